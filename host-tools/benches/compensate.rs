@@ -1,0 +1,180 @@
+//! Frames a second of `iltm compensate` on Y4M, without decoder and disk.
+//!
+//! `cargo bench -p iltm --bench compensate` prints the median of several runs for
+//! every frame size, grid, tier and number of threads. Frames come through an
+//! operating system pipe that a thread of this program feeds, and leave through
+//! another that a thread empties, as between programs; both threads' work is in
+//! the figures. `-- WORD` runs only the cases whose line contains the word.
+//!
+//! Beside it stands the processor time of a frame, all threads and the kernel's
+//! pipes together (Linux only): it tells what a machine could do that had nothing
+//! else to do, while frames a second are those of this machine at this moment.
+
+#[path = "../src/video/tests/sample_table.rs"]
+mod sample_table;
+
+use iltm::compile::image::ImageWriter;
+use iltm::progress::Silent;
+use iltm::video::{Compensator, Settings};
+use iltm_runtime::Grid;
+use iltm_runtime::image::Table;
+use sample_table::SampleTable;
+use std::io::{Read, Write};
+use std::time::Instant;
+
+/// Runs of each case.
+const RUNS: usize = 5;
+
+/// Entries that an operator row has: what a 64 x 64 grid needs for an error of
+/// one 8-bit code (2 to 10).
+const ENTRIES: usize = 10;
+
+/// One line of the result.
+struct Case {
+    width: u16,
+    height: u16,
+    grid: (u16, u16),
+    channels: usize,
+    tier: u8,
+    threads: usize,
+    colour: &'static str,
+}
+
+fn main() {
+    let filter = std::env::args().skip(1).find(|word| !word.starts_with('-'));
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    println!("{cores} cores; median and range of {RUNS} runs");
+    for case in cases(cores) {
+        let name = format!(
+            "{} x {} C{}, grid {} x {}, {} channels, tier {}, {} threads",
+            case.width,
+            case.height,
+            case.colour,
+            case.grid.0,
+            case.grid.1,
+            case.channels,
+            case.tier,
+            case.threads
+        );
+        if filter.as_ref().is_some_and(|word| !name.contains(word)) {
+            continue;
+        }
+        let runs: Vec<(f64, f64)> = (0..RUNS).map(|_| run(&case)).collect();
+        let sorted = |of: fn(&(f64, f64)) -> f64| {
+            let mut values: Vec<f64> = runs.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let (rates, costs) = (sorted(|run| run.0), sorted(|run| run.1));
+        println!(
+            "{name:72} {:7.1} frames/s ({:.1} to {:.1}), {:6.2} ms of processor time a frame",
+            rates[RUNS / 2],
+            rates[0],
+            rates[RUNS - 1],
+            costs[RUNS / 2]
+        );
+    }
+}
+
+fn cases(cores: usize) -> Vec<Case> {
+    let case = |(width, height), grid, channels, tier, threads, colour| Case {
+        width,
+        height,
+        grid,
+        channels,
+        tier,
+        threads,
+        colour,
+    };
+    let full_hd = (1920, 1080);
+    let mut cases = Vec::new();
+    for grid in [(13, 21), (16, 24), (48, 64)] {
+        cases.push(case(full_hd, grid, 3, 2, cores, "420jpeg"));
+    }
+    for tier in [0, 1] {
+        cases.push(case(full_hd, (48, 64), 3, tier, cores, "420jpeg"));
+    }
+    cases.push(case(full_hd, (48, 64), 3, 2, 1, "420jpeg"));
+    cases.push(case(full_hd, (16, 24), 3, 2, cores, "444"));
+    cases.push(case(full_hd, (16, 24), 1, 2, cores, "420jpeg"));
+    cases.push(case(full_hd, (16, 24), 1, 2, cores, "mono"));
+    cases.push(case((1280, 720), (16, 24), 3, 2, cores, "420jpeg"));
+    cases.push(case((3840, 2160), (16, 24), 3, 2, cores, "420jpeg"));
+    cases.push(case((24, 16), (16, 24), 3, 2, cores, "444"));
+    cases
+}
+
+/// Processor time that this process has used, in milliseconds; not a number where
+/// the system does not say.
+fn processor_time() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The fields after the name in brackets; a tick is a hundredth of a second.
+    let fields = stat
+        .rsplit(')')
+        .next()
+        .unwrap_or_default()
+        .split_whitespace();
+    let ticks: Vec<f64> = fields
+        .skip(11)
+        .take(2)
+        .filter_map(|f| f.parse().ok())
+        .collect();
+    if ticks.len() == 2 {
+        10.0 * (ticks[0] + ticks[1])
+    } else {
+        f64::NAN
+    }
+}
+
+/// Frames a second and milliseconds of processor time a frame of one run.
+fn run(case: &Case) -> (f64, f64) {
+    let grid = Grid::new(case.grid.0, case.grid.1).expect("a small grid");
+    let image = SampleTable::random(grid, case.channels, ENTRIES, 1).image();
+    let table = Table::check(&image).expect("a sample table is whole");
+    let settings = Settings {
+        tier: Some(case.tier),
+        threads: case.threads,
+        ..Settings::default()
+    };
+    let compensator = Compensator::new(&table, settings).expect("threads start");
+    let pixels = usize::from(case.width) * usize::from(case.height);
+    let bytes = match case.colour {
+        "mono" => pixels,
+        "444" => 3 * pixels,
+        _ => pixels * 3 / 2,
+    };
+    // About a second, whatever the size.
+    let frames = (400_000_000 / bytes).clamp(20, 20_000);
+    let (input, mut feed) = std::io::pipe().expect("a pipe");
+    let (mut drain, output) = std::io::pipe().expect("a pipe");
+    let header = format!(
+        "YUV4MPEG2 W{} H{} F60:1 Ip C{}\n",
+        case.width, case.height, case.colour
+    );
+    let mut random = fastrand::Rng::with_seed(2);
+    let samples: Vec<u8> = std::iter::repeat_with(|| random.u8(40..200))
+        .take(bytes)
+        .collect();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            feed.write_all(header.as_bytes())?;
+            for _ in 0..frames {
+                feed.write_all(b"FRAME\n")?;
+                feed.write_all(&samples)?;
+            }
+            Ok::<_, std::io::Error>(())
+        });
+        scope.spawn(move || {
+            let mut buffer = vec![0; 1 << 20];
+            while drain.read(&mut buffer)? > 0 {}
+            Ok::<_, std::io::Error>(())
+        });
+        let (start, before) = (Instant::now(), processor_time());
+        let summary = compensator
+            .y4m(input, output, &Silent)
+            .expect("a whole stream");
+        assert_eq!(summary.frames, frames as u64);
+        let rate = frames as f64 / start.elapsed().as_secs_f64();
+        (rate, (processor_time() - before) / frames as f64)
+    })
+}

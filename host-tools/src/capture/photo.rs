@@ -1,0 +1,256 @@
+//! One photograph in linear light.
+
+use super::picture::{Opened, Samples, Source};
+use super::{CaptureError, Response};
+use std::path::PathBuf;
+
+/// Pixels a photograph is kept at. A larger one is averaged over squares of
+/// pixels: a cell needs tens of pixels, a sensor of 24 megapixels has thousands
+/// a cell, and memory would grow with them.
+const WORKING_PIXELS: u64 = 4 << 20;
+
+/// Value, of full scale, from which a sample counts as saturated: sensors bend
+/// and clip a little below the last code.
+const SATURATED_VALUE: f64 = 0.98;
+
+/// A photograph in linear light, 0 to 1 of the camera's full scale, saturated
+/// samples as [`Photo::SATURATED`].
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Photo {
+    /// One plane a channel, each row by row, length `width * height`.
+    pub(super) planes: Vec<Vec<f32>>,
+}
+
+impl Photo {
+    /// What a sample near full scale reads as. A squared-up pixel has it as soon
+    /// as one of its samples does.
+    pub(super) const SATURATED: f32 = 1.0;
+}
+
+/// What all photographs of a capture share, taken from the first of them.
+#[derive(Clone, Debug)]
+pub(super) struct PhotoFormat {
+    /// File the format was taken from.
+    first: PathBuf,
+    /// Width and height in the files.
+    file_size: (u32, u32),
+    /// Colour channels, 1 or 3.
+    pub(super) channels: usize,
+    /// Side of the square of pixels in the file that make one.
+    pub(super) binning: usize,
+    /// Width after binning.
+    pub(super) width: usize,
+    /// Height after binning.
+    pub(super) height: usize,
+    /// Light of each 8-bit value.
+    eight: Vec<f32>,
+    /// Light of each 16-bit value.
+    sixteen: Vec<f32>,
+}
+
+impl PhotoFormat {
+    /// Reads the format of the first photograph.
+    ///
+    /// # Errors
+    /// As [`Opened::open`].
+    pub(super) fn of_first(source: Source<'_>, response: Response) -> Result<Self, CaptureError> {
+        let opened = Opened::open(source)?;
+        let (width, height) = opened.size();
+        let pixels = u64::from(width) * u64::from(height);
+        let binning = (pixels as f64 / WORKING_PIXELS as f64)
+            .sqrt()
+            .ceil()
+            .max(1.0) as usize;
+        Ok(Self {
+            first: source.path.to_owned(),
+            file_size: (width, height),
+            channels: opened.channels(),
+            binning,
+            width: (width as usize / binning).max(1),
+            height: (height as usize / binning).max(1),
+            eight: light_table(response, u8::MAX.into()),
+            sixteen: light_table(response, u16::MAX),
+        })
+    }
+
+    /// Pixels after binning.
+    pub(super) fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Bytes of one photograph while it is being decoded.
+    pub(super) fn decoding_bytes(&self) -> usize {
+        let (width, height) = self.file_size;
+        width as usize * height as usize * self.channels * 2 + self.bytes()
+    }
+
+    /// Bytes of one decoded photograph.
+    pub(super) fn bytes(&self) -> usize {
+        self.pixels() * self.channels * size_of::<f32>()
+    }
+
+    /// Reads a photograph of this format.
+    ///
+    /// # Errors
+    /// [`CaptureError::PhotoSize`] or [`CaptureError::PhotoChannels`] before any
+    /// pixel is decoded; otherwise what [`Opened`] returns.
+    pub(super) fn read(&self, source: Source<'_>) -> Result<Photo, CaptureError> {
+        let opened = Opened::open(source)?;
+        if opened.size() != self.file_size {
+            return Err(CaptureError::PhotoSize {
+                path: source.path.to_owned(),
+                found: opened.size(),
+                first: self.first.clone(),
+                expected: self.file_size,
+            });
+        }
+        if opened.channels() != self.channels {
+            return Err(CaptureError::PhotoChannels {
+                path: source.path.to_owned(),
+                found: opened.channels(),
+                first: self.first.clone(),
+                expected: self.channels,
+            });
+        }
+        Ok(match opened.decode()? {
+            Samples::Eight(samples) => self.linear(&samples, &self.eight),
+            Samples::Sixteen(samples) => self.linear(&samples, &self.sixteen),
+        })
+    }
+
+    /// Looks up the light of every sample and averages squares of pixels.
+    fn linear<T: Copy + Into<usize>>(&self, samples: &[T], light: &[f32]) -> Photo {
+        let channels = self.channels;
+        let plane = |channel: usize| -> Vec<f32> {
+            if self.binning == 1 {
+                let values = samples.iter().skip(channel).step_by(channels);
+                return values.map(|&value| light[value.into()]).collect();
+            }
+            (0..self.pixels())
+                .map(|at| self.binned(samples, light, channel, at))
+                .collect()
+        };
+        Photo {
+            planes: (0..channels).map(plane).collect(),
+        }
+    }
+
+    /// One binned pixel. Rows and columns that do not fill a square are cut off,
+    /// unless there would be nothing left.
+    fn binned<T: Copy + Into<usize>>(
+        &self,
+        samples: &[T],
+        light: &[f32],
+        channel: usize,
+        at: usize,
+    ) -> f32 {
+        let (file_width, file_height) = (self.file_size.0 as usize, self.file_size.1 as usize);
+        let (row, col) = (
+            at / self.width * self.binning,
+            at % self.width * self.binning,
+        );
+        let rows = row..(row + self.binning).min(file_height);
+        let cols = col..(col + self.binning).min(file_width);
+        let share = 1.0 / (rows.len() * cols.len()) as f32;
+        let mut sum = 0.0;
+        for r in rows {
+            for c in cols.clone() {
+                let value = light[samples[(r * file_width + c) * self.channels + channel].into()];
+                if value >= Photo::SATURATED {
+                    return Photo::SATURATED;
+                }
+                sum += value;
+            }
+        }
+        share * sum
+    }
+}
+
+/// Light of each value from 0 to `full_scale`.
+fn light_table(response: Response, full_scale: u16) -> Vec<f32> {
+    let full = f64::from(full_scale);
+    (0..=full_scale)
+        .map(|value| f64::from(value) / full)
+        .map(|value| {
+            if value >= SATURATED_VALUE {
+                Photo::SATURATED
+            } else {
+                response.light(value) as f32
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::picture::tests::source;
+    use super::*;
+    use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
+
+    fn read(picture: impl Into<DynamicImage>, response: Response) -> Result<Photo, CaptureError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f.png");
+        picture.into().save(&path).unwrap();
+        PhotoFormat::of_first(source(&path), response)?.read(source(&path))
+    }
+
+    #[test]
+    fn eight_and_sixteen_bits_are_the_same_light() {
+        let eight = read(GrayImage::from_pixel(1, 1, Luma([51])), Response::Linear).unwrap();
+        let wide: ImageBuffer<Luma<u16>, _> = ImageBuffer::from_pixel(1, 1, Luma([13107]));
+        assert_eq!(eight, read(wide, Response::Linear).unwrap());
+        assert!((eight.planes[0][0] - 0.2).abs() < 1e-7);
+    }
+
+    #[test]
+    fn colours_become_planes_and_a_response_is_undone() {
+        let photo = read(
+            RgbImage::from_pixel(2, 1, Rgb([255, 128, 0])),
+            Response::Srgb,
+        )
+        .unwrap();
+        assert_eq!(photo.planes[0], [Photo::SATURATED; 2]);
+        assert!((photo.planes[1][1] - 0.215_861).abs() < 1e-6);
+        assert_eq!(photo.planes[2], [0.0; 2]);
+    }
+
+    #[test]
+    fn a_photograph_of_another_size_or_colour_is_refused_before_decoding() {
+        let folder = tempfile::tempdir().unwrap();
+        let (a, b, c) = (
+            folder.path().join("a"),
+            folder.path().join("b"),
+            folder.path().join("c"),
+        );
+        let png = image::ImageFormat::Png;
+        GrayImage::new(4, 3).save_with_format(&a, png).unwrap();
+        GrayImage::new(3, 4).save_with_format(&b, png).unwrap();
+        RgbImage::new(4, 3).save_with_format(&c, png).unwrap();
+        let format = PhotoFormat::of_first(source(&a), Response::Linear).unwrap();
+        let error = format.read(source(&b)).unwrap_err().to_string();
+        assert!(
+            error.contains("3 x 4 pixels, but") && error.contains("has 4 x 3"),
+            "{error}"
+        );
+        let error = format.read(source(&c)).unwrap_err().to_string();
+        assert!(
+            error.contains("3 colour channels, but") && error.contains("has 1"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_large_photograph_is_averaged_in_linear_light_and_stays_saturated() {
+        // 4096 x 2048 is twice the working size: squares of 2 x 2.
+        let value = |x, y| match (x, y) {
+            (0, 0) => 255,
+            (2 | 3, 0) => 128,
+            _ => 0,
+        };
+        let picture = GrayImage::from_fn(4096, 2048, |x, y| Luma([value(x, y)]));
+        let photo = read(picture, Response::Srgb).unwrap();
+        assert_eq!(photo.planes[0].len(), 2048 * 1024);
+        assert!(photo.planes[0][0] >= Photo::SATURATED);
+        assert!((photo.planes[0][1] - 0.215_861 / 2.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,162 @@
+//! `capture.toml`: what photographs cannot say about themselves.
+
+use super::{CaptureError, Response};
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+/// Name of the settings file in a capture folder. It may be absent.
+pub const SETTINGS_FILE: &str = "capture.toml";
+
+/// Bytes a settings file may have: a person writes it.
+const MAX_BYTES: u64 = 64 << 10;
+
+/// Contents of `capture.toml`; everything has a default, unknown keys are
+/// refused.
+///
+/// ```toml
+/// [camera]
+/// response = "linear"     # "linear", "srgb" or a gamma number
+/// [projector]
+/// response = "srgb"       # the same choice
+/// [scene]
+/// name = "M-shaped panels"
+/// ```
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// The camera that took the photographs.
+    pub camera: CameraSettings,
+    /// The projector that showed the patterns.
+    pub projector: ProjectorSettings,
+    /// What was photographed.
+    pub scene: SceneSettings,
+}
+
+/// `[camera]` of [`Settings`].
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CameraSettings {
+    /// From a photograph's values to light.
+    pub response: Response,
+}
+
+/// `[projector]` of [`Settings`].
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProjectorSettings {
+    /// From projector input values to light. Patterns are only on or off, so
+    /// photographs do not depend on it; compensated frames do.
+    pub response: Response,
+}
+
+impl Default for ProjectorSettings {
+    fn default() -> Self {
+        Self {
+            response: Response::Srgb,
+        }
+    }
+}
+
+/// `[scene]` of [`Settings`].
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SceneSettings {
+    /// For people; goes into the table's provenance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+impl Settings {
+    /// Reads `capture.toml` of a capture folder, or the defaults if there is
+    /// none.
+    ///
+    /// # Errors
+    /// [`CaptureError::Settings`] if it is not what [`Settings`] documents,
+    /// [`CaptureError::Io`] if it cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, CaptureError> {
+        let path = folder.join(SETTINGS_FILE);
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Self::default()),
+            Err(source) => return Err(CaptureError::Io { path, source }),
+        };
+        let mut bytes = Vec::new();
+        if let Err(source) = file.take(MAX_BYTES + 1).read_to_end(&mut bytes) {
+            return Err(CaptureError::Io { path, source });
+        }
+        Self::parse(&bytes, &path)
+    }
+
+    /// Reads the contents of a `capture.toml`; `path` is only for errors.
+    ///
+    /// # Errors
+    /// [`CaptureError::Settings`] with the place.
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, CaptureError> {
+        let refuse = |reason| CaptureError::Settings {
+            path: path.to_owned(),
+            reason,
+        };
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(refuse(format!("it is longer than {MAX_BYTES} bytes")));
+        }
+        let text = std::str::from_utf8(bytes).map_err(|error| refuse(error.to_string()))?;
+        toml::from_str(text).map_err(|error| refuse(error.to_string().trim_end().to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn parse(text: &str) -> Result<Settings, String> {
+        Settings::parse(text.as_bytes(), Path::new("c")).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_capture_without_settings_has_a_linear_camera_and_an_srgb_projector() {
+        let settings = Settings::read(tempfile::tempdir().unwrap().path()).unwrap();
+        assert_eq!(settings.camera.response, Response::Linear);
+        assert_eq!(settings.projector.response, Response::Srgb);
+        assert_eq!(settings.scene.name, None);
+    }
+
+    #[test]
+    fn every_kind_of_response_can_be_written_and_read_back() {
+        for response in [Response::Linear, Response::Srgb, Response::Gamma(2.2)] {
+            let mut settings = Settings::default();
+            settings.camera.response = response;
+            settings.projector.response = response;
+            settings.scene.name = Some("dome".into());
+            let text = toml::to_string(&settings).unwrap();
+            assert_eq!(parse(&text), Ok(settings));
+        }
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_its_line() {
+        let error = parse("[camera]\nresponse = 2\n[projektor]\n").unwrap_err();
+        assert!(
+            error.contains("projektor") && error.contains("line 3"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_gamma_that_is_a_slip_of_the_pen_is_refused() {
+        for text in ["0", "-1", "22", "nan", "inf", "\"Linear\"", "true"] {
+            let text = format!("[camera]\nresponse = {text}\n");
+            let error = parse(&text).unwrap_err();
+            assert!(error.contains("a gamma from 0.2 to 5"), "{error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = Settings::parse(&bytes, Path::new("c"));
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! Which camera pixels see one cell and nothing else.
+//!
+//! Only a pixel at the border between two cells can see both. Its regression
+//! weight of the other cell would say how much, were it not that light bouncing
+//! off that cell's patch looks the same; but a pixel a little further inside
+//! receives the bounced light too and nothing else of the other cell. So the
+//! excess over that pixel counts. "A little" is an eighth of a cell, so that a
+//! blurred border of many pixels is judged like a sharp one of a single pixel.
+
+use super::registration::Candidate;
+use super::regression::axis_sums;
+use iltm_runtime::Grid;
+
+/// Part of a second cell, relative to the pixel's own, from which a pixel counts
+/// as shared.
+pub(super) const SHARED: f32 = 0.15;
+
+/// Part of a pixel beyond the border of the projection from which it counts as
+/// shared. More than for a second cell: darkness scales what the pixel shows,
+/// while a second cell shows something else.
+const BEYOND: f32 = 0.45;
+
+/// Direct light, relative to the brightest of the eight neighbours, below which
+/// a pixel lies beyond the border of the projection.
+const OUTSIDE: f32 = 0.25;
+
+/// Distance, in cells, of the pixels that a pixel is compared with.
+const REACH: f64 = 0.125;
+
+/// Neighbours, of eight, that must have the same cell or one next to it. Where
+/// there is only noise, cells are random and agree by accident; a corner of the
+/// projection has three.
+const COHERENT: usize = 3;
+
+/// Removes candidates that the projector does not light, as the surroundings in
+/// the image of `camera` (width and height) pixels show: much darker than a
+/// neighbour, or of a cell that the neighbours contradict. Candidates are ordered
+/// by pixel.
+pub(super) fn drop_unlit(candidates: &mut Vec<Candidate>, grid: Grid, camera: (usize, usize)) {
+    let cols = grid.cols() as u32;
+    let map = Map::new(candidates, grid, camera);
+    let near =
+        |a: u32, b: u32| (a / cols).abs_diff(b / cols) <= 1 && (a % cols).abs_diff(b % cols) <= 1;
+    let lit = |candidate: &Candidate| {
+        let (mut agreeing, mut brightest) = (0, 0.0_f32);
+        for (dx, dy) in directions() {
+            if let Some(other) = map.neighbour(candidate, dx, dy) {
+                agreeing += usize::from(near(other.cell, candidate.cell));
+                brightest = brightest.max(other.direct());
+            }
+        }
+        agreeing >= COHERENT && candidate.direct() >= OUTSIDE * brightest
+    };
+    let keep: Vec<bool> = candidates.iter().map(lit).collect();
+    let mut keep = keep.into_iter();
+    candidates.retain(|_| keep.next() == Some(true));
+}
+
+/// Sets [`Candidate::shared`] of every candidate of an image of `camera` (width
+/// and height) pixels. Candidates are ordered by pixel.
+pub(super) fn judge(candidates: &mut [Candidate], grid: Grid, camera: (usize, usize)) {
+    let map = Map::new(candidates, grid, camera);
+    let shared = |candidate: &Candidate| {
+        let along = |(dx, dy): (isize, isize)| {
+            let outward = map.neighbour(candidate, dx, dy);
+            let inward = map.neighbour(candidate, -dx, -dy);
+            match outward {
+                None => dark_part(candidate, inward) * SHARED / BEYOND,
+                // What a diagonal neighbour could tell, one of the others does.
+                Some(_) if dx != 0 && dy != 0 => 0.0,
+                Some(outward) => other_part(candidate, outward, inward, grid),
+            }
+        };
+        directions().map(along).fold(0.0, f32::max)
+    };
+    let shared: Vec<f32> = candidates.iter().map(shared).collect();
+    for (candidate, shared) in candidates.iter_mut().zip(shared) {
+        candidate.shared = shared;
+    }
+}
+
+/// Camera pixels between a pixel and those it is compared with.
+pub(super) fn reach(candidates: &[Candidate], grid: Grid) -> usize {
+    let mut seen = vec![false; grid.cells()];
+    for candidate in candidates {
+        seen[candidate.cell as usize] = true;
+    }
+    let cells = seen.iter().filter(|&&seen| seen).count().max(1);
+    let side = (candidates.len() as f64 / cells as f64).sqrt();
+    (REACH * side).round().max(1.0) as usize
+}
+
+/// Candidates by pixel.
+struct Map<'a> {
+    candidates: &'a [Candidate],
+    /// Index into `candidates`, or `u32::MAX`.
+    at: Vec<u32>,
+    camera: (usize, usize),
+    reach: isize,
+}
+
+impl<'a> Map<'a> {
+    fn new(candidates: &'a [Candidate], grid: Grid, camera: (usize, usize)) -> Self {
+        let mut at = vec![u32::MAX; camera.0 * camera.1];
+        for (index, candidate) in (0..).zip(candidates) {
+            at[candidate.pixel as usize] = index;
+        }
+        Self {
+            candidates,
+            at,
+            camera,
+            reach: reach(candidates, grid) as isize,
+        }
+    }
+
+    /// The pixel that is compared with `of` in a direction.
+    fn neighbour(&self, of: &Candidate, dx: isize, dy: isize) -> Option<&'a Candidate> {
+        let (width, height) = self.camera;
+        let x = (of.pixel as usize % width).checked_add_signed(dx * self.reach)?;
+        let y = (of.pixel as usize / width).checked_add_signed(dy * self.reach)?;
+        if x >= width || y >= height {
+            return None;
+        }
+        self.candidates.get(self.at[y * width + x] as usize)
+    }
+}
+
+/// The eight directions from a pixel.
+fn directions() -> impl Iterator<Item = (isize, isize)> {
+    let around = (0..9).map(|k| (k % 3 - 1, k / 3 - 1));
+    around.filter(|&direction| direction != (0, 0))
+}
+
+/// Part of `pixel` that no cell lights, given the pixel further `inward`.
+fn dark_part(pixel: &Candidate, inward: Option<&Candidate>) -> f32 {
+    inward.map_or(0.0, |inward| 1.0 - pixel.direct() / inward.direct())
+}
+
+/// Part of `pixel` that belongs to the cell of the pixel `outward` of it, given
+/// the pixel on the opposite side, `inward`.
+fn other_part(
+    pixel: &Candidate,
+    outward: &Candidate,
+    inward: Option<&Candidate>,
+    grid: Grid,
+) -> f32 {
+    if outward.cell == pixel.cell {
+        return 0.0;
+    }
+    let cols = grid.cols() as u32;
+    let (rows, columns) = axis_sums(&pixel.weights);
+    let same_cell = inward.filter(|inward| inward.cell == pixel.cell);
+    let (rows_within, columns_within) = same_cell
+        .map_or(([0.0, 1.0, 0.0], [0.0, 1.0, 0.0]), |inward| {
+            axis_sums(&inward.weights)
+        });
+    let by_row = excess(rows, rows_within, pixel.cell / cols, outward.cell / cols);
+    let by_column = excess(
+        columns,
+        columns_within,
+        pixel.cell % cols,
+        outward.cell % cols,
+    );
+    by_row.max(by_column)
+}
+
+/// Weight, along one axis, on the side where `other` lies of `own`, relative to
+/// the own weight, beyond what a pixel further inside has there. Relative, so
+/// that the two pixels may differ in albedo.
+fn excess(weights: [f32; 3], within: [f32; 3], own: u32, other: u32) -> f32 {
+    let side = match other.cmp(&own) {
+        std::cmp::Ordering::Less => 0,
+        std::cmp::Ordering::Equal => return 0.0,
+        std::cmp::Ordering::Greater => 2,
+    };
+    let relative = |w: [f32; 3]| (w[1] > 0.0).then(|| w[side] / w[1]);
+    // No light from its own cell at all: nothing of the pixel is its own.
+    relative(weights).map_or(1.0, |part| part - relative(within).unwrap_or(0.0))
+}

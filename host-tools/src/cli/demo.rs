@@ -1,0 +1,102 @@
+//! `iltm demo`
+
+use super::args::Demo;
+use super::compensate;
+use super::failure::{Failure, Kind};
+use super::output::{Output, cannot_write};
+use super::progress::progress;
+use super::solve::summary;
+use crate::demo::{self, DemoError, Outcome};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::io::ErrorKind;
+use std::path::Path;
+use std::time::Instant;
+
+pub(super) fn run(arguments: &Demo, output: &Output) -> Result<(), Failure> {
+    let start = Instant::now();
+    let bars = progress(output);
+    let outcome = demo::run(&arguments.out, bars.as_ref());
+    bars.end();
+    let outcome = outcome.map_err(failed)?;
+    let seconds = start.elapsed().as_secs_f64();
+    output.result(&data(&outcome, seconds), &text(&outcome, seconds));
+    Ok(())
+}
+
+fn failed(error: DemoError) -> Failure {
+    match error {
+        DemoError::Folder { ref source, .. } => {
+            let next_step = match source.kind() {
+                ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
+                    "a file is in its place: move it away, or choose another folder with --out"
+                }
+                _ => "choose a folder that you may write to with --out",
+            };
+            Failure::new(Kind::Write, error, next_step)
+        }
+        DemoError::Write { path, source } => cannot_write(&path, &source),
+        DemoError::Learn(error) => error.into(),
+        DemoError::Video(error) => compensate::failed(&error),
+        DemoError::Report(error) => Failure::new(
+            Kind::Frames,
+            error,
+            "please report this: the demo brings all that it needs",
+        ),
+    }
+}
+
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
+fn data(outcome: &Outcome, seconds: f64) -> Value {
+    let paths = &outcome.paths;
+    let images = outcome
+        .images
+        .iter()
+        .map(|(name, [uncompensated, gain_only, compensated])| {
+            json!({
+                "name": name,
+                "uncompensated": uncompensated,
+                "gain_only": gain_only,
+                "compensated": compensated,
+            })
+        });
+    let steps = outcome
+        .seconds
+        .iter()
+        .map(|(step, seconds)| json!({ "step": step, "seconds": seconds }));
+    let mut data = summary(&outcome.learned);
+    data["capture"] = json!(shown(&paths.capture));
+    data["table"] = json!(shown(&paths.table));
+    data["video"] = json!(shown(&paths.video));
+    data["compensated"] = json!(shown(&paths.compensated));
+    data["report"] = json!(shown(&paths.report));
+    data["pictures"] = json!(shown(&paths.pictures));
+    data["report_bytes"] = json!(outcome.report_bytes);
+    data["frames"] = json!(outcome.video.frames);
+    data["clipped"] = json!(outcome.video.clipped as f64 / outcome.video.samples.max(1) as f64);
+    data["images"] = images.collect();
+    data["steps"] = steps.collect();
+    data["seconds"] = json!(seconds);
+    data
+}
+
+fn text(outcome: &Outcome, seconds: f64) -> String {
+    let paths = &outcome.paths;
+    let mut text = super::solve::text(&outcome.learned);
+    let listed = [
+        ("photographs", &paths.capture),
+        ("table", &paths.table),
+        ("video", &paths.video),
+        ("compensated", &paths.compensated),
+        ("pictures", &paths.pictures),
+    ];
+    let _ = writeln!(text, "\nAll done in {seconds:.1} s:");
+    for (what, path) in listed {
+        let _ = writeln!(text, "  {what:<12} {}", path.display());
+    }
+    let _ = writeln!(text, "\nOpen {} in a browser.", paths.report.display());
+    text
+}

@@ -1,0 +1,142 @@
+//! `iltm inspect`
+
+use super::args::Inspect;
+use super::failure::{Failure, Kind};
+use super::output::{Output, read_file};
+use iltm_runtime::image::Table;
+use iltm_runtime::operator::{Bounds, Operator};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+pub(super) fn run(arguments: &Inspect, output: &Output) -> Result<(), Failure> {
+    let image = read_file(&arguments.table)?;
+    let table = check(&arguments.table, &image)?;
+    output.result(&data(&table), &text(&arguments.table, &table));
+    Ok(())
+}
+
+/// Checks the bytes of a table file.
+pub(super) fn check<'a>(path: &Path, image: &'a [u8]) -> Result<Table<'a>, Failure> {
+    Table::check(image).map_err(|error| {
+        let message = format!("{}: {error}", path.display());
+        Failure::new(
+            Kind::Table,
+            message,
+            "Copy the table again, or make it anew with `iltm solve`.",
+        )
+    })
+}
+
+/// The stages that the runtime builds for the table, with what each is there for.
+fn effects(table: &Table<'_>) -> Vec<&'static str> {
+    let listed = [
+        (true, "per-cell gain"),
+        (table.fine_gain().is_some(), "fine gain"),
+        (table.ambient_row(0, 0).is_some(), "ambient light"),
+        (table.operator().is_some(), "interreflection"),
+        (table.response_code(0, 0).is_some(), "projector response"),
+    ];
+    let listed = listed.into_iter().filter(|(there, _)| *there);
+    listed.map(|(_, name)| name).collect()
+}
+
+/// Predicted error of the inverse; zero in the image stands for none predicted.
+fn inverse_error(table: &Table<'_>) -> Option<f64> {
+    let error = table.inverse_error().to_num::<f64>();
+    (error > 0.0).then_some(error)
+}
+
+fn data(table: &Table<'_>) -> Value {
+    let tiers = table.tiers().iter().map(|tier| {
+        json!({
+            "error": tier.predicted_error.to_num::<f64>(),
+            "entries": tier.entries,
+            "multiplications": tier.multiplications,
+        })
+    });
+    let bounds = table.operator().map(Operator::bounds);
+    json!({
+        "rows": table.grid().rows(),
+        "cols": table.grid().cols(),
+        "channels": table.channels(),
+        "bytes": table.bytes(),
+        "effects": effects(table),
+        "fine_gain": table.fine_gain().map(|fine| json!({
+            "rows": fine.size().height(),
+            "cols": fine.size().width(),
+        })),
+        "reference_white": table.reference_white().to_num::<f64>(),
+        "inverse_error": inverse_error(table),
+        "tiers": tiers.collect::<Vec<_>>(),
+        "bounds": bounds.map(|bounds| json!({
+            "accumulator": bounds.accumulator,
+            "correction": bounds.correction,
+        })),
+        "provenance": toml::from_str::<Value>(table.provenance()).ok(),
+    })
+}
+
+fn text(path: &Path, table: &Table<'_>) -> String {
+    let mut text = String::new();
+    let colour = if table.channels() == 1 {
+        "grey"
+    } else {
+        "colour"
+    };
+    let _ = writeln!(
+        text,
+        "{}: {} cells, {colour}, {} bytes",
+        path.display(),
+        table.grid(),
+        table.bytes()
+    );
+    let _ = writeln!(text, "effects          {}", effects(table).join(", "));
+    if let Some(fine) = table.fine_gain() {
+        let _ = writeln!(text, "fine gain        {}", fine.size());
+    }
+    let _ = writeln!(
+        text,
+        "reference white  {:.4} of the camera's full scale",
+        table.reference_white().to_num::<f64>()
+    );
+    let _ = match inverse_error(table) {
+        Some(error) => writeln!(
+            text,
+            "error            {error:.4} of the inverse itself, predicted from held-out photographs"
+        ),
+        None => writeln!(
+            text,
+            "error            not predicted: too few photographs to hold any out"
+        ),
+    };
+    if let Some(operator) = table.operator() {
+        let Bounds {
+            accumulator,
+            correction,
+        } = operator.bounds();
+        let _ = writeln!(
+            text,
+            "overflow proof   sums reach {:.0} % of 32 bits, corrections {:.0} % of theirs",
+            100.0 * f64::from(accumulator) / Bounds::MAX_ACCUMULATOR as f64,
+            100.0 * f64::from(correction) / Bounds::MAX_CORRECTION as f64
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\ntier   left out   entries   multiplications a frame"
+    );
+    for (index, tier) in table.tiers().iter().enumerate() {
+        let _ = writeln!(
+            text,
+            "{index:>4}   {:>8.5}   {:>7}   {:>15}",
+            tier.predicted_error.to_num::<f64>(),
+            tier.entries,
+            tier.multiplications
+        );
+    }
+    if !table.provenance().is_empty() {
+        let _ = writeln!(text, "\n{}", table.provenance().trim_end());
+    }
+    text
+}

@@ -1,0 +1,94 @@
+//! Where words and data go.
+
+use super::failure::{Failure, Kind};
+use crate::video::{VideoError, WholeFile};
+use serde_json::{Value, json};
+use std::fs;
+use std::io::{self, IsTerminal, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Standard output and standard error as a command sees them.
+#[derive(Debug)]
+pub(super) struct Output {
+    json: bool,
+    /// Whether somebody watches standard error.
+    pub(super) terminal: bool,
+}
+
+impl Output {
+    pub(super) fn new(json: bool) -> Self {
+        let terminal = io::stderr().is_terminal();
+        Self { json, terminal }
+    }
+
+    pub(super) const fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// The result of a command: JSON for programs or text for people. A reader
+    /// that went away is no failure of the command.
+    pub(super) fn result(&self, data: &Value, text: &str) {
+        if self.json {
+            let _ = writeln!(io::stdout(), "{data}");
+        } else {
+            let _ = write!(io::stderr(), "{text}");
+        }
+    }
+
+    pub(super) fn failure(&self, failure: &Failure) -> ExitCode {
+        if self.json {
+            let data = json!({ "error": {
+                "kind": failure.kind.name(),
+                "exit": failure.kind.code(),
+                "message": failure.message,
+                "next_step": failure.next_step,
+            }});
+            let _ = writeln!(io::stdout(), "{data}");
+        }
+        let mut text = String::new();
+        let graphical = miette::GraphicalReportHandler::new();
+        if !self.terminal || graphical.render_report(&mut text, failure).is_err() {
+            text = format!("error: {}\nnext: {}\n", failure.message, failure.next_step);
+        }
+        let _ = write!(io::stderr(), "{text}");
+        ExitCode::from(failure.kind.code())
+    }
+}
+
+/// Writes a file whole or not at all: beside its place, then renamed.
+pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let write = || {
+        let mut whole = WholeFile::create(path)?;
+        let written = whole.file().write_all(bytes);
+        written.map_err(|source| VideoError::File {
+            path: path.to_owned(),
+            source,
+        })?;
+        whole.finish()
+    };
+    write().map_err(|error| match error {
+        VideoError::File { path, source } => cannot_write(&path, &source),
+        other => Failure::new(Kind::Write, &other, other.next_step()),
+    })
+}
+
+pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    let next_step = match error.kind() {
+        io::ErrorKind::StorageFull => "Free some space and run the command again.",
+        io::ErrorKind::PermissionDenied => "Choose a folder that you may write to.",
+        io::ErrorKind::NotFound => "Make the folder first, or choose another.",
+        _ => "Check the folder and run the command again.",
+    };
+    let message = format!("{}: cannot be written: {error}", path.display());
+    Failure::new(Kind::Write, message, next_step)
+}
+
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|error| cannot_read(path, &error))
+}
+
+pub(super) fn cannot_read(path: &Path, error: &io::Error) -> Failure {
+    let message = format!("{}: cannot be read: {error}", path.display());
+    Failure::new(Kind::Read, message, "Check the name and the permissions.")
+}

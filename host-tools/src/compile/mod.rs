@@ -1,0 +1,27 @@
+//! From an [`InverseTransport`](crate::solve::InverseTransport) to a table image.
+//!
+//! | step | file |
+//! |---|---|
+//! | light of the brightest uniform grey | [`white`] |
+//! | what video looks like, for choosing and predicting | [`content`] |
+//! | `K` in the Haar domain, most useful entries first, cut into tiers | [`ladder`] |
+//! | `i16` entries with a power of two a row | [`quantise`] |
+//! | gains, also finer than the cells | [`gain`] |
+//! | projector codes by drive | [`response`] |
+//! | bytes | [`image`] |
+//!
+//! The image is checked by the runtime's own reader before it is returned, so
+//! what leaves here is known to load.
+
+pub mod content;
+pub mod gain;
+pub mod image;
+pub mod ladder;
+pub mod quantise;
+pub mod response;
+mod table;
+pub mod white;
+
+pub use gain::FineGains;
+pub use ladder::Ladder;
+pub use table::{CompileError, CompileOptions, Compiled, compile};

@@ -1,0 +1,78 @@
+//! What the report says of the sample that photographs cannot.
+
+use crate::report::{Command, Words};
+use std::path::Path;
+
+/// The words for a demo that was written to `out`.
+pub(super) fn words(out: &Path, seconds: &[(&'static str, f64)]) -> Words {
+    let path = |name: &str| quoted(&out.join(name));
+    let command = |what: &str, line: String| Command {
+        what: what.to_owned(),
+        line,
+    };
+    Words {
+        title: "Light that bounces, learned and taken away".to_owned(),
+        scene: "Four panels, red, white, blue and white, stand zigzag like the letter M. A projector \
+                lights them, each panel lights the one opposite, and whatever is projected is washed \
+                out and tinted. Sixty photographs were enough to cancel that. (Here a path tracer stands in \
+                for projector and noisy camera; nothing else is prepared.)"
+            .to_owned(),
+        commands: vec![
+            command("This page and everything beside it:", format!("iltm demo --out {}", quoted(out))),
+            command(
+                "The table alone, from the photographs; with --photos 20 from half of the random ones:",
+                format!("iltm solve {} -o {}", path("capture"), path("table.iltm")),
+            ),
+            command("What is in it:", format!("iltm inspect {}", path("table.iltm"))),
+            command(
+                "A video or a picture of your own, or this one with tier 0 (gain only) for comparison:",
+                format!(
+                    "iltm compensate {} {} -o {}\niltm compensate {} {} -o {} --tier 0",
+                    path("table.iltm"),
+                    path("video.y4m"),
+                    path("compensated.y4m"),
+                    path("table.iltm"),
+                    path("video.y4m"),
+                    path("gain-only.y4m"),
+                ),
+            ),
+        ],
+        seconds: seconds.iter().map(|(what, seconds)| ((*what).to_owned(), *seconds)).collect(),
+    }
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |letter: char| letter.is_alphanumeric() || "/._-+".contains(letter);
+    if !text.is_empty() && text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_with_spaces_stays_one_word() {
+        assert_eq!(quoted(Path::new("my demo/it's")), r"'my demo/it'\''s'");
+        assert_eq!(
+            quoted(Path::new("iltm-demo/table.iltm")),
+            "iltm-demo/table.iltm"
+        );
+    }
+
+    #[test]
+    fn commands_name_the_folder_that_was_written() {
+        let words = words(Path::new("/tmp/here"), &[]);
+        assert!(
+            words
+                .commands
+                .iter()
+                .all(|command| command.line.contains("/tmp/here"))
+        );
+    }
+}

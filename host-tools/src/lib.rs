@@ -1,0 +1,18 @@
+//! `iltm` learns a scene's sparse inverse light transport from photographs,
+//! compiles it into a table for the runtime, and compensates frames with it.
+//!
+//! Light flows one way through the crate:
+//!
+//! ```text
+//! photographs -> capture::Measurements -> solve::InverseTransport -> compile -> .iltm image -> iltm_runtime -> frames
+//! ```
+
+pub mod capture;
+pub mod cli;
+pub mod compile;
+pub mod demo;
+pub mod learn;
+pub mod progress;
+pub mod report;
+pub mod solve;
+pub mod video;

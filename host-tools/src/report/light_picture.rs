@@ -1,0 +1,150 @@
+//! Pictures as light, which adds up, rather than as codes, which do not.
+
+use crate::capture::Response;
+use crate::video::{Picture, Samples};
+use iltm_runtime::FrameSize;
+
+/// Linear light (or linear projector input) of one or three channels.
+#[derive(Clone, PartialEq, Debug)]
+pub struct LightPicture {
+    pub(crate) size: FrameSize,
+    pub(crate) planes: Vec<Vec<f32>>,
+}
+
+impl LightPicture {
+    /// A picture of these planes, each row by row; `None` unless there are one or
+    /// three and all have a value for each pixel.
+    #[must_use]
+    pub fn new(size: FrameSize, planes: Vec<Vec<f32>>) -> Option<Self> {
+        let fits = planes.iter().all(|plane| plane.len() == size.pixels());
+        (fits && matches!(planes.len(), 1 | 3)).then_some(Self { size, planes })
+    }
+
+    /// The light that codes stand for under `response`, 0 to 1.
+    #[must_use]
+    pub fn decode(picture: &Picture, response: Response) -> Self {
+        let channels = picture.channels();
+        let light = |value: f64| response.light(value) as f32;
+        let plane = |channel: usize| -> Vec<f32> {
+            let own = (channel..picture.samples().len()).step_by(channels);
+            match picture.samples() {
+                Samples::Eight(codes) => {
+                    let by_code: Vec<f32> = (0..=u8::MAX)
+                        .map(|code| light(f64::from(code) / f64::from(u8::MAX)))
+                        .collect();
+                    own.map(|at| by_code[usize::from(codes[at])]).collect()
+                }
+                Samples::Sixteen(codes) => own
+                    .map(|at| light(f64::from(codes[at]) / f64::from(u16::MAX)))
+                    .collect(),
+            }
+        };
+        Self {
+            size: picture.size(),
+            planes: (0..channels).map(plane).collect(),
+        }
+    }
+
+    /// 8-bit sRGB codes for a screen. Light outside 0 to 1 is cut.
+    #[must_use]
+    pub fn for_display(&self) -> Picture {
+        let code = |light: f32| {
+            let value = Response::Srgb.value(f64::from(light));
+            (value * f64::from(u8::MAX)).round() as u8
+        };
+        let pixels = 0..self.size.pixels();
+        let samples = pixels.flat_map(|at| self.planes.iter().map(move |plane| code(plane[at])));
+        picture(self.size, samples.collect())
+    }
+
+    /// All light times `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let scale = |plane: &Vec<f32>| plane.iter().map(|light| light * factor as f32).collect();
+        Self {
+            size: self.size,
+            planes: self.planes.iter().map(scale).collect(),
+        }
+    }
+
+    /// The mean of every 2 x 2 pixels; an odd last row or column is left out. A
+    /// picture of a single row or column stays as it is.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.size.width() / 2, self.size.height() / 2);
+        let Some(size) = FrameSize::new(width as u16, height as u16) else {
+            return self.clone();
+        };
+        let row = self.size.width();
+        let plane = |plane: &Vec<f32>| {
+            let mean = |at: usize| {
+                let first = at / width * 2 * row + at % width * 2;
+                let [top, bottom] = [first, first + row].map(|at| plane[at] + plane[at + 1]);
+                (top + bottom) / 4.0
+            };
+            (0..size.pixels()).map(mean).collect()
+        };
+        Self {
+            size,
+            planes: self.planes.iter().map(plane).collect(),
+        }
+    }
+
+    /// Its size.
+    #[must_use]
+    pub const fn size(&self) -> FrameSize {
+        self.size
+    }
+
+    /// One plane a channel, row by row.
+    #[must_use]
+    pub fn planes(&self) -> &[Vec<f32>] {
+        &self.planes
+    }
+}
+
+/// A picture of 8-bit samples.
+///
+/// # Panics
+/// If there are not one or three for each pixel: whoever calls this has counted
+/// them.
+pub(super) fn picture(size: FrameSize, samples: Vec<u8>) -> Picture {
+    match Picture::new(size, Samples::Eight(samples)) {
+        Some(picture) => picture,
+        None => unreachable!("samples were made pixel by pixel"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_survives_the_way_to_light_and_back() {
+        let size = FrameSize::new(256, 1).unwrap();
+        let codes: Vec<u8> = (0..=u8::MAX)
+            .flat_map(|code| [code, 255 - code, code / 2])
+            .collect();
+        let given = picture(size, codes);
+        let light = LightPicture::decode(&given, Response::Srgb);
+        assert_eq!(light.planes().len(), 3);
+        assert_eq!(light.for_display(), given);
+    }
+
+    #[test]
+    fn halving_keeps_the_mean_and_leaves_out_odd_ends() {
+        let size = FrameSize::new(5, 2).unwrap();
+        let plane = vec![0.0, 0.4, 0.1, 0.1, 9.0, 0.2, 0.2, 0.1, 0.1, 9.0];
+        let halved = LightPicture::new(size, vec![plane]).unwrap().halved();
+        assert_eq!(halved.size(), FrameSize::new(2, 1).unwrap());
+        assert!((halved.planes()[0][0] - 0.2).abs() < 1e-6);
+        assert!((halved.planes()[0][1] - 0.1).abs() < 1e-6);
+    }
+
+    #[test]
+    fn two_planes_are_no_picture() {
+        let size = FrameSize::new(2, 1).unwrap();
+        assert_eq!(LightPicture::new(size, vec![vec![0.0; 2]; 2]), None);
+        assert_eq!(LightPicture::new(size, vec![vec![0.0; 3]]), None);
+    }
+}

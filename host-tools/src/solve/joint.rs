@@ -1,0 +1,311 @@
+//! [`Method::Joint`](super::Method::Joint): gains and one operator for all
+//! channels, from every photograph.
+//!
+//! 1. `lambda`, by held-out photographs, from strong to weak, each solve starting
+//!    from the last one's answer.
+//! 2. The solve of all photographs.
+//! 3. The gains once more by least squares, free of the l1 term's pull.
+//! 4. With three channels, each one's deviation from the shared operator: cells
+//!    that straddle two albedos reflect a colour that no gain describes.
+
+use super::admm::Consensus;
+use super::convergence::{Convergence, Stop};
+use super::data_term::DataTerm;
+use super::forward::{Inverse, product};
+use super::haar::Haar;
+use super::held_out::{Split, misfit};
+use super::prepare::Prepared;
+use super::report::LambdaTrial;
+use super::solution::{Channel, Solution, drop_dead};
+use crate::progress::Progress;
+use nalgebra::{DMatrix, DVector};
+
+/// Penalty ratio of one level to the next coarser one.
+const WEIGHT_BASE: f64 = 1.3;
+/// First weight tried; halved until the held-out misfit has risen.
+const STRONGEST: f64 = 0.032;
+/// Most weights tried.
+const MOST_TRIALS: i32 = 8;
+/// What `lambda` is when no photographs can be held out.
+pub(super) const FALLBACK_LAMBDA: f64 = 0.008;
+/// Solves on the way to `lambda` need not be closer than this.
+const TRIAL: Stop = Stop {
+    tolerance: 4e-3,
+    iterations: 60,
+};
+/// A misfit that exceeds the least one by this factor ends the search.
+const ENOUGH: f64 = 1.01;
+/// `lambda` of a channel's deviation, in those of the shared operator.
+const DEVIATION_RATIO: f64 = 4.0;
+/// Rounds of fitting the channels' scales at most.
+const MOST_SCALE_ROUNDS: usize = 8;
+/// Relative change of a scale that is not worth another round.
+const SCALE_TOLERANCE: f64 = 0.005;
+
+/// The method's state over its solves.
+#[derive(Debug)]
+pub(super) struct Solver<'p> {
+    prepared: &'p Prepared,
+    stop: Stop,
+    weights: Vec<f64>,
+    haar: &'p Haar,
+    consensus: Consensus<'p>,
+    /// What the shared operator is multiplied by in each channel.
+    scales: Vec<f64>,
+    iterations: u32,
+}
+
+/// What the search for `lambda` found.
+#[derive(Debug)]
+pub(super) struct Choice {
+    pub(super) lambda: f64,
+    pub(super) trials: Vec<LambdaTrial>,
+    /// The best inverses found without the held-out photographs.
+    pub(super) inverses: Vec<Inverse>,
+}
+
+impl<'p> Solver<'p> {
+    pub(super) fn new(prepared: &'p Prepared, haar: &'p Haar, stop: Stop) -> Self {
+        let weight = |fineness: &f64| WEIGHT_BASE.powf(fineness / 2.0);
+        let weights: Vec<f64> = haar.fineness().iter().map(weight).collect();
+        Self {
+            prepared,
+            stop,
+            consensus: Consensus::new(haar, &weights, &prepared.live, None),
+            weights,
+            haar,
+            scales: vec![1.0; prepared.light.len()],
+            iterations: 0,
+        }
+    }
+
+    /// Finds `lambda` by the held-out photographs of `split`, or judges the one
+    /// that is given.
+    pub(super) fn choose(
+        &mut self,
+        split: &Split,
+        given: Option<f64>,
+        progress: &dyn Progress,
+    ) -> Choice {
+        let photographs = self.photographs(&split.solved);
+        progress.begin("choosing lambda", 0);
+        self.settle_scales(&photographs, progress);
+        let data = self.data(&photographs);
+        let path = match given {
+            Some(lambda) => vec![lambda],
+            None => (0..MOST_TRIALS)
+                .map(|k| STRONGEST / f64::from(1 << k))
+                .collect(),
+        };
+        let mut choice = Choice {
+            lambda: path[0],
+            trials: Vec::new(),
+            inverses: Vec::new(),
+        };
+        let mut least = f64::INFINITY;
+        let mut best = None;
+        for lambda in path {
+            self.run(&data, lambda, TRIAL, progress);
+            let found = self.found(&photographs);
+            let misfit = misfit(self.prepared, &found.inverses(), &split.held_out);
+            choice.trials.push(LambdaTrial { lambda, misfit });
+            if misfit < least {
+                least = misfit;
+                choice.lambda = lambda;
+                best = Some(found);
+            } else if misfit > ENOUGH * least {
+                break;
+            }
+        }
+        if let Some(mut best) = best {
+            self.add_deviations(&mut best, &photographs, choice.lambda, TRIAL, progress);
+            choice.inverses = best.inverses();
+        }
+        progress.end();
+        choice
+    }
+
+    /// Iterations of all solves so far.
+    pub(super) fn iterations(&self) -> u32 {
+        self.iterations
+    }
+
+    /// Solves for all photographs.
+    pub(super) fn solve(&mut self, lambda: f64, progress: &dyn Progress) -> Solution {
+        let all: Vec<usize> = (0..self.prepared.roles.len()).collect();
+        let photographs = self.photographs(&all);
+        progress.begin("solving", 0);
+        self.settle_scales(&photographs, progress);
+        let data = self.data(&photographs);
+        let convergence = self.run(&data, lambda, self.stop, progress);
+        let mut found = self.found(&photographs);
+        found.convergence = convergence;
+        self.add_deviations(&mut found, &photographs, lambda, self.stop, progress);
+        progress.end();
+        found
+    }
+
+    fn photographs(&self, chosen: &[usize]) -> Photographs {
+        let light = self.prepared.light.iter();
+        Photographs {
+            patterns: self.prepared.patterns.select_columns(chosen),
+            weights: self.prepared.weights.select_columns(chosen),
+            light: light.map(|c| c.select_columns(chosen)).collect(),
+        }
+    }
+
+    /// The data term of the joint solve: light scaled so that all channels have
+    /// the same operator.
+    fn data(&self, photographs: &Photographs) -> DataTerm {
+        let light = photographs.light.iter().zip(&self.scales);
+        DataTerm::new(
+            light.map(|(c, scale)| c * *scale).collect(),
+            vec![photographs.patterns.clone(); self.scales.len()],
+            &photographs.weights,
+        )
+    }
+
+    fn run(
+        &mut self,
+        data: &DataTerm,
+        lambda: f64,
+        stop: Stop,
+        progress: &dyn Progress,
+    ) -> Convergence {
+        let lambda = lambda * data.channels() as f64;
+        let end = self
+            .consensus
+            .run(data, lambda, stop, &|| progress.advance(1));
+        self.iterations += end.iterations;
+        end
+    }
+
+    /// The consensus' operator with gains fitted to `photographs`.
+    fn found(&self, photographs: &Photographs) -> Solution {
+        let mut shared = self.consensus.operator();
+        shared.apply(|value| *value = value.max(0.0));
+        shared.fill_diagonal(0.0);
+        drop_dead(&mut shared, &self.prepared.live);
+        let channels = photographs.light.iter().zip(&self.scales);
+        let channels = channels
+            .map(|(light, scale)| Channel {
+                gain: photographs.fitted_gain(light, &(product(&shared, light) * *scale)),
+                scale: *scale,
+                deviation: None,
+            })
+            .collect();
+        Solution {
+            shared,
+            channels,
+            coefficients: self.consensus.coefficients(),
+            convergence: Convergence::none(),
+        }
+    }
+
+    /// Finds the projector's gain in each channel, up to a common factor: that
+    /// with which the shared operator explains the channel's photographs best.
+    fn settle_scales(&mut self, photographs: &Photographs, progress: &dyn Progress) {
+        if self.scales.len() < 2 {
+            return;
+        }
+        for _ in 0..MOST_SCALE_ROUNDS {
+            let data = self.data(photographs);
+            self.run(&data, FALLBACK_LAMBDA, TRIAL, progress);
+            let shared = self.found(photographs).shared;
+            let light = photographs.light.iter();
+            let fitted: Vec<f64> = light
+                .map(|light| fitted_scale(light, &product(&shared, light), &photographs.patterns))
+                .collect();
+            // Where the light tells nothing (no interreflection) nothing is told.
+            if fitted
+                .iter()
+                .any(|scale| !(*scale > 0.0 && scale.is_finite()))
+            {
+                return;
+            }
+            let mean = fitted.iter().map(|s| s.ln()).sum::<f64>() / fitted.len() as f64;
+            let mut change = 0.0_f64;
+            for (scale, fitted) in self.scales.iter_mut().zip(fitted) {
+                let next = fitted / mean.exp();
+                change = change.max((next / *scale - 1.0).abs());
+                *scale = next;
+            }
+            if change < SCALE_TOLERANCE {
+                return;
+            }
+        }
+    }
+
+    /// Each channel's own part, and the gains that go with it.
+    fn add_deviations(
+        &mut self,
+        found: &mut Solution,
+        photographs: &Photographs,
+        lambda: f64,
+        stop: Stop,
+        progress: &dyn Progress,
+    ) {
+        if found.channels.len() < 2 {
+            return;
+        }
+        for (channel, light) in found.channels.iter_mut().zip(&photographs.light) {
+            let own = &found.shared * channel.scale;
+            let target = &photographs.patterns + product(&own, light);
+            let data = DataTerm::new(vec![light.clone()], vec![target], &photographs.weights);
+            let floor = -&own;
+            let mut consensus =
+                Consensus::new(self.haar, &self.weights, &self.prepared.live, Some(&floor));
+            let end = consensus.run(&data, DEVIATION_RATIO * lambda, stop, &|| {
+                progress.advance(1);
+            });
+            self.iterations += end.iterations;
+            let mut deviation = consensus.operator().zip_map(&floor, f64::max);
+            deviation.fill_diagonal(0.0);
+            drop_dead(&mut deviation, &self.prepared.live);
+            let reflected = product(&(&own + &deviation), light);
+            channel.gain = photographs.fitted_gain(light, &reflected);
+            channel.deviation = Some(deviation);
+        }
+    }
+}
+
+/// Photographs chosen for one solve, `N x m` each.
+#[derive(Debug)]
+struct Photographs {
+    patterns: DMatrix<f64>,
+    weights: DMatrix<f64>,
+    light: Vec<DMatrix<f64>>,
+}
+
+impl Photographs {
+    /// Gains that explain a channel's light best, given the light that the
+    /// operator takes away; zero for a cell without light.
+    fn fitted_gain(&self, light: &DMatrix<f64>, reflected: &DMatrix<f64>) -> DVector<f64> {
+        DVector::from_fn(light.nrows(), |cell, _| {
+            let (mut both, mut norm) = (0.0, 0.0);
+            for (k, weight) in self.weights.row(cell).iter().enumerate() {
+                let seen = light[(cell, k)];
+                both += weight * seen * (reflected[(cell, k)] + self.patterns[(cell, k)]);
+                norm += weight * seen * seen;
+            }
+            if norm > 0.0 { both / norm } else { 0.0 }
+        })
+    }
+}
+
+/// The factor on `reflected = K C` with which the photographs are explained best,
+/// whatever the gains: both sides lose their part along the cell's own light.
+fn fitted_scale(light: &DMatrix<f64>, reflected: &DMatrix<f64>, patterns: &DMatrix<f64>) -> f64 {
+    let (mut both, mut norm) = (0.0, 0.0);
+    for cell in 0..light.nrows() {
+        let (seen, reflected) = (light.row(cell), reflected.row(cell));
+        let own = seen.norm_squared();
+        if own > 0.0 {
+            let along = reflected.dot(&seen) / own;
+            let pattern = patterns.row(cell);
+            both -= reflected.dot(&pattern) - along * seen.dot(&pattern);
+            norm += reflected.norm_squared() - along * along * own;
+        }
+    }
+    both / norm
+}

@@ -1,0 +1,305 @@
+//! From [`Measurements`] to [`InverseTransport`].
+//!
+//! The inverse of a scene's light transport is `T^-1 = diag(g) - K`: texture is
+//! in the gains `g` alone, and `K` is geometry, one bounce, smooth and
+//! non-negative. [`Method::Joint`] looks for exactly that, over all channels and
+//! all photographs at once; [`Method::Direct`] is the method of Chu, Ng, Pahwa,
+//! Quek, Huang, *Compressive Inverse Light Transport* (BMVC 2011), for
+//! comparison.
+//!
+//! ```text
+//! observed, prepare     what is solved from, checked and scaled
+//! haar, lane            the sparse basis, sixteen images at a time
+//! joint                 lambda, scales of the channels, solve, gains, deviations
+//!   admm                the iteration, over data_term, row_block and column_block
+//! direct                the paper's method, over basis_pursuit
+//! forward, held_out     light from an inverse; the photographs it is judged by
+//! ```
+//!
+//! # Cost
+//!
+//! An iteration takes `O(N^2 min(N, m))` multiplications, memory grows as
+//! `N^2 + N m`. Whole solves of a simulated corner, `lambda` by held-out
+//! photographs included, on 2 cores (x86-64, AVX-512) that other work kept busy;
+//! memory is what is held beyond the measurements. Repeat with
+//! `cargo bench -p iltm --bench solve`.
+//!
+//! | cells | photographs | channels | joint | | direct | |
+//! |---|---|---|---|---|---|---|
+//! | 273 | 41 | 1 | 0.21 s | 8 MB | 0.25 s | 5 MB |
+//! | 273 | 151 | 1 | 0.24 s | 12 MB | 0.19 s | 7 MB |
+//! | 273 | 301 | 1 | 0.26 s | 19 MB | 0.18 s | 10 MB |
+//! | 384 | 151 | 3 | 1.5 s | 47 MB | 1.3 s | 19 MB |
+//! | 1024 | 301 | 1 | 4.5 s | 124 MB | 4.7 s | 79 MB |
+//! | 2025 | 301 | 1 | 18 s | 415 MB | 60 s | 270 MB |
+
+mod admm;
+mod basis_pursuit;
+mod column_block;
+mod convergence;
+mod data_term;
+mod direct;
+mod error;
+mod forward;
+mod haar;
+mod held_out;
+mod inverse;
+mod joint;
+mod lane;
+mod observed;
+mod options;
+mod prepare;
+mod report;
+mod row_block;
+mod solution;
+#[cfg(test)]
+mod test_linear_program;
+#[cfg(test)]
+mod test_reference;
+#[cfg(test)]
+#[allow(missing_docs, unreachable_pub)]
+mod test_scene;
+#[cfg(test)]
+mod tests;
+
+pub use convergence::Convergence;
+pub use error::SolveError;
+pub use forward::Inverse;
+pub use haar::{Basis, Haar};
+pub use inverse::{ChannelInverse, InverseTransport};
+pub use observed::{CellNoise, Observed, ObservedChannel};
+pub use options::{Method, SolveOptions, UnknownMethod};
+pub use report::{LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport};
+
+use crate::capture::{Measurements, Role};
+use crate::progress::Progress;
+use convergence::Stop;
+use held_out::{Split, predict};
+use joint::{FALLBACK_LAMBDA, Solver};
+use prepare::Prepared;
+use solution::Solution;
+use std::time::Instant;
+
+/// A solve that ends with a residual above this is no answer.
+const HOPELESS: f64 = 0.05;
+/// Photographs below which no scene of more cells can be told.
+const LEAST_PHOTOGRAPHS: usize = 8;
+
+/// Solves `measurements` for the inverse light transport.
+///
+/// The same measurements and options give the same bits, whatever the number of
+/// threads.
+///
+/// # Errors
+/// [`SolveError`] if the measurements are inconsistent, not finite or too few,
+/// if the iteration does not come near an answer, or if the answer cannot be the
+/// inverse of a real scene.
+pub fn solve(
+    measurements: &Measurements,
+    options: &SolveOptions,
+    progress: &dyn Progress,
+) -> Result<(InverseTransport, SolveReport), SolveError> {
+    solve_observed(&measurements.into(), options, progress)
+}
+
+/// [`solve`] for observations that are not from photographs.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_observed(
+    observed: &Observed<'_>,
+    options: &SolveOptions,
+    progress: &dyn Progress,
+) -> Result<(InverseTransport, SolveReport), SolveError> {
+    let mut clock = Clock::new();
+    options.check()?;
+    let prepared = Prepared::new(observed)?;
+    check_count(&prepared, options.method)?;
+    let haar = Haar::new(observed.grid, options.basis);
+    let split = Split::new(&prepared);
+    let mut seconds = Seconds {
+        prepare: clock.lap(),
+        ..Seconds::default()
+    };
+    let stop = Stop {
+        tolerance: options.tolerance,
+        iterations: options.iterations,
+    };
+    let task = Task {
+        prepared: &prepared,
+        haar: &haar,
+        split: split.as_ref(),
+        stop,
+        progress,
+    };
+    let outcome = match options.method {
+        Method::Joint => task.joint(options.lambda, &mut seconds, &mut clock),
+        Method::Direct => task.direct(&mut seconds, &mut clock),
+    };
+    let inverses = outcome.solution.inverses();
+    check_answer(&outcome.solution, &inverses, &prepared, options)?;
+    let condition = |inverse: &Inverse| inverse.condition(&prepared.live);
+    let condition = inverses.iter().map(condition).fold(1.0, f64::max);
+    let prediction = split
+        .as_ref()
+        .zip(outcome.without_held_out.as_ref())
+        .map(|(split, inverses)| predict(&prepared, inverses, &split.held_out));
+    seconds.finish = clock.lap();
+    let report = SolveReport {
+        method: options.method,
+        photographs: count(&prepared, options.method, split.as_ref()),
+        live_cells: prepared.live_cells(),
+        cells: prepared.cells(),
+        lambda: outcome.lambda,
+        lambda_path: outcome.trials,
+        convergence: outcome.solution.convergence,
+        iterations: outcome.iterations,
+        coefficients: outcome.solution.coefficients,
+        condition,
+        prediction,
+        seconds,
+    };
+    Ok((
+        outcome.solution.in_camera_units(observed, &prepared),
+        report,
+    ))
+}
+
+/// What both methods need.
+struct Task<'t> {
+    prepared: &'t Prepared,
+    haar: &'t Haar,
+    split: Option<&'t Split>,
+    stop: Stop,
+    progress: &'t dyn Progress,
+}
+
+/// What a method returns beside its answer.
+struct Outcome {
+    solution: Solution,
+    lambda: f64,
+    trials: Vec<LambdaTrial>,
+    iterations: u32,
+    /// Inverses that have not seen the held-out photographs.
+    without_held_out: Option<Vec<Inverse>>,
+}
+
+impl Task<'_> {
+    fn joint(&self, lambda: Option<f64>, seconds: &mut Seconds, clock: &mut Clock) -> Outcome {
+        let mut solver = Solver::new(self.prepared, self.haar, self.stop);
+        let choice = self
+            .split
+            .map(|split| solver.choose(split, lambda, self.progress));
+        seconds.choose = clock.lap();
+        let chosen = choice.as_ref().map(|choice| choice.lambda);
+        let lambda = lambda.or(chosen).unwrap_or(FALLBACK_LAMBDA);
+        let solution = solver.solve(lambda, self.progress);
+        seconds.solve = clock.lap();
+        let iterations = solver.iterations();
+        let (trials, without_held_out) = match choice {
+            Some(choice) => (choice.trials, Some(choice.inverses)),
+            None => (Vec::new(), None),
+        };
+        Outcome {
+            solution,
+            lambda,
+            trials,
+            iterations,
+            without_held_out,
+        }
+    }
+
+    fn direct(&self, seconds: &mut Seconds, clock: &mut Clock) -> Outcome {
+        let usable = self.prepared.with_role(direct::uses);
+        let solve = |chosen: &[usize], what| {
+            self.progress.begin(what, 0);
+            let found = direct::solve(self.prepared, self.haar, chosen, self.stop, self.progress);
+            self.progress.end();
+            found
+        };
+        let trial = self.split.map(|split| {
+            let kept = |k: &usize| !split.held_out.contains(k);
+            let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
+            solve(&chosen, "solving without the held-out photographs")
+        });
+        seconds.choose = clock.lap();
+        let solution = solve(&usable, "solving");
+        seconds.solve = clock.lap();
+        let trial_iterations = trial.as_ref().map_or(0, |t| t.convergence.iterations);
+        Outcome {
+            lambda: 0.0,
+            trials: Vec::new(),
+            iterations: trial_iterations + solution.convergence.iterations,
+            without_held_out: trial.map(|trial| trial.inverses()),
+            solution,
+        }
+    }
+}
+
+fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
+    let given = match method {
+        Method::Joint => prepared.roles.len(),
+        Method::Direct => prepared.with_role(direct::uses).len(),
+    };
+    let least = prepared.live_cells().min(LEAST_PHOTOGRAPHS);
+    if given < least {
+        return Err(SolveError::TooFewPhotographs {
+            method: method.name(),
+            given,
+            least,
+        });
+    }
+    Ok(())
+}
+
+fn check_answer(
+    solution: &Solution,
+    inverses: &[Inverse],
+    prepared: &Prepared,
+    options: &SolveOptions,
+) -> Result<(), SolveError> {
+    let residual = solution.convergence.residual();
+    // Written so that a residual that is not a number is refused too.
+    let near = residual <= HOPELESS.max(options.tolerance);
+    if !near {
+        return Err(SolveError::DidNotConverge {
+            iterations: solution.convergence.iterations,
+            residual,
+            tolerance: options.tolerance,
+        });
+    }
+    for (channel, inverse) in inverses.iter().enumerate() {
+        if let Some(why) = inverse.flaw(&prepared.live) {
+            return Err(SolveError::NotPhysical { channel, why });
+        }
+    }
+    Ok(())
+}
+
+fn count(prepared: &Prepared, method: Method, split: Option<&Split>) -> PhotographCounts {
+    let gray = |role| matches!(role, Role::Column { .. } | Role::Row { .. });
+    PhotographCounts {
+        white: prepared.with_role(|role| role == Role::White).len(),
+        gray_code: match method {
+            Method::Joint => prepared.with_role(gray).len(),
+            Method::Direct => 0,
+        },
+        bernoulli: prepared.with_role(|role| role == Role::Bernoulli).len(),
+        held_out: split.map_or(0, |split| split.held_out.len()),
+    }
+}
+
+/// Seconds between laps.
+struct Clock(Instant);
+
+impl Clock {
+    fn new() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> f64 {
+        let seconds = self.0.elapsed().as_secs_f64();
+        self.0 = Instant::now();
+        seconds
+    }
+}

@@ -1,0 +1,194 @@
+//! Checks what was observed and brings them to the solver's units.
+
+use super::error::SolveError;
+use super::observed::{CellNoise, Observed, ObservedChannel, is_lit};
+use crate::capture::Role;
+use nalgebra::DMatrix;
+
+/// Weight of a photograph in which a cell is dark, at most: below that noise the
+/// model's own error rules.
+const MOST_WEIGHT: f64 = 10.0;
+
+/// Observations that a solve can rely on: sizes agree, everything is finite,
+/// at least one cell is live.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    /// Cells that are seen and that some light reaches in every channel.
+    pub(super) live: Vec<bool>,
+    /// `L`, `N x m`; rows of cells that are not live are zero.
+    pub(super) patterns: DMatrix<f64>,
+    /// `C_c` with the mean flood light of all channels scaled to 1, `N x m`;
+    /// rows of cells that are not live are zero.
+    pub(super) light: Vec<DMatrix<f64>>,
+    /// Standard deviation of an element of `light` by channel and cell.
+    pub(super) noise: Vec<Vec<CellNoise>>,
+    /// Weight of each squared residual, `N x m`, mean 1 in each row.
+    pub(super) weights: DMatrix<f64>,
+    pub(super) roles: Vec<Role>,
+    /// Camera units of one unit of `light`.
+    pub(super) unit: f64,
+}
+
+impl Prepared {
+    /// # Errors
+    /// [`SolveError`] for sizes that disagree, numbers that are not finite, a
+    /// wrong number of channels, or no live cell.
+    pub(super) fn new(observed: &Observed<'_>) -> Result<Self, SolveError> {
+        check_sizes(observed)?;
+        check_finite(observed)?;
+        let live: Vec<bool> = (0..observed.grid.cells())
+            .map(|cell| {
+                let reached =
+                    |c: &ObservedChannel<'_>| c.light.row(cell).iter().any(|light| *light > 0.0);
+                observed.live[cell] && observed.channels.iter().all(reached)
+            })
+            .collect();
+        if !live.contains(&true) {
+            return Err(SolveError::NoLiveCells { cells: live.len() });
+        }
+        let keep = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |cell, k| {
+                if live[cell] { matrix[(cell, k)] } else { 0.0 }
+            })
+        };
+        let patterns = keep(observed.patterns);
+        let mut light: Vec<_> = observed
+            .channels
+            .iter()
+            .map(|channel| keep(channel.light))
+            .collect();
+        let unit = flood_level(&light, &patterns);
+        for light in &mut light {
+            *light /= unit;
+        }
+        let noise: Vec<Vec<CellNoise>> = observed
+            .channels
+            .iter()
+            .map(|channel| {
+                let in_units = |noise: &CellNoise| CellNoise {
+                    lit: noise.lit / unit,
+                    unlit: noise.unlit / unit,
+                };
+                channel.noise.iter().map(in_units).collect()
+            })
+            .collect();
+        Ok(Self {
+            weights: weights(&patterns, &noise),
+            live,
+            patterns,
+            light,
+            noise,
+            roles: observed.roles.to_vec(),
+            unit,
+        })
+    }
+
+    pub(super) fn cells(&self) -> usize {
+        self.live.len()
+    }
+
+    pub(super) fn live_cells(&self) -> usize {
+        self.live.iter().filter(|live| **live).count()
+    }
+
+    /// The photographs whose role passes `filter`, by index.
+    pub(super) fn with_role(&self, filter: impl Fn(Role) -> bool) -> Vec<usize> {
+        let roles = self.roles.iter().enumerate();
+        roles
+            .filter(|(_, role)| filter(**role))
+            .map(|(k, _)| k)
+            .collect()
+    }
+}
+
+/// Light is noisy: photographs in which a cell is dark say more about what it
+/// gets from others. Every pattern that does not light a cell counts as many
+/// times as its noise variance is smaller than that of those which do.
+fn weights(patterns: &DMatrix<f64>, noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
+    let (cells, photographs) = patterns.shape();
+    let mut weights = DMatrix::from_element(cells, photographs, 1.0);
+    for (cell, mut row) in weights.row_iter_mut().enumerate() {
+        let variance = |of: fn(&CellNoise) -> f64| -> f64 {
+            noise.iter().map(|channel| of(&channel[cell]).powi(2)).sum()
+        };
+        let ratio = variance(|noise| noise.lit) / variance(|noise| noise.unlit);
+        if ratio.is_nan() {
+            continue;
+        }
+        for (photograph, weight) in row.iter_mut().enumerate() {
+            if !is_lit(patterns, cell, photograph) {
+                *weight = ratio.clamp(1.0, MOST_WEIGHT);
+            }
+        }
+        let mean = row.mean();
+        row /= mean;
+    }
+    weights
+}
+
+/// Mean light of all channels where the projector shows white: total light over
+/// total projected share.
+fn flood_level(light: &[DMatrix<f64>], patterns: &DMatrix<f64>) -> f64 {
+    let total: f64 = light.iter().map(DMatrix::sum).sum();
+    let level = total / light.len() as f64 / patterns.sum();
+    // Neither can be zero in a capture that is worth solving; an odd one must not
+    // become a division by zero.
+    if level.is_finite() && level > 0.0 {
+        level
+    } else {
+        1.0
+    }
+}
+
+fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {
+    let (cells, photographs) = (observed.grid.cells(), observed.roles.len());
+    let check = |what, given: (usize, usize), wanted: (usize, usize)| {
+        if given == wanted {
+            return Ok(());
+        }
+        Err(SolveError::Size {
+            what,
+            rows: wanted.0,
+            cols: wanted.1,
+            given_rows: given.0,
+            given_cols: given.1,
+        })
+    };
+    check("patterns", observed.patterns.shape(), (cells, photographs))?;
+    check("live cells", (observed.live.len(), 1), (cells, 1))?;
+    if !matches!(observed.channels.len(), 1 | 3) {
+        return Err(SolveError::Channels {
+            given: observed.channels.len(),
+        });
+    }
+    for channel in &observed.channels {
+        check("observations", channel.light.shape(), (cells, photographs))?;
+        check(
+            "ambient light values",
+            (channel.ambient.len(), 1),
+            (cells, 1),
+        )?;
+        check("noise estimates", (channel.noise.len(), 1), (cells, 1))?;
+    }
+    Ok(())
+}
+
+fn check_finite(observed: &Observed<'_>) -> Result<(), SolveError> {
+    let check = |what, channel, matrix: &DMatrix<f64>| match matrix
+        .iter()
+        .position(|value| !value.is_finite())
+    {
+        None => Ok(()),
+        Some(index) => Err(SolveError::NotFinite {
+            what,
+            cell: index % matrix.nrows(),
+            photograph: index / matrix.nrows(),
+            channel,
+        }),
+    };
+    check("pattern", 0, observed.patterns)?;
+    for (index, channel) in observed.channels.iter().enumerate() {
+        check("light", index, channel.light)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,524 @@
+//! Whole solves of a scene whose transport is known.
+
+// Zero is exact, and the same bits are the same bits.
+#![allow(clippy::float_cmp)]
+
+use super::test_scene::{Corner, add_noise, patterns};
+use super::*;
+use crate::progress::Silent;
+use iltm_runtime::Grid;
+use nalgebra::DMatrix;
+
+/// Owns what an [`Observed`] borrows.
+#[derive(Clone)]
+struct Capture {
+    grid: Grid,
+    patterns: DMatrix<f64>,
+    roles: Vec<Role>,
+    live: Vec<bool>,
+    light: Vec<DMatrix<f64>>,
+    ambient: Vec<f64>,
+    noise: CellNoise,
+}
+
+impl Capture {
+    fn new(scene: &Corner, (rows, cols): (u16, u16), bernoulli: usize) -> Self {
+        let grid = Grid::new(rows, cols).unwrap();
+        let patterns = patterns(grid.cells(), bernoulli);
+        let mut roles = vec![Role::Bernoulli; bernoulli + 1];
+        roles[0] = Role::White;
+        Self {
+            grid,
+            roles,
+            live: vec![true; grid.cells()],
+            light: vec![scene.photograph(&patterns)],
+            ambient: vec![0.0; grid.cells()],
+            patterns,
+            noise: CellNoise {
+                lit: 1e-3,
+                unlit: 1e-3,
+            },
+        }
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        let channel = |light| ObservedChannel {
+            light,
+            ambient: &self.ambient,
+            noise: vec![self.noise; self.grid.cells()],
+        };
+        Observed {
+            grid: self.grid,
+            patterns: &self.patterns,
+            roles: &self.roles,
+            live: &self.live,
+            channels: self.light.iter().map(channel).collect(),
+        }
+    }
+
+    fn solve(&self, options: &SolveOptions) -> Result<(InverseTransport, SolveReport), SolveError> {
+        solve_observed(&self.observed(), options, &Silent)
+    }
+
+    fn solved(&self) -> (InverseTransport, SolveReport) {
+        self.solve(&SolveOptions::default()).unwrap()
+    }
+
+    fn error(&self) -> SolveError {
+        self.solve(&SolveOptions::default()).unwrap_err()
+    }
+}
+
+fn method(method: Method) -> SolveOptions {
+    SolveOptions {
+        method,
+        ..SolveOptions::default()
+    }
+}
+
+/// Albedo between 0.3 and 0.8, another one in every cell.
+fn textured(cell: usize) -> f64 {
+    0.55 + 0.25 * (cell as f64 * 2.3).sin()
+}
+
+fn corner(rows: u16, cols: u16) -> Corner {
+    Corner::new(rows.into(), cols.into(), textured)
+}
+
+/// `diag(g) - K` of a channel.
+fn inverse(found: &InverseTransport, channel: usize) -> DMatrix<f64> {
+    let channel = &found.channels[channel];
+    let mut inverse = &found.shared * -channel.scale;
+    if let Some(deviation) = &channel.deviation {
+        inverse -= deviation;
+    }
+    for (cell, gain) in channel.gain.iter().enumerate() {
+        inverse[(cell, cell)] += gain;
+    }
+    inverse
+}
+
+fn relative(found: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
+    (found - wanted).norm() / wanted.norm()
+}
+
+/// Mean relative error of the light that compensated smooth images make.
+fn closed_loop(found: &InverseTransport, scene: &Corner, size: (u16, u16)) -> f64 {
+    loop_error(&inverse(found, 0), scene, size)
+}
+
+fn loop_error(inverse: &DMatrix<f64>, scene: &Corner, (rows, cols): (u16, u16)) -> f64 {
+    let wanted = DMatrix::from_fn(usize::from(rows) * usize::from(cols), 3, |cell, image| {
+        let (row, col) = (cell / usize::from(cols), cell % usize::from(cols));
+        let phase = (image + 1) as f64
+            * (row as f64 / f64::from(rows) + 2.0 * col as f64 / f64::from(cols));
+        0.5 + 0.3 * (3.0 * phase).sin()
+    });
+    relative(&scene.photograph(&(inverse * &wanted)), &wanted)
+}
+
+#[test]
+fn enough_noiseless_photographs_give_the_exact_inverse() {
+    let scene = corner(6, 8);
+    let capture = Capture::new(&scene, (6, 8), 100);
+    for basis in [Basis::QuadTree, Basis::Tensor] {
+        let options = SolveOptions {
+            basis,
+            lambda: Some(1e-7),
+            tolerance: 1e-7,
+            ..SolveOptions::default()
+        };
+        let (found, report) = capture.solve(&options).unwrap();
+        assert!(relative(&found.shared, &scene.operator) < 2e-4, "{basis:?}");
+        assert!(
+            relative(&inverse(&found, 0), &scene.inverse()) < 2e-5,
+            "{basis:?}"
+        );
+        let predicted = report.prediction.unwrap().compensated;
+        assert!(predicted < 1e-3, "{predicted}");
+    }
+}
+
+#[test]
+fn the_papers_method_gives_the_exact_inverse_from_as_many_photographs_as_cells() {
+    let scene = corner(6, 8);
+    let mut capture = Capture::new(&scene, (6, 8), 100);
+    capture.noise.lit = 0.0;
+    let options = SolveOptions {
+        tolerance: 1e-9,
+        ..method(Method::Direct)
+    };
+    let (found, _) = capture.solve(&options).unwrap();
+    assert!(relative(&inverse(&found, 0), &scene.inverse()) < 1e-6);
+}
+
+#[test]
+fn fewer_photographs_than_cells_suffice_and_knowing_physics_helps() {
+    let scene = corner(12, 16);
+    let mut capture = Capture::new(&scene, (12, 16), 60);
+    add_noise(&mut capture.light[0], 1e-3);
+    let error = |options: &SolveOptions| {
+        let (found, report) = capture.solve(options).unwrap();
+        assert!(report.convergence.converged);
+        closed_loop(&found, &scene, (12, 16))
+    };
+    let joint = error(&SolveOptions::default());
+    let direct = error(&method(Method::Direct));
+    let gain_only = {
+        let flood = capture.light[0].column(0).map(f64::recip);
+        loop_error(&DMatrix::from_diagonal(&flood), &scene, (12, 16))
+    };
+    assert!(joint < 0.1 * gain_only, "{joint} against {gain_only}");
+    assert!(joint < 0.5 * direct, "{joint} against {direct}");
+}
+
+#[test]
+fn the_operator_is_non_negative_with_a_zero_diagonal_in_every_channel() {
+    let mut capture = Capture::new(&corner(6, 8), (6, 8), 40);
+    let other = Corner::new(6, 8, |cell| 0.8 - 0.5 * textured(cell));
+    capture.light.push(other.photograph(&capture.patterns));
+    capture.light.push(capture.light[0].clone() * 0.9);
+    for light in &mut capture.light {
+        add_noise(light, 1e-2);
+    }
+    let (found, _) = capture.solved();
+    assert!(found.shared.min() >= 0.0);
+    assert_eq!(found.shared.diagonal().amax(), 0.0);
+    for channel in 0..3 {
+        let inverse = inverse(&found, channel);
+        for (index, value) in inverse.iter().enumerate() {
+            let diagonal = index % 48 == index / 48;
+            assert!(if diagonal {
+                *value > 0.0
+            } else {
+                *value <= 1e-12
+            });
+        }
+    }
+}
+
+#[test]
+fn a_projectors_gain_in_each_channel_is_found() {
+    let scene = corner(6, 8);
+    let mut capture = Capture::new(&scene, (6, 8), 60);
+    let light = capture.light[0].clone();
+    // Twice the light is the same scene under a projector twice as bright.
+    capture.light = [0.5, 1.0, 2.0].map(|gain| &light * gain).to_vec();
+    let (found, _) = capture.solved();
+    let scales: Vec<f64> = found.channels.iter().map(|c| c.scale).collect();
+    assert!((scales[0] / scales[1] - 2.0).abs() < 0.05, "{scales:?}");
+    assert!((scales[1] / scales[2] - 2.0).abs() < 0.05, "{scales:?}");
+    for (channel, gain) in [0.5, 1.0, 2.0].into_iter().enumerate() {
+        let wanted = scene.inverse() / gain;
+        assert!(relative(&inverse(&found, channel), &wanted) < 0.01);
+    }
+}
+
+#[test]
+fn a_longer_exposure_scales_the_inverse_and_nothing_else() {
+    let mut capture = Capture::new(&corner(5, 7), (5, 7), 40);
+    add_noise(&mut capture.light[0], 3e-3);
+    let (once, report) = capture.solved();
+    capture.light[0] *= 4.0;
+    let (four_times, longer) = capture.solved();
+    assert_eq!(report.lambda, longer.lambda);
+    assert!(relative(&(inverse(&four_times, 0) * 4.0), &inverse(&once, 0)) < 1e-6);
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_threads() {
+    let mut capture = Capture::new(&corner(9, 11), (9, 11), 30);
+    capture.light = vec![capture.light[0].clone(); 3];
+    add_noise(&mut capture.light[1], 1e-2);
+    capture.noise.unlit = 5e-4;
+    for method_name in Method::ALL {
+        let solve = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| capture.solve(&method(method_name)).unwrap().0)
+        };
+        let one = solve(1);
+        for threads in [2, 3, 7] {
+            let many = solve(threads);
+            for channel in 0..3 {
+                assert_eq!(inverse(&one, channel), inverse(&many, channel));
+            }
+        }
+    }
+}
+
+#[test]
+fn held_out_photographs_predict_the_error_of_new_ones() {
+    let scene = corner(8, 10);
+    let mut capture = Capture::new(&scene, (8, 10), 200);
+    add_noise(&mut capture.light[0], 5e-3);
+    // The first 100 to solve from, the rest to compare with.
+    let rest = capture.patterns.columns(100, 100).into_owned();
+    capture.patterns = capture.patterns.columns(0, 100).into_owned();
+    let observed = capture.light[0].columns(100, 100).into_owned();
+    capture.light[0] = capture.light[0].columns(0, 100).into_owned();
+    capture.roles.truncate(100);
+    let (found, report) = capture.solved();
+    let predicted = report.prediction.unwrap();
+    let light = inverse(&found, 0).try_inverse().unwrap() * rest;
+    let actual = relative(&observed, &light);
+    assert!(
+        (predicted.compensated / actual - 1.0).abs() < 0.1,
+        "{predicted:?} {actual}"
+    );
+    assert!(predicted.compensated < predicted.gain_only);
+    assert!(predicted.gain_only < predicted.uncompensated);
+}
+
+#[test]
+fn dead_cells_have_no_gain_and_no_part_in_the_operator() {
+    let scene = corner(6, 8);
+    let mut capture = Capture::new(&scene, (6, 8), 60);
+    // One that the camera never saw, and one that it saw dark.
+    capture.live[3] = false;
+    capture.light[0].row_mut(20).fill(0.0);
+    for method_name in Method::ALL {
+        let (found, report) = capture.solve(&method(method_name)).unwrap();
+        assert_eq!(report.live_cells, 46);
+        for dead in [3, 20] {
+            assert!(!found.live[dead]);
+            assert_eq!(found.channels[0].gain[dead], 0.0);
+            assert_eq!(found.shared.row(dead).amax(), 0.0);
+            assert_eq!(found.shared.column(dead).amax(), 0.0);
+        }
+    }
+    let (found, _) = capture.solved();
+    let gain = found.channels[0].gain[10];
+    assert!((gain / scene.gain[10] - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn patterns_that_repeat_and_contradict_no_one_are_welcome() {
+    let scene = corner(6, 8);
+    let mut capture = Capture::new(&scene, (6, 8), 40);
+    let inverted = capture.patterns.map(|lit| 1.0 - lit);
+    let mut patterns = capture.patterns.clone().resize_horizontally(82, 0.0);
+    patterns.columns_mut(41, 41).copy_from(&inverted);
+    capture.patterns = patterns;
+    capture.light = vec![scene.photograph(&capture.patterns)];
+    capture.roles = vec![Role::Bernoulli; 82];
+    for method_name in Method::ALL {
+        let (found, _) = capture.solve(&method(method_name)).unwrap();
+        let error = closed_loop(&found, &scene, (6, 8));
+        assert!(error < 0.03, "{method_name} {error}");
+    }
+}
+
+#[test]
+fn a_grid_may_be_one_cell_or_one_line() {
+    for size in [(1, 1), (1, 5), (5, 1), (1, 40), (33, 1)] {
+        let scene = corner(size.0, size.1);
+        let capture = Capture::new(&scene, size, 60);
+        for method_name in Method::ALL {
+            let (found, _) = capture.solve(&method(method_name)).unwrap();
+            let error = relative(&inverse(&found, 0), &scene.inverse());
+            assert!(error < 0.02, "{size:?} {method_name}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_flat_scene_has_no_operator() {
+    let scene = Corner::new(6, 1, textured);
+    let capture = Capture::new(&scene, (6, 1), 40);
+    let (found, report) = capture.solved();
+    assert!(found.shared.amax() < 1e-5);
+    let bounds = (1.0 / 0.8, 1.0 / 0.3);
+    assert!(
+        found.channels[0]
+            .gain
+            .iter()
+            .all(|g| (bounds.0..bounds.1).contains(g))
+    );
+    // diag(g) alone: largest over smallest gain.
+    let gains = found.channels[0].gain.iter();
+    let spread = gains.clone().fold(0.0, |a: f64, g| a.max(*g))
+        / gains.fold(f64::INFINITY, |a: f64, g| a.min(*g));
+    assert!((report.condition / spread - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn a_measurement_that_is_not_a_number_is_named() {
+    let mut capture = Capture::new(&corner(3, 4), (3, 4), 20);
+    capture.light[0][(7, 5)] = f64::NAN;
+    let place = SolveError::NotFinite {
+        what: "light",
+        cell: 7,
+        photograph: 5,
+        channel: 0,
+    };
+    assert_eq!(capture.error(), place);
+    capture.light[0][(7, 5)] = 0.5;
+    capture.patterns[(2, 1)] = f64::INFINITY;
+    assert!(matches!(
+        capture.error(),
+        SolveError::NotFinite {
+            what: "pattern",
+            cell: 2,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn too_few_photographs_are_refused_with_the_least_number() {
+    let capture = Capture::new(&corner(3, 4), (3, 4), 6);
+    let error = capture.error();
+    assert_eq!(
+        error.to_string().matches("at least 8").count(),
+        1,
+        "{error}"
+    );
+    assert!(
+        Capture::new(&corner(3, 4), (3, 4), 7)
+            .solve(&SolveOptions::default())
+            .is_ok()
+    );
+}
+
+#[test]
+fn gray_code_does_not_count_for_the_papers_method() {
+    let mut capture = Capture::new(&corner(3, 4), (3, 4), 12);
+    for role in &mut capture.roles[1..8] {
+        *role = Role::Row {
+            bit: 0,
+            inverse: false,
+        };
+    }
+    let error = capture.solve(&method(Method::Direct)).unwrap_err();
+    assert!(matches!(
+        error,
+        SolveError::TooFewPhotographs {
+            given: 6,
+            least: 8,
+            ..
+        }
+    ));
+    assert!(capture.solve(&SolveOptions::default()).is_ok());
+}
+
+#[test]
+fn a_dark_capture_is_refused() {
+    let mut capture = Capture::new(&corner(3, 4), (3, 4), 20);
+    capture.light[0].fill(0.0);
+    assert_eq!(capture.error(), SolveError::NoLiveCells { cells: 12 });
+}
+
+#[test]
+fn sizes_that_disagree_are_refused() {
+    let good = Capture::new(&corner(3, 4), (3, 4), 20);
+    let mut capture = good.clone();
+    capture.roles.pop();
+    assert!(matches!(
+        capture.error(),
+        SolveError::Size {
+            what: "patterns",
+            ..
+        }
+    ));
+    let mut capture = good.clone();
+    capture.light[0] = capture.light[0].rows(0, 11).into_owned();
+    assert!(matches!(
+        capture.error(),
+        SolveError::Size {
+            what: "observations",
+            ..
+        }
+    ));
+    let mut capture = good;
+    capture.light.push(capture.light[0].clone());
+    assert_eq!(capture.error(), SolveError::Channels { given: 2 });
+}
+
+#[test]
+fn options_that_make_no_sense_are_refused() {
+    let capture = Capture::new(&corner(3, 4), (3, 4), 20);
+    let default = SolveOptions::default();
+    for (name, options) in [
+        (
+            "lambda",
+            SolveOptions {
+                lambda: Some(f64::NAN),
+                ..default.clone()
+            },
+        ),
+        (
+            "lambda",
+            SolveOptions {
+                lambda: Some(-1.0),
+                ..default.clone()
+            },
+        ),
+        (
+            "tolerance",
+            SolveOptions {
+                tolerance: 0.0,
+                ..default.clone()
+            },
+        ),
+        (
+            "iterations",
+            SolveOptions {
+                iterations: 0,
+                ..default.clone()
+            },
+        ),
+    ] {
+        let error = capture.solve(&options).unwrap_err();
+        assert!(matches!(error, SolveError::Option { option, .. } if option == name));
+    }
+}
+
+#[test]
+fn an_iteration_cut_short_is_no_answer() {
+    let capture = Capture::new(&corner(6, 8), (6, 8), 40);
+    let options = SolveOptions {
+        iterations: 1,
+        lambda: Some(0.01),
+        ..SolveOptions::default()
+    };
+    let mut few = capture;
+    // Nothing held out, hence nothing to start from.
+    few.roles.fill(Role::White);
+    let error = few.solve(&options).unwrap_err();
+    assert!(
+        matches!(error, SolveError::DidNotConverge { iterations: 1, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn photographs_of_other_patterns_are_not_taken_for_an_inverse() {
+    let mut capture = Capture::new(&corner(6, 8), (6, 8), 60);
+    // Every photograph is of the pattern before.
+    let last = capture.patterns.ncols() - 1;
+    for k in (2..=last).rev() {
+        let before = capture.patterns.column(k - 1).into_owned();
+        capture.patterns.set_column(k, &before);
+    }
+    match capture.solve(&SolveOptions::default()) {
+        Ok((_, report)) => {
+            let prediction = report.prediction.unwrap();
+            assert!(prediction.compensated > 0.2, "{prediction:?}");
+        }
+        Err(error) => assert!(matches!(
+            error,
+            SolveError::NotPhysical { .. } | SolveError::DidNotConverge { .. }
+        )),
+    }
+}
+
+#[test]
+fn every_method_is_read_back_from_its_name() {
+    for method in Method::ALL {
+        assert_eq!(method.name().parse(), Ok(method));
+    }
+    assert!("two-stage".parse::<Method>().is_err());
+}

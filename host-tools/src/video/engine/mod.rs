@@ -1,0 +1,83 @@
+//! Frames of one size and layout through one table.
+//!
+//! A frame larger than the grid passes twice, in bands of rows spread over the
+//! threads ([`rows`]): once to become light and to be averaged over the cells,
+//! once to become drives and codes. In between the operator works on the grid,
+//! which takes little time beside that. The light is kept from the one to the
+//! other, and the gains of the pixels from frame to frame. A frame of one pixel a
+//! cell goes through [`cells`].
+//!
+//! Averages are sums of integers, so that it does not matter which thread adds
+//! which row, or how many there are.
+
+mod cells;
+mod memory;
+mod rows;
+
+use super::VideoError;
+use super::bands::Bands;
+use cells::Cells;
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{Encoding, FrameError};
+use memory::OperatorMemory;
+use rayon::ThreadPool;
+use rows::FullFrames;
+
+/// Compensates frames of type `P` with a table of `C` channels.
+pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
+    work: Work,
+    operator: OperatorMemory<C>,
+    path: Path<'t, 'a, P, C>,
+}
+
+/// What frames there will be and what is to be done to them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Work {
+    pub(super) size: FrameSize,
+    /// Colours of a pixel: as many as the table has channels, or three for a table
+    /// of one, which is then used for each of them.
+    pub(super) colours: usize,
+    pub(super) tier: u8,
+    pub(super) encoding: Encoding,
+}
+
+enum Path<'t, 'a, P: Bands, const C: usize> {
+    /// One pixel a cell.
+    Cells(Cells<'t, 'a, P::Code, C>),
+    /// More.
+    Full(Box<FullFrames<'t, 'a, P, C>>),
+}
+
+impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
+    /// Sizes everything for the frames to come and expands the gains.
+    ///
+    /// # Errors
+    /// [`FrameError`] if the frame is smaller than the grid, or the table has not
+    /// `C` channels.
+    pub(super) fn new(
+        table: &'t Table<'a>,
+        threads: &'t ThreadPool,
+        work: Work,
+    ) -> Result<Self, FrameError> {
+        let path = if work.size == FrameSize::of_grid(table.grid()) {
+            Path::Cells(Cells::new(table, &work)?)
+        } else {
+            Path::Full(Box::new(FullFrames::new(table, threads, &work)?))
+        };
+        Ok(Self {
+            work,
+            operator: OperatorMemory::new(table),
+            path,
+        })
+    }
+
+    /// Compensates a frame in place; returns how many samples were clipped.
+    pub(super) fn compensate(&mut self, frame: &mut P) -> Result<u64, VideoError> {
+        let clipped = match &mut self.path {
+            Path::Cells(cells) => cells.compensate(&self.work, &mut self.operator, frame),
+            Path::Full(full) => full.compensate(&self.work, &mut self.operator, frame),
+        };
+        clipped.map_err(VideoError::Runtime)
+    }
+}

@@ -1,0 +1,243 @@
+//! Frames larger than the grid, in bands of rows.
+
+#![allow(
+    clippy::inline_always,
+    reason = "compiled into `engine::rows`, which chooses the processor's instructions"
+)]
+
+use super::super::bands::{Band, Bands, STRIP};
+use super::super::curves::{Code, Curves};
+use super::Work;
+use super::memory::{BandMemory, Memories, OperatorMemory, RowMemory};
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{FrameError, FullPipeline};
+use iltm_runtime::units::Light;
+use pulp::{Arch, NullaryFnOnce};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+/// Rows that a thread takes at a time: few enough that the threads end together,
+/// many enough that taking them costs nothing.
+const BAND_ROWS: usize = 16;
+
+/// Compensates frames larger than the grid.
+pub(super) struct FullFrames<'t, 'a, P: Bands, const C: usize> {
+    stages: Stages<'t, 'a, P::Code, C>,
+    threads: &'t ThreadPool,
+    arch: Arch,
+    memories: Memories<P::Code, P::Memory, C>,
+    /// Light without ambient: row by row, in a row colour by colour.
+    light: Vec<Light>,
+    sums: Vec<[u64; C]>,
+    /// Of the cells, for each group of `C` colours.
+    corrections: Vec<Vec<[i32; C]>>,
+}
+
+/// What is done to every row.
+struct Stages<'t, 'a, S: Code, const C: usize> {
+    pipeline: FullPipeline<'t, 'a, C>,
+    /// Colours of a pixel.
+    colours: usize,
+    curves: Curves<S>,
+    /// Gains of every pixel: row by row, in a row channel by channel.
+    gains: Vec<u16>,
+}
+
+impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
+    pub(super) fn new(
+        table: &'t Table<'a>,
+        threads: &'t ThreadPool,
+        work: &Work,
+    ) -> Result<Self, FrameError> {
+        let pipeline = FullPipeline::new(table, work.size)?;
+        let (cells, pixels) = (table.grid().cells(), work.size.pixels());
+        Ok(Self {
+            stages: Stages {
+                pipeline,
+                colours: work.colours,
+                curves: Curves::new(table, work.encoding),
+                gains: threads.install(|| expand_gains(&pipeline)),
+            },
+            threads,
+            arch: Arch::new(),
+            memories: Memories::new(pipeline.line_len(), cells, *work),
+            light: vec![Light::ZERO; pixels * work.colours],
+            sums: vec![[0; C]; cells],
+            corrections: vec![vec![[0; C]; cells]; work.colours / C],
+        })
+    }
+
+    /// Compensates a frame in place; returns how many samples were clipped.
+    pub(super) fn compensate(
+        &mut self,
+        work: &Work,
+        operator: &mut OperatorMemory<C>,
+        frame: &mut P,
+    ) -> Result<u64, FrameError> {
+        self.read(frame);
+        for (group, values) in self.corrections.iter_mut().enumerate() {
+            self.memories.take_sums(group, &mut self.sums);
+            let mut workspace = operator.workspace(values);
+            self.stages
+                .pipeline
+                .correct(work.tier, &self.sums, &mut workspace)?;
+        }
+        Ok(self.write(frame))
+    }
+
+    /// Elements of the light, the codes and the drives of a band.
+    fn band_len(&self) -> usize {
+        BAND_ROWS * self.stages.row_len()
+    }
+
+    fn read(&mut self, frame: &mut P) {
+        let band_len = self.band_len();
+        let (stages, arch, memories) = (&self.stages, self.arch, &self.memories);
+        let light = &mut self.light;
+        self.threads.install(|| {
+            let bands = frame.bands(BAND_ROWS).into_par_iter();
+            let bands = bands.zip(light.par_chunks_mut(band_len)).enumerate();
+            bands.for_each(|(index, (band, light))| {
+                let first_row = BAND_ROWS * index;
+                memories.lend(|memory| {
+                    arch.dispatch(ReadBand {
+                        stages,
+                        first_row,
+                        band: &band,
+                        light,
+                        memory,
+                    });
+                });
+            });
+        });
+    }
+
+    fn write(&self, frame: &mut P) -> u64 {
+        let (stages, arch, memories) = (&self.stages, self.arch, &self.memories);
+        let corrections = &self.corrections;
+        self.threads.install(|| {
+            let bands = frame.bands(BAND_ROWS).into_par_iter();
+            let bands = bands
+                .zip(self.light.par_chunks(self.band_len()))
+                .enumerate();
+            let clipped = bands.map(|(index, (mut band, light))| {
+                let first_row = BAND_ROWS * index;
+                memories.lend(|memory| {
+                    arch.dispatch(WriteBand {
+                        stages,
+                        first_row,
+                        light,
+                        corrections,
+                        band: &mut band,
+                        memory,
+                    })
+                })
+            });
+            clipped.sum()
+        })
+    }
+}
+
+impl<S: Code, const C: usize> Stages<'_, '_, S, C> {
+    /// Samples of a row.
+    fn row_len(&self) -> usize {
+        self.pipeline.frame().width() * self.colours
+    }
+}
+
+/// From the samples of a band to its light, which is added to the sums.
+///
+/// A struct with a method and not a closure, because only a method can be made to
+/// be compiled into its caller, which is what makes it use the processor's widest
+/// vectors; so is all that it calls.
+struct ReadBand<'w, 't, 'a, B: Band, const C: usize> {
+    stages: &'w Stages<'t, 'a, B::Code, C>,
+    first_row: usize,
+    band: &'w B,
+    light: &'w mut [Light],
+    memory: &'w mut BandMemory<B::Code, B::Memory, C>,
+}
+
+impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (stages, memory) = (self.stages, self.memory);
+        let (width, colours) = (stages.pipeline.frame().width(), stages.colours);
+        let strips = self.light.chunks_mut(STRIP * stages.row_len());
+        for (strip, light) in strips.enumerate() {
+            let codes = &mut memory.codes[..light.len()];
+            self.band.unpack(strip, &mut memory.conversion, codes);
+            let lines = codes.chunks_exact(width).zip(light.chunks_exact_mut(width));
+            for (line, (codes, light)) in lines.enumerate() {
+                let y = self.first_row + STRIP * strip + line / colours;
+                let (group, channel) = (line % colours / C, line % colours % C);
+                let (mut row, _) = memory.row.split();
+                stages.curves.decode(codes, light);
+                stages.pipeline.remove_ambient(y, channel, light, &mut row);
+                let sums = &mut memory.sums[group];
+                stages.pipeline.average_row(y, channel, light, sums);
+            }
+        }
+    }
+}
+
+/// From the light of a band to its samples; returns how many were clipped. A
+/// struct for the same reason as [`ReadBand`].
+struct WriteBand<'w, 't, 'a, B: Band, const C: usize> {
+    stages: &'w Stages<'t, 'a, B::Code, C>,
+    first_row: usize,
+    light: &'w [Light],
+    corrections: &'w [Vec<[i32; C]>],
+    band: &'w mut B,
+    memory: &'w mut BandMemory<B::Code, B::Memory, C>,
+}
+
+impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn call(self) -> u64 {
+        let (stages, memory) = (self.stages, self.memory);
+        let (width, colours) = (stages.pipeline.frame().width(), stages.colours);
+        let strips = self.light.chunks(STRIP * stages.row_len());
+        let mut clipped = 0;
+        for (strip, light) in strips.enumerate() {
+            let codes = &mut memory.codes[..light.len()];
+            let lines = codes.chunks_exact_mut(width).zip(light.chunks_exact(width));
+            for (line, (codes, light)) in lines.enumerate() {
+                let y = self.first_row + STRIP * strip + line / colours;
+                let (group, channel) = (line % colours / C, line % colours % C);
+                let gain = &stages.gains[(y * C + channel) * width..][..width];
+                let (mut row, drives) = memory.row.split();
+                clipped += u64::from(stages.pipeline.finish_row(
+                    y,
+                    channel,
+                    (light, gain),
+                    &self.corrections[group],
+                    &mut row,
+                    drives,
+                ));
+                stages.curves.encode(channel, drives, codes);
+            }
+            self.band.pack(strip, &mut memory.conversion, codes);
+        }
+        clipped
+    }
+}
+
+/// Gains of every pixel: row by row, in a row channel by channel.
+fn expand_gains<const C: usize>(pipeline: &FullPipeline<'_, '_, C>) -> Vec<u16> {
+    let (size, line) = (pipeline.frame(), pipeline.line_len());
+    let mut gains = vec![0; C * size.pixels()];
+    let rows = gains.par_chunks_mut(size.width()).enumerate();
+    rows.for_each_init(
+        || RowMemory::new(line, size.width()),
+        |memory, (index, gains)| {
+            let (mut row, _) = memory.split();
+            pipeline.gain_row(index / C, index % C, &mut row, gains);
+        },
+    );
+    gains
+}

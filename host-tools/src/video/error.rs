@@ -1,0 +1,102 @@
+//! Why frames could not be compensated.
+
+use super::png::PngError;
+use super::y4m::Y4mError;
+use iltm_runtime::pipeline::FrameError;
+use iltm_runtime::{FrameSize, Grid};
+use std::path::PathBuf;
+
+/// Why frames could not be compensated. Every case carries its place;
+/// [`VideoError::next_step`] says what to do about it.
+#[derive(Debug, thiserror::Error)]
+pub enum VideoError {
+    /// A file could not be opened or put in its place.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The input could not be read.
+    #[error("reading the input: {source}")]
+    Read {
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The input is of no kind that is read here.
+    #[error("the input begins neither like a PNG picture nor like a Y4M stream")]
+    UnknownFormat,
+    /// A Y4M stream is at fault.
+    #[error(transparent)]
+    Y4m(#[from] Y4mError),
+    /// A PNG picture is at fault.
+    #[error(transparent)]
+    Png(#[from] PngError),
+    /// The frame has fewer pixels than the table has cells, along a side.
+    #[error("the frame, {frame}, is smaller than the table's grid of {} x {} cells",
+        grid.cols(), grid.rows())]
+    SmallerThanGrid {
+        /// Size of the frame.
+        frame: FrameSize,
+        /// Grid of the table: rows, then columns.
+        grid: Grid,
+    },
+    /// A colour table gives grey light a coloured input, which a grey frame has
+    /// no room for.
+    #[error(
+        "the frame is grey, but the table drives three colours, which a grey frame cannot hold"
+    )]
+    GreyFrame,
+    /// The table has no such tier.
+    #[error("the table has tiers 0 to {top}, not {tier}")]
+    NoSuchTier {
+        /// The tier asked for.
+        tier: u8,
+        /// The table's top tier.
+        top: u8,
+    },
+    /// The threads that work on the rows could not be started.
+    #[error("starting {threads} threads: {reason}")]
+    Threads {
+        /// Threads asked for, 0 for one a core.
+        threads: usize,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// The runtime refuses the frame.
+    #[error("the runtime refuses the frame: {0}")]
+    Runtime(FrameError),
+}
+
+impl VideoError {
+    /// What to do about it.
+    #[must_use]
+    pub const fn next_step(&self) -> &'static str {
+        match self {
+            Self::File { .. } => {
+                "Check that the file and its folder exist, may be used, and that the disk has room."
+            }
+            Self::Read { .. } => "Check that the input can be read to its end.",
+            Self::UnknownFormat => {
+                "Convert it: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`, or save the picture as PNG."
+            }
+            Self::Y4m(error) => error.next_step(),
+            Self::Png(error) => error.next_step(),
+            Self::SmallerThanGrid { .. } => {
+                "Scale the frames up to the projector's own size, or at least to one pixel a cell."
+            }
+            Self::GreyFrame => {
+                "Convert it to colour: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`, or save the \
+                 picture as RGB."
+            }
+            Self::NoSuchTier { .. } => {
+                "Ask for a tier that `iltm inspect` lists, or for none, to use the top one."
+            }
+            Self::Threads { .. } => "Ask for fewer threads.",
+            Self::Runtime(_) => {
+                "Please report this with the table and the first frame: it should never get here."
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Reading, working and writing at the same time.
+//!
+//! Three threads pass a fixed number of frames round: one reads into them, the
+//! caller's works on them in place, one writes them out. So a pipe that is slow
+//! for a moment stops nobody, and memory does not depend on the stream's length.
+
+use super::VideoError;
+use super::y4m::{Frame, Header, Reader, Writer, Y4mError};
+use std::io::{Read, Write};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+/// Frames that go round: one with each thread, and one waiting between them.
+const FRAMES: usize = 5;
+
+/// Sends every frame of `reader` through `work` to `output`, in order; returns
+/// how many.
+///
+/// # Errors
+/// What reading, `work` or writing returns. What came before it has been written.
+pub(super) fn run<R: Read + Send, W: Write + Send>(
+    reader: Reader<R>,
+    output: W,
+    mut work: impl FnMut(&mut Frame) -> Result<(), VideoError>,
+) -> Result<u64, VideoError> {
+    let header = reader.header().clone();
+    let (free, empty) = sync_channel(FRAMES);
+    let (filled, read) = sync_channel(FRAMES);
+    let (finished, done) = sync_channel(FRAMES);
+    for _ in 0..FRAMES {
+        // The channel has room for all, and its other end is here.
+        let _ = free.send(Frame::default());
+    }
+    thread::scope(|scope| {
+        let reading = scope.spawn(move || read_all(reader, &empty, &filled));
+        let writing = scope.spawn(move || write_all(output, &header, &done, &free));
+        let mut frames = 0;
+        let mut worked = Ok(());
+        for mut frame in read {
+            worked = work(&mut frame);
+            if worked.is_err() || finished.send(frame).is_err() {
+                break;
+            }
+            frames += 1;
+        }
+        drop(finished);
+        finish(writing.join())?;
+        finish(reading.join())?;
+        worked.map(|()| frames)
+    })
+}
+
+fn finish(result: thread::Result<Result<(), Y4mError>>) -> Result<(), Y4mError> {
+    result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// Reads until the end, an error, or nobody takes frames any more.
+fn read_all<R: Read>(
+    mut reader: Reader<R>,
+    empty: &Receiver<Frame>,
+    filled: &SyncSender<Frame>,
+) -> Result<(), Y4mError> {
+    for mut frame in empty {
+        if !reader.read_frame(&mut frame)? || filled.send(frame).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Writes until there are no more frames, or an error.
+fn write_all<W: Write>(
+    output: W,
+    header: &Header,
+    done: &Receiver<Frame>,
+    free: &SyncSender<Frame>,
+) -> Result<(), Y4mError> {
+    let mut writer = Writer::new(output, header)?;
+    for frame in done {
+        writer.write_frame(&frame)?;
+        // The reader may have come to the end and need no more.
+        let _ = free.send(frame);
+    }
+    writer.finish().map(drop)
+}

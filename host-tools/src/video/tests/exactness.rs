@@ -1,0 +1,96 @@
+//! What must not change a single bit.
+
+use super::*;
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn gain_one_and_nothing_else_returns_the_picture(
+        (rows, cols) in (1_u16..9, 1_u16..9),
+        (width, height) in (0_u16..40, 0_u16..40),
+        (table_channels, channels) in prop::sample::select(vec![(1, 1), (1, 3), (3, 3)]),
+        wide: bool,
+        seed: u64,
+    ) {
+        // Light has 15 bits: of 16-bit codes every second comes back.
+        let grid = grid(rows, cols);
+        let mut picture = random_picture(size(width + cols, height + rows), channels, wide, seed);
+        if let Samples::Sixteen(samples) = picture.samples_mut() {
+            for sample in samples {
+                let light = (u32::from(*sample) * 32_768 + 32_767) / 65_535;
+                *sample = ((light * 65_535 + 16_384) >> 15) as u16;
+            }
+        }
+        let table = SampleTable::identity(grid, table_channels);
+        let (result, summary) = compensated(&table, settings(Encoding::Linear), &picture).unwrap();
+        prop_assert_eq!(result, picture);
+        prop_assert_eq!(summary.clipped, 0);
+    }
+
+    #[test]
+    fn the_number_of_threads_changes_nothing(
+        (width, height) in (21_u16..90, 13_u16..90),
+        (table_channels, channels) in prop::sample::select(vec![(1, 1), (1, 3), (3, 3)]),
+        wide: bool,
+        seed: u64,
+    ) {
+        let table = SampleTable::random(grid(13, 21), table_channels, 5, seed);
+        let picture = random_picture(size(width, height), channels, wide, seed);
+        let by = |threads| {
+            let settings = Settings { threads, ..Settings::default() };
+            compensated(&table, settings, &picture).unwrap()
+        };
+        let one = by(1);
+        prop_assert!(one.0 != picture);
+        for threads in [2, 3, 8] {
+            prop_assert_eq!(&by(threads), &one);
+        }
+    }
+}
+
+#[test]
+fn display_codes_come_back_through_a_projector_that_undoes_them() {
+    let mut table = SampleTable::identity(grid(4, 4), 3);
+    table.response = Some(sample_table::srgb_response());
+    let ramp = (0..=255)
+        .flat_map(|code: u8| [code, 255 - code, code / 2])
+        .collect();
+    let picture = Picture::new(size(16, 16), Samples::Eight(ramp)).unwrap();
+    let (result, _) = compensated(&table, Settings::default(), &picture).unwrap();
+    assert_eq!(result, picture);
+}
+
+#[test]
+fn a_frame_of_one_pixel_a_cell_is_what_the_full_resolution_way_makes_of_it() {
+    // The same cells, once as they are and once each as four pixels: averages are
+    // those of the cells, and with gains and ambient light alike everywhere, and
+    // no operator but the constant, nothing depends on the place within a cell.
+    let grid = grid(6, 10);
+    let mut table = SampleTable::identity(grid, 3);
+    table.gains.fill(5000);
+    table.ambient = Some(vec![321; table.gains.len()]);
+    table.response = Some(sample_table::srgb_response());
+    table.row_shifts = vec![4; grid.cells()];
+    let constant = grid.cells() as u16 - 1;
+    table.tiers = vec![vec![(constant, constant, 1500)]];
+    let small = random_picture(size(10, 6), 3, false, 7);
+    let Samples::Eight(samples) = small.samples() else {
+        panic!("a picture of bytes");
+    };
+    let doubled = |samples: &[u8]| -> Vec<u8> {
+        let rows = samples.chunks(30).flat_map(|row| [row, row]);
+        rows.flat_map(|row| row.chunks(3).flat_map(|pixel| [pixel, pixel]))
+            .flatten()
+            .copied()
+            .collect()
+    };
+    let large = Picture::new(size(20, 12), Samples::Eight(doubled(samples))).unwrap();
+    let (small, _) = compensated(&table, Settings::default(), &small).unwrap();
+    let (large, _) = compensated(&table, Settings::default(), &large).unwrap();
+    let Samples::Eight(samples) = small.samples() else {
+        panic!("a picture of bytes");
+    };
+    assert_eq!(large.samples(), &Samples::Eight(doubled(samples)));
+}

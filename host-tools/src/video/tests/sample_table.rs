@@ -1,0 +1,220 @@
+//! Tables made up for tests and benches: gains, ambient light and operators that
+//! exercise every stage, without a scene behind them.
+//!
+//! The bench includes this file too, so it takes the writer from its parent.
+
+use super::ImageWriter;
+use fixed::types::U1F15;
+use iltm_runtime::Grid;
+use iltm_runtime::haar::Basis;
+use iltm_runtime::image::layout::{SectionKind, meta, segment, tier};
+use iltm_runtime::operator::{Channels, Operator, Segment};
+use iltm_runtime::pipeline::{RESPONSE_KNOTS, knot_drive};
+use std::ops::Range;
+
+/// What a table is to hold.
+#[derive(Clone)]
+pub(crate) struct SampleTable {
+    pub(crate) grid: Grid,
+    pub(crate) channels: usize,
+    /// Of every cell and channel.
+    pub(crate) gain_fraction: u8,
+    pub(crate) gains: Vec<u16>,
+    pub(crate) ambient: Option<Vec<u16>>,
+    pub(crate) response: Option<Vec<u16>>,
+    /// Rows, columns, gains.
+    pub(crate) fine_gains: Option<(u16, u16, Vec<u16>)>,
+    /// Of every operator row; none without an operator.
+    pub(crate) row_shifts: Vec<u8>,
+    /// Row, column, value of the entries that each tier above 0 adds.
+    pub(crate) tiers: Vec<Vec<(u16, u16, i16)>>,
+    pub(crate) channel_scales: [U1F15; 3],
+}
+
+impl SampleTable {
+    /// Gain 1, and nothing else.
+    pub(crate) fn identity(grid: Grid, channels: usize) -> Self {
+        let mut channel_scales = [U1F15::ZERO; 3];
+        channel_scales[..channels].fill(U1F15::ONE);
+        Self {
+            grid,
+            channels,
+            gain_fraction: 12,
+            gains: vec![1 << 12; grid.cells() * channels],
+            ambient: None,
+            response: None,
+            fine_gains: None,
+            row_shifts: Vec::new(),
+            tiers: Vec::new(),
+            channel_scales,
+        }
+    }
+
+    /// Gains between .7 and 1.3, some ambient light, a response like sRGB, fine
+    /// gains four times finer than the cells, and an operator of two tiers with
+    /// `entries` entries a row.
+    pub(crate) fn random(grid: Grid, channels: usize, entries: usize, seed: u64) -> Self {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut gains = |cells: usize| -> Vec<u16> {
+            let gain = || ((0.7 + 0.6 * random.f64()) * 4096.0) as u16;
+            std::iter::repeat_with(gain)
+                .take(cells * channels)
+                .collect()
+        };
+        let (fine_rows, fine_cols) = (4 * grid.rows(), 4 * grid.cols());
+        let mut table = Self::identity(grid, channels);
+        table.gains = gains(grid.cells());
+        table.fine_gains = Some((
+            fine_rows as u16,
+            fine_cols as u16,
+            gains(fine_rows * fine_cols),
+        ));
+        let ambient = || random.u16(0..600);
+        table.ambient = Some(
+            std::iter::repeat_with(ambient)
+                .take(table.gains.len())
+                .collect(),
+        );
+        table.response = Some(srgb_response());
+        if channels == 3 {
+            table.channel_scales[1] = U1F15::from_num(0.9);
+        }
+        let basis = Basis::new(grid);
+        table.row_shifts = vec![6; grid.cells()];
+        table.tiers = vec![Vec::new(); 2];
+        for (row, function) in basis.functions().enumerate() {
+            let most = (12_000 / function.peak() / entries as u64).max(1) as i16;
+            let mut cols: Vec<u16> = (0..entries)
+                .map(|_| random.u16(..grid.cells() as u16))
+                .collect();
+            cols.sort_unstable();
+            cols.dedup();
+            for col in cols {
+                let value = random.i16(-most..=most);
+                table.tiers[usize::from(random.bool())].push((row as u16, col, value));
+            }
+        }
+        table
+    }
+
+    /// The bytes of the image.
+    pub(crate) fn image(&self) -> Vec<u8> {
+        let segments: Vec<Vec<u8>> = self.tiers.iter().map(|tier| words(tier)).collect();
+        let basis = Basis::new(self.grid);
+        let operator = (!self.row_shifts.is_empty()).then(|| {
+            let segments = (1..).zip(&segments).map(|(tier, bytes)| {
+                let index = usize::from(tier) - 1;
+                Segment::new(index, tier, Channels::All, bytes).expect("whole words")
+            });
+            Operator::new(
+                &basis,
+                segments.collect(),
+                &self.row_shifts,
+                self.channel_scales,
+            )
+            .expect("a sample operator does not overflow")
+        });
+        let mut writer = ImageWriter::default();
+        writer.section(SectionKind::Meta, 0, self.meta(operator.as_ref()));
+        let tiers = (0..=self.tiers.len() as u8).flat_map(|number| {
+            let mut entry = vec![0; tier::SIZE];
+            let cost = operator.as_ref().map_or((0, 0), |operator| {
+                operator.cost(number, self.channels as u8)
+            });
+            put(&mut entry, tier::ENTRIES, &cost.0.to_le_bytes());
+            put(&mut entry, tier::MULTIPLICATIONS, &cost.1.to_le_bytes());
+            entry
+        });
+        writer.section(SectionKind::Tiers, 0, tiers.collect());
+        writer.section(SectionKind::Gain, 0, halfwords(&self.gains));
+        if let Some(ambient) = &self.ambient {
+            writer.section(SectionKind::Ambient, 0, halfwords(ambient));
+        }
+        if let Some(response) = &self.response {
+            writer.section(SectionKind::Response, 0, halfwords(response));
+        }
+        if let Some((rows, cols, gains)) = &self.fine_gains {
+            let bytes = [halfwords(&[*rows, *cols]), halfwords(gains)].concat();
+            writer.section(SectionKind::FineGain, 0, bytes);
+        }
+        if operator.is_some() {
+            writer.section(SectionKind::RowShifts, 0, self.row_shifts.clone());
+            for (selector, bytes) in (1..).zip(segments.clone()) {
+                writer.section(SectionKind::Operator, selector, bytes);
+            }
+        }
+        writer.finish()
+    }
+
+    fn meta(&self, operator: Option<&Operator<'_>>) -> Vec<u8> {
+        let mut head = vec![0; meta::SIZE];
+        put(
+            &mut head,
+            meta::ROWS,
+            &(self.grid.rows() as u16).to_le_bytes(),
+        );
+        put(
+            &mut head,
+            meta::COLS,
+            &(self.grid.cols() as u16).to_le_bytes(),
+        );
+        head[meta::CHANNELS] = self.channels as u8;
+        head[meta::GAIN_FRACTION] = self.gain_fraction;
+        put(
+            &mut head,
+            meta::REFERENCE_WHITE,
+            &(1_u32 << 23).to_le_bytes(),
+        );
+        let scales: Vec<u16> = self.channel_scales.iter().map(|s| s.to_bits()).collect();
+        put(&mut head, meta::CHANNEL_SCALES, &halfwords(&scales));
+        if let Some(operator) = operator {
+            let bounds = operator.bounds();
+            put(
+                &mut head,
+                meta::ACCUMULATOR_BOUND,
+                &bounds.accumulator.to_le_bytes(),
+            );
+            put(
+                &mut head,
+                meta::CORRECTION_BOUND,
+                &bounds.correction.to_le_bytes(),
+            );
+        }
+        head
+    }
+}
+
+/// Codes of a projector that undoes sRGB.
+pub(crate) fn srgb_response() -> Vec<u16> {
+    let code = |knot: usize| {
+        let drive = knot_drive(knot).to_num::<f64>();
+        let value = if drive <= 0.003_130_8 {
+            12.92 * drive
+        } else {
+            1.055 * drive.powf(1.0 / 2.4) - 0.055
+        };
+        (value * 65_535.0).round() as u16
+    };
+    (0..RESPONSE_KNOTS).map(code).collect()
+}
+
+fn words(entries: &[(u16, u16, i16)]) -> Vec<u8> {
+    let mut words = Vec::new();
+    for row in entries.chunk_by(|a, b| a.0 == b.0) {
+        words.push(segment::word(row[0].0, row.len() as u16));
+        let entries = row.iter();
+        words.extend(entries.map(|(_, col, value)| segment::word(*col, value.cast_unsigned())));
+    }
+    words.concat()
+}
+
+fn halfwords(values: &[u16]) -> Vec<u8> {
+    values
+        .iter()
+        .flat_map(|value| value.to_le_bytes())
+        .collect()
+}
+
+fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
+    bytes[field].copy_from_slice(value);
+}

@@ -1,0 +1,257 @@
+//! The stream header: one line of tags.
+
+use super::super::MAX_PIXELS;
+use super::Y4mError;
+use iltm_runtime::FrameSize;
+
+/// First bytes of every stream.
+pub(super) const MAGIC: &[u8] = b"YUV4MPEG2";
+
+/// Longest stream header in bytes, its newline included. `FFmpeg` reads at most
+/// 128; comments may be longer.
+pub(super) const MAX_HEADER: usize = 4096;
+
+/// How many chroma samples there are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Sampling {
+    /// None: the luma plane is all there is.
+    Mono,
+    /// One for every square of 2 x 2 pixels; an odd last row or column has its
+    /// own.
+    Chroma420,
+    /// One for every pixel.
+    Chroma444,
+}
+
+/// Which codes are black and white.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Range {
+    /// Luma 16 to 235, chroma 16 to 240.
+    Limited,
+    /// 0 to 255.
+    Full,
+}
+
+/// A stream header that has been read.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Header {
+    line: Vec<u8>,
+    size: FrameSize,
+    sampling: Sampling,
+    range: Range,
+}
+
+impl Header {
+    /// A header for progressive video with square pixels.
+    ///
+    /// `rate` is the frame rate as a fraction.
+    #[must_use]
+    pub fn new(size: FrameSize, rate: (u32, u32), sampling: Sampling, range: Range) -> Self {
+        let colour = match sampling {
+            Sampling::Mono => "mono",
+            Sampling::Chroma420 => "420jpeg",
+            Sampling::Chroma444 => "444",
+        };
+        let name = match range {
+            Range::Limited => "LIMITED",
+            Range::Full => "FULL",
+        };
+        let line = format!(
+            "YUV4MPEG2 W{} H{} F{}:{} Ip A1:1 C{colour} XCOLORRANGE={name}",
+            size.width(),
+            size.height(),
+            rate.0,
+            rate.1,
+        );
+        Self {
+            line: line.into_bytes(),
+            size,
+            sampling,
+            range,
+        }
+    }
+
+    /// Reads a header from its line, without the newline.
+    ///
+    /// # Errors
+    /// [`Y4mError`] if a tag is malformed, missing, there twice, or says what
+    /// this reader does not support.
+    ///
+    /// # Fuzzing
+    /// Total: any bytes give a header or an error.
+    pub fn parse(line: &[u8]) -> Result<Self, Y4mError> {
+        let tags = line.strip_prefix(MAGIC).ok_or(Y4mError::NotY4m)?;
+        if !matches!(tags.first(), None | Some(b' ')) {
+            return Err(Y4mError::NotY4m);
+        }
+        let mut fields = Fields::default();
+        let mut offset = MAGIC.len() as u64;
+        for bytes in tags.split(|byte| *byte == b' ') {
+            fields.read(Tag { bytes, offset })?;
+            offset += bytes.len() as u64 + 1;
+        }
+        let side = |tag, value: Option<u64>| value.ok_or(Y4mError::NoSize { tag });
+        let (width, height) = (side('W', fields.width)?, side('H', fields.height)?);
+        let sampling = fields.sampling.unwrap_or(Sampling::Chroma420);
+        let default_range = match sampling {
+            Sampling::Mono => Range::Full,
+            Sampling::Chroma420 | Sampling::Chroma444 => Range::Limited,
+        };
+        Ok(Self {
+            line: line.to_vec(),
+            size: size(width, height)?,
+            sampling,
+            range: fields.range.unwrap_or(default_range),
+        })
+    }
+
+    /// The line as it was read, without the newline.
+    #[must_use]
+    pub fn line(&self) -> &[u8] {
+        &self.line
+    }
+
+    /// The size of every frame.
+    #[must_use]
+    pub const fn size(&self) -> FrameSize {
+        self.size
+    }
+
+    /// How chroma is sampled.
+    #[must_use]
+    pub const fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Which codes are black and white.
+    #[must_use]
+    pub const fn range(&self) -> Range {
+        self.range
+    }
+
+    /// Width and height of each chroma plane; zero without chroma.
+    #[must_use]
+    pub const fn chroma(&self) -> (usize, usize) {
+        match self.sampling {
+            Sampling::Mono => (0, 0),
+            Sampling::Chroma420 => (
+                self.size.width().div_ceil(2),
+                self.size.height().div_ceil(2),
+            ),
+            Sampling::Chroma444 => (self.size.width(), self.size.height()),
+        }
+    }
+
+    /// Bytes of a frame's planes, all together.
+    #[must_use]
+    pub const fn frame_bytes(&self) -> usize {
+        let (width, height) = self.chroma();
+        self.size.pixels() + 2 * width * height
+    }
+}
+
+fn size(width: u64, height: u64) -> Result<FrameSize, Y4mError> {
+    let too_large = Y4mError::TooLarge { width, height };
+    let (Ok(narrow_width), Ok(narrow_height)) = (u16::try_from(width), u16::try_from(height))
+    else {
+        return Err(too_large);
+    };
+    match FrameSize::new(narrow_width, narrow_height) {
+        Some(size) if size.pixels() <= MAX_PIXELS => Ok(size),
+        _ => Err(too_large),
+    }
+}
+
+/// One tag of the line.
+#[derive(Clone, Copy)]
+struct Tag<'l> {
+    bytes: &'l [u8],
+    offset: u64,
+}
+
+impl Tag<'_> {
+    fn text(self) -> String {
+        String::from_utf8_lossy(self.bytes).into_owned()
+    }
+
+    fn error(self, reason: &'static str) -> Y4mError {
+        Y4mError::Tag {
+            tag: self.text(),
+            offset: self.offset,
+            reason,
+        }
+    }
+
+    /// Stores what the tag says, unless another did before.
+    fn store<T>(self, slot: &mut Option<T>, value: T) -> Result<(), Y4mError> {
+        match slot.replace(value) {
+            None => Ok(()),
+            Some(_) => Err(self.error("is there for the second time")),
+        }
+    }
+}
+
+/// What the tags say that matters here.
+#[derive(Default)]
+struct Fields {
+    width: Option<u64>,
+    height: Option<u64>,
+    sampling: Option<Sampling>,
+    range: Option<Range>,
+}
+
+impl Fields {
+    fn read(&mut self, tag: Tag<'_>) -> Result<(), Y4mError> {
+        let Some((name, value)) = tag.bytes.split_first() else {
+            return Ok(());
+        };
+        match name {
+            b'W' => tag.store(&mut self.width, side(tag, value)?),
+            b'H' => tag.store(&mut self.height, side(tag, value)?),
+            b'C' => tag.store(&mut self.sampling, sampling(tag, value)?),
+            b'I' => match value {
+                b"p" | b"?" => Ok(()),
+                b"t" | b"b" | b"m" => Err(Y4mError::Interlaced {
+                    tag: tag.text(),
+                    offset: tag.offset,
+                }),
+                _ => Err(tag.error("is not a kind of interlacing")),
+            },
+            b'X' => match value.strip_prefix(b"COLORRANGE=") {
+                Some(b"LIMITED") => tag.store(&mut self.range, Range::Limited),
+                Some(b"FULL") => tag.store(&mut self.range, Range::Full),
+                Some(_) => Err(tag.error("is neither LIMITED nor FULL")),
+                None => Ok(()),
+            },
+            _ => Ok(()),
+        }
+    }
+}
+
+fn side(tag: Tag<'_>, value: &[u8]) -> Result<u64, Y4mError> {
+    if value.is_empty() || !value.iter().all(u8::is_ascii_digit) {
+        return Err(tag.error("is not a number of pixels"));
+    }
+    // More digits than fit are as much too large as the largest that fits.
+    let number = value.iter().fold(0_u64, |number, digit| {
+        number
+            .saturating_mul(10)
+            .saturating_add(u64::from(digit - b'0'))
+    });
+    if number == 0 {
+        return Err(tag.error("is zero; a frame has at least one pixel"));
+    }
+    Ok(number)
+}
+
+fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<Sampling, Y4mError> {
+    match value {
+        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok(Sampling::Chroma420),
+        b"444" => Ok(Sampling::Chroma444),
+        b"mono" => Ok(Sampling::Mono),
+        _ => Err(Y4mError::Colour {
+            tag: tag.text(),
+            offset: tag.offset,
+        }),
+    }
+}

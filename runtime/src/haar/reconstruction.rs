@@ -1,0 +1,76 @@
+//! The exact inverse of the analysis.
+
+use super::ShortSlice;
+use super::basis::Basis;
+use super::level::Pair;
+use super::synthesis::{Rule, descend};
+
+struct Solve;
+
+/// The two halves that have this sum and this detail.
+///
+/// `sum = x + y` and `detail = first_weight x - second_weight y`; the division
+/// leaves no remainder where both came from integer cells.
+fn halves(pair: Pair, sum: i64, detail: i64) -> (i64, i64) {
+    if !pair.splits() {
+        return (sum, 0);
+    }
+    let (first_weight, second_weight) =
+        (i64::from(pair.first_weight), i64::from(pair.second_weight));
+    let first = second_weight
+        .wrapping_mul(sum)
+        .wrapping_add(detail)
+        .checked_div(first_weight + second_weight)
+        .unwrap_or(0);
+    (first, sum.wrapping_sub(first))
+}
+
+impl Rule<i64> for Solve {
+    fn plain(sum: i64, columns: i64, rows: i64, both: i64) -> [i64; 4] {
+        let equal = Pair {
+            first: 1,
+            second: 1,
+            first_weight: 1,
+            second_weight: 1,
+        };
+        Self::weighted(sum, columns, rows, both, (equal, equal))
+    }
+
+    fn weighted(
+        sum: i64,
+        columns: i64,
+        rows: i64,
+        both: i64,
+        (row_pair, col_pair): (Pair, Pair),
+    ) -> [i64; 4] {
+        let (top, bottom) = halves(row_pair, sum, rows);
+        let (top_detail, bottom_detail) = halves(row_pair, columns, both);
+        let (a, b) = halves(col_pair, top, top_detail);
+        let (c, d) = halves(col_pair, bottom, bottom_detail);
+        [a, b, c, d]
+    }
+}
+
+/// Computes the cells `x` from their exact coefficients `S^T x`.
+///
+/// The frame pipeline does not need this; it shows that the transform loses
+/// nothing, and turns stored coefficients back into pictures.
+///
+/// # Errors
+/// [`ShortSlice`] if a slice is too short.
+pub fn reconstruct(
+    basis: &Basis,
+    coefficients: &[i64],
+    cells: &mut [i64],
+    scratch: &mut [i64],
+) -> Result<(), ShortSlice> {
+    let needed = basis.grid().cells();
+    let coefficients = coefficients.get(..needed).ok_or(ShortSlice {
+        what: "coefficient",
+        needed,
+        given: coefficients.len(),
+    })?;
+    descend::<i64, Solve>(basis, cells, scratch, |index| {
+        coefficients.get(index).copied().unwrap_or(0)
+    })
+}

@@ -1,0 +1,225 @@
+//! Where every byte of a table image is.
+//!
+//! An image is little-endian and can be used where it lies, in flash:
+//!
+//! ```text
+//! header          16 bytes, see `header`
+//! section table   16 bytes a section, see `entry`
+//! sections        in the order of the section table, each padded with zeros to
+//!                 a multiple of 4 bytes; the image ends with the last one
+//! ```
+//!
+//! The CRC-32 (ISO-HDLC, as in zip and Ethernet) of the header covers the header
+//! and the section table; each section has its own. Nothing lies outside them,
+//! so no byte of an image can change unnoticed.
+//!
+//! Reader and writer share this file and nothing else.
+
+use core::ops::Range;
+
+/// First bytes of every image.
+pub const MAGIC: [u8; 4] = *b"ILTM";
+
+/// Version of the layout described here.
+pub const FORMAT_VERSION: u16 = 1;
+
+/// Sections start at multiples of this many bytes.
+pub const ALIGNMENT: usize = 4;
+
+/// Most sections an image may have.
+pub const MAX_SECTIONS: usize = 64;
+
+/// Most tiers, tier 0 (gain only) included.
+pub const MAX_TIERS: usize = 16;
+
+/// Most operator segments: a shared one and one a channel for some tiers.
+pub const MAX_SEGMENTS: usize = 48;
+
+/// Longest provenance text, bytes.
+pub const MAX_PROVENANCE: usize = 1 << 16;
+
+/// The header, 16 bytes.
+pub mod header {
+    use super::Range;
+    /// [`MAGIC`](super::MAGIC).
+    pub const MAGIC: Range<usize> = 0..4;
+    /// [`FORMAT_VERSION`](super::FORMAT_VERSION), `u16`.
+    pub const VERSION: Range<usize> = 4..6;
+    /// Number of sections, `u16`.
+    pub const SECTIONS: Range<usize> = 6..8;
+    /// Length of the whole image in bytes, `u32`.
+    pub const LENGTH: Range<usize> = 8..12;
+    /// CRC-32 of the bytes before this field and of the section table, `u32`.
+    pub const CRC: Range<usize> = 12..16;
+    /// Length of the header.
+    pub const SIZE: usize = 16;
+}
+
+/// One entry of the section table, 16 bytes.
+pub mod entry {
+    use super::Range;
+    /// [`SectionKind`](super::SectionKind), `u16`.
+    pub const KIND: Range<usize> = 0..2;
+    /// What the section applies to, `u16`; see [`SectionKind`](super::SectionKind).
+    pub const SELECTOR: Range<usize> = 2..4;
+    /// Offset from the start of the image, `u32`.
+    pub const OFFSET: Range<usize> = 4..8;
+    /// Length in bytes without padding, `u32`.
+    pub const LENGTH: Range<usize> = 8..12;
+    /// CRC-32 of the section without padding, `u32`.
+    pub const CRC: Range<usize> = 12..16;
+    /// Length of an entry.
+    pub const SIZE: usize = 16;
+}
+
+/// What a section holds. The numbers are the format: do not reorder.
+///
+/// Sections stand in the order of their kinds. Except for
+/// [`Operator`](Self::Operator), a kind occurs once at most and its selector is
+/// zero.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[repr(u16)]
+pub enum SectionKind {
+    /// Sizes, units and proved bounds; see [`meta`]. Required.
+    Meta = 1,
+    /// What each tier promises and costs; see [`tier`]. Required.
+    Tiers = 2,
+    /// Gain `g` of every cell and channel, `u16`, channels of a cell side by
+    /// side; unit: `2^-gain_fraction` of drive per light. Required.
+    Gain = 3,
+    /// Ambient light of every cell and channel, `u16`
+    /// [`Light`](crate::units::Light), channels of a cell side by side.
+    Ambient = 4,
+    /// Projector codes by drive, [`RESPONSE_KNOTS`](crate::pipeline::RESPONSE_KNOTS)
+    /// `u16` for all channels, or that many for each.
+    Response = 5,
+    /// Gain on a grid finer than the cells; see [`fine_gain`].
+    FineGain = 6,
+    /// Bits by which the sum of each operator row is shifted right, one byte a
+    /// cell.
+    RowShifts = 7,
+    /// Operator entries of one tier; the selector is the tier plus 256 times the
+    /// channel number (0: all channels, 1: the first, ...). Selectors ascend.
+    /// See [`segment`].
+    Operator = 8,
+    /// Where the table comes from: UTF-8 text for people and host tools.
+    Provenance = 9,
+}
+
+impl SectionKind {
+    /// The kind with this number.
+    #[must_use]
+    pub const fn from_number(number: u16) -> Option<Self> {
+        Some(match number {
+            1 => Self::Meta,
+            2 => Self::Tiers,
+            3 => Self::Gain,
+            4 => Self::Ambient,
+            5 => Self::Response,
+            6 => Self::FineGain,
+            7 => Self::RowShifts,
+            8 => Self::Operator,
+            9 => Self::Provenance,
+            _ => return None,
+        })
+    }
+
+    /// Its name in messages.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Meta => "meta",
+            Self::Tiers => "tiers",
+            Self::Gain => "gain",
+            Self::Ambient => "ambient",
+            Self::Response => "response",
+            Self::FineGain => "fine gain",
+            Self::RowShifts => "row shifts",
+            Self::Operator => "operator",
+            Self::Provenance => "provenance",
+        }
+    }
+}
+
+/// The meta section, 32 bytes.
+pub mod meta {
+    use super::Range;
+    /// Rows of the grid, `u16`.
+    pub const ROWS: Range<usize> = 0..2;
+    /// Columns of the grid, `u16`.
+    pub const COLS: Range<usize> = 2..4;
+    /// Colour channels, 1 or 3, `u8`.
+    pub const CHANNELS: usize = 4;
+    /// Fraction bits of the gains, 0 to 15, `u8`.
+    pub const GAIN_FRACTION: usize = 5;
+    /// Zero.
+    pub const RESERVED: Range<usize> = 6..8;
+    /// Camera units of reference white, `u32` with 24 fraction bits.
+    pub const REFERENCE_WHITE: Range<usize> = 8..12;
+    /// Largest magnitude that a row's sum can reach, `u32`.
+    pub const ACCUMULATOR_BOUND: Range<usize> = 12..16;
+    /// Largest magnitude of a correction, `u32`
+    /// [`Correction`](crate::units::Correction) bits.
+    pub const CORRECTION_BOUND: Range<usize> = 16..20;
+    /// Scale of the operator in each channel, three `u16` with 15 fraction bits;
+    /// zero for channels that the table does not have.
+    pub const CHANNEL_SCALES: Range<usize> = 20..26;
+    /// Zero.
+    pub const RESERVED_END: Range<usize> = 26..28;
+    /// Predicted closed-loop error of the inverse itself, before any tier leaves
+    /// entries out, `u32` with 32 fraction bits.
+    pub const INVERSE_ERROR: Range<usize> = 28..32;
+    /// Length of the section.
+    pub const SIZE: usize = 32;
+}
+
+/// One entry of the tiers section, 12 bytes.
+pub mod tier {
+    use super::Range;
+    /// Predicted error of what the tier leaves out, `u32` with 32 fraction bits.
+    pub const PREDICTED_ERROR: Range<usize> = 0..4;
+    /// Operator entries read a frame, this tier and all below, `u32`.
+    pub const ENTRIES: Range<usize> = 4..8;
+    /// Multiplications by operator entries a frame, `u32`.
+    pub const MULTIPLICATIONS: Range<usize> = 8..12;
+    /// Length of an entry.
+    pub const SIZE: usize = 12;
+}
+
+/// The head of the fine gain section, 4 bytes; the gains follow as in
+/// [`SectionKind::Gain`].
+pub mod fine_gain {
+    use super::Range;
+    /// Rows of the fine grid, `u16`.
+    pub const ROWS: Range<usize> = 0..2;
+    /// Columns of the fine grid, `u16`.
+    pub const COLS: Range<usize> = 2..4;
+    /// Length of the head.
+    pub const SIZE: usize = 4;
+}
+
+/// The words of an operator section, `u32` each.
+///
+/// For every row that has entries, in ascending order: a word with the row's
+/// index in the low half and its number of entries in the high half; then its
+/// entries in ascending order of their index, which is the low half; the high
+/// half is the value, `i16`.
+pub mod segment {
+    /// Length of a word in bytes.
+    pub const WORD: usize = 4;
+
+    /// A word from its halves.
+    #[must_use]
+    pub const fn word(low: u16, high: u16) -> [u8; WORD] {
+        let [a, b] = low.to_le_bytes();
+        let [c, d] = high.to_le_bytes();
+        [a, b, c, d]
+    }
+
+    /// The halves of a word, low first.
+    #[must_use]
+    pub const fn halves(word: [u8; WORD]) -> (u16, u16) {
+        let [a, b, c, d] = word;
+        (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]))
+    }
+}

@@ -1,0 +1,206 @@
+//! A checked table.
+
+use super::ImageError;
+use super::bytes::Halfwords;
+use super::check;
+use super::layout::MAX_TIERS;
+use crate::haar::Basis;
+use crate::operator::Operator;
+use crate::units::Light;
+use crate::{FrameSize, Grid};
+use fixed::types::{U0F32, U8F24};
+use heapless::Vec;
+
+/// A compensation table, checked.
+///
+/// Made by [`Table::check`] only, so whoever holds one knows that every section
+/// is whole and that no frame can overflow.
+#[derive(Clone, Debug)]
+pub struct Table<'a> {
+    pub(super) basis: Basis,
+    pub(super) channels: u8,
+    pub(super) gain_fraction: u8,
+    pub(super) reference_white: U8F24,
+    pub(super) inverse_error: U0F32,
+    pub(super) tiers: Vec<TierInfo, MAX_TIERS>,
+    pub(super) gain: Halfwords<'a>,
+    pub(super) ambient: Option<Halfwords<'a>>,
+    pub(super) response: Option<Halfwords<'a>>,
+    pub(super) fine_gain: Option<FineGain<'a>>,
+    pub(super) operator: Option<Operator<'a>>,
+    pub(super) provenance: &'a str,
+    pub(super) bytes: usize,
+}
+
+/// What one tier promises and costs.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TierInfo {
+    /// Predicted error of what the tier leaves out of the inverse: mean over
+    /// natural images of `|light with the tier - light with all entries|` over
+    /// `|wanted light|`. It adds to [`Table::inverse_error`], as the root of the
+    /// sum of squares.
+    pub predicted_error: U0F32,
+    /// Operator entries read a frame.
+    pub entries: u32,
+    /// Multiplications by operator entries a frame, all channels.
+    pub multiplications: u32,
+}
+
+/// Gains on a grid finer than the cells, for frames larger than the grid.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct FineGain<'a> {
+    pub(super) size: FrameSize,
+    pub(super) channels: u8,
+    pub(super) gain: Halfwords<'a>,
+}
+
+impl FineGain<'_> {
+    /// Its size.
+    #[must_use]
+    pub const fn size(&self) -> FrameSize {
+        self.size
+    }
+
+    /// Gains of one channel along one row of the fine grid.
+    pub fn row(&self, row: usize, channel: usize) -> impl Iterator<Item = u16> {
+        channel_row(self.gain, self.size.width(), self.channels, row, channel)
+    }
+}
+
+/// Every `channels`-th value of a row of cells.
+fn channel_row(
+    values: Halfwords<'_>,
+    cols: usize,
+    channels: u8,
+    row: usize,
+    channel: usize,
+) -> impl Iterator<Item = u16> {
+    let channels = usize::from(channels).max(1);
+    let start = row
+        .saturating_mul(cols)
+        .saturating_mul(channels)
+        .saturating_add(channel);
+    values
+        .run(start, cols.saturating_mul(channels))
+        .step_by(channels)
+}
+
+impl<'a> Table<'a> {
+    /// Checks an image and proves that no frame can overflow.
+    ///
+    /// Takes time in the order of the image's length; on the reference device
+    /// that is once at boot.
+    ///
+    /// # Errors
+    /// [`ImageError`] with the section and field at fault.
+    ///
+    /// # Fuzzing
+    /// Total: any bytes give a table or an error. `tests/fuzz/fuzz_targets/image.rs`
+    /// holds it to that.
+    pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
+        check::check(image)
+    }
+
+    /// The grid of cells.
+    #[must_use]
+    pub const fn grid(&self) -> Grid {
+        self.basis.grid()
+    }
+
+    /// The Haar basis of the grid.
+    #[must_use]
+    pub const fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    /// Colour channels: 1 or 3.
+    #[must_use]
+    pub const fn channels(&self) -> u8 {
+        self.channels
+    }
+
+    /// Bytes of the image.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Light of reference white in camera units (1 is full scale of the
+    /// photographs).
+    #[must_use]
+    pub const fn reference_white(&self) -> U8F24 {
+        self.reference_white
+    }
+
+    /// Closed-loop error of the inverse itself, predicted from photographs that
+    /// the solve had not seen: `|photograph - wanted| / |wanted|`. Zero where none
+    /// could be held out.
+    #[must_use]
+    pub const fn inverse_error(&self) -> U0F32 {
+        self.inverse_error
+    }
+
+    /// Fraction bits of [`gain`](Self::gain_row) and of the fine gains.
+    #[must_use]
+    pub const fn gain_fraction(&self) -> u8 {
+        self.gain_fraction
+    }
+
+    /// The ladder, tier 0 (gain only) first.
+    #[must_use]
+    pub fn tiers(&self) -> &[TierInfo] {
+        &self.tiers
+    }
+
+    /// The most accurate tier.
+    #[must_use]
+    pub fn top_tier(&self) -> u8 {
+        self.tiers.len().saturating_sub(1) as u8
+    }
+
+    /// Gains of one channel along a row of cells.
+    pub fn gain_row(&self, row: usize, channel: usize) -> impl Iterator<Item = u16> {
+        channel_row(self.gain, self.grid().cols(), self.channels, row, channel)
+    }
+
+    /// Ambient light of one channel along a row of cells; `None` if the scene is
+    /// dark.
+    pub fn ambient_row(&self, row: usize, channel: usize) -> Option<impl Iterator<Item = Light>> {
+        let row = channel_row(
+            self.ambient?,
+            self.grid().cols(),
+            self.channels,
+            row,
+            channel,
+        );
+        Some(row.map(Light::from_bits))
+    }
+
+    /// Projector code (full scale 65,535) at one knot of a channel's response;
+    /// `None` if the projector is linear.
+    #[must_use]
+    pub fn response_code(&self, knot: usize, channel: usize) -> Option<u16> {
+        let response = self.response?;
+        let knots = crate::pipeline::RESPONSE_KNOTS;
+        let curve = if response.len() == knots { 0 } else { channel };
+        Some(response.get(curve * knots + knot))
+    }
+
+    /// Gains finer than the cells, where the table has them.
+    #[must_use]
+    pub const fn fine_gain(&self) -> Option<FineGain<'a>> {
+        self.fine_gain
+    }
+
+    /// The interreflection operator; `None` for a scene without.
+    #[must_use]
+    pub const fn operator(&self) -> Option<&Operator<'a>> {
+        self.operator.as_ref()
+    }
+
+    /// Where the table comes from, for people and host tools.
+    #[must_use]
+    pub const fn provenance(&self) -> &'a str {
+        self.provenance
+    }
+}

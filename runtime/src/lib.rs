@@ -1,0 +1,55 @@
+//! What runs on the device: the table image, the Haar-domain operator and the
+//! frame pipeline.
+//!
+//! The principles of this crate:
+//!
+//! - It has no heap, never panics, and trusts no length: whatever bytes it is
+//!   given, it returns a value or an error.
+//! - It is deterministic: integers only, rounding in named places, so that a host
+//!   that uses this crate previews bit for bit what the device shows.
+//! - What host and device must agree on is here and nowhere else.
+//! - Simple code over clever code; a faster way must have a measurement beside it
+//!   and a plain reference to be tested against.
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`units`] | fixed-point types of light, drive and correction |
+//! | [`haar`] | the exact integer Haar transform on any grid |
+//! | [`operator`] | the sparse operator and the proof that it cannot overflow |
+//! | [`image`] | the `.iltm` image: layout, check, accessors |
+//! | [`resample`] | between pixels and cells |
+//! | [`pipeline`] | frames in, projector input out |
+#![no_std]
+#![warn(
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unreachable,
+    clippy::todo,
+    clippy::string_slice
+)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::indexing_slicing,
+        clippy::expect_used,
+        clippy::unwrap_used,
+        clippy::panic
+    )
+)]
+
+#[cfg(test)]
+extern crate std;
+
+mod frame;
+mod grid;
+pub mod haar;
+pub mod image;
+pub mod operator;
+pub mod pipeline;
+pub mod resample;
+pub mod units;
+
+pub use frame::FrameSize;
+pub use grid::{Grid, GridError};

@@ -1,0 +1,235 @@
+//! Frames larger than the grid.
+//!
+//! `p(x) = g(x) d'(x) - (U K A d')(x)`. A frame passes twice: once to average
+//! its light over the cells ([`FullPipeline::average_row`]), once to apply gain
+//! and correction ([`FullPipeline::finish_row`]). Rows may come in any order and
+//! from several threads; nothing of the frame is kept here.
+
+#![allow(
+    clippy::inline_always,
+    reason = "a host compiles rows for its widest vectors, which a call would leave"
+)]
+
+use super::FrameError;
+use super::stages::{Workspace, correct, drive_row, subtract_ambient};
+use crate::FrameSize;
+use crate::haar::ShortSlice;
+use crate::image::{FineGain, Table};
+use crate::resample::area::AreaAverage;
+use crate::resample::interpolation::{Axis, blend};
+use crate::units::{Drive, Light};
+
+/// Fraction bits that gains have beyond their own while they are interpolated.
+const GAIN_GUARD_BITS: u32 = 12;
+
+/// Half of the last place that is kept of an interpolated gain.
+const GAIN_HALF: i32 = 1 << (GAIN_GUARD_BITS - 1);
+
+/// Compensates frames of one size, `C` channels.
+#[derive(Clone, Copy, Debug)]
+pub struct FullPipeline<'t, 'a, const C: usize> {
+    table: &'t Table<'a>,
+    frame: FrameSize,
+    average: AreaAverage,
+    fine_gain: Option<FineGain<'a>>,
+    cells: [Axis; 2],
+    gains: [Axis; 2],
+}
+
+/// Memory for one row of one channel.
+#[derive(Debug)]
+pub struct Row<'w> {
+    /// Values of the cells that the row crosses,
+    /// [`line_len`](FullPipeline::line_len) elements.
+    pub line: &'w mut [i32],
+    /// Interpolated values along the row, one element a pixel.
+    pub spread: &'w mut [i32],
+}
+
+impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
+    /// A pipeline for frames of this size.
+    ///
+    /// # Errors
+    /// [`FrameError`] if the table has not `C` channels or the frame is smaller
+    /// than the grid.
+    pub fn new(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
+        if usize::from(table.channels()) != C {
+            return Err(FrameError::Channels {
+                table: table.channels(),
+                pipeline: C as u8,
+            });
+        }
+        let smaller = FrameError::SmallerThanGrid {
+            width: frame.width() as u16,
+            height: frame.height() as u16,
+        };
+        let grid = table.grid();
+        // Fine gains are used where the frame can show them, else the cells' own.
+        let fine_gain = table.fine_gain().filter(|fine| {
+            fine.size().width() <= frame.width() && fine.size().height() <= frame.height()
+        });
+        let gains = fine_gain.map_or(FrameSize::of_grid(grid), |fine| fine.size());
+        let axes = |size: FrameSize| {
+            let rows = Axis::new(size.height(), frame.height())?;
+            let cols = Axis::new(size.width(), frame.width())?;
+            Some([rows, cols])
+        };
+        Ok(Self {
+            table,
+            frame,
+            average: AreaAverage::new(grid, frame).ok_or(smaller)?,
+            fine_gain,
+            cells: axes(FrameSize::of_grid(grid)).ok_or(smaller)?,
+            gains: axes(gains).ok_or(smaller)?,
+        })
+    }
+
+    /// The table it works with.
+    #[must_use]
+    pub const fn table(&self) -> &'t Table<'a> {
+        self.table
+    }
+
+    /// The size of its frames.
+    #[must_use]
+    pub const fn frame(&self) -> FrameSize {
+        self.frame
+    }
+
+    /// Elements that [`Row::line`] needs.
+    #[must_use]
+    pub fn line_len(&self) -> usize {
+        let fine = self.fine_gain.map_or(0, |fine| fine.size().width());
+        self.table.grid().cols().max(fine)
+    }
+
+    /// Takes the ambient light of one channel away from row `y`.
+    #[inline(always)]
+    pub fn remove_ambient(&self, y: usize, channel: usize, light: &mut [Light], row: &mut Row<'_>) {
+        let [rows, cols] = self.cells;
+        let place = rows.place(y);
+        let (Some(before), Some(after)) = (
+            self.table.ambient_row(place.before, channel),
+            self.table.ambient_row(place.after, channel),
+        ) else {
+            return;
+        };
+        let widen = |light: Light| i32::from(light.to_bits()) << GAIN_GUARD_BITS;
+        let count = self.table.grid().cols();
+        for (slot, (before, after)) in row.line.iter_mut().zip(before.zip(after)) {
+            *slot = blend(widen(before), widen(after), place.fraction);
+        }
+        cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
+        for (light, ambient) in light.iter_mut().zip(row.spread.iter()) {
+            let ambient = Light::from_bits((ambient >> GAIN_GUARD_BITS) as u16);
+            subtract_ambient(core::slice::from_mut(light), &[ambient]);
+        }
+    }
+
+    /// Adds the light (without ambient) of row `y` of one channel to the sums of
+    /// its cells; `sums` has `N` elements and starts at zero.
+    #[inline(always)]
+    pub fn average_row(&self, y: usize, channel: usize, light: &[Light], sums: &mut [[u64; C]]) {
+        self.average.add_row(y, light, channel, sums);
+    }
+
+    /// Turns the sums of a whole frame into the corrections of its cells, which
+    /// stay in `workspace.values`.
+    ///
+    /// # Errors
+    /// [`FrameError`] if the tier does not exist or a slice is too short.
+    pub fn correct(
+        &self,
+        tier: u8,
+        sums: &[[u64; C]],
+        workspace: &mut Workspace<'_, C>,
+    ) -> Result<(), FrameError> {
+        let (top, needed) = (self.table.top_tier(), self.table.grid().cells());
+        if tier > top {
+            return Err(FrameError::NoSuchTier { tier, top });
+        }
+        if sums.len() < needed {
+            return Err(FrameError::Short(ShortSlice {
+                what: "sums",
+                needed,
+                given: sums.len(),
+            }));
+        }
+        for (value, sum) in workspace.values.iter_mut().zip(sums) {
+            *value = sum.map(|sum| i32::from(self.average.mean(sum).to_bits()));
+        }
+        Ok(correct(self.table, tier, workspace)?)
+    }
+
+    /// Gains of one channel along row `y`, to nearest.
+    ///
+    /// They depend on the frame's size alone: whoever has the memory computes
+    /// them once.
+    pub fn gain_row(&self, y: usize, channel: usize, row: &mut Row<'_>, gains: &mut [u16]) {
+        let [rows, cols] = self.gains;
+        let place = rows.place(y);
+        let used = if let Some(fine) = self.fine_gain {
+            let line = |at| fine.row(at, channel);
+            fill_line(
+                row.line,
+                line(place.before).zip(line(place.after)),
+                place.fraction,
+            )
+        } else {
+            let line = |at| self.table.gain_row(at, channel);
+            fill_line(
+                row.line,
+                line(place.before).zip(line(place.after)),
+                place.fraction,
+            )
+        };
+        cols.expand(row.line.get(..used).unwrap_or_default(), row.spread);
+        for (gain, spread) in gains.iter_mut().zip(row.spread.iter()) {
+            *gain = (spread.wrapping_add(GAIN_HALF) >> GAIN_GUARD_BITS)
+                .clamp(0, i32::from(u16::MAX)) as u16;
+        }
+    }
+
+    /// Drives of one channel along row `y`; returns how many were clipped.
+    ///
+    /// `light` is the row without ambient and `gain` its
+    /// [`gain_row`](Self::gain_row), side by side; `corrections` is what
+    /// [`correct`](Self::correct) left in the workspace.
+    #[inline(always)]
+    pub fn finish_row(
+        &self,
+        y: usize,
+        channel: usize,
+        (light, gain): (&[Light], &[u16]),
+        corrections: &[[i32; C]],
+        row: &mut Row<'_>,
+        drives: &mut [Drive],
+    ) -> u32 {
+        let [rows, cols] = self.cells;
+        let place = rows.place(y);
+        let count = self.table.grid().cols();
+        let line = |at: usize| {
+            let line = corrections.get(at * count..).unwrap_or_default();
+            line.iter()
+                .map(move |cell| cell.get(channel).copied().unwrap_or(0))
+        };
+        let pairs = line(place.before).zip(line(place.after));
+        for (slot, (before, after)) in row.line.iter_mut().take(count).zip(pairs) {
+            *slot = blend(before, after, place.fraction);
+        }
+        cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
+        let fraction = u32::from(self.table.gain_fraction());
+        drive_row(light, gain, fraction, row.spread, drives)
+    }
+}
+
+/// Blends two rows of gains, widened by the guard bits; returns how many.
+fn fill_line(line: &mut [i32], pairs: impl Iterator<Item = (u16, u16)>, fraction: u32) -> usize {
+    let widen = |gain: u16| i32::from(gain) << GAIN_GUARD_BITS;
+    let mut used = 0;
+    for (slot, (before, after)) in line.iter_mut().zip(pairs) {
+        *slot = blend(widen(before), widen(after), fraction);
+        used += 1;
+    }
+    used
+}

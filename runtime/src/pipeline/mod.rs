@@ -1,0 +1,89 @@
+//! From a wanted frame to the projector's input.
+//!
+//! ```text
+//! codes -> light d -> d' = d - ambient -> Haar -> operator -> inverse Haar = K d'
+//!                              |                                  |
+//!                              +------ gain * d'  -  K d' --------+-> clip -> response -> codes
+//! ```
+//!
+//! [`GridPipeline`] works on frames of one pixel a cell, [`FullPipeline`] on any
+//! larger ones. Both run the stages that the table lists and no others: without
+//! an ambient section nothing is subtracted, without an operator no transform is
+//! made, without a response codes are proportional to drives.
+//!
+//! All arithmetic is in integers and rounds in named places only
+//! ([`Sample`], [`analyse_rounded`](crate::haar::analyse_rounded),
+//! [`Operator::apply`](crate::operator::Operator::apply), [`stages::drive`],
+//! [`resample`](crate::resample)), so a frame comes out the same, bit for bit, on
+//! the device and on the host.
+
+mod full;
+mod grid;
+mod response;
+mod sample;
+pub mod srgb;
+pub mod stages;
+
+pub use full::{FullPipeline, Row};
+pub use grid::GridPipeline;
+pub use response::{RESPONSE_KNOTS, Response, knot_drive, linear_code, nearest_knot};
+pub use sample::{Encoding, Sample};
+pub use stages::Workspace;
+
+use crate::haar::ShortSlice;
+use core::fmt;
+
+/// Why a frame could not be worked on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum FrameError {
+    /// The table has another number of channels than the pipeline.
+    Channels {
+        /// Channels of the table.
+        table: u8,
+        /// Channels of the pipeline.
+        pipeline: u8,
+    },
+    /// The frame is smaller than the grid.
+    SmallerThanGrid {
+        /// Width of the frame, pixels.
+        width: u16,
+        /// Height of the frame, pixels.
+        height: u16,
+    },
+    /// The table has no such tier.
+    NoSuchTier {
+        /// The tier asked for.
+        tier: u8,
+        /// The table's top tier.
+        top: u8,
+    },
+    /// A slice is too short.
+    Short(ShortSlice),
+}
+
+impl From<ShortSlice> for FrameError {
+    fn from(short: ShortSlice) -> Self {
+        Self::Short(short)
+    }
+}
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Channels { table, pipeline } => write!(
+                f,
+                "the table has {table} channels and the frame has {pipeline}"
+            ),
+            Self::SmallerThanGrid { width, height } => write!(
+                f,
+                "the frame, {width} x {height} pixels, is smaller than the table's grid"
+            ),
+            Self::NoSuchTier { tier, top } => {
+                write!(f, "the table has tiers 0 to {top}, not {tier}")
+            }
+            Self::Short(short) => short.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}

@@ -1,0 +1,141 @@
+//! `U`: linear interpolation between cell centres.
+//!
+//! Along an axis of `length` pixels and `cells` cells, the centre of pixel `x`
+//! lies `((2 x + 1) cells - length) / (2 length)` cell widths after the centre of
+//! the first cell. Before the first centre and after the last, values stay
+//! constant. Between two centres the values of a row of pixels are an arithmetic
+//! progression, which is how [`Axis::expand`] computes them: no multiplication a
+//! pixel.
+
+#![allow(
+    clippy::inline_always,
+    reason = "a host compiles rows for its widest vectors, which a call would leave"
+)]
+
+/// One axis of an interpolation.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Axis {
+    cells: u32,
+    length: u32,
+    /// `2^32 cells / length`: what one pixel is of a cell width.
+    step: u64,
+    /// `2^32 / (2 cells)`.
+    half_cell: u64,
+}
+
+/// Where one pixel lies between two cell centres.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Place {
+    /// Cell whose centre is at or before the pixel's (the first cell for pixels
+    /// before all centres).
+    pub before: usize,
+    /// Cell whose centre is after the pixel's (the last cell after all centres).
+    pub after: usize,
+    /// Share of `after`, 31 fraction bits.
+    pub fraction: u32,
+}
+
+impl Axis {
+    /// `cells` values over `length` pixels; `None` unless
+    /// `1 <= cells <= length <= 65,535`.
+    #[must_use]
+    pub fn new(cells: usize, length: usize) -> Option<Self> {
+        if cells == 0 || length < cells || length > usize::from(u16::MAX) {
+            return None;
+        }
+        let (cells, length) = (cells as u32, length as u32);
+        Some(Self {
+            cells,
+            length,
+            step: (u64::from(cells) << 32).checked_div(u64::from(length))?,
+            half_cell: (1_u64 << 31).checked_div(u64::from(cells))?,
+        })
+    }
+
+    /// Where pixel `x` lies.
+    #[inline]
+    #[must_use]
+    pub fn place(&self, x: usize) -> Place {
+        let (cells, length) = (u64::from(self.cells), u64::from(self.length));
+        let last = self.cells as usize - 1;
+        let Some(along) = ((2 * x as u64 + 1) * cells).checked_sub(length) else {
+            return Place {
+                before: 0,
+                after: 0,
+                fraction: 0,
+            };
+        };
+        let before = (along / (2 * length)) as usize;
+        if before >= last {
+            return Place {
+                before: last,
+                after: last,
+                fraction: 0,
+            };
+        }
+        let rest = along % (2 * length);
+        Place {
+            before,
+            after: before + 1,
+            fraction: ((rest << 31) / (2 * length)) as u32,
+        }
+    }
+
+    /// Spreads `cells` values over the pixels of a row.
+    ///
+    /// Differences of neighbours must fit an `i32`.
+    #[inline(always)]
+    pub fn expand(&self, values: &[i32], pixels: &mut [i32]) {
+        let (cells, length) = (self.cells, self.length);
+        let first = values.first().copied().unwrap_or(0);
+        // The first pixel at or after the first centre, and how far after it, in
+        // units of which a cell width has 2 * length and a pixel 2 * cells.
+        let before = length.saturating_sub(cells);
+        let start = before.div_ceil(2 * cells);
+        let mut past = start * 2 * cells - before;
+        let (whole, part) = (length / cells, 2 * (length % cells));
+        let mut rest = fill_front(pixels, start as usize, |run| run.fill(first));
+        let pairs = values.iter().zip(values.iter().skip(1));
+        for (value, next) in pairs {
+            let difference = i64::from(*next) - i64::from(*value);
+            let step = (difference * self.step as i64 + (1 << 31)) >> 32;
+            let offset = (step * i64::from(past) * self.half_cell as i64) >> 32;
+            let begin = value.wrapping_add(offset as i32);
+            // The next centre is `whole` pixels and `part` units further on.
+            let mut run = whole;
+            if part > past {
+                run += 1;
+                past += 2 * cells;
+            }
+            past -= part;
+            let fill = |run: &mut [i32]| progression(begin, step as i32, run);
+            rest = fill_front(rest, run as usize, fill);
+        }
+        let last = values.last().copied().unwrap_or(0);
+        rest.fill(last);
+    }
+}
+
+/// Gives the first `count` elements (or all) to `fill` and returns the rest.
+#[inline(always)]
+fn fill_front(pixels: &mut [i32], count: usize, fill: impl FnOnce(&mut [i32])) -> &mut [i32] {
+    let (front, rest) = pixels.split_at_mut(count.min(pixels.len()));
+    fill(front);
+    rest
+}
+
+/// `begin + index * step` for every pixel of a run.
+#[inline(always)]
+fn progression(begin: i32, step: i32, run: &mut [i32]) {
+    for (index, pixel) in (0_i32..).zip(run) {
+        *pixel = begin.wrapping_add(step.wrapping_mul(index));
+    }
+}
+
+/// `before + fraction * (after - before)`, rounded down; `fraction` has 31 bits.
+#[inline(always)]
+#[must_use]
+pub fn blend(before: i32, after: i32, fraction: u32) -> i32 {
+    let difference = i64::from(after) - i64::from(before);
+    before.wrapping_add((difference.wrapping_mul(i64::from(fraction)) >> 31) as i32)
+}

@@ -1,0 +1,78 @@
+#!/usr/bin/env bash
+# Installs what the tests need, builds everything, and passes all checks:
+# formatting, clippy, documentation, tests. Needs a Debian-like machine or one
+# that has Rust already. The last line is the number of tests passed and failed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+say() { printf '\n== %s\n' "$*"; }
+
+as_root() {
+    if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+# Debian's own Rust is new enough on every release that has `rustc-web` or a
+# `rustc` of at least the workspace's `rust-version`.
+install_packages() {
+    say "installing $*"
+    as_root apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive as_root apt-get install -y -qq --no-install-recommends "$@"
+}
+
+wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+
+new_enough() {
+    command -v cargo >/dev/null && command -v rustc >/dev/null || return 1
+    local have
+    have=$(rustc --version | cut -d' ' -f2)
+    [ "$(printf '%s\n%s\n' "$wanted" "$have" | sort -V | head -n 1)" = "$wanted" ]
+}
+
+missing=()
+command -v cc >/dev/null || missing+=(gcc libc6-dev)
+new_enough || missing+=(cargo-web rustc-web)
+if [ ${#missing[@]} -gt 0 ]; then
+    command -v apt-get >/dev/null || {
+        echo "error: this needs Rust $wanted or newer and a C linker; install them (rustup does) and run this again" >&2
+        exit 1
+    }
+    install_packages "${missing[@]}"
+    hash -r
+fi
+new_enough || {
+    echo "error: Rust is $(rustc --version 2>/dev/null || echo missing), $wanted or newer is needed; run \`rustup update\`" >&2
+    exit 1
+}
+
+# rustfmt and clippy come with rustup's default profile and with Debian's Rust in
+# packages of their own.
+for component in rustfmt clippy; do
+    if ! cargo "${component/rustfmt/fmt}" --version >/dev/null 2>&1; then
+        if command -v rustup >/dev/null; then
+            rustup component add "$component"
+        elif [ "$component" = rustfmt ]; then
+            install_packages rustfmt-web
+        else
+            install_packages rust-web-clippy
+        fi
+    fi
+done
+
+say "formatting"
+cargo fmt --all --check
+
+say "clippy"
+cargo clippy --workspace --all-targets --locked -- -D warnings
+
+say "documentation"
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+
+say "tests"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+status=0
+cargo test --workspace --locked --no-fail-fast 2>&1 | tee "$log" || status=$?
+
+count() { sed -n "s/^test result:.* \([0-9]\+\) $1;.*/\1/p" "$log" | awk '{ sum += $1 } END { print sum + 0 }'; }
+printf '\n%s passed, %s failed\n' "$(count passed)" "$(count failed)"
+exit "$status"

@@ -1,0 +1,100 @@
+//! One function for each parser of foreign bytes. Whatever the bytes, it must
+//! return: the fuzz targets in `tests/fuzz` and the smoke test in
+//! `tests/tests/foreign_bytes.rs` call the same functions.
+
+use crate::wedge_table;
+use iltm::capture::{self, CaptureOptions, Manifest, Settings};
+use iltm::progress::Silent;
+use iltm::video::Compensator;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{Encoding, GridPipeline, Workspace};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// A table image, and frames through it where it is taken.
+pub fn image(bytes: &[u8]) {
+    if let Ok(table) = Table::check(bytes) {
+        match table.channels() {
+            1 => frame::<1>(&table),
+            _ => frame::<3>(&table),
+        }
+    }
+}
+
+/// A black and a white frame through a table, at every tier.
+fn frame<const C: usize>(table: &Table<'_>) {
+    let cells = table.grid().cells();
+    let Ok(pipeline) = GridPipeline::<C>::new(table) else {
+        return;
+    };
+    let (mut buffer, mut scratch) = (vec![0; cells], vec![0; cells]);
+    let (mut inputs, mut values) = (vec![[0; C]; cells], vec![[0; C]; cells]);
+    for tier in 0..=table.top_tier() {
+        for code in [0_u8, 255] {
+            let mut workspace = Workspace {
+                cells: &mut buffer,
+                scratch: &mut scratch,
+                inputs: &mut inputs,
+                values: &mut values,
+            };
+            let (wanted, mut input) = (vec![[code; C]; cells], vec![[0; C]; cells]);
+            let done =
+                pipeline.compensate(tier, Encoding::Display, &wanted, &mut input, &mut workspace);
+            assert!(done.is_ok(), "a checked table refused a frame of its size");
+        }
+    }
+}
+
+/// A picture or a video stream, by its first bytes, through a small table.
+pub fn frames(bytes: &[u8]) {
+    static IMAGE: OnceLock<Vec<u8>> = OnceLock::new();
+    let image = IMAGE.get_or_init(|| wedge_table(2, 3, 1));
+    let Ok(table) = Table::check(image) else {
+        return;
+    };
+    if let Ok(compensator) = Compensator::new(&table, iltm::video::Settings::default()) {
+        let _ = compensator.stream(bytes, io::sink(), &Silent);
+    }
+}
+
+/// A `capture.csv`.
+///
+/// # Panics
+/// If a manifest that was read is written and read again as another. Only the
+/// lines may differ: they are written in the order of the index.
+pub fn manifest(bytes: &[u8]) {
+    let parse = |bytes: &[u8]| Manifest::parse(bytes, Path::new("capture.csv"));
+    if let Ok(manifest) = parse(bytes) {
+        let mut again = parse(manifest.to_csv().as_bytes()).expect("a written manifest is good");
+        assert_eq!(again.shots.len(), manifest.shots.len(), "photographs");
+        for (again, first) in again.shots.iter_mut().zip(&manifest.shots) {
+            again.line = first.line;
+            assert_eq!(again, first, "written and read again");
+        }
+    }
+}
+
+/// A `capture.toml`.
+pub fn settings(bytes: &[u8]) {
+    let _ = Settings::parse(bytes, Path::new("capture.toml"));
+}
+
+/// A pattern and a photograph of an otherwise plain capture.
+pub fn photograph(bytes: &[u8]) {
+    static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = std::env::temp_dir().join(format!("iltm-fuzz-{}", std::process::id()));
+        fs::create_dir_all(&folder).ok()?;
+        let lines =
+            "index,role,pattern,photo\n0,white,bytes.png,bytes.png\n1,black,bytes.png,bytes.png\n";
+        fs::write(folder.join("capture.csv"), lines).ok()?;
+        Some(folder)
+    });
+    if let Some(folder) = folder
+        && fs::write(folder.join("bytes.png"), bytes).is_ok()
+    {
+        let _ = capture::read(folder, &CaptureOptions::default(), &Silent);
+    }
+}

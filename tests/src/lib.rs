@@ -1,0 +1,98 @@
+//! What the tests across crates share: a scene whose inverse is known exactly.
+
+pub mod fuzz;
+
+use iltm::capture::Response;
+use iltm::compile::{CompileOptions, compile};
+use iltm::solve::{ChannelInverse, InverseTransport};
+use iltm_runtime::Grid;
+use nalgebra::DMatrix;
+
+/// A Lambertian wedge of two square panels at a right angle, hinged in the
+/// middle column, lit evenly.
+///
+/// `K` is exact for point patches: `F_ij = cos_i cos_j A / (pi r^2)`, scaled where
+/// needed so that no cell sends out more than it receives. With three channels
+/// the albedos differ by channel and panel, and the blue channel has a small
+/// deviation and half the projector's light.
+#[must_use]
+pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
+    let cells = grid.cells();
+    let place = |cell: usize| {
+        let (row, col) = (cell / grid.cols(), cell % grid.cols());
+        let along = (col as f64 + 0.5) / grid.cols() as f64 * 2.0 - 1.0;
+        let height = (row as f64 + 0.5) / grid.rows() as f64;
+        // The left panel lies in x < 0, the right one stands up in z.
+        if along < 0.0 {
+            ([along, height, 0.0], [0.0, 0.0, 1.0])
+        } else {
+            ([0.0, height, along], [-1.0, 0.0, 0.0])
+        }
+    };
+    let area = 2.0 / cells as f64;
+    let mut shared = DMatrix::from_fn(cells, cells, |i, j| {
+        let ((here, normal), (there, other)) = (place(i), place(j));
+        let mut way = [0.0; 3];
+        for axis in 0..3 {
+            way[axis] = there[axis] - here[axis];
+        }
+        let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let squared = dot(way, way);
+        let (leaves, arrives) = (dot(way, normal), -dot(way, other));
+        if leaves <= 0.0 || arrives <= 0.0 {
+            return 0.0;
+        }
+        leaves * arrives * area / (std::f64::consts::PI * squared * squared)
+    });
+    let most = shared.row_iter().map(|row| row.sum()).fold(0.0, f64::max);
+    if most > 0.5 {
+        shared *= 0.5 / most;
+    }
+    let albedo = |channel: usize, cell: usize| {
+        let right = cell % grid.cols() * 2 >= grid.cols();
+        [[0.8, 0.8], [0.7, 0.4], [0.45, 0.75]][channel][usize::from(right)]
+    };
+    let of_channel = |channel: usize| ChannelInverse {
+        gain: (0..cells).map(|cell| 1.0 / albedo(channel, cell)).collect(),
+        scale: if channel == 2 { 0.5 } else { 1.0 },
+        deviation: (channel == 2).then(|| {
+            DMatrix::from_fn(cells, cells, |i, j| {
+                if i != j && (i + 3 * j).is_multiple_of(17) {
+                    0.002
+                } else {
+                    0.0
+                }
+            })
+        }),
+        ambient: vec![0.01; cells],
+    };
+    InverseTransport {
+        grid,
+        live: vec![true; cells],
+        shared,
+        channels: (0..channels).map(of_channel).collect(),
+    }
+}
+
+/// The table image of [`wedge`] for an sRGB projector.
+#[must_use]
+pub fn wedge_table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
+    wedge_table_for(Response::Srgb, rows, cols, channels)
+}
+
+/// The table image of [`wedge`].
+///
+/// # Panics
+/// If it cannot be compiled: then the test that asked for it has failed.
+#[must_use]
+pub fn wedge_table_for(projector: Response, rows: u16, cols: u16, channels: usize) -> Vec<u8> {
+    let grid = Grid::new(rows, cols).expect("a small grid");
+    let options = CompileOptions {
+        projector,
+        inverse_error: 0.005,
+        provenance: "scene = \"wedge\"\n".to_owned(),
+        ..CompileOptions::default()
+    };
+    let compiled = compile(&wedge(grid, channels), None, &options);
+    compiled.expect("the wedge is a plain scene").image
+}
