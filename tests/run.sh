@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what the tests need, builds everything, and passes all checks:
-# formatting, clippy, documentation, tests. Needs a Debian-like machine or one
-# that has Rust already. The last line is the number of tests passed and failed.
+# formatting, clippy, documentation, tests, the firmware's in an emulator among
+# them. Needs a Debian-like machine or one that has Rust and QEMU already. The last
+# line is the number of tests passed and failed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -31,9 +32,10 @@ new_enough() {
 missing=()
 command -v cc >/dev/null || missing+=(gcc libc6-dev)
 new_enough || missing+=(cargo-web rustc-web)
+command -v qemu-system-arm >/dev/null || missing+=(qemu-system-arm)
 if [ ${#missing[@]} -gt 0 ]; then
     command -v apt-get >/dev/null || {
-        echo "error: this needs Rust $wanted or newer and a C linker; install them (rustup does) and run this again" >&2
+        echo "error: this needs Rust $wanted or newer, a C linker and qemu-system-arm; missing: ${missing[*]}. Install them and run this again" >&2
         exit 1
     }
     install_packages "${missing[@]}"
@@ -58,14 +60,33 @@ for component in rustfmt clippy; do
     fi
 done
 
+firmware=runtime/firmware
+say "firmware"
+# Where this fails, the tests that need the firmware fail and say why.
+"$firmware/build.sh" || echo "the firmware cannot be built here" >&2
+
 say "formatting"
 cargo fmt --all --check
+cargo fmt --manifest-path "$firmware/Cargo.toml" --check
 
 say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings
+# The firmware's own checks need a Rust with a core library for its target; where
+# there is none, core is built with the firmware, and only the firmware.
+has_target=
+[ -d "$(rustc --print sysroot)/lib/rustlib/thumbv7em-none-eabihf/lib" ] && has_target=yes
+if [ $has_target ]; then
+    for board in mps2-an500 mps2-an386; do
+        (cd "$firmware" && cargo clippy --release --lib --bins --locked \
+            --no-default-features --features "$board" -- -D warnings)
+    done
+fi
 
 say "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+if [ $has_target ]; then
+    (cd "$firmware" && RUSTDOCFLAGS="-D warnings" cargo doc --lib --no-deps --locked --quiet)
+fi
 
 say "tests"
 log=$(mktemp)

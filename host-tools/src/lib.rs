@@ -11,6 +11,7 @@ pub mod capture;
 pub mod cli;
 pub mod compile;
 pub mod demo;
+pub mod device;
 pub mod learn;
 pub mod progress;
 pub mod report;

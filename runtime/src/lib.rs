@@ -19,6 +19,10 @@
 //! | [`image`] | the `.iltm` image: layout, check, accessors |
 //! | [`resample`] | between pixels and cells |
 //! | [`pipeline`] | frames in, projector input out |
+//! | [`exchange`] | frame buffers shared with the hardware that fills and shows them |
+//! | [`governor`] | the tier that fits the frame budget |
+//! | [`link`] | the serial line: frames, channels, messages |
+//! | [`ring`] | bytes between an interrupt and the loop |
 #![no_std]
 #![warn(
     clippy::indexing_slicing,
@@ -42,13 +46,17 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod exchange;
 mod frame;
+pub mod governor;
 mod grid;
 pub mod haar;
 pub mod image;
+pub mod link;
 pub mod operator;
 pub mod pipeline;
 pub mod resample;
+pub mod ring;
 pub mod units;
 
 pub use frame::FrameSize;

@@ -2,11 +2,13 @@
 //! return: the fuzz targets in `tests/fuzz` and the smoke test in
 //! `tests/tests/foreign_bytes.rs` call the same functions.
 
+use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{self, CaptureOptions, Manifest, Settings};
 use iltm::progress::Silent;
 use iltm::video::Compensator;
 use iltm_runtime::image::Table;
+use iltm_runtime::link::{DELIMITER, Decoder, Event, Response, Session};
 use iltm_runtime::pipeline::{Encoding, GridPipeline, Workspace};
 use std::fs;
 use std::io;
@@ -96,5 +98,60 @@ pub fn photograph(bytes: &[u8]) {
         && fs::write(folder.join("bytes.png"), bytes).is_ok()
     {
         let _ = capture::read(folder, &CaptureOptions::default(), &Silent);
+    }
+}
+
+/// A hello of protocol version 1 with number 7, as it goes on a line.
+pub const HELLO: [u8; 11] = [
+    0x01, 0x02, 0x07, 0x01, 0x06, 0x01, 0x32, 0xFF, 0xF2, 0x2C, 0x00,
+];
+
+/// A subscription to a status every 500 ms with number 8.
+pub const SUBSCRIBE: [u8; 12] = [
+    0x01, 0x02, 0x08, 0x08, 0x02, 0xF4, 0x03, 0x0F, 0x4B, 0xEF, 0x6B, 0x00,
+];
+
+/// Bytes on a serial line: to a device, and to a host.
+///
+/// # Panics
+/// If the device does not answer a hello after them, or says something that is no
+/// frame.
+pub fn link(bytes: &[u8]) {
+    let device = FakeDevice::default();
+    let mut session = Session::new(device.identity());
+    // The first byte of each piece says how long to wait before the rest.
+    let (mut now, mut decoder) = (0, Decoder::new());
+    for piece in bytes.chunks(64) {
+        now += u64::from(piece[0]) * 16;
+        session.receive(piece, now, &device);
+        session.poll(now, &device);
+        session.log(piece);
+        say(&mut session, &mut decoder);
+    }
+    session.receive(&[DELIMITER], now, &device);
+    say(&mut session, &mut decoder);
+    session.receive(&HELLO, now, &device);
+    assert!(!session.pending().is_empty(), "a hello is answered");
+    say(&mut session, &mut decoder);
+
+    let mut decoder = Decoder::new();
+    for byte in bytes {
+        if let Some(Ok(frame)) = decoder.push(*byte) {
+            let _ = postcard::from_bytes::<Response>(frame.payload);
+            let _ = postcard::from_bytes::<Event>(frame.payload);
+        }
+    }
+}
+
+/// Takes what a session has to say, which is whole frames.
+fn say(session: &mut Session, decoder: &mut Decoder) {
+    while !session.pending().is_empty() {
+        let bytes = session.pending().to_vec();
+        session.sent(bytes.len());
+        for byte in bytes {
+            if let Some(frame) = decoder.push(byte) {
+                assert!(frame.is_ok(), "a device sends whole frames");
+            }
+        }
     }
 }

@@ -1,5 +1,8 @@
-//! What the tests across crates share: a scene whose inverse is known exactly.
+//! What the tests across crates share: a scene whose inverse is known exactly, and
+//! a device that is none.
 
+pub mod fake_device;
+pub mod firmware;
 pub mod fuzz;
 
 use iltm::capture::Response;

@@ -40,6 +40,14 @@ fn video() -> Vec<u8> {
     stream
 }
 
+/// A hello, and a subscription to a status every half second.
+fn requests() -> Vec<u8> {
+    let mut bytes = fuzz::HELLO.to_vec();
+    bytes.extend(fuzz::SUBSCRIBE);
+    bytes.extend([0; 60]);
+    bytes
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
 
@@ -50,6 +58,7 @@ proptest! {
         fuzz::manifest(&bytes);
         fuzz::settings(&bytes);
         fuzz::photograph(&bytes);
+        fuzz::link(&bytes);
     }
 
     #[test]
@@ -71,6 +80,11 @@ proptest! {
     #[test]
     fn a_changed_capture_is_no_trouble(bytes in mutated(sample("capture.csv"))) {
         fuzz::manifest(&bytes);
+    }
+
+    #[test]
+    fn a_changed_request_is_no_trouble(bytes in mutated(requests())) {
+        fuzz::link(&bytes);
     }
 
     #[test]

@@ -1,8 +1,13 @@
 //! What can be typed.
 
 use super::failure::Kind;
+#[cfg(unix)]
+use crate::device::emulator::Board;
+use crate::device::port::BAUD;
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
+#[cfg(unix)]
+use iltm_runtime::FrameSize;
 use std::path::PathBuf;
 
 /// Cancels the light that bounces between the surfaces of a projection.
@@ -26,6 +31,13 @@ pub(super) enum Command {
     Inspect(Inspect),
     /// Compensate a picture or a video with a table
     Compensate(Compensate),
+    /// Say how a device is
+    Status(Status),
+    /// Watch a device: frame rate, tier, time budget, events, log
+    Monitor(Monitor),
+    /// Run the firmware on an emulated board, with its serial line as a port
+    #[cfg(unix)]
+    Emulate(Emulate),
 }
 
 #[derive(Debug, Args)]
@@ -80,4 +92,73 @@ pub(super) struct Compensate {
     /// Tier of the table's accuracy ladder; the most accurate if left out
     #[arg(long, value_name = "TIER")]
     pub(super) tier: Option<u8>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SerialLine {
+    /// Serial port of the device
+    #[arg(long, value_name = "PORT")]
+    pub(super) port: String,
+    /// Speed of the line, bits a second
+    #[arg(long, value_name = "BAUD", default_value_t = BAUD)]
+    pub(super) baud: u32,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Status {
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Monitor {
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+    /// ELF file of the device's firmware, which has the words of its log messages
+    #[arg(long, value_name = "ELF")]
+    pub(super) firmware: Option<PathBuf>,
+    /// Milliseconds between two reports of the device
+    #[arg(long, value_name = "MS", default_value_t = 500)]
+    pub(super) period: u16,
+}
+
+#[cfg(unix)]
+#[derive(Debug, Args)]
+pub(super) struct Emulate {
+    /// Table in the board's flash; without one it shows frames as they are
+    pub(super) table: Option<PathBuf>,
+    /// Board: mps2-an500 (Cortex-M7) or mps2-an386 (Cortex-M4F)
+    #[arg(long, value_name = "BOARD", default_value_t)]
+    pub(super) board: Board,
+    /// ELF file of the firmware; by default that of the source folder, built anew
+    #[arg(long, value_name = "ELF")]
+    pub(super) firmware: Option<PathBuf>,
+    /// PNG or Y4M to play over and over, instead of a moving test scene
+    #[arg(long, value_name = "INPUT")]
+    pub(super) frames: Option<PathBuf>,
+    /// Size of the test scene; by default 128x96, or the grid's where that is larger
+    #[arg(long, value_name = "WxH", value_parser = frame_size, conflicts_with = "frames")]
+    pub(super) size: Option<FrameSize>,
+    /// Frames a second; by default the video's own rate, or 25
+    #[arg(long, value_name = "RATE", value_parser = rate)]
+    pub(super) fps: Option<f64>,
+    /// File that holds the board's memory and keeps it for the next time
+    #[arg(long, value_name = "FILE")]
+    pub(super) memory: Option<PathBuf>,
+}
+
+#[cfg(unix)]
+fn frame_size(text: &str) -> Result<FrameSize, String> {
+    let sides = text.split_once('x');
+    let side = |text: &str| text.parse::<u16>().ok();
+    sides
+        .and_then(|(width, height)| FrameSize::new(side(width)?, side(height)?))
+        .ok_or_else(|| "a size is written like 320x240".to_owned())
+}
+
+#[cfg(unix)]
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse::<f64>().ok();
+    rate.filter(|rate| (0.1..=1_000.0).contains(rate))
+        .ok_or_else(|| "a rate is a number from 0.1 to 1000".to_owned())
 }

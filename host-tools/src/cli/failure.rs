@@ -2,6 +2,7 @@
 
 use crate::capture::CaptureError;
 use crate::compile::CompileError;
+use crate::device::DeviceError;
 use crate::learn::LearnError;
 use miette::Diagnostic;
 use std::fmt::{self, Write};
@@ -26,10 +27,18 @@ pub(super) enum Kind {
     Frames = 8,
     /// The result cannot be written.
     Write = 9,
+    /// A serial port cannot be opened.
+    Port = 10,
+    /// A device does not answer.
+    NoAnswer = 11,
+    /// A device answers and cannot do what was asked.
+    Device = 12,
+    /// The emulated board cannot be started.
+    Emulator = 13,
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 8] = [
+    const ALL: [(Self, &'static str, &'static str); 12] = [
         (
             Self::Usage,
             "usage",
@@ -50,6 +59,18 @@ impl Kind {
         (Self::Table, "table", "a table is damaged, or not a table"),
         (Self::Frames, "frames", "a picture or video cannot be used"),
         (Self::Write, "write", "the result cannot be written"),
+        (Self::Port, "port", "a serial port cannot be opened"),
+        (Self::NoAnswer, "no-answer", "a device does not answer"),
+        (
+            Self::Device,
+            "device",
+            "a device cannot do what it was asked",
+        ),
+        (
+            Self::Emulator,
+            "emulator",
+            "the emulated board cannot be started",
+        ),
     ];
 
     pub(super) const fn code(self) -> u8 {
@@ -65,7 +86,7 @@ impl Kind {
     pub(super) fn table() -> String {
         let mut text = String::from("Exit codes:\n   0  done");
         for (kind, _, meaning) in Self::ALL {
-            let _ = write!(text, "\n   {}  {meaning}", kind.code());
+            let _ = write!(text, "\n  {:>2}  {meaning}", kind.code());
         }
         text
     }
@@ -90,6 +111,20 @@ impl Failure {
             message: message.to_string(),
             next_step: next_step.into(),
         }
+    }
+}
+
+impl Failure {
+    /// Of the device at a port.
+    pub(super) fn of_device(port: &str, error: &DeviceError) -> Self {
+        let kind = match error {
+            DeviceError::Open { .. } => Kind::Port,
+            DeviceError::Gone { .. } | DeviceError::NoAnswer { .. } => Kind::NoAnswer,
+            DeviceError::Protocol { .. }
+            | DeviceError::Refused { .. }
+            | DeviceError::Answer { .. } => Kind::Device,
+        };
+        Self::new(kind, format!("{port}: {error}"), error.next_step())
     }
 }
 

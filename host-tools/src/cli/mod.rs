@@ -1,16 +1,22 @@
 //! The command line. Thin: arguments in, library calls, words and codes out.
 //!
 //! People read standard error; standard output carries data: a video stream, or
-//! with `--json` one JSON object and nothing else.
+//! with `--json` one JSON object and nothing else. What goes on until it is
+//! stopped prints a JSON object a line.
 
 mod args;
 mod compensate;
 mod demo;
+#[cfg(unix)]
+mod emulate;
 mod failure;
 mod inspect;
+mod interrupt;
+mod monitor;
 mod output;
 mod progress;
 mod solve;
+mod status;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -27,6 +33,10 @@ pub fn run() -> ExitCode {
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Status(status) => status::run(status, &output),
+        Command::Monitor(monitor) => monitor::run(monitor, &output),
+        #[cfg(unix)]
+        Command::Emulate(emulate) => emulate::run(emulate, &output),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,266 @@
+//! `iltm emulate`
+
+use super::args::Emulate;
+use super::compensate;
+use super::failure::{Failure, Kind};
+use super::inspect::check;
+use super::interrupt;
+use super::output::{Output, cannot_read, read_file};
+use crate::device::emulator::{Board, Emulator, EmulatorError};
+use crate::device::frames::Frames;
+use crate::device::memory::Memory;
+use crate::device::playback::{Playback, PlaybackError};
+use crate::video::VideoError;
+use iltm_runtime::FrameSize;
+use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::Encoding;
+use serde_json::json;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Builds the firmware; the last line that it prints is the ELF file.
+const BUILD: &str = "runtime/firmware/build.sh";
+
+/// Frames a second of the test scene.
+const RATE: f64 = 25.0;
+
+pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
+    let memory = memory(arguments)?;
+    let image = arguments.table.as_deref().map(read_file).transpose()?;
+    let table = match (&arguments.table, &image) {
+        (Some(path), Some(image)) => Some(check(path, image)?),
+        _ => None,
+    };
+    if let (Some(path), Some(image)) = (&arguments.table, &image) {
+        put_table(&memory, path, image)?;
+    }
+    let mut frames = frames(arguments, table.as_ref())?;
+    let format = format(&frames)?;
+    let firmware = match &arguments.firmware {
+        Some(firmware) => firmware.clone(),
+        None => build(arguments.board, output)?,
+    };
+    let mut playback = Playback::new(&memory, format).map_err(|error| playback_failure(&error))?;
+    interrupt::catch();
+    let started = Emulator::start(arguments.board, &firmware, &memory);
+    let mut emulator = started.map_err(|error| emulator_failure(&error))?;
+    report(arguments, &emulator, &firmware, output);
+    let played = play(&mut emulator, &mut playback, &mut frames);
+    // Ctrl-C goes to the emulator as well, which may be the first to notice.
+    if !interrupt::stopped() {
+        thread::sleep(Duration::from_millis(100));
+    }
+    if interrupt::stopped() {
+        let counts = playback.counts();
+        if !output.is_json() {
+            let _ = writeln!(
+                io::stderr(),
+                "{} frames given, {} shown",
+                counts.given,
+                counts.shown
+            );
+        }
+        return Ok(());
+    }
+    played
+}
+
+fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
+    let memory = match &arguments.memory {
+        Some(path) => Memory::kept(path).map_err(|error| {
+            let message = format!("{}: cannot be the board's memory: {error}", path.display());
+            Failure::new(Kind::Write, message, "Name a file that is not there yet.")
+        })?,
+        None => Memory::temporary().map_err(|error| {
+            let message = format!("no file for the board's memory can be made: {error}");
+            Failure::new(
+                Kind::Write,
+                message,
+                "Make room, or name a file with --memory.",
+            )
+        })?,
+    };
+    Ok(memory)
+}
+
+fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> {
+    memory.write(&psram::SLOT_A, image).map_err(|error| {
+        let message = format!(
+            "{}: does not fit the board's flash: {error}; a slot has {} bytes and the table {}",
+            path.display(),
+            psram::SLOT_A.len(),
+            image.len()
+        );
+        Failure::new(Kind::Table, message, "Solve for a coarser grid.")
+    })
+}
+
+fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<Frames, Failure> {
+    let channels = table.map(Table::channels);
+    if let Some(path) = &arguments.frames {
+        let frames = Frames::file(path, channels, arguments.fps);
+        return frames.map_err(|error| match error {
+            VideoError::File { path, source } => cannot_read(&path, &source),
+            error => compensate::failed(&error),
+        });
+    }
+    let size = arguments.size.unwrap_or_else(|| scene_size(table));
+    let rate = arguments.fps.unwrap_or(RATE);
+    Ok(Frames::scene(size, channels.unwrap_or(3), rate))
+}
+
+/// A size that the emulated board can keep up with.
+fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
+    let grid = table.map(|table| FrameSize::of_grid(table.grid()));
+    let side = |least: u16, side: fn(FrameSize) -> usize| {
+        grid.map_or(least, |grid| least.max(side(grid) as u16))
+    };
+    let width = side(128, FrameSize::width);
+    FrameSize::new(width, side(96, FrameSize::height)).expect("neither side is zero")
+}
+
+fn format(frames: &Frames) -> Result<Format, Failure> {
+    let period = (1e6 / frames.rate()).round().clamp(1.0, 1e8) as u32;
+    let format = Format::new(frames.size(), frames.channels(), Encoding::Display, period);
+    format.ok_or_else(|| {
+        let message = format!("a board cannot take frames of {}", frames.size());
+        Failure::new(Kind::Frames, message, "Give other frames.")
+    })
+}
+
+/// Builds the firmware of the source folder that this is run in, or was built
+/// from; returns its ELF file.
+fn build(board: Board, output: &Output) -> Result<PathBuf, Failure> {
+    let here = std::env::current_dir().unwrap_or_default();
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    let script = here
+        .ancestors()
+        .chain(source)
+        .map(|folder| folder.join(BUILD))
+        .find(|script| script.is_file())
+        .ok_or_else(|| {
+            Failure::new(
+                Kind::Emulator,
+                "there is no firmware: this is not a source folder, and none was given",
+                "Give the firmware's ELF file with --firmware, or run this in the source folder.",
+            )
+        })?;
+    if output.terminal {
+        let _ = writeln!(io::stderr(), "building the firmware for {board}");
+    }
+    let built = Command::new("bash")
+        .arg(&script)
+        .arg(board.name())
+        .stdin(Stdio::null())
+        .stderr(if output.terminal {
+            Stdio::inherit()
+        } else {
+            Stdio::piped()
+        })
+        .output();
+    let failed = |why: String| {
+        let message = format!("{}: {why}", script.display());
+        let next_step = format!("Run `bash {} {board}` to see all of it.", script.display());
+        Failure::new(Kind::Emulator, message, next_step)
+    };
+    let built = built.map_err(|error| failed(error.to_string()))?;
+    let last = |text: &[u8]| {
+        let text = String::from_utf8_lossy(text);
+        let last = text.lines().rfind(|line| !line.trim().is_empty());
+        last.unwrap_or_default().trim().to_owned()
+    };
+    if !built.status.success() {
+        let why = match last(&built.stderr) {
+            empty if empty.is_empty() => built.status.to_string(),
+            why => why,
+        };
+        return Err(failed(format!("the firmware cannot be built: {why}")));
+    }
+    Ok(PathBuf::from(last(&built.stdout)))
+}
+
+fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Output) {
+    let shown = |path: &Path| path.display().to_string();
+    let mut out = io::stdout();
+    let _ = if output.is_json() {
+        let data = json!({
+            "port": emulator.port(),
+            "board": arguments.board.name(),
+            "firmware": shown(firmware),
+            "table": arguments.table.as_deref().map(shown),
+            "memory": arguments.memory.as_deref().map(shown),
+        });
+        writeln!(out, "{data}")
+    } else {
+        writeln!(out, "{}", emulator.port())
+    };
+    let _ = out.flush();
+    if output.terminal && !output.is_json() {
+        let _ = writeln!(
+            io::stderr(),
+            "{} runs; try `iltm monitor --port {} --firmware {}` in another terminal. Ctrl-C ends it.",
+            arguments.board,
+            emulator.port(),
+            firmware.display()
+        );
+    }
+}
+
+/// Frames at their rate, until somebody stops it or the board ends.
+fn play(
+    emulator: &mut Emulator,
+    playback: &mut Playback<'_>,
+    frames: &mut Frames,
+) -> Result<(), Failure> {
+    let period = Duration::from_secs_f64(1.0 / frames.rate());
+    let mut due = Instant::now();
+    while !interrupt::stopped() {
+        emulator.check().map_err(|error| emulator_failure(&error))?;
+        let frame = frames
+            .next_frame()
+            .map_err(|error| compensate::failed(&error))?;
+        wait_until(due);
+        // After a pause, go on from now rather than make up for it in a burst.
+        due = (due + period).max(Instant::now());
+        let passed = playback
+            .give(&frame)
+            .and_then(|()| playback.show(|_, _| ()));
+        passed.map_err(|error| playback_failure(&error))?;
+    }
+    Ok(())
+}
+
+/// Sleeps in pieces, so that ctrl-C is noticed at a slow rate too.
+fn wait_until(time: Instant) {
+    const PIECE: Duration = Duration::from_millis(100);
+    while !interrupt::stopped() {
+        let left = time.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            break;
+        }
+        thread::sleep(left.min(PIECE));
+    }
+}
+
+fn emulator_failure(error: &EmulatorError) -> Failure {
+    Failure::new(Kind::Emulator, error, error.next_step())
+}
+
+fn playback_failure(error: &PlaybackError) -> Failure {
+    match error {
+        PlaybackError::Memory(_) => Failure::new(
+            Kind::Emulator,
+            error,
+            "Check that the disk has room for the board's memory.",
+        ),
+        PlaybackError::Region(_) => Failure::new(
+            Kind::Frames,
+            error,
+            "Give smaller frames, or a smaller --size.",
+        ),
+    }
+}

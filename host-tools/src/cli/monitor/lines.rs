@@ -1,0 +1,64 @@
+//! A line for everything that happens, on standard output.
+
+use super::super::status;
+use super::Show;
+use super::happening::Happening;
+use super::view::Rates;
+use std::io::{self, Write};
+
+/// One JSON object a line.
+#[derive(Debug)]
+pub(super) struct Json;
+
+impl Show for Json {
+    fn show(&mut self, happening: &Happening) -> io::Result<()> {
+        line(&happening.data().to_string())
+    }
+}
+
+/// Words.
+#[derive(Debug, Default)]
+pub(super) struct Plain {
+    rates: Rates,
+    /// Whether it was said that there is a log that cannot be read.
+    hinted: bool,
+}
+
+impl Show for Plain {
+    fn show(&mut self, happening: &Happening) -> io::Result<()> {
+        match happening {
+            Happening::Status(status) => {
+                self.rates.add(status);
+                let time = status.frame_time;
+                line(&format!(
+                    "{} {}, tier {} of {}, {}, \
+                     {:.1} of {:.1} ms, {:.2} % clipped, {} late, {} dropped, {} broken",
+                    status::duration(status.uptime_ms),
+                    status.mode,
+                    status.tier,
+                    status.top_tier,
+                    self.rates.words(),
+                    f64::from(time.mean_us) / 1000.0,
+                    f64::from(time.budget_us) / 1000.0,
+                    100.0 * status::clipped_share(status),
+                    status.frames.late,
+                    status.frames.dropped,
+                    status.frames.broken,
+                ))
+            }
+            Happening::Connected(_) => {
+                self.rates = Rates::default();
+                line(&happening.words().unwrap_or_default())
+            }
+            Happening::UnreadLog { .. } if std::mem::replace(&mut self.hinted, true) => Ok(()),
+            other => line(&other.words().unwrap_or_default()),
+        }
+    }
+}
+
+/// A line, seen at once also through a pipe.
+fn line(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{text}")?;
+    out.flush()
+}

@@ -1,0 +1,195 @@
+//! `iltm monitor`
+//!
+//! | what | file |
+//! |---|---|
+//! | the conversation, and beginning it anew when it breaks | here |
+//! | what there is to show | [`happening`] |
+//! | a line of text or JSON for each | [`lines`] |
+//! | the live view: its state as lines | [`view`] |
+//! | the live view: those lines on a terminal | [`live`] |
+
+mod happening;
+mod lines;
+mod live;
+mod view;
+
+use super::args::{Monitor, SerialLine};
+use super::failure::{Failure, Kind};
+use super::interrupt;
+use super::output::Output;
+use crate::device::logs::Logs;
+use crate::device::{Client, DeviceError, Incoming, Patience, Port};
+use happening::Happening;
+use iltm_runtime::link::{Channel, Refusal};
+use std::io;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Between two attempts to find a device that has gone.
+const RETRY: Duration = Duration::from_secs(1);
+
+/// Longest wait before the screen and ctrl-C are looked at again.
+const TICK: Duration = Duration::from_millis(100);
+
+/// Somebody who is shown what happens.
+trait Show {
+    /// Shows one thing.
+    fn show(&mut self, happening: &Happening) -> io::Result<()>;
+
+    /// Time has passed.
+    fn tick(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
+    let logs = arguments.firmware.as_deref().map(Logs::read).transpose();
+    let logs = logs.map_err(|error| {
+        let next_step = "Give the ELF file that the device's firmware was flashed from.";
+        Failure::new(Kind::Read, error, next_step)
+    })?;
+    let line = &arguments.line;
+    let period = Duration::from_millis(arguments.period.into());
+    let failed = |error| Failure::of_device(&line.port, &error);
+    // A first failure ends the command; later ones are the device's business.
+    let first = Watch::begin(line, period, logs.as_ref()).map_err(failed)?;
+    interrupt::catch();
+    let mut show: Box<dyn Show> = if output.is_json() {
+        Box::new(lines::Json)
+    } else if live::possible() {
+        Box::new(live::Live::start(&line.port))
+    } else {
+        Box::new(lines::Plain::default())
+    };
+    match watch(first, line, period, logs.as_ref(), show.as_mut()) {
+        Ok(()) => Ok(()),
+        // Whoever read has read enough, as `head` does.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => {
+            let message = format!("standard output: {error}");
+            let next_step = "Check where standard output goes.";
+            Err(Failure::new(Kind::Write, message, next_step))
+        }
+    }
+}
+
+/// Shows what happens until somebody stops it.
+fn watch(
+    first: Watch<'_>,
+    line: &SerialLine,
+    period: Duration,
+    logs: Option<&Logs>,
+    show: &mut dyn Show,
+) -> io::Result<()> {
+    let mut current = Ok(first);
+    // Said once for each time that the device is lost.
+    let mut said = false;
+    while !interrupt::stopped() {
+        match current {
+            Ok(mut watch) => {
+                show.show(&Happening::Connected(watch.client.device().clone()))?;
+                said = false;
+                let error = watch.until_lost(show)?;
+                let Some(error) = error else {
+                    break;
+                };
+                current = Err(error);
+            }
+            Err(DeviceError::Refused {
+                refusal: Refusal::HelloFirst,
+                ..
+            }) => {
+                show.show(&Happening::Restarted)?;
+                current = Watch::begin(line, period, logs);
+            }
+            Err(error) => {
+                if !said {
+                    show.show(&Happening::Lost(error.to_string()))?;
+                    said = true;
+                }
+                let end = Instant::now() + RETRY;
+                while Instant::now() < end && !interrupt::stopped() {
+                    thread::sleep(TICK);
+                    show.tick()?;
+                }
+                current = Watch::begin(line, period, logs);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A conversation with a device that has granted a subscription.
+struct Watch<'l> {
+    client: Client<Port>,
+    logs: Option<&'l Logs>,
+    period: Duration,
+    /// Between two renewals of the subscription.
+    renewal: Duration,
+}
+
+impl<'l> Watch<'l> {
+    fn begin(
+        line: &SerialLine,
+        period: Duration,
+        logs: Option<&'l Logs>,
+    ) -> Result<Self, DeviceError> {
+        let port = Port::open(&line.port, line.baud)?;
+        let mut client = Client::greet(port, Patience::default())?;
+        let subscription = client.subscribe(period)?;
+        Ok(Self {
+            client,
+            logs,
+            period,
+            renewal: subscription.lapse / 4,
+        })
+    }
+
+    /// Shows what the device says until it is lost, or `None` until somebody
+    /// stops it.
+    fn until_lost(&mut self, show: &mut dyn Show) -> io::Result<Option<DeviceError>> {
+        // What was queued during the subscription comes out at once.
+        let mut renew = Instant::now() + self.renewal;
+        while !interrupt::stopped() {
+            if Instant::now() >= renew {
+                renew = Instant::now() + self.renewal;
+                if let Err(error) = self.client.subscribe(self.period) {
+                    return Ok(Some(error));
+                }
+            }
+            match self.client.next(TICK) {
+                Ok(Some(incoming)) => self.show(incoming, show)?,
+                Ok(None) => show.tick()?,
+                Err(error) => return Ok(Some(error)),
+            }
+        }
+        // The device would stop by itself; asking is kinder to whoever is next.
+        let _ = self.client.subscribe(Duration::ZERO);
+        Ok(None)
+    }
+
+    fn show(&self, incoming: Incoming, show: &mut dyn Show) -> io::Result<()> {
+        match incoming {
+            Incoming::Event(event) => show.show(&event.into()),
+            Incoming::Log(payload) => match self.logs {
+                Some(logs) => {
+                    for message in logs.messages(&payload) {
+                        show.show(&Happening::Log(message))?;
+                    }
+                    Ok(())
+                }
+                None => show.show(&Happening::UnreadLog {
+                    bytes: payload.len(),
+                }),
+            },
+            Incoming::Missed { channel, count } => show.show(&Happening::Missed {
+                what: if channel == Channel::Log {
+                    "log"
+                } else {
+                    "event"
+                },
+                count,
+            }),
+        }
+    }
+}

@@ -1,0 +1,434 @@
+//! What the live view says, as lines of a given width.
+
+use super::super::status;
+use super::happening::Happening;
+use console::{StyledObject, style, truncate_str};
+use iltm_runtime::link::{Hello, Mode, Status};
+use jiff::Zoned;
+use std::collections::VecDeque;
+
+/// Events and log lines that are kept: more than any terminal has rows.
+const KEPT: usize = 200;
+
+/// Width of a bar in cells.
+const BAR: usize = 30;
+
+/// Shares of the budget from which a bar is yellow, then red.
+const WARM: f64 = 0.7;
+const HOT: f64 = 0.9;
+
+/// Frames a second, from what a device counts.
+#[derive(Debug, Default)]
+pub(in super::super) struct Rates {
+    /// Uptime in ms, received, shown.
+    last: Option<(u64, u32, u32)>,
+    a_second: Option<(f64, f64)>,
+}
+
+impl Rates {
+    /// Takes the next status.
+    pub(super) fn add(&mut self, status: &Status) {
+        let frames = &status.frames;
+        let now = (status.uptime_ms, frames.received, frames.shown);
+        if let Some((time, received, shown)) = self.last
+            && now.0 > time
+        {
+            let seconds = (now.0 - time) as f64 / 1000.0;
+            let rate = |new: u32, old: u32| f64::from(new.saturating_sub(old)) / seconds;
+            self.a_second = Some((rate(now.1, received), rate(now.2, shown)));
+        }
+        self.last = Some(now);
+    }
+
+    /// In words; there is no rate before the second status.
+    pub(super) fn words(&self) -> String {
+        match self.a_second {
+            Some((received, shown)) => format!("{received:.1} in/s, {shown:.1} out/s"),
+            None => "- in/s, - out/s".to_owned(),
+        }
+    }
+}
+
+/// What is known of the device.
+#[derive(Debug)]
+pub(super) struct View {
+    port: String,
+    device: Option<Hello>,
+    status: Option<Status>,
+    rates: Rates,
+    lost: Option<String>,
+    events: VecDeque<String>,
+    log: VecDeque<String>,
+}
+
+impl View {
+    pub(super) fn new(port: &str) -> Self {
+        Self {
+            port: port.to_owned(),
+            device: None,
+            status: None,
+            rates: Rates::default(),
+            lost: None,
+            events: VecDeque::new(),
+            log: VecDeque::new(),
+        }
+    }
+
+    /// Takes in what has happened.
+    pub(super) fn take(&mut self, happening: &Happening) {
+        match happening {
+            Happening::Status(status) => {
+                self.rates.add(status);
+                self.status = Some(status.clone());
+            }
+            Happening::Connected(device) => {
+                self.device = Some(device.clone());
+                self.rates = Rates::default();
+                self.lost = None;
+                self.event(happening);
+            }
+            Happening::Lost(why) => {
+                self.lost = Some(why.clone());
+                self.event(happening);
+            }
+            Happening::Log(message) => {
+                let level = match message.level.as_str() {
+                    "error" => style("error").red(),
+                    "warn" => style("warn ").yellow(),
+                    "info" => style("info ").green(),
+                    "debug" => style("debug").blue(),
+                    "trace" => style("trace").dim(),
+                    _ => style("     "),
+                };
+                let line = format!("{} {level} {}", message.time, message.text);
+                keep(&mut self.log, line);
+            }
+            Happening::UnreadLog { .. } => {
+                self.log.clear();
+                self.log.extend(happening.words());
+            }
+            Happening::TierChanged { .. }
+            | Happening::Fault(_)
+            | Happening::Missed { .. }
+            | Happening::Restarted => self.event(happening),
+        }
+    }
+
+    fn event(&mut self, happening: &Happening) {
+        let time = Zoned::now().strftime("%H:%M:%S").to_string();
+        let words = style(happening.words().unwrap_or_default());
+        let words = match happening {
+            Happening::Fault(_) | Happening::Lost(_) => words.red(),
+            Happening::Missed { .. } | Happening::Restarted => words.yellow(),
+            _ => words,
+        };
+        keep(&mut self.events, format!("{time}  {words}"));
+    }
+
+    /// What to leave on the terminal at the end.
+    pub(super) fn last_words(&self) -> Vec<String> {
+        let mut lines: Vec<String> = self.events.iter().rev().take(10).cloned().collect();
+        lines.reverse();
+        lines
+    }
+
+    /// The whole view, at most `height` lines of at most `width` columns.
+    pub(super) fn lines(&self, width: usize, height: usize) -> Vec<String> {
+        let mut lines = vec![self.title(), self.state(), String::new()];
+        if let Some(status) = &self.status {
+            lines.extend(self.figures(status));
+            lines.push(String::new());
+        }
+        let rest = height.saturating_sub(lines.len());
+        // Headings included; what the log does not need goes to the events.
+        let for_log = match self.log.len() {
+            0 => 0,
+            lines => (lines + 1).min(rest / 2),
+        };
+        list(&mut lines, "events", &self.events, rest - for_log);
+        list(&mut lines, "log", &self.log, for_log);
+        lines.truncate(height);
+        let cut = |line: &String| truncate_str(line, width, "").into_owned();
+        lines.iter().map(cut).collect()
+    }
+
+    fn title(&self) -> String {
+        let name = style("iltm monitor").bold();
+        match &self.device {
+            Some(device) => format!(
+                "{name}  {}  {}  firmware {}   {}",
+                self.port,
+                device.board,
+                device.firmware,
+                style("ctrl-C ends").dim()
+            ),
+            None => format!("{name}  {}", self.port),
+        }
+    }
+
+    fn state(&self) -> String {
+        if let Some(why) = &self.lost {
+            return style(format!("lost: {why}; trying again"))
+                .red()
+                .to_string();
+        }
+        let Some(status) = &self.status else {
+            return style("waiting for the first status").dim().to_string();
+        };
+        let mode = match status.mode {
+            Mode::Compensating => style(status.mode.to_string()).green(),
+            Mode::PassThrough(_) => style(status.mode.to_string()).yellow(),
+        };
+        format!("{mode}, up {}", status::duration(status.uptime_ms))
+    }
+
+    fn figures(&self, status: &Status) -> Vec<String> {
+        let frames = &status.frames;
+        let time = &status.frame_time;
+        let share = |us: u32| f64::from(us) / f64::from(time.budget_us.max(1));
+        let clipped = status::clipped_share(status);
+        let stack = f64::from(status.stack.used) / f64::from(status.stack.size.max(1));
+        let count = |count: u32, what: &str| {
+            let text = format!("{count} {what}");
+            if count == 0 {
+                style(text).dim()
+            } else {
+                style(text).yellow()
+            }
+        };
+        let line = |name: &str, value: String| format!("{name:<11}{value}");
+        vec![
+            line(
+                "frames",
+                format!(
+                    "{}   {}   {}   {}",
+                    self.rates.words(),
+                    count(frames.late, "late"),
+                    count(frames.dropped, "dropped"),
+                    count(frames.broken, "broken")
+                ),
+            ),
+            line(
+                "budget",
+                format!(
+                    "{} {:>6.1} % of {}",
+                    gauge(share(time.mean_us), Some(share(time.worst_us))),
+                    100.0 * share(time.mean_us),
+                    status::milliseconds(time.budget_us)
+                ),
+            ),
+            line(
+                "",
+                style(format!(
+                    "last {}, mean {}, worst {}",
+                    status::milliseconds(time.last_us),
+                    status::milliseconds(time.mean_us),
+                    status::milliseconds(time.worst_us)
+                ))
+                .dim()
+                .to_string(),
+            ),
+            line("tier", ladder(status.tier, status.top_tier)),
+            line(
+                "clipped",
+                format!(
+                    "{} {:>6.2} % of samples",
+                    gauge(clipped, None),
+                    100.0 * clipped
+                ),
+            ),
+            line(
+                "stack",
+                format!(
+                    "{} {:>6.1} % of {} bytes",
+                    gauge(stack, None),
+                    100.0 * stack,
+                    status.stack.size
+                ),
+            ),
+            line(
+                "table",
+                format!(
+                    "{}   slots {}",
+                    status::table(status),
+                    status::slots(status)
+                ),
+            ),
+            line(
+                "line",
+                format!(
+                    "{}; watchdog {}",
+                    status::serial(status),
+                    status::watchdog(status)
+                ),
+            ),
+        ]
+    }
+}
+
+fn keep(lines: &mut VecDeque<String>, line: String) {
+    if lines.len() == KEPT {
+        lines.pop_front();
+    }
+    lines.push_back(line);
+}
+
+/// A heading and the newest lines below it, `rows` in all.
+fn list(lines: &mut Vec<String>, heading: &str, items: &VecDeque<String>, rows: usize) {
+    if rows < 2 {
+        return;
+    }
+    lines.push(style(heading).bold().to_string());
+    let first = items.len().saturating_sub(rows - 1);
+    lines.extend(items.range(first..).map(|item| format!("  {item}")));
+    let missing = (rows - 1).saturating_sub(items.len());
+    lines.extend(std::iter::repeat_n(String::new(), missing));
+}
+
+/// A bar like a thermometer: each cell has the colour of the heat it stands for.
+/// `peak` is marked where it was.
+fn gauge(share: f64, peak: Option<f64>) -> String {
+    const EIGHTHS: [&str; 8] = ["█", "▏", "▎", "▍", "▌", "▋", "▊", "▉"];
+    let eighths = |share: f64| (share.clamp(0.0, 1.0) * (8 * BAR) as f64).ceil() as usize;
+    let filled = eighths(share);
+    let peak = peak.map(|peak| eighths(peak).div_ceil(8));
+    let cell = |index: usize| {
+        let heat = (index as f64 + 0.5) / BAR as f64;
+        if 8 * (index + 1) <= filled {
+            coloured(EIGHTHS[0], heat)
+        } else if 8 * index < filled {
+            coloured(EIGHTHS[filled % 8], heat)
+        } else if peak == Some(index + 1) {
+            coloured("│", heat)
+        } else {
+            style("·").dim()
+        }
+    };
+    (0..BAR).map(|index| cell(index).to_string()).collect()
+}
+
+fn coloured(cell: &'static str, heat: f64) -> StyledObject<&'static str> {
+    let cell = style(cell);
+    if heat < WARM {
+        cell.green()
+    } else if heat < HOT {
+        cell.yellow()
+    } else {
+        cell.red()
+    }
+}
+
+/// The tiers as rungs, the one in use and those below it lit.
+fn ladder(tier: u8, top: u8) -> String {
+    let rung = |rung: u8| {
+        if rung <= tier {
+            style("■").cyan().to_string()
+        } else {
+            style("□").dim().to_string()
+        }
+    };
+    let rungs: Vec<String> = (0..=top.min(31)).map(rung).collect();
+    format!("{}  {tier} of {top}", rungs.join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use iltm_runtime::link::{Device, Fault, FaultyFrame, Mode, PassThrough, TierReason};
+    use iltm_tests::fake_device::FakeDevice;
+
+    /// The view without its times of day.
+    fn shown(view: &View, width: usize, height: usize) -> String {
+        console::set_colors_enabled(false);
+        let lines = view.lines(width, height);
+        assert!(lines.len() <= height);
+        let wide = lines.iter().map(|line| console::measure_text_width(line));
+        assert!(wide.max() <= Some(width));
+        let time = |line: &String| {
+            let is_time = |text: &str| {
+                text.get(2..10)
+                    .is_some_and(|at| at.matches(':').count() == 2)
+            };
+            if is_time(line) {
+                format!("  hh:mm:ss{}", &line[10..])
+            } else {
+                line.clone()
+            }
+        };
+        lines.iter().map(time).collect::<Vec<_>>().join("\n")
+    }
+
+    fn status(uptime_ms: u64) -> Status {
+        let device = FakeDevice {
+            uptime_ms,
+            ..FakeDevice::default()
+        };
+        device.status()
+    }
+
+    #[test]
+    fn the_view_shows_rates_tier_bars_events_and_log() {
+        let mut view = View::new("/dev/ttyACM0");
+        view.take(&Happening::Connected(FakeDevice::default().identity()));
+        view.take(&Happening::Status(status(4_000)));
+        view.take(&Happening::Status(status(5_000)));
+        view.take(&Happening::TierChanged {
+            from: 4,
+            to: 3,
+            reason: TierReason::OverBudget,
+            frame: 250,
+        });
+        view.take(&Happening::Fault(Fault::Frame {
+            sequence: 260,
+            cause: FaultyFrame::Torn,
+        }));
+        view.take(&Happening::UnreadLog { bytes: 12 });
+        insta::assert_snapshot!(shown(&view, 80, 24));
+    }
+
+    #[test]
+    fn a_small_terminal_cuts_the_view_and_breaks_nothing() {
+        let mut view = View::new("/dev/ttyACM0");
+        view.take(&Happening::Connected(FakeDevice::default().identity()));
+        view.take(&Happening::Status(status(4_000)));
+        for (width, height) in [(0, 0), (1, 1), (10, 3), (30, 12), (79, 15)] {
+            shown(&view, width, height);
+        }
+    }
+
+    #[test]
+    fn a_lost_device_says_so_until_it_is_back() {
+        let mut view = View::new("/dev/ttyACM0");
+        let connected = Happening::Connected(FakeDevice::default().identity());
+        view.take(&connected);
+        view.take(&Happening::Status(status(4_000)));
+        view.take(&Happening::Lost("the port has gone".to_owned()));
+        assert!(view.lines(80, 24)[1].contains("lost: the port has gone"));
+        view.take(&connected);
+        assert!(view.lines(80, 24)[1].contains("compensating"));
+    }
+
+    #[test]
+    fn bars_end_where_the_share_does() {
+        console::set_colors_enabled(false);
+        assert_eq!(gauge(0.0, None), "·".repeat(BAR));
+        assert_eq!(gauge(1.0, None), "█".repeat(BAR));
+        assert_eq!(gauge(7.0, Some(9.0)), "█".repeat(BAR), "over budget");
+        assert_eq!(
+            gauge(0.5, Some(1.0)),
+            format!("{}{}│", "█".repeat(15), "·".repeat(14))
+        );
+        // 1 % of 30 cells is 2.4 eighths of one: what is there is seen.
+        assert_eq!(gauge(0.01, None), format!("▍{}", "·".repeat(29)));
+    }
+
+    #[test]
+    fn why_frames_pass_through_is_said() {
+        let mut view = View::new("/dev/ttyACM0");
+        let mut status = status(1_000);
+        status.mode = Mode::PassThrough(PassThrough::NoTable);
+        status.table = None;
+        view.take(&Happening::Status(status));
+        assert!(view.lines(80, 24)[1].contains("pass-through: there is no table"));
+    }
+}

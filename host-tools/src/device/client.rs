@@ -1,0 +1,140 @@
+//! The host's side of the conversation.
+
+use super::talk::{Talk, name};
+use super::{DeviceError, Line};
+use iltm_runtime::link::{Channel, Event, Hello, PROTOCOL_VERSION, Request, Response, Status};
+use std::time::Duration;
+
+/// How long a device is waited for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Patience {
+    /// For one answer.
+    pub answer: Duration,
+    /// How often a request is sent before giving up.
+    pub tries: u32,
+}
+
+impl Default for Patience {
+    /// The longest request and answer take .1 s at 115,200 baud.
+    fn default() -> Self {
+        Self {
+            answer: Duration::from_millis(400),
+            tries: 5,
+        }
+    }
+}
+
+/// What a device says by itself.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Incoming {
+    /// An event.
+    Event(Event),
+    /// Whole defmt frames; see [`Logs`](super::logs::Logs).
+    Log(Vec<u8>),
+    /// Frames that the device sent and that did not come.
+    Missed {
+        /// The channel: events or logs.
+        channel: Channel,
+        /// How many.
+        count: u16,
+    },
+}
+
+/// What a subscription was granted.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Subscription {
+    /// Between two statuses; zero if there will be none.
+    pub period: Duration,
+    /// Silence of the host after which the device stops.
+    pub lapse: Duration,
+}
+
+/// A conversation with a device.
+///
+/// A request without an answer is sent again under the same number, which does
+/// no harm: the device answers each copy alike, and any of the answers will do.
+#[derive(Debug)]
+pub struct Client<L> {
+    talk: Talk<L>,
+    device: Hello,
+}
+
+impl<L: Line> Client<L> {
+    /// Says hello.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if nothing answers, or something of another version.
+    pub fn greet(line: L, patience: Patience) -> Result<Self, DeviceError> {
+        let mut talk = Talk::new(line, patience);
+        let hello = Request::Hello {
+            protocol: PROTOCOL_VERSION,
+        };
+        match talk.ask(hello)? {
+            Response::Hello(device) if device.protocol == PROTOCOL_VERSION => {
+                talk.forget();
+                Ok(Self { talk, device })
+            }
+            Response::Hello(device) => Err(DeviceError::Protocol {
+                device: device.protocol,
+            }),
+            other => Err(unexpected(hello, &other)),
+        }
+    }
+
+    /// Who the device is.
+    #[must_use]
+    pub const fn device(&self) -> &Hello {
+        &self.device
+    }
+
+    /// How the device is.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if it does not answer, or not this.
+    pub fn status(&mut self) -> Result<Status, DeviceError> {
+        match self.talk.ask(Request::Status)? {
+            Response::Status(status) => Ok(status),
+            other => Err(unexpected(Request::Status, &other)),
+        }
+    }
+
+    /// Asks for events and logs, with a status each `period`, or for nothing more
+    /// if that is zero. To be repeated before [`Subscription::lapse`] is over.
+    ///
+    /// # Errors
+    /// [`DeviceError`] if the device does not answer, or not this.
+    pub fn subscribe(&mut self, period: Duration) -> Result<Subscription, DeviceError> {
+        let request = Request::Subscribe {
+            period_ms: u16::try_from(period.as_millis()).unwrap_or(u16::MAX),
+        };
+        match self.talk.ask(request)? {
+            Response::Subscribed {
+                period_ms,
+                lapse_ms,
+            } => Ok(Subscription {
+                period: Duration::from_millis(period_ms.into()),
+                lapse: Duration::from_millis(lapse_ms.into()),
+            }),
+            other => Err(unexpected(request, &other)),
+        }
+    }
+
+    /// What the device says next by itself; waits for it at most as long as `wait`.
+    ///
+    /// # Errors
+    /// [`DeviceError::Gone`].
+    pub fn next(&mut self, wait: Duration) -> Result<Option<Incoming>, DeviceError> {
+        self.talk.next(wait)
+    }
+}
+
+const fn unexpected(request: Request, response: &Response) -> DeviceError {
+    let request = name(request);
+    match response {
+        Response::Refused(refusal) => DeviceError::Refused {
+            request,
+            refusal: *refusal,
+        },
+        _ => DeviceError::Answer { request },
+    }
+}

@@ -1,0 +1,110 @@
+//! Why a device could not be spoken to.
+
+use iltm_runtime::link::{PROTOCOL_VERSION, Refusal};
+use std::io;
+
+/// Why a device could not be spoken to. [`DeviceError::next_step`] says what to
+/// do about it.
+#[derive(Debug, thiserror::Error)]
+pub enum DeviceError {
+    /// The port could not be opened.
+    #[error("the port cannot be opened: {source}")]
+    Open {
+        /// What the operating system says.
+        source: serialport::Error,
+    },
+    /// The port was there and is not any more.
+    #[error("the port has gone: {source}")]
+    Gone {
+        /// What the operating system says.
+        source: io::Error,
+    },
+    /// Nothing came back that is an answer.
+    #[error("no answer after asking {tries} times in {seconds:.1} s; {heard}")]
+    NoAnswer {
+        /// How often it was asked.
+        tries: u32,
+        /// How long that took.
+        seconds: f64,
+        /// What did come back.
+        heard: Heard,
+    },
+    /// The device speaks another version.
+    #[error(
+        "the device speaks version {device} of the protocol; these host tools speak version {}",
+        PROTOCOL_VERSION
+    )]
+    Protocol {
+        /// The device's version.
+        device: u16,
+    },
+    /// The device did not do what it was asked.
+    #[error("the device refuses the request \"{request}\": {refusal}")]
+    Refused {
+        /// What it was asked.
+        request: &'static str,
+        /// Why not.
+        refusal: Refusal,
+    },
+    /// The answer belongs to another request, or cannot be read.
+    #[error("the device answers the request \"{request}\" with something else")]
+    Answer {
+        /// What it was asked.
+        request: &'static str,
+    },
+}
+
+/// What came over a line while an answer was awaited.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Heard {
+    /// Bytes.
+    pub bytes: u64,
+    /// Whole frames.
+    pub frames: u64,
+}
+
+impl std::fmt::Display for Heard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.bytes, self.frames) {
+            (0, _) => f.write_str("the line is silent"),
+            (bytes, 0) => write!(f, "{bytes} bytes came, none of them an iltm frame"),
+            (_, frames) => write!(f, "{frames} frames came, none of them the answer"),
+        }
+    }
+}
+
+impl DeviceError {
+    /// What to do about it.
+    #[must_use]
+    pub fn next_step(&self) -> &'static str {
+        match self {
+            Self::Open { source, .. } => match source.kind() {
+                serialport::ErrorKind::NoDevice => {
+                    "Check the name and the cable, and close other programs that use the port."
+                }
+                serialport::ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
+                    "Join the group that owns the port: `sudo usermod -aG dialout $USER`, then log in again."
+                }
+                _ => "Check the name: `ls /dev/tty*` before and after plugging the device in.",
+            },
+            Self::Gone { .. } => "Check the cable and the device's power, then try again.",
+            Self::NoAnswer { heard, .. } if heard.bytes > 0 && heard.frames == 0 => {
+                "Give the device's speed with --baud, or another --port: something else speaks there."
+            }
+            Self::NoAnswer { .. } => {
+                "Check that the device has power, that the cable is the right one, and try another --port or --baud."
+            }
+            Self::Protocol { device } if *device > PROTOCOL_VERSION => {
+                "Use the host tools of the firmware's version, or later ones."
+            }
+            Self::Protocol { .. } => "Bring the device's firmware up to date.",
+            Self::Refused {
+                refusal: Refusal::HelloFirst,
+                ..
+            } => "The device has just restarted: try again.",
+            Self::Refused { .. } | Self::Answer { .. } => {
+                "Use host tools and firmware of the same version."
+            }
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Devices at the other end of a serial line, real and emulated.
+//!
+//! | step | file |
+//! |---|---|
+//! | the line: a serial port, or anything else that carries bytes both ways | [`port`] |
+//! | requests, answers, events | [`client`] |
+//! | log messages, with the firmware's ELF file | [`logs`] |
+//! | the emulated board, its serial line as a port | [`emulator`] |
+//! | the emulated board's memory, which is a file here | [`memory`] |
+//! | frames for it | [`frames`], [`playback`] |
+//!
+//! What goes over the line is defined in [`iltm_runtime::link`], which the device
+//! uses as well.
+
+pub mod client;
+#[cfg(unix)]
+pub mod emulator;
+mod error;
+#[cfg(unix)]
+pub mod frames;
+pub mod logs;
+#[cfg(unix)]
+pub mod memory;
+#[cfg(unix)]
+pub mod playback;
+pub mod port;
+mod talk;
+
+pub use client::{Client, Incoming, Patience};
+pub use error::DeviceError;
+pub use port::{Line, Port};

@@ -1,0 +1,172 @@
+//! Frames out, frames in: what every request has in common.
+
+use super::client::{Incoming, Patience};
+use super::error::Heard;
+use super::{DeviceError, Line};
+use iltm_runtime::link::{
+    Channel, DELIMITER, Decoder, Frame, MAX_ENCODED, MAX_PAYLOAD, Request, Response, encode,
+};
+use std::collections::VecDeque;
+use std::io;
+use std::time::{Duration, Instant};
+
+/// A line with frames on it.
+#[derive(Debug)]
+pub(super) struct Talk<L> {
+    line: L,
+    decoder: Decoder,
+    patience: Patience,
+    /// Number of the last request.
+    sequence: u16,
+    /// Number of the next event and of the next log, once there has been one.
+    expected: [Option<u16>; 2],
+    incoming: VecDeque<Incoming>,
+    heard: Heard,
+}
+
+impl<L: Line> Talk<L> {
+    pub(super) fn new(line: L, patience: Patience) -> Self {
+        Self {
+            line,
+            decoder: Decoder::new(),
+            patience,
+            // Answers that an earlier host asked for must not look like ours.
+            sequence: fastrand::u16(..),
+            expected: [None; 2],
+            incoming: VecDeque::new(),
+            heard: Heard::default(),
+        }
+    }
+
+    /// Forgets what the device said to an earlier host.
+    pub(super) fn forget(&mut self) {
+        self.expected = [None; 2];
+        self.incoming.clear();
+    }
+
+    /// What the device says next by itself; waits for it at most as long as `wait`.
+    pub(super) fn next(&mut self, wait: Duration) -> Result<Option<Incoming>, DeviceError> {
+        let end = Instant::now() + wait;
+        loop {
+            if let Some(incoming) = self.incoming.pop_front() {
+                return Ok(Some(incoming));
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            // Answers that come too late are of no use to anybody.
+            self.listen(left, |_, _| ())?;
+        }
+    }
+
+    /// Sends a request until it is answered.
+    pub(super) fn ask(&mut self, request: Request) -> Result<Response, DeviceError> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let sequence = self.sequence;
+        let bytes = encoded(sequence, request);
+        let start = Instant::now();
+        self.heard = Heard::default();
+        for _ in 0..self.patience.tries {
+            self.line.write(&bytes).map_err(gone)?;
+            if let Some(response) = self.answer(sequence)? {
+                return response.map_err(|_| DeviceError::Answer {
+                    request: name(request),
+                });
+            }
+        }
+        Err(DeviceError::NoAnswer {
+            tries: self.patience.tries,
+            seconds: start.elapsed().as_secs_f64(),
+            heard: self.heard,
+        })
+    }
+
+    /// Waits for the response with this number.
+    fn answer(
+        &mut self,
+        sequence: u16,
+    ) -> Result<Option<Result<Response, postcard::Error>>, DeviceError> {
+        let end = Instant::now() + self.patience.answer;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            let mut answer = None;
+            self.listen(left, |number, payload| {
+                if number == sequence {
+                    answer = Some(postcard::from_bytes(payload));
+                }
+            })?;
+            if answer.is_some() {
+                return Ok(answer);
+            }
+        }
+    }
+
+    /// Reads once; `response` gets number and payload of every response in it.
+    fn listen(
+        &mut self,
+        wait: Duration,
+        mut response: impl FnMut(u16, &[u8]),
+    ) -> Result<(), DeviceError> {
+        let mut bytes = [0; 1024];
+        let count = self.line.read(&mut bytes, wait).map_err(gone)?;
+        self.heard.bytes += count as u64;
+        for byte in &bytes[..count] {
+            let Some(Ok(frame)) = self.decoder.push(*byte) else {
+                continue;
+            };
+            self.heard.frames += 1;
+            let incoming = match frame.channel {
+                Channel::Request => continue,
+                Channel::Response => {
+                    response(frame.sequence, frame.payload);
+                    continue;
+                }
+                Channel::Event => postcard::from_bytes(frame.payload)
+                    .map(Incoming::Event)
+                    .ok(),
+                Channel::Log => Some(Incoming::Log(frame.payload.to_vec())),
+            };
+            let (channel, sequence) = (frame.channel, frame.sequence);
+            let expected = &mut self.expected[usize::from(channel == Channel::Log)];
+            let count = sequence.wrapping_sub(expected.unwrap_or(sequence));
+            *expected = Some(sequence.wrapping_add(1));
+            if count != 0 {
+                self.incoming.push_back(Incoming::Missed { channel, count });
+            }
+            self.incoming.extend(incoming);
+        }
+        Ok(())
+    }
+}
+
+const fn gone(source: io::Error) -> DeviceError {
+    DeviceError::Gone { source }
+}
+
+/// A request as it goes on the line: after a delimiter, which ends whatever the
+/// device may have heard before.
+fn encoded(sequence: u16, request: Request) -> Vec<u8> {
+    let mut payload = [0; MAX_PAYLOAD];
+    let mut bytes = [DELIMITER; 1 + MAX_ENCODED];
+    let payload = postcard::to_slice(&request, &mut payload).expect("a request fits a frame");
+    let frame = Frame {
+        channel: Channel::Request,
+        sequence,
+        payload,
+    };
+    let length = encode(frame, &mut bytes[1..]).expect("a payload fits a frame");
+    bytes[..=length].to_vec()
+}
+
+/// What a request is called in messages.
+pub(super) const fn name(request: Request) -> &'static str {
+    match request {
+        Request::Hello { .. } => "hello",
+        Request::Status => "status",
+        Request::Subscribe { .. } => "subscribe",
+    }
+}

@@ -1,0 +1,43 @@
+//! Arm MPS2+ with a Cortex-M7 (application note 500), as QEMU's `mps2-an500`.
+//!
+//! Its PSRAM stands for table flash and frame memory.
+
+use super::cmsdk::{self, Lamp, Nap, Timer, Uart, WatchdogTimer};
+use super::psram::{PsramFlash, PsramSink, PsramSource};
+use crate::board::{Board, Peripherals};
+
+/// The board.
+pub struct Mps2An500;
+
+impl Board for Mps2An500 {
+    const NAME: &'static str = "mps2-an500";
+
+    type Clock = Timer;
+    type Source = PsramSource;
+    type Sink = PsramSink;
+    type Serial = Uart;
+    type Flash = PsramFlash;
+    type Watchdog = WatchdogTimer;
+    type Lamp = Lamp;
+    type Rest = Nap;
+
+    fn take() -> Option<Peripherals<Self>> {
+        // The first to take the core's peripherals has the board's as well. The
+        // caches stay off: frame buffers are shared with hardware that does not see
+        // them. The emulator has none; on silicon, an MPU region that keeps the
+        // PSRAM from being cached lets them be switched on here.
+        cortex_m::Peripherals::take()?;
+        let cmsdk = cmsdk::take();
+        let (flash, source, sink) = super::psram::take();
+        Some(Peripherals {
+            clock: cmsdk.timer,
+            source,
+            sink,
+            serial: cmsdk.uart,
+            flash,
+            watchdog: cmsdk.watchdog,
+            lamp: cmsdk.lamp,
+            rest: cmsdk.nap,
+        })
+    }
+}

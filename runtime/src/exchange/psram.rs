@@ -1,0 +1,27 @@
+//! What lies where in the emulated boards' PSRAM.
+//!
+//! 16 MiB that stand for three things of a real board: the NOR flash with the
+//! table slots, the flash sectors for small records, and the DMA memory of the
+//! frames. Behind it is a file of the host. Offsets are from the start of the
+//! PSRAM, whose address differs from board to board.
+
+use core::ops::Range;
+
+/// Bytes of the PSRAM.
+pub const SIZE: usize = 16 << 20;
+
+/// Table slot A.
+pub const SLOT_A: Range<usize> = 0..2 << 20;
+
+/// Table slot B.
+pub const SLOT_B: Range<usize> = 2 << 20..4 << 20;
+
+/// Records of the slots and the device's own settings.
+pub const RECORDS: Range<usize> = 4 << 20..5 << 20;
+
+/// Orders to the firmware's self-test and its findings; the product leaves it
+/// alone.
+pub const SELF_TEST: Range<usize> = 5 << 20..6 << 20;
+
+/// The frame memory.
+pub const FRAMES: Range<usize> = 6 << 20..SIZE;

@@ -1,0 +1,209 @@
+//! The device's side of the conversation, without a line of its own.
+//!
+//! ```text
+//! bytes from the line -> receive -+            +-> pending, sent -> bytes to the line
+//! time                -> poll ----+-> Session -+
+//! events, logs        -> event, log +
+//! ```
+
+use super::decoder::Decoder;
+use super::frame::{Channel, Frame, MAX_ENCODED, MAX_PAYLOAD};
+use super::message::{Event, Hello, Refusal, Request, Response};
+use super::outbox::Outbox;
+use super::status::{SerialCounts, Status};
+use serde::Serialize;
+
+/// Shortest time between two statuses that nobody asked for, milliseconds. At
+/// 115,200 baud a status of the usual length takes a tenth of it.
+pub const MIN_PERIOD_MS: u16 = 100;
+
+/// Milliseconds without a frame from the host after which a subscription ends.
+pub const LAPSE_MS: u16 = 5_000;
+
+/// Bytes that may wait for the line: room for two of the longest frames.
+pub const OUTBOX: usize = 2 * MAX_ENCODED;
+
+/// What a session asks of the device around it.
+pub trait Device {
+    /// How it is. The session fills in [`Status::serial`].
+    fn status(&self) -> Status;
+}
+
+/// A conversation with whatever host is at the other end.
+///
+/// It says nothing before a frame has come in whole; it answers every request,
+/// and sends events and logs only to a host that has subscribed and still speaks.
+/// Times are milliseconds on any clock that does not run backwards.
+#[derive(Debug)]
+pub struct Session {
+    identity: Hello,
+    decoder: Decoder,
+    outbox: Outbox<OUTBOX>,
+    greeted: bool,
+    subscription: Option<Subscription>,
+    events: u16,
+    logs: u16,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Subscription {
+    period_ms: u16,
+    /// When the next status is due.
+    due: u64,
+    /// When the host spoke last.
+    heard: u64,
+}
+
+impl Session {
+    /// Of a device that has just started and says of itself what `identity` says.
+    #[must_use]
+    pub const fn new(identity: Hello) -> Self {
+        Self {
+            identity,
+            decoder: Decoder::new(),
+            outbox: Outbox::new(),
+            greeted: false,
+            subscription: None,
+            events: 0,
+            logs: 0,
+        }
+    }
+
+    /// Takes bytes from the line and answers the requests that they complete.
+    pub fn receive(&mut self, bytes: &[u8], now_ms: u64, device: &impl Device) {
+        for byte in bytes {
+            let Some(Ok(frame)) = self.decoder.push(*byte) else {
+                continue;
+            };
+            // A host hears nothing on this channel, and says nothing on others.
+            if frame.channel != Channel::Request {
+                continue;
+            }
+            let (sequence, request) = (frame.sequence, Request::parse(frame.payload));
+            if let Some(subscription) = &mut self.subscription {
+                subscription.heard = now_ms;
+            }
+            let response = match request {
+                Ok(request) => self.answer(request, now_ms, device),
+                Err(refusal) => Response::Refused(refusal),
+            };
+            self.send(Channel::Response, sequence, &response);
+        }
+    }
+
+    fn answer(&mut self, request: Request, now_ms: u64, device: &impl Device) -> Response {
+        match request {
+            Request::Hello { .. } => {
+                self.greeted = true;
+                self.subscription = None;
+                Response::Hello(self.identity.clone())
+            }
+            _ if !self.greeted => Response::Refused(Refusal::HelloFirst),
+            Request::Status => Response::Status(self.status(device)),
+            Request::Subscribe { period_ms: 0 } => {
+                self.subscription = None;
+                Response::Subscribed {
+                    period_ms: 0,
+                    lapse_ms: LAPSE_MS,
+                }
+            }
+            Request::Subscribe { period_ms } => {
+                let period_ms = period_ms.max(MIN_PERIOD_MS);
+                // Renewing must not put the next status off.
+                let next = now_ms.saturating_add(u64::from(period_ms));
+                let due = self.subscription.map_or(next, |old| old.due.min(next));
+                self.subscription = Some(Subscription {
+                    period_ms,
+                    due,
+                    heard: now_ms,
+                });
+                Response::Subscribed {
+                    period_ms,
+                    lapse_ms: LAPSE_MS,
+                }
+            }
+        }
+    }
+
+    /// Sends what is due by now. Call it a few times per [`MIN_PERIOD_MS`].
+    pub fn poll(&mut self, now_ms: u64, device: &impl Device) {
+        let Some(subscription) = &mut self.subscription else {
+            return;
+        };
+        if now_ms.saturating_sub(subscription.heard) > u64::from(LAPSE_MS) {
+            self.subscription = None;
+        } else if now_ms >= subscription.due {
+            subscription.due = now_ms.saturating_add(u64::from(subscription.period_ms));
+            let status = self.status(device);
+            self.event(&Event::Status(status));
+        }
+    }
+
+    /// Tells a subscribed host of something; nothing happens without one.
+    pub fn event(&mut self, event: &Event) {
+        if self.is_subscribed() {
+            let sequence = self.events;
+            self.events = sequence.wrapping_add(1);
+            self.send(Channel::Event, sequence, event);
+        }
+    }
+
+    /// Sends whole defmt frames, at most [`MAX_PAYLOAD`] bytes, to a subscribed
+    /// host; nothing happens without one.
+    pub fn log(&mut self, frames: &[u8]) {
+        if self.is_subscribed() {
+            let sequence = self.logs;
+            self.logs = sequence.wrapping_add(1);
+            self.outbox.push(Frame {
+                channel: Channel::Log,
+                sequence,
+                payload: frames,
+            });
+        }
+    }
+
+    /// Whether a host wants events and logs.
+    #[must_use]
+    pub const fn is_subscribed(&self) -> bool {
+        self.subscription.is_some()
+    }
+
+    /// Bytes for the line, as many as lie side by side; empty if there are none.
+    #[must_use]
+    pub fn pending(&self) -> &[u8] {
+        self.outbox.pending()
+    }
+
+    /// The first `count` bytes of [`pending`](Self::pending) are on the line.
+    pub fn sent(&mut self, count: usize) {
+        self.outbox.sent(count);
+    }
+
+    /// What went wrong on the line so far.
+    #[must_use]
+    pub const fn trouble(&self) -> SerialCounts {
+        SerialCounts {
+            bad: self.decoder.bad(),
+            unsent: self.outbox.refused(),
+        }
+    }
+
+    fn status(&self, device: &impl Device) -> Status {
+        Status {
+            serial: self.trouble(),
+            ..device.status()
+        }
+    }
+
+    fn send(&mut self, channel: Channel, sequence: u16, message: &impl Serialize) {
+        let mut bytes = [0; MAX_PAYLOAD];
+        // The longest message has room, which a test makes sure of.
+        if let Ok(payload) = postcard::to_slice(message, &mut bytes) {
+            self.outbox.push(Frame {
+                channel,
+                sequence,
+                payload,
+            });
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! How a device is.
+//!
+//! The order of variants and fields is the wire format: do not reorder.
+
+use super::message::Version;
+use crate::exchange::{AttachError, Broken};
+use crate::image::ImageError;
+use core::fmt;
+use heapless::String;
+use serde::{Deserialize, Serialize};
+
+/// Longest name of a board, bytes.
+pub const MAX_NAME: usize = 32;
+
+/// Name of a board.
+pub type Name = String<MAX_NAME>;
+
+/// All that a device knows of itself. Counters start at zero when it starts.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Status {
+    /// Version of the firmware.
+    pub firmware: Version,
+    /// Name of the board.
+    pub board: Name,
+    /// Milliseconds since it started.
+    pub uptime_ms: u64,
+    /// The table in use.
+    pub table: Option<TableName>,
+    /// What it does with frames.
+    pub mode: Mode,
+    /// Tier of the last frame.
+    pub tier: u8,
+    /// The table's most accurate tier.
+    pub top_tier: u8,
+    /// What became of the frames.
+    pub frames: FrameCounts,
+    /// Samples that the projector cannot show.
+    pub clipping: Clipping,
+    /// How long frames took.
+    pub frame_time: FrameTime,
+    /// The table slots.
+    pub slots: [SlotState; 2],
+    /// What went wrong last.
+    pub last_fault: Option<Fault>,
+    /// Depth of the stack.
+    pub stack: Stack,
+    /// Times that the watchdog restarted the device since it was switched on.
+    pub watchdog_resets: u32,
+    /// Trouble on this line.
+    pub serial: SerialCounts,
+}
+
+/// What tells one table from another.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct TableName {
+    /// CRC-32 of its image.
+    pub id: u32,
+    /// Its version; 0 if it has none.
+    pub version: u32,
+}
+
+impl fmt::Display for TableName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:08x} version {}", self.id, self.version)
+    }
+}
+
+/// What a device does with frames.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Mode {
+    /// It compensates them.
+    Compensating,
+    /// It shows them as they are.
+    PassThrough(PassThrough),
+}
+
+/// Why frames are shown as they are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum PassThrough {
+    /// There is no table.
+    NoTable,
+    /// There is one, but it is damaged or not for this firmware.
+    BrokenTable,
+    /// The frames are smaller than the table's grid, or of other channels.
+    OtherFrames,
+    /// The table needs more memory than the device has.
+    Memory,
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Compensating => f.write_str("compensating"),
+            Self::PassThrough(why) => write!(f, "pass-through: {why}"),
+        }
+    }
+}
+
+impl fmt::Display for PassThrough {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoTable => "there is no table",
+            Self::BrokenTable => "the table cannot be used",
+            Self::OtherFrames => "the table is for other frames",
+            Self::Memory => "the table needs more memory than there is",
+        })
+    }
+}
+
+/// What became of the frames. Each stops at the largest number.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct FrameCounts {
+    /// Came in.
+    pub received: u32,
+    /// Went out.
+    pub shown: u32,
+    /// Were not there when they were due.
+    pub late: u32,
+    /// Were numbered by the source and never seen.
+    pub dropped: u32,
+    /// Were torn, short or stale, and not shown.
+    pub broken: u32,
+}
+
+/// Samples that were wanted brighter or darker than the projector can show.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct Clipping {
+    /// In the last frame.
+    pub last: u32,
+    /// In all frames.
+    pub total: u64,
+    /// Samples of a frame, clipped or not.
+    pub samples: u32,
+}
+
+/// Microseconds from a frame taken to its compensated frame handed on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct FrameTime {
+    /// Of the last frame.
+    pub last_us: u32,
+    /// Moving mean.
+    pub mean_us: u32,
+    /// Longest.
+    pub worst_us: u32,
+    /// What a frame may take.
+    pub budget_us: u32,
+}
+
+/// What is in a table slot.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum SlotState {
+    /// Nothing.
+    Empty,
+    /// A whole table, not in use.
+    Valid,
+    /// Something that is no table.
+    Broken,
+    /// The table in use.
+    Active,
+    /// The table in use, until it is confirmed or its time is over.
+    Trial,
+}
+
+impl fmt::Display for SlotState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Empty => "empty",
+            Self::Valid => "valid",
+            Self::Broken => "broken",
+            Self::Active => "active",
+            Self::Trial => "trial",
+        })
+    }
+}
+
+/// Bytes of stack.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct Stack {
+    /// Most that were ever in use.
+    pub used: u32,
+    /// All.
+    pub size: u32,
+}
+
+/// Trouble on the serial line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct SerialCounts {
+    /// Times that something other than a frame stood between delimiters.
+    pub bad: u32,
+    /// Frames that were not sent because the line was busy.
+    pub unsent: u32,
+}
+
+/// Something that went wrong.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Fault {
+    /// A slot's table was refused.
+    Table {
+        /// Index of the slot.
+        slot: u8,
+        /// Why.
+        cause: TableFault,
+    },
+    /// A frame was not shown.
+    Frame {
+        /// Its number.
+        sequence: u32,
+        /// Why.
+        cause: FaultyFrame,
+    },
+    /// The source announced frames that the device cannot take.
+    Source(SourceFault),
+    /// The watchdog restarted the device.
+    Watchdog,
+    /// The firmware stopped itself and started anew: a defect.
+    Crash,
+}
+
+/// Why a table is refused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum TableFault {
+    /// It is no table, or not all of one.
+    NotATable,
+    /// It has another format version.
+    Version,
+    /// It does not match its checksums.
+    Checksum,
+    /// Its contents contradict each other, or could overflow.
+    Contents,
+}
+
+/// Why a frame is not shown.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum FaultyFrame {
+    /// It changed while it was read.
+    Torn,
+    /// It is incomplete.
+    Short,
+    /// It is not newer than the last.
+    Stale,
+    /// The source changed its format.
+    Superseded,
+}
+
+/// Why the frames of a source cannot be taken.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum SourceFault {
+    /// It has another version of the frame memory.
+    Version,
+    /// There are no such frames.
+    Format,
+    /// They do not fit in the frame memory.
+    TooLarge,
+}
+
+impl From<&ImageError> for TableFault {
+    fn from(error: &ImageError) -> Self {
+        match error {
+            ImageError::Truncated { .. } | ImageError::NotATable | ImageError::Length { .. } => {
+                Self::NotATable
+            }
+            ImageError::Version { .. } => Self::Version,
+            ImageError::HeaderChecksum | ImageError::SectionChecksum { .. } => Self::Checksum,
+            _ => Self::Contents,
+        }
+    }
+}
+
+impl From<Broken> for FaultyFrame {
+    fn from(broken: Broken) -> Self {
+        match broken {
+            Broken::Torn => Self::Torn,
+            Broken::Short => Self::Short,
+            Broken::Stale => Self::Stale,
+            Broken::Superseded => Self::Superseded,
+        }
+    }
+}
+
+impl SourceFault {
+    /// The fault behind an error; `None` where there merely is no source.
+    #[must_use]
+    pub const fn of(error: &AttachError) -> Option<Self> {
+        Some(match error {
+            AttachError::NoSource => return None,
+            AttachError::Version { .. } => Self::Version,
+            AttachError::Format => Self::Format,
+            AttachError::Region(_) => Self::TooLarge,
+        })
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Table { slot, cause } => write!(f, "the table in slot {slot} {cause}"),
+            Self::Frame { sequence, cause } => write!(f, "frame {sequence} {cause}"),
+            Self::Source(cause) => write!(f, "the source of frames {cause}"),
+            Self::Watchdog => f.write_str("the watchdog restarted the device"),
+            Self::Crash => f.write_str("the firmware crashed and started anew"),
+        }
+    }
+}
+
+impl fmt::Display for TableFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotATable => "is not a whole table",
+            Self::Version => "has a format version that the firmware does not read",
+            Self::Checksum => "does not match its checksums",
+            Self::Contents => "contradicts itself",
+        })
+    }
+}
+
+impl fmt::Display for FaultyFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Torn => "changed while it was read",
+            Self::Short => "is incomplete",
+            Self::Stale => "is not newer than the one before",
+            Self::Superseded => "was of another format",
+        })
+    }
+}
+
+impl fmt::Display for SourceFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Version => "has another version of the frame memory",
+            Self::Format => "announces frames that there cannot be",
+            Self::TooLarge => "announces frames that do not fit in the frame memory",
+        })
+    }
+}
