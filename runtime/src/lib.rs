@@ -46,6 +46,7 @@ mod frame;
 mod grid;
 pub mod haar;
 pub mod image;
+mod kernel;
 pub mod operator;
 pub mod pipeline;
 pub mod resample;

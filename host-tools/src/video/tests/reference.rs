@@ -3,7 +3,6 @@
 
 use super::*;
 use iltm_runtime::haar::Basis;
-use iltm_runtime::pipeline::Sample;
 
 /// Fraction bits of light and drive.
 const UNIT: f64 = 32_768.0;
@@ -153,7 +152,7 @@ fn worst(table: &SampleTable, tier: u8, frame: FrameSize, picture: &Picture) -> 
         };
         let light: Vec<f64> = own(wanted)
             .into_iter()
-            .map(|code| code.light(Encoding::Linear).to_num())
+            .map(|code| (f64::from(code) / 65_535.0 * UNIT).round() / UNIT)
             .collect();
         let drives = reference(table, channel, frame, &light);
         for (drive, code) in drives.into_iter().zip(own(result)) {
