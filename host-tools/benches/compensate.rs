@@ -13,7 +13,8 @@
 #[path = "../src/video/tests/sample_table.rs"]
 mod sample_table;
 
-use iltm::compile::image::ImageWriter;
+use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
+use iltm::compile::response::codes as response_codes;
 use iltm::progress::Silent;
 use iltm::video::{Compensator, Settings};
 use iltm_runtime::Grid;

@@ -83,6 +83,7 @@ pub fn learn(
         reference_white,
         inverse_error: report.prediction.map_or(0.0, |p| p.compensated),
         provenance: provenance(capture, &measurements, &report),
+        targets: None,
     };
     let compiled = compile::compile(&inverse, fine.as_ref(), &options)?;
     progress.end();

@@ -52,6 +52,7 @@ pub mod governor;
 mod grid;
 pub mod haar;
 pub mod image;
+mod kernel;
 pub mod link;
 pub mod operator;
 pub mod pipeline;

@@ -6,10 +6,10 @@ use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{self, CaptureOptions, Manifest, Settings};
 use iltm::progress::Silent;
-use iltm::video::Compensator;
+use iltm::video::{Compensator, OperatorMemory};
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{DELIMITER, Decoder, Event, Response, Session};
-use iltm_runtime::pipeline::{Encoding, GridPipeline, Workspace};
+use iltm_runtime::pipeline::{Encoding, GridPipeline};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -31,16 +31,10 @@ fn frame<const C: usize>(table: &Table<'_>) {
     let Ok(pipeline) = GridPipeline::<C>::new(table) else {
         return;
     };
-    let (mut buffer, mut scratch) = (vec![0; cells], vec![0; cells]);
-    let (mut inputs, mut values) = (vec![[0; C]; cells], vec![[0; C]; cells]);
+    let mut memory = OperatorMemory::new(table);
     for tier in 0..=table.top_tier() {
         for code in [0_u8, 255] {
-            let mut workspace = Workspace {
-                cells: &mut buffer,
-                scratch: &mut scratch,
-                inputs: &mut inputs,
-                values: &mut values,
-            };
+            let mut workspace = memory.workspace();
             let (wanted, mut input) = (vec![[code; C]; cells], vec![[0; C]; cells]);
             let done =
                 pipeline.compensate(tier, Encoding::Display, &wanted, &mut input, &mut workspace);

@@ -1,8 +1,9 @@
 //! A table image survives nothing but itself.
 
 use iltm::capture::Response;
+use iltm::video::OperatorMemory;
 use iltm_runtime::image::{ImageError, Table};
-use iltm_runtime::pipeline::{Encoding, GridPipeline, Workspace};
+use iltm_runtime::pipeline::{Encoding, GridPipeline};
 use iltm_tests::{wedge_table, wedge_table_for};
 use proptest::prelude::*;
 use std::sync::OnceLock;
@@ -93,12 +94,8 @@ fn forged(image: &[u8], changes: &[(usize, u8)]) -> Vec<u8> {
 fn run<const C: usize>(table: &Table<'_>) {
     let cells = table.grid().cells();
     let pipeline = GridPipeline::<C>::new(table).expect("chosen by the table's channels");
-    let mut workspace = Workspace {
-        cells: &mut vec![0; cells],
-        scratch: &mut vec![0; cells],
-        inputs: &mut vec![[0; C]; cells],
-        values: &mut vec![[0; C]; cells],
-    };
+    let mut memory = OperatorMemory::new(table);
+    let mut workspace = memory.workspace();
     for level in [0_u8, 255] {
         let mut input = vec![[0; C]; cells];
         let wanted = vec![[level; C]; cells];

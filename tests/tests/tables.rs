@@ -3,9 +3,10 @@
 use iltm::compile::content::natural_images;
 use iltm::compile::ladder::relative_error;
 use iltm::compile::white::reference_white;
+use iltm::video::OperatorMemory;
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, GridPipeline, Workspace};
+use iltm_runtime::pipeline::{Encoding, GridPipeline};
 use iltm_tests::{wedge, wedge_table};
 use nalgebra::DMatrix;
 
@@ -25,12 +26,8 @@ fn compensate<const C: usize>(
         let code = |light: &f64| [(light * 65_535.0).round() as u16; C];
         let codes: Vec<[u16; C]> = image.iter().map(code).collect();
         let mut input = vec![[0; C]; cells];
-        let mut workspace = Workspace {
-            cells: &mut vec![0; cells],
-            scratch: &mut vec![0; cells],
-            inputs: &mut vec![[0; C]; cells],
-            values: &mut vec![[0; C]; cells],
-        };
+        let mut memory = OperatorMemory::new(table);
+        let mut workspace = memory.workspace();
         clipped += pipeline
             .compensate(tier, Encoding::Linear, &codes, &mut input, &mut workspace)
             .expect("everything has the table's size");
@@ -118,10 +115,7 @@ fn a_scene_without_interreflection_has_a_table_without_operator() {
     let table = Table::check(&compiled.image).expect("compile checked it");
     assert!(table.operator().is_none());
     assert!(table.ambient_row(0, 0).is_none());
-    assert!(
-        table.response_code(0, 0).is_none(),
-        "the default projector is linear"
-    );
+    assert!(!table.has_response(), "the default projector is linear");
     assert_eq!(table.tiers().len(), 1);
 }
 

@@ -35,7 +35,7 @@ fn effects(table: &Table<'_>) -> Vec<&'static str> {
         (table.fine_gain().is_some(), "fine gain"),
         (table.ambient_row(0, 0).is_some(), "ambient light"),
         (table.operator().is_some(), "interreflection"),
-        (table.response_code(0, 0).is_some(), "projector response"),
+        (table.has_response(), "projector response"),
     ];
     let listed = listed.into_iter().filter(|(there, _)| *there);
     listed.map(|(_, name)| name).collect()

@@ -1,7 +1,7 @@
 //! The bytes of an image. Knows the layout and nothing of what it means.
 
 use super::ladder::Part;
-use super::quantise::Stored;
+use super::quantise::Quantised;
 use iltm_runtime::image::crc32;
 use iltm_runtime::image::layout::{
     ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, segment,
@@ -60,26 +60,85 @@ pub(super) fn halfwords(values: impl IntoIterator<Item = u16>) -> Vec<u8> {
     values.into_iter().flat_map(u16::to_le_bytes).collect()
 }
 
-/// Operator sections of entries in the order of [`quantise`](super::quantise):
+/// One row of an operator as a segment stores it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct StoredRow {
+    /// Index of the output coefficient.
+    pub index: u16,
+    /// Bits by which its sum is shifted right.
+    pub shift: u16,
+    /// Index of the input coefficient and value of each entry, ascending.
+    pub entries: Vec<(u16, i16)>,
+}
+
+impl StoredRow {
+    /// Its entries two by two where they are neighbours: index of the first, and
+    /// the values of that and of the next.
+    fn pairs(&self, cells: usize) -> Vec<(u16, [i16; 2])> {
+        let last = cells.saturating_sub(2) as u16;
+        let mut pairs: Vec<(u16, [i16; 2])> = Vec::new();
+        for &(index, value) in &self.entries {
+            match pairs.last_mut() {
+                Some((first, values)) if *first + 1 == index => values[1] = value,
+                // The very last coefficient has no next one.
+                _ if index > last => pairs.push((last, [0, value])),
+                _ => pairs.push((index, [value, 0])),
+            }
+        }
+        pairs
+    }
+}
+
+/// The bytes of an operator section: rows, given in ascending order of their index,
+/// grouped by their number of pairs. `cells` are those of the grid: a single one, which
+/// lights no other, has no operator.
+#[must_use]
+pub fn segment_bytes(cells: usize, rows: &[StoredRow]) -> Vec<u8> {
+    let mut groups = vec![(0_u16, Vec::new()); segment::MAX_SHORT + 1];
+    for row in rows {
+        let pairs = row.pairs(cells);
+        let place = pairs.len().min(segment::MAX_SHORT + 1) - 1;
+        let (count, words) = &mut groups[place];
+        *count += 1;
+        words.push(segment::word(row.index, row.shift));
+        if pairs.len() > segment::MAX_SHORT {
+            words.push(segment::word(pairs.len() as u16, 0));
+        }
+        for two in pairs.chunks(2) {
+            let values = two.iter().map(|(_, [first, second])| {
+                segment::word(first.cast_unsigned(), second.cast_unsigned())
+            });
+            words.extend(values);
+            words.push(segment::word(two[0].0, two.get(1).map_or(0, |pair| pair.0)));
+        }
+    }
+    let mut bytes = Vec::new();
+    for (index, (count, words)) in groups.into_iter().enumerate() {
+        let pairs = index + 1;
+        if count == 0 {
+            continue;
+        }
+        if pairs > segment::MAX_SHORT {
+            bytes.push(segment::word(0, count));
+            bytes.push((words.len() as u32).to_le_bytes());
+        } else {
+            bytes.push(segment::word(pairs as u16, count));
+        }
+        bytes.extend(words);
+    }
+    bytes.concat()
+}
+
+/// Operator sections of rows in the order of [`quantise`](super::quantise):
 /// selector and bytes of each.
-pub(super) fn operator_sections(entries: &[Stored]) -> Vec<(u16, Vec<u8>)> {
-    let segment_of = |stored: &Stored| (stored.part, stored.tier);
-    let of_one_segment = entries.chunk_by(|a, b| segment_of(a) == segment_of(b));
-    let section = |entries: &[Stored]| {
-        let (part, tier) = segment_of(&entries[0]);
-        let channel = match part {
+pub(super) fn operator_sections(cells: usize, quantised: &[Quantised]) -> Vec<(u16, Vec<u8>)> {
+    let section = |segment: &Quantised| {
+        let channel = match segment.part {
             Part::Shared => 0,
             Part::Channel(channel) => channel as u16 + 1,
         };
-        let mut bytes = Vec::with_capacity(segment::WORD * entries.len() * 3 / 2);
-        for row in entries.chunk_by(|a, b| a.row == b.row) {
-            bytes.extend(segment::word(row[0].row, row.len() as u16));
-            let words = row
-                .iter()
-                .map(|e| segment::word(e.col, e.value.cast_unsigned()));
-            bytes.extend(words.flatten());
-        }
-        (u16::from(tier) + 256 * channel, bytes)
+        let selector = u16::from(segment.tier) + 256 * channel;
+        (selector, segment_bytes(cells, &segment.rows))
     };
-    of_one_segment.map(section).collect()
+    quantised.iter().map(section).collect()
 }

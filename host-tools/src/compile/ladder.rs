@@ -66,9 +66,10 @@ pub struct Ladder {
 }
 
 /// Chooses entries and tiers. `content` holds [natural images](super::content), in
-/// camera units; `sigma` comes from them.
+/// camera units; `sigma` comes from them. `targets` are the errors that the tiers aim
+/// for, descending.
 #[must_use]
-pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>) -> Ladder {
+pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]) -> Ladder {
     let haar = Haar::new(inverse.grid, Basis::QuadTree);
     let coefficients = haar.analyse_columns(content);
     let sigma = DVector::from_iterator(
@@ -81,7 +82,7 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>) -> Ladder {
     let judge = Judge::new(inverse, &haar, content, &coefficients);
     let gain_only = judge.error(&entries);
     let mut tiers: Vec<Tier> = Vec::new();
-    for target in TARGETS {
+    for &target in targets {
         let last = tiers.last().map_or(gain_only, |tier| tier.error);
         if last <= target {
             continue;

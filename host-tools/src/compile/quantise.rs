@@ -6,113 +6,105 @@
 //! and shifts the row's sum right by `shift_i`; so `shift_i` is chosen as large as
 //! the value's 16 bits and the proof against overflow allow.
 
+use super::image::StoredRow;
 use super::ladder::{Entry, Part};
 use iltm_runtime::haar::{Basis, Function};
-use iltm_runtime::operator::{Bounds, Operator};
+use iltm_runtime::operator::{Bounds, Segment};
 use iltm_runtime::units::{CORRECTION_GUARD_BITS, INPUT_COEFFICIENT_MAX};
 
-/// One entry as it is stored.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Stored {
-    /// The operator.
-    pub part: Part,
-    /// Tier that first needs it.
-    pub tier: u8,
-    /// Output coefficient.
-    pub row: u16,
-    /// Input coefficient.
-    pub col: u16,
-    /// `v`.
-    pub value: i16,
-}
-
-/// Entries and shifts of an operator.
+/// The entries of one tier in one operator, as they are stored.
 #[derive(Clone, Debug)]
 pub struct Quantised {
-    /// In the order of segments: by tier, part, row, column.
-    pub entries: Vec<Stored>,
-    /// One shift a row.
-    pub row_shifts: Vec<u8>,
+    /// The operator.
+    pub part: Part,
+    /// The tier.
+    pub tier: u8,
+    /// Rows that have entries, in ascending order of their index.
+    pub rows: Vec<StoredRow>,
 }
 
-/// Quantises entries given with their tier. `scale(part)` is what an entry's value
-/// must be multiplied by to reach drive per reference light, before the channel's
-/// own scale.
+/// A row too strong for any shift.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TooStrong {
+    /// Row of the operator.
+    pub row: usize,
+}
+
+/// Quantises all entries of one tier. `scale(part)` is what an entry's value must be
+/// multiplied by to reach drive per reference light, before the channel's own scale.
 ///
 /// Entries that round to zero are left out.
 ///
 /// # Errors
-/// The row whose values are too large for any shift.
+/// [`TooStrong`] with the row whose values are too large for any shift.
 pub fn quantise(
     basis: &Basis,
-    entries: &[(u8, Entry)],
+    tier: u8,
+    entries: &[Entry],
     scale: impl Fn(Part) -> f64,
-) -> Result<Quantised, usize> {
+) -> Result<Vec<Quantised>, TooStrong> {
     let functions: Vec<Function> = basis.functions().collect();
-    let norm = |index: usize| (functions[index].squared_norm() as f64).sqrt();
-    let norms: Vec<f64> = (0..functions.len()).map(norm).collect();
-    let mut rows: Vec<Vec<(u8, Entry, f64)>> = vec![Vec::new(); functions.len()];
-    for (tier, entry) in entries {
-        let shift = functions[entry.col].input_shift() + CORRECTION_GUARD_BITS;
-        let unit = (f64::from(shift)).exp2() / (norms[entry.row] * norms[entry.col]);
-        let value = entry.value * scale(entry.part) * unit;
-        rows[entry.row].push((*tier, *entry, value));
-    }
-    let mut quantised = Quantised {
-        entries: Vec::with_capacity(entries.len()),
-        row_shifts: Vec::with_capacity(rows.len()),
-    };
-    for (index, row) in rows.iter().enumerate() {
-        let shift = row_shift(row).ok_or(index)?;
-        quantised.row_shifts.push(shift);
-        let factor = f64::from(shift).exp2();
-        for (tier, entry, value) in row {
-            let value = (value * factor).round() as i16;
-            if value != 0 {
-                quantised.entries.push(Stored {
-                    part: entry.part,
-                    tier: *tier,
-                    row: entry.row as u16,
-                    col: entry.col as u16,
-                    value,
-                });
-            }
-        }
-    }
-    quantised.entries.sort_by_key(|stored| {
-        let channel = match stored.part {
+    let norm = |function: &Function| (function.squared_norm() as f64).sqrt();
+    let norms: Vec<f64> = functions.iter().map(norm).collect();
+    let place = |entry: &Entry| {
+        let channel = match entry.part {
             Part::Shared => 0,
             Part::Channel(channel) => channel + 1,
         };
-        // The selector of a segment is its tier plus 256 times the channel number.
-        (channel, stored.tier, stored.row, stored.col)
-    });
-    Ok(quantised)
+        (channel, entry.row, entry.col)
+    };
+    let mut entries = entries.to_vec();
+    entries.sort_by_key(place);
+    let of_part = entries.chunk_by(|a, b| a.part == b.part);
+    let quantise_part = |entries: &[Entry]| {
+        let part = entries[0].part;
+        let of_row = entries.chunk_by(|a, b| a.row == b.row);
+        let rows = of_row.map(|row| {
+            let values = row.iter().map(|entry| {
+                let shift = functions[entry.col].input_shift() + CORRECTION_GUARD_BITS;
+                let unit = f64::from(shift).exp2() / (norms[entry.row] * norms[entry.col]);
+                (entry.col as u16, entry.value * scale(part) * unit)
+            });
+            quantise_row(row[0].row, &values.collect::<Vec<_>>())
+        });
+        let rows: Result<Vec<StoredRow>, TooStrong> = rows.collect();
+        Ok(Quantised {
+            part,
+            tier,
+            rows: rows?
+                .into_iter()
+                .filter(|row| !row.entries.is_empty())
+                .collect(),
+        })
+    };
+    of_part.map(quantise_part).collect()
 }
 
-/// The largest shift with which every value fits and the sum cannot overflow;
-/// 0 for a row without entries.
-fn row_shift(row: &[(u8, Entry, f64)]) -> Option<u8> {
-    let magnitude = |part: Part| -> f64 {
-        let own = row.iter().filter(|(_, entry, _)| entry.part == part);
-        own.map(|(.., value)| value.abs()).sum()
-    };
-    let widest = (0..3)
-        .map(|channel| magnitude(Part::Channel(channel)))
-        .fold(0.0, f64::max);
-    let sum = magnitude(Part::Shared) + widest;
-    let largest = row
+fn quantise_row(row: usize, values: &[(u16, f64)]) -> Result<StoredRow, TooStrong> {
+    let shift = row_shift(values).ok_or(TooStrong { row })?;
+    let factor = f64::from(shift).exp2();
+    let stored = values
         .iter()
-        .map(|(.., value)| value.abs())
-        .fold(0.0, f64::max);
-    if largest == 0.0 {
-        return Some(0);
-    }
-    (0..=Operator::MAX_ROW_SHIFT).rev().find(|shift| {
-        let factor = f64::from(*shift).exp2();
-        // Rounding can add half to every value.
-        let rounded = sum * factor + 0.5 * row.len() as f64;
-        let bound = rounded * f64::from(INPUT_COEFFICIENT_MAX) + factor / 2.0;
-        (largest * factor).round() <= f64::from(i16::MAX) && bound <= Bounds::MAX_ACCUMULATOR as f64
+        .map(|(col, value)| (*col, (value * factor).round() as i16));
+    Ok(StoredRow {
+        index: row as u16,
+        shift,
+        entries: stored.filter(|(_, value)| *value != 0).collect(),
     })
+}
+
+/// The largest shift with which every value fits and the sum cannot overflow.
+fn row_shift(values: &[(u16, f64)]) -> Option<u16> {
+    let magnitudes = || values.iter().map(|(_, value)| value.abs());
+    let (sum, largest) = (magnitudes().sum::<f64>(), magnitudes().fold(0.0, f64::max));
+    (Segment::MIN_SHIFT..=Segment::MAX_SHIFT)
+        .rev()
+        .find(|shift| {
+            let factor = f64::from(*shift).exp2();
+            // Rounding can add half to every value.
+            let rounded = sum * factor + 0.5 * values.len() as f64;
+            let bound = rounded * f64::from(INPUT_COEFFICIENT_MAX);
+            (largest * factor).round() <= f64::from(i16::MAX)
+                && bound <= Bounds::MAX_ACCUMULATOR as f64
+        })
 }

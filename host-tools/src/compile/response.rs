@@ -1,7 +1,9 @@
 //! Projector codes at the knots of a table's response section.
 
 use crate::capture::Response;
-use iltm_runtime::pipeline::{RESPONSE_KNOTS, knot_drive};
+use iltm_runtime::pipeline::{
+    CODES, RESPONSE_KNOTS, Response as RuntimeResponse, codes, knot_drive,
+};
 
 /// The code, full scale 65,535, of every knot's drive; `None` for a linear
 /// projector, whose table needs no response.
@@ -16,6 +18,15 @@ pub fn knots(response: Response) -> Option<Vec<u16>> {
             .map(|knot| code(knot).round() as u16)
             .collect(),
     )
+}
+
+/// The 8-bit codes of a response given by its knots.
+#[must_use]
+pub fn codes(knots: &[u16]) -> Vec<u8> {
+    let knots: Vec<[u8; 2]> = knots.iter().map(|code| code.to_le_bytes()).collect();
+    let curves = knots.chunks_exact(RESPONSE_KNOTS).map(RuntimeResponse::new);
+    let of_curve = |response| (0..CODES).map(move |index| codes::code(index, response));
+    curves.flat_map(of_curve).collect()
 }
 
 #[cfg(test)]

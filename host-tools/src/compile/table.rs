@@ -4,7 +4,7 @@ use super::content::natural_images;
 use super::gain::FineGains;
 use super::image::{ImageWriter, halfwords, operator_sections, put};
 use super::ladder::{self, Ladder, Part};
-use super::quantise::{Quantised, quantise};
+use super::quantise::{TooStrong, quantise};
 use super::response;
 use super::white::{ReferenceWhite, reference_white};
 use crate::capture::Response;
@@ -27,6 +27,9 @@ pub struct CompileOptions {
     pub reference_white: Option<f64>,
     /// Predicted closed-loop error of the inverse.
     pub inverse_error: f64,
+    /// Errors that the tiers above 0 aim for, descending; by default
+    /// [`TARGETS`](super::ladder::TARGETS).
+    pub targets: Option<Vec<f64>>,
     /// Where the table comes from: text for people, at most 64 KiB.
     pub provenance: String,
 }
@@ -130,7 +133,11 @@ pub fn compile(
         return Err(CompileError::ReferenceWhite { light: white.light });
     }
     let content = natural_images(inverse.grid) * white.light;
-    let ladder = ladder::build(inverse, &live_only(inverse, content));
+    let ladder = ladder::build(
+        inverse,
+        &live_only(inverse, content),
+        options.targets.as_deref().unwrap_or(&ladder::TARGETS),
+    );
     let basis = Basis::new(inverse.grid);
     let operator = StoredOperator::new(inverse, &basis, &ladder, white.light)?;
     let gains = Gains::new(inverse, fine, white.light)?;
@@ -173,6 +180,7 @@ pub fn compile(
         image.section(SectionKind::Ambient, 0, halfwords(ambient));
     }
     if let Some(knots) = response::knots(options.projector) {
+        image.section(SectionKind::Codes, 0, response::codes(&knots));
         image.section(SectionKind::Response, 0, halfwords(knots));
     }
     if let (Some(fine), Some(values)) = (fine, gains.fine) {
@@ -191,7 +199,6 @@ pub fn compile(
         image.section(SectionKind::FineGain, 0, bytes);
     }
     if !operator.sections.is_empty() {
-        image.section(SectionKind::RowShifts, 0, operator.quantised.row_shifts);
         for (selector, bytes) in operator.sections {
             image.section(SectionKind::Operator, selector, bytes);
         }
@@ -243,7 +250,6 @@ fn live_only(
 
 /// The operator as sections, with its proof.
 struct StoredOperator {
-    quantised: Quantised,
     sections: Vec<(u16, Vec<u8>)>,
     scales: [U1F15; 3],
     bounds: Bounds,
@@ -271,34 +277,22 @@ impl StoredOperator {
             // The runtime multiplies by the channel's scale afterwards.
             Part::Channel(channel) => white / scales[channel].max(U1F15::DELTA).to_num::<f64>(),
         };
-        let mut tier = 0_u8;
-        let entries: Vec<_> = ladder
-            .entries
-            .iter()
-            .enumerate()
-            .map(|(index, entry)| {
-                while ladder
-                    .tiers
-                    .get(usize::from(tier))
-                    .is_some_and(|t| index >= t.entries)
-                {
-                    tier += 1;
-                }
-                (tier + 1, *entry)
-            })
-            .collect();
-        let quantised =
-            quantise(basis, &entries, factor).map_err(|row| CompileError::TooStrong { row })?;
-        let sections = operator_sections(&quantised.entries);
+        let mut quantised = Vec::new();
+        for (tier, info) in (1..).zip(&ladder.tiers) {
+            let entries = &ladder.entries[..info.entries];
+            let segments = quantise(basis, tier, entries, factor)
+                .map_err(|TooStrong { row }| CompileError::TooStrong { row })?;
+            quantised.extend(segments);
+        }
+        let sections = operator_sections(basis.grid().cells(), &quantised);
         let (bounds, costs) = {
-            let operator = load(basis, &quantised, &sections, scales)?;
+            let operator = load(basis, &sections, scales)?;
             let channels = inverse.channels.len() as u8;
             let tiers = 0..=ladder.tiers.len() as u8;
             let costs = tiers.map(|tier| operator.cost(tier, channels)).collect();
             (operator.bounds(), costs)
         };
         Ok(Self {
-            quantised,
             sections,
             scales,
             bounds,
@@ -310,7 +304,6 @@ impl StoredOperator {
 /// The stored operator as the runtime will see it, with its proof.
 fn load<'a>(
     basis: &Basis,
-    quantised: &'a Quantised,
     sections: &'a [(u16, Vec<u8>)],
     scales: [U1F15; 3],
 ) -> Result<Operator<'a>, CompileError> {
@@ -323,7 +316,7 @@ fn load<'a>(
             .push(segment)
             .map_err(|_| CompileError::Operator(OperatorError::Segments))?;
     }
-    Operator::new(basis, segments, &quantised.row_shifts, scales).map_err(CompileError::Operator)
+    Operator::new(basis, segments, scales).map_err(CompileError::Operator)
 }
 
 /// The tiers section.

@@ -4,9 +4,6 @@ use super::microseconds;
 use iltm_runtime::image::{Table, TierInfo};
 use iltm_runtime::pipeline::FrameError;
 
-/// Bytes of an entry, and of what comes before the entries of a row.
-const WORD: u64 = iltm_runtime::image::layout::segment::WORD as u64;
-
 /// One tier.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Rung {
@@ -51,8 +48,6 @@ fn operator_bytes(table: &Table<'_>, tier: u8) -> u64 {
     let segments = table
         .operator()
         .map_or(&[][..], |operator| operator.segments());
-    let used = segments.iter().filter(|segment| segment.tier <= tier);
-    let rows = used.flat_map(iltm_runtime::operator::Segment::rows);
-    rows.map(|row| WORD * (1 + row.entries().len() as u64))
-        .sum()
+    let used = segments.iter().filter(|segment| segment.tier == tier);
+    used.map(|segment| segment.bytes() as u64).sum()
 }

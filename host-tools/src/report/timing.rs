@@ -2,8 +2,9 @@
 
 use crate::capture::Response;
 use crate::compile::content::natural_images;
+use crate::video::OperatorMemory;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, FrameError, GridPipeline, Workspace};
+use iltm_runtime::pipeline::{Encoding, FrameError, GridPipeline};
 use std::time::Instant;
 
 /// Runs of which the median counts: odd, and few enough to take no time.
@@ -32,18 +33,12 @@ fn of_channels<const C: usize>(table: &Table<'_>) -> Result<Vec<f64>, FrameError
         .map(|image| image.iter().map(|light| [code(*light); C]).collect())
         .collect();
     let mut input = vec![[0_u8; C]; cells];
-    let (mut line, mut scratch) = (vec![0; cells], vec![0; table.basis().scratch_len()]);
-    let (mut inputs, mut values) = (vec![[0; C]; cells], vec![[0; C]; cells]);
+    let mut memory = OperatorMemory::new(table);
     let mut medians = Vec::new();
     for tier in 0..=table.top_tier() {
         let mut runs = Vec::with_capacity(RUNS);
         for image in images.iter().cycle().take(RUNS) {
-            let mut workspace = Workspace {
-                cells: &mut line,
-                scratch: &mut scratch,
-                inputs: &mut inputs,
-                values: &mut values,
-            };
+            let mut workspace = memory.workspace();
             let start = Instant::now();
             pipeline.compensate(tier, Encoding::Display, image, &mut input, &mut workspace)?;
             runs.push(start.elapsed().as_secs_f64() * 1e6);

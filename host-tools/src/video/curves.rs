@@ -12,7 +12,7 @@
 )]
 
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, Response, Sample};
+use iltm_runtime::pipeline::{Encoding, Sample};
 use iltm_runtime::units::{Drive, Light};
 
 /// Elements of a table.
@@ -50,14 +50,14 @@ impl<S: Code> Curves<S> {
     pub(super) fn new(table: &Table<'_>, encoding: Encoding) -> Self {
         let mut light = vec![Light::ZERO; VALUES];
         for (slot, code) in light.iter_mut().zip(S::all()) {
-            *slot = code.light(encoding);
+            *slot = code.light(S::curves(table, encoding, 0));
         }
         let mut codes: Vec<_> = (0..usize::from(table.channels()))
             .map(|channel| {
-                let response = Response::new(table, channel);
+                let curves = S::curves(table, encoding, channel);
                 let mut codes = vec![S::default(); VALUES];
                 for (code, bits) in codes.iter_mut().zip(0..=Drive::ONE.to_bits()) {
-                    *code = S::code(Drive::from_bits(bits), encoding, response);
+                    (*code, _) = S::code(bits.into(), curves);
                 }
                 codes
             })

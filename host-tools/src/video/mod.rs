@@ -33,6 +33,7 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
+mod operator_memory;
 pub mod picture;
 mod planar;
 pub mod png;
@@ -44,6 +45,7 @@ pub mod yuv;
 
 pub use compensate::{Compensator, Settings, Summary};
 pub use error::VideoError;
+pub use operator_memory::OperatorMemory;
 pub use picture::{Picture, Samples};
 pub use whole_file::WholeFile;
 

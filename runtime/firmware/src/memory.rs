@@ -1,15 +1,19 @@
 //! The workspace of a frame: the one large piece of memory, taken once.
 
-use iltm_runtime::Grid;
-use iltm_runtime::pipeline::{Row, Workspace};
-use iltm_runtime::units::{Drive, InputCoefficient, Light};
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{FullMemory, Halfword, Row, Workspace};
+use iltm_runtime::units::InputCoefficient;
+use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
 
 /// Most cells of a table's grid. A board with less memory may take fewer; tables
 /// with more are refused with the reason.
 pub const MAX_CELLS: usize = Grid::MAX_CELLS;
 
-/// Most pixels in a row of a frame larger than the grid.
+/// Most pixels of a frame larger than the grid.
+pub const MAX_PIXELS: usize = 320 * 240;
+
+/// Most pixels in a row of such a frame.
 pub const MAX_WIDTH: usize = 2_048;
 
 const CHANNELS: usize = 3;
@@ -17,48 +21,39 @@ const CHANNELS: usize = 3;
 /// The workspace. Its size counts apart from the rest of the firmware's memory:
 /// it follows the largest table and frame that a board is to take.
 pub struct Memory {
+    buffers: [[i32; MAX_CELLS / 2 + 1]; 2],
     cells: [i32; MAX_CELLS],
-    scratch: [i32; MAX_CELLS],
     inputs: [InputCoefficient; CHANNELS * MAX_CELLS],
-    values: [i32; CHANNELS * MAX_CELLS],
+    coefficients: [i32; CHANNELS * MAX_CELLS],
+    corrections: [i32; CHANNELS * MAX_CELLS],
     sums: [u64; CHANNELS * MAX_CELLS],
+    gains: [Halfword; CHANNELS * MAX_PIXELS],
+    ambient: [Halfword; CHANNELS * MAX_PIXELS],
+    columns: [u32; 2 * CHANNELS * MAX_WIDTH],
     line: [i32; MAX_WIDTH],
     spread: [i32; MAX_WIDTH],
-    light: [Light; MAX_WIDTH],
-    gains: [u16; MAX_WIDTH],
-    drives: [Drive; MAX_WIDTH],
+    values: [u16; MAX_WIDTH],
+    /// The table and the frames whose gains and ambient light are there.
+    prepared: Option<(u32, FrameSize)>,
 }
 
-/// Its name is how the test of the firmware's size finds it.
+/// Its name is how `size.sh` finds it.
 #[unsafe(no_mangle)]
 static FRAME_WORKSPACE: ConstStaticCell<Memory> = ConstStaticCell::new(Memory {
+    buffers: [[0; MAX_CELLS / 2 + 1]; 2],
     cells: [0; MAX_CELLS],
-    scratch: [0; MAX_CELLS],
     inputs: [0; CHANNELS * MAX_CELLS],
-    values: [0; CHANNELS * MAX_CELLS],
+    coefficients: [0; CHANNELS * MAX_CELLS],
+    corrections: [0; CHANNELS * MAX_CELLS],
     sums: [0; CHANNELS * MAX_CELLS],
+    gains: [[0; 2]; CHANNELS * MAX_PIXELS],
+    ambient: [[0; 2]; CHANNELS * MAX_PIXELS],
+    columns: [0; 2 * CHANNELS * MAX_WIDTH],
     line: [0; MAX_WIDTH],
     spread: [0; MAX_WIDTH],
-    light: [Light::ZERO; MAX_WIDTH],
-    gains: [0; MAX_WIDTH],
-    drives: [Drive::ZERO; MAX_WIDTH],
+    values: [0; MAX_WIDTH],
+    prepared: None,
 });
-
-/// What a frame of `C` channels larger than the grid needs.
-pub struct FullMemory<'m, const C: usize> {
-    /// For the operator.
-    pub workspace: Workspace<'m, C>,
-    /// Light by cell.
-    pub sums: &'m mut [[u64; C]],
-    /// Interpolation along a row.
-    pub row: Row<'m>,
-    /// A row of one channel.
-    pub light: &'m mut [Light],
-    /// Its gains.
-    pub gains: &'m mut [u16],
-    /// Its drives.
-    pub drives: &'m mut [Drive],
-}
 
 impl Memory {
     /// The workspace, once.
@@ -67,56 +62,55 @@ impl Memory {
         FRAME_WORKSPACE.try_take()
     }
 
-    /// What the operator needs for `cells` cells and `C` channels.
-    pub fn workspace<const C: usize>(&mut self, cells: usize) -> Workspace<'_, C> {
-        workspace(
-            cells,
-            &mut self.cells,
-            &mut self.scratch,
-            &mut self.inputs,
-            &mut self.values,
-        )
+    /// What the operator needs.
+    pub fn workspace(&mut self) -> Workspace<'_> {
+        let [first, second] = &mut self.buffers;
+        Workspace {
+            buffers: [first, second],
+            cells: &mut self.cells,
+            inputs: &mut self.inputs,
+            sums: &mut self.coefficients,
+        }
+    }
+
+    /// Whether gains and ambient light are those of this table and size of frames;
+    /// from now on they are taken to be.
+    pub fn is_prepared(&mut self, table: &Table<'_>, size: FrameSize) -> bool {
+        let wanted = Some((table.id(), size));
+        core::mem::replace(&mut self.prepared, wanted) == wanted
     }
 
     /// What a frame larger than the grid needs.
-    pub fn full<const C: usize>(&mut self, cells: usize, width: usize) -> FullMemory<'_, C> {
-        FullMemory {
-            workspace: workspace(
-                cells,
-                &mut self.cells,
-                &mut self.scratch,
-                &mut self.inputs,
-                &mut self.values,
-            ),
-            sums: first(self.sums.as_chunks_mut().0, cells),
+    pub fn full<const C: usize>(
+        &mut self,
+        cells: usize,
+        width: usize,
+    ) -> (FullMemory<'_, C>, Workspace<'_>) {
+        let [first, second] = &mut self.buffers;
+        let frame = FullMemory {
+            gains: self.gains.as_chunks_mut().0,
+            ambient: self.ambient.as_chunks_mut().0,
+            sums: leading(&mut self.sums, C * cells),
+            corrections: leading(&mut self.corrections, C * cells),
+            columns: &mut self.columns,
             row: Row {
                 line: &mut self.line,
-                spread: first(&mut self.spread, width),
+                spread: leading(&mut self.spread, width),
             },
-            light: first(&mut self.light, width),
-            gains: first(&mut self.gains, width),
-            drives: first(&mut self.drives, width),
-        }
-    }
-}
-
-fn workspace<'m, const C: usize>(
-    count: usize,
-    cells: &'m mut [i32],
-    scratch: &'m mut [i32],
-    inputs: &'m mut [InputCoefficient],
-    values: &'m mut [i32],
-) -> Workspace<'m, C> {
-    Workspace {
-        cells: first(cells, count),
-        scratch: first(scratch, count),
-        inputs: first(inputs.as_chunks_mut().0, count),
-        values: first(values.as_chunks_mut().0, count),
+            values: leading(&mut self.values, width),
+        };
+        let workspace = Workspace {
+            buffers: [first, second],
+            cells: &mut self.cells,
+            inputs: &mut self.inputs,
+            sums: &mut self.coefficients,
+        };
+        (frame, workspace)
     }
 }
 
 /// The first `count` elements, or all.
-fn first<T>(all: &mut [T], count: usize) -> &mut [T] {
+fn leading<T>(all: &mut [T], count: usize) -> &mut [T] {
     let count = count.min(all.len());
     all.split_at_mut(count).0
 }

@@ -1,11 +1,11 @@
 //! One frame through a table, or past it.
 
-use crate::memory::{MAX_CELLS, MAX_WIDTH, Memory};
+use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
 use iltm_runtime::FrameSize;
 use iltm_runtime::exchange::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline, Response, Sample};
+use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 
 /// What is done to the frames of a format.
 #[derive(Clone, Copy)]
@@ -36,7 +36,7 @@ impl<'t> Stage<'t> {
         if size == FrameSize::of_grid(table.grid()) {
             return Self::Grid(table, format.encoding());
         }
-        if size.width() > MAX_WIDTH {
+        if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
             return Self::PassThrough(PassThrough::Memory);
         }
         Self::Full(table, format.encoding(), size)
@@ -95,12 +95,10 @@ fn grid<const C: usize>(
         encoding,
         wanted.as_chunks().0,
         input.as_chunks_mut().0,
-        &mut memory.workspace(table.grid().cells()),
+        &mut memory.workspace(),
     )
 }
 
-/// Rows are read twice, once for the cells' averages and once for the result:
-/// keeping the light of a frame would take twice the memory of the frame.
 fn full<const C: usize>(
     table: &Table<'static>,
     size: FrameSize,
@@ -110,52 +108,16 @@ fn full<const C: usize>(
     memory: &mut Memory,
 ) -> Result<u32, FrameError> {
     let pipeline = FullPipeline::<C>::new(table, size)?;
-    let mut memory = memory.full::<C>(table.grid().cells(), size.width());
-    let wanted = wanted.as_chunks::<C>().0;
-    let input = input.as_chunks_mut::<C>().0;
-    memory.sums.fill([0; C]);
-    for (y, line) in wanted.chunks_exact(size.width()).enumerate() {
-        for channel in 0..C {
-            decode(line, channel, encoding, memory.light);
-            pipeline.remove_ambient(y, channel, memory.light, &mut memory.row);
-            pipeline.average_row(y, channel, memory.light, memory.sums);
-        }
+    let prepared = memory.is_prepared(table, size);
+    let (mut frame, mut workspace) = memory.full::<C>(table.grid().cells(), size.width());
+    if !prepared {
+        pipeline.prepare(&mut frame)?;
     }
-    pipeline.correct(tier, memory.sums, &mut memory.workspace)?;
-    let mut clipped = 0;
-    let lines = wanted.chunks_exact(size.width());
-    for (y, (line, out)) in lines.zip(input.chunks_exact_mut(size.width())).enumerate() {
-        for channel in 0..C {
-            decode(line, channel, encoding, memory.light);
-            pipeline.remove_ambient(y, channel, memory.light, &mut memory.row);
-            pipeline.gain_row(y, channel, &mut memory.row, memory.gains);
-            clipped += pipeline.finish_row(
-                y,
-                channel,
-                (memory.light, memory.gains),
-                memory.workspace.values,
-                &mut memory.row,
-                memory.drives,
-            );
-            let response = Response::new(table, channel);
-            for (pixel, drive) in out.iter_mut().zip(memory.drives.iter()) {
-                if let Some(sample) = pixel.get_mut(channel) {
-                    *sample = u8::code(*drive, encoding, response);
-                }
-            }
-        }
-    }
-    Ok(clipped)
-}
-
-fn decode<const C: usize>(
-    line: &[[u8; C]],
-    channel: usize,
-    encoding: Encoding,
-    light: &mut [iltm_runtime::units::Light],
-) {
-    for (light, pixel) in light.iter_mut().zip(line) {
-        let sample = pixel.get(channel).copied().unwrap_or(0);
-        *light = sample.light(encoding);
-    }
+    pipeline.compensate(
+        (tier, encoding),
+        wanted.as_chunks().0,
+        input.as_chunks_mut().0,
+        &mut frame,
+        &mut workspace,
+    )
 }

@@ -2,7 +2,7 @@
 
 use crate::board::TableFlash;
 use iltm_runtime::image::layout::header;
-use iltm_runtime::image::{ImageError, Table, crc32};
+use iltm_runtime::image::{ImageError, Table};
 use iltm_runtime::link::{Fault, PassThrough, SlotState, TableFault, TableName};
 use static_cell::StaticCell;
 
@@ -58,7 +58,7 @@ impl Tables {
             Ok(_) if self.active.is_ok() => SlotState::Valid,
             Ok(table) => {
                 self.name = Some(TableName {
-                    id: crc32(&[image]),
+                    id: table.id(),
                     version: 0,
                 });
                 self.active = Ok(table);

@@ -1,166 +1,241 @@
 //! From cells to coefficients: `S^T x`.
 
-use super::basis::{Basis, NodeShifts};
+use super::basis::{Basis, NodeShifts, input_shift};
 use super::level::{Level, Pair};
+use super::source::{Block, Cells, Row, Source};
 use super::{ShortSlice, front};
 use crate::units::InputCoefficient;
 
-/// Receives coefficients one after the other, in the order of the basis.
-///
-/// `shift` is the function's [`input_shift`](super::Function::input_shift).
-pub trait Sink {
-    /// A coefficient that fits 32 bits whatever the frame.
-    fn put(&mut self, value: i32, shift: u32);
-    /// A coefficient of two unequal halves, whose weights can make it wider.
-    fn put_wide(&mut self, value: i64, shift: u32);
-}
+/// A coefficient as it is stored. `shift` is its function's
+/// [`input_shift`](super::Function::input_shift).
+pub trait Coefficient: Copy {
+    /// From a value that fits 32 bits whatever the frame.
+    fn narrow(value: i32, shift: u32) -> Self;
+    /// From the value of two unequal halves, whose weights can make it wider.
+    fn wide(value: i64, shift: u32) -> Self;
 
-/// Computes all coefficients of `cells` and gives them to `sink`.
-///
-/// `cells` holds the grid row by row and is used up; `scratch` needs
-/// [`Basis::scratch_len`] elements. The result is exact for any cells whose
-/// magnitudes add up to less than 2^31.
-///
-/// # Errors
-/// [`ShortSlice`] if a slice is too short; nothing has been put out then.
-pub fn analyse(
-    basis: &Basis,
-    cells: &mut [i32],
-    scratch: &mut [i32],
-    sink: &mut impl Sink,
-) -> Result<(), ShortSlice> {
-    let mut from = front(cells, basis.grid().cells(), "cells")?;
-    let mut to = front(scratch, basis.scratch_len(), "scratch")?;
-    for level in basis.levels() {
-        merge(level, from, to, sink);
-        core::mem::swap(&mut from, &mut to);
+    /// Details as input coefficients, if that is what they are.
+    #[inline]
+    fn inputs(details: &mut [[Self; 3]]) -> Option<&mut [[InputCoefficient; 3]]> {
+        let _ = details;
+        None
     }
-    let sum = from.first().copied().unwrap_or(0);
-    sink.put(sum, super::basis::input_shift(basis.grid().cells() as u64));
-    Ok(())
 }
 
-/// Computes all coefficients of one channel, each shifted right by its
-/// [`input_shift`](super::Function::input_shift), and stores them in
-/// `coefficients[..][channel]`.
+/// Exact.
+impl Coefficient for i64 {
+    fn narrow(value: i32, _shift: u32) -> Self {
+        value.into()
+    }
+
+    fn wide(value: i64, _shift: u32) -> Self {
+        value
+    }
+}
+
+/// A named rounding place: shifted right, to nearest, halves upwards.
+impl Coefficient for InputCoefficient {
+    #[inline]
+    fn narrow(value: i32, shift: u32) -> Self {
+        let half = 1_i32.wrapping_shl(shift.wrapping_sub(1));
+        value.wrapping_add(half).wrapping_shr(shift) as Self
+    }
+
+    #[inline]
+    fn wide(value: i64, shift: u32) -> Self {
+        let half = 1_i64.wrapping_shl(shift.wrapping_sub(1));
+        value.wrapping_add(half).wrapping_shr(shift) as Self
+    }
+
+    #[inline]
+    fn inputs(details: &mut [[Self; 3]]) -> Option<&mut [[InputCoefficient; 3]]> {
+        Some(details)
+    }
+}
+
+/// Computes all coefficients of one channel: exact as `i64`, rounded as
+/// [`InputCoefficient`].
 ///
-/// This is one of the named rounding places: to nearest, halves upwards. `cells`
-/// are [`Light`](crate::units::Light) bits, 0 to 2^15.
+/// `buffers` are memory for the sums of the levels, [`Basis::scratch_len`] elements
+/// each. Exact for any values whose magnitudes add up to less than 2^31.
 ///
 /// # Errors
 /// [`ShortSlice`] if a slice is too short.
-pub fn analyse_rounded<const C: usize>(
+pub fn analyse<T: Coefficient>(
     basis: &Basis,
-    cells: &mut [i32],
-    scratch: &mut [i32],
-    coefficients: &mut [[InputCoefficient; C]],
-    channel: usize,
+    cells: &impl Source,
+    [to, from]: [&mut [i32]; 2],
+    coefficients: &mut [T],
 ) -> Result<(), ShortSlice> {
-    let coefficients = front(coefficients, basis.grid().cells(), "coefficient")?;
-    let mut sink = Rounding {
-        slots: coefficients.iter_mut(),
-        channel,
+    let mut to = front(to, basis.scratch_len(), "first buffer")?;
+    let mut from = front(from, basis.scratch_len(), "second buffer")?;
+    let mut rest = front(coefficients, basis.grid().cells(), "coefficient")?;
+    let mut levels = basis.levels().iter();
+    let sum = if let Some(finest) = levels.next() {
+        rest = merge(finest, cells, to, rest);
+        for level in levels {
+            core::mem::swap(&mut from, &mut to);
+            let values = Cells {
+                values: from.get(..level.nodes()).unwrap_or_default(),
+                cols: level.cols.nodes,
+            };
+            rest = merge(level, &values, to, rest);
+        }
+        to.first().copied().unwrap_or(0)
+    } else {
+        cells.rows().next().map_or(0, |row| row.at(0))
     };
-    analyse(basis, cells, scratch, &mut sink)
-}
-
-struct Rounding<'c, const C: usize> {
-    slots: core::slice::IterMut<'c, [InputCoefficient; C]>,
-    channel: usize,
-}
-
-impl<const C: usize> Rounding<'_, C> {
-    #[inline]
-    fn store(&mut self, value: InputCoefficient) {
-        let slot = self.slots.next();
-        if let Some(slot) = slot.and_then(|channels| channels.get_mut(self.channel)) {
-            *slot = value;
-        }
+    if let Some(constant) = rest.first_mut() {
+        *constant = T::narrow(sum, input_shift(basis.grid().cells() as u64));
     }
+    Ok(())
 }
 
-impl<const C: usize> Sink for Rounding<'_, C> {
-    #[inline]
-    fn put(&mut self, value: i32, shift: u32) {
-        let half = 1_i32.wrapping_shl(shift.wrapping_sub(1));
-        self.store(value.wrapping_add(half).wrapping_shr(shift) as InputCoefficient);
-    }
-
-    #[inline]
-    fn put_wide(&mut self, value: i64, shift: u32) {
-        let half = 1_i64.wrapping_shl(shift.wrapping_sub(1));
-        self.store(value.wrapping_add(half).wrapping_shr(shift) as InputCoefficient);
-    }
-}
-
-/// One level: sums go from `from` to `to`, details to `sink`.
-fn merge(level: &Level, from: &[i32], to: &mut [i32], sink: &mut impl Sink) {
-    let mut rows = from.chunks_exact(level.cols.nodes).take(level.rows.nodes);
-    let merged = to
-        .chunks_exact_mut(level.merged_cols())
-        .take(level.merged_rows());
-    for (index, sums) in merged.enumerate() {
-        let pair = level.row_pair(index);
-        let top = rows.next().unwrap_or_default();
-        let bottom = if pair.splits() {
-            rows.next().unwrap_or_default()
-        } else {
-            &[]
-        };
-        let plain = if pair.is_plain() {
-            level.plain_cols()
-        } else {
-            0
-        };
-        merge_plain(level, pair, (top, bottom), sums, plain, sink);
-        for (col, sum) in sums.iter_mut().enumerate().skip(plain) {
-            *sum = merge_weighted(pair, level.col_pair(col), (top, bottom), col, sink);
-        }
-    }
-}
-
-/// The first `plain` nodes of a row of nodes, all of equal halves.
-#[inline]
-fn merge_plain(
+/// One level: sums of its nodes go to `to`, details to the front of `details`;
+/// returns what is left of them.
+fn merge<'c, T: Coefficient>(
     level: &Level,
-    rows: Pair,
-    (top, bottom): (&[i32], &[i32]),
+    values: &impl Source,
+    to: &mut [i32],
+    details: &'c mut [T],
+) -> &'c mut [T] {
+    let cols = level.cols.nodes;
+    let all = Block {
+        row: 0,
+        cols,
+        nodes: level.merged_cols(),
+        rows: level.merged_rows(),
+    };
+    if level.is_plain() && merge_block(all, level.shifts(0, 0), values, to, details) {
+        return details.get_mut(level.details()..).unwrap_or_default();
+    }
+    let mut details = details;
+    let mut rows = values.rows().take(level.rows.nodes);
+    let merged = to.chunks_exact_mut(level.merged_cols());
+    for (index, sums) in merged.take(level.merged_rows()).enumerate() {
+        let pair = level.row_pair(index);
+        let Some(top) = rows.next() else { break };
+        let bottom = if pair.splits() { rows.next() } else { None };
+        let mut plain = 0;
+        if let (Some(bottom), true) = (bottom, pair.is_plain()) {
+            plain = level.plain_cols().min(details.len() / 3);
+            let (own, rest) = details.split_at_mut(3 * plain);
+            details = rest;
+            let shifts = level.shifts(index, 0);
+            let block = Block {
+                row: 2 * index,
+                cols,
+                nodes: plain,
+                rows: 1,
+            };
+            if !merge_block(block, shifts, values, sums, own) {
+                merge_plain(shifts, (top, bottom), sums, own);
+            }
+        }
+        for (col, sum) in sums.iter_mut().enumerate().skip(plain) {
+            let (cols, shifts) = (level.col_pair(col), level.shifts(index, col));
+            // Nodes at the border are mostly two equal halves, or one alone.
+            let halves = match (pair.splits(), cols.splits()) {
+                (true, false) if pair.is_plain() => Some((bottom, 2 * col, shifts.rows)),
+                (false, true) if cols.is_plain() => Some((Some(top), 2 * col + 1, shifts.columns)),
+                (false, false) => Some((None, 0, 0)),
+                _ => None,
+            };
+            if let Some((row, at, shift)) = halves {
+                let first = top.at(2 * col);
+                *sum = first;
+                if let Some(row) = row {
+                    let second = row.at(at);
+                    *sum = first.wrapping_add(second);
+                    let detail = T::narrow(first.wrapping_sub(second), shift);
+                    details = put_first(details, detail);
+                }
+                continue;
+            }
+            let node = merge_weighted((pair, cols), shifts, (top, bottom), col);
+            *sum = node.sum;
+            for (value, shift) in node.details.into_iter().flatten() {
+                details = put_first(details, T::wide(value, shift));
+            }
+        }
+    }
+    details
+}
+
+/// Nodes of four equal quarters, if there is a faster way for them.
+#[inline]
+fn merge_block<T: Coefficient>(
+    block: Block,
+    shifts: NodeShifts,
+    values: &impl Source,
     sums: &mut [i32],
-    plain: usize,
-    sink: &mut impl Sink,
-) {
-    let shifts = NodeShifts::new(rows, level.col_pair(0));
-    let (top, _) = top.as_chunks::<2>();
-    let (bottom, _) = bottom.as_chunks::<2>();
-    for ((sum, [a, b]), [c, d]) in sums.iter_mut().zip(top).zip(bottom).take(plain) {
-        let (top_sum, top_difference) = (a.wrapping_add(*b), a.wrapping_sub(*b));
-        let (bottom_sum, bottom_difference) = (c.wrapping_add(*d), c.wrapping_sub(*d));
-        *sum = top_sum.wrapping_add(bottom_sum);
-        sink.put(
-            top_difference.wrapping_add(bottom_difference),
-            shifts.columns,
-        );
-        sink.put(top_sum.wrapping_sub(bottom_sum), shifts.rows);
-        sink.put(top_difference.wrapping_sub(bottom_difference), shifts.both);
+    details: &mut [T],
+) -> bool {
+    let count = block.nodes * block.rows;
+    let alike = shifts.columns == shifts.both && shifts.rows == shifts.both;
+    let details = details.as_chunks_mut::<3>().0.get_mut(..count);
+    match (details.and_then(T::inputs), sums.get_mut(..count)) {
+        (Some(inputs), Some(sums)) if alike => values.merge(block, shifts.both, sums, inputs),
+        _ => false,
     }
 }
 
-/// Any node; returns its sum.
-fn merge_weighted(
-    rows: Pair,
-    cols: Pair,
-    (top, bottom): (&[i32], &[i32]),
+/// Stores one detail and returns the rest.
+fn put_first<T>(details: &mut [T], value: T) -> &mut [T] {
+    match details.split_first_mut() {
+        Some((slot, rest)) => {
+            *slot = value;
+            rest
+        }
+        None => &mut [],
+    }
+}
+
+/// Nodes of four equal quarters, as many as `details` has room for.
+#[inline]
+fn merge_plain<R: Row, T: Coefficient>(
+    shifts: NodeShifts,
+    (top, bottom): (R, R),
+    sums: &mut [i32],
+    details: &mut [T],
+) {
+    let (details, _) = details.as_chunks_mut::<3>();
+    let quarters = top.pairs().zip(bottom.pairs());
+    for ((slots, sum), ([a, b], [c, d])) in details.iter_mut().zip(sums).zip(quarters) {
+        let (top_sum, top_difference) = (a.wrapping_add(b), a.wrapping_sub(b));
+        let (bottom_sum, bottom_difference) = (c.wrapping_add(d), c.wrapping_sub(d));
+        *sum = top_sum.wrapping_add(bottom_sum);
+        *slots = [
+            T::narrow(
+                top_difference.wrapping_add(bottom_difference),
+                shifts.columns,
+            ),
+            T::narrow(top_sum.wrapping_sub(bottom_sum), shifts.rows),
+            T::narrow(top_difference.wrapping_sub(bottom_difference), shifts.both),
+        ];
+    }
+}
+
+/// A merged node: its sum, and its details with their shifts.
+struct Merged {
+    sum: i32,
+    details: [Option<(i64, u32)>; 3],
+}
+
+/// Any node.
+fn merge_weighted<R: Row>(
+    (rows, cols): (Pair, Pair),
+    shifts: NodeShifts,
+    (top, bottom): (R, Option<R>),
     col: usize,
-    sink: &mut impl Sink,
-) -> i32 {
-    let value = |row: &[i32], at: usize| row.get(at).copied().unwrap_or(0);
-    let halves = |row: &[i32]| {
+) -> Merged {
+    let halves = |row: R| {
         let second = if cols.splits() {
-            value(row, 2 * col + 1)
+            row.at(2 * col + 1)
         } else {
             0
         };
-        (value(row, 2 * col), second)
+        (row.at(2 * col), second)
     };
     let detail = |pair: Pair, first: i64, second: i64| {
         let (first_weight, second_weight) =
@@ -169,22 +244,19 @@ fn merge_weighted(
             .wrapping_mul(first)
             .wrapping_sub(second_weight.wrapping_mul(second))
     };
-    let ((a, b), (c, d)) = (halves(top), halves(bottom));
+    let ((a, b), (c, d)) = (halves(top), bottom.map_or((0, 0), halves));
     let (top_sum, bottom_sum) = (a.wrapping_add(b), c.wrapping_add(d));
     let top_detail = detail(cols, i64::from(a), i64::from(b));
     let bottom_detail = detail(cols, i64::from(c), i64::from(d));
-    let shifts = NodeShifts::new(rows, cols);
-    if cols.splits() {
-        sink.put_wide(top_detail.wrapping_add(bottom_detail), shifts.columns);
+    let columns = (top_detail.wrapping_add(bottom_detail), shifts.columns);
+    let along_rows = detail(rows, i64::from(top_sum), i64::from(bottom_sum));
+    let both = detail(rows, top_detail, bottom_detail);
+    Merged {
+        sum: top_sum.wrapping_add(bottom_sum),
+        details: [
+            cols.splits().then_some(columns),
+            rows.splits().then_some((along_rows, shifts.rows)),
+            (rows.splits() && cols.splits()).then_some((both, shifts.both)),
+        ],
     }
-    if rows.splits() {
-        sink.put_wide(
-            detail(rows, i64::from(top_sum), i64::from(bottom_sum)),
-            shifts.rows,
-        );
-    }
-    if rows.splits() && cols.splits() {
-        sink.put_wide(detail(rows, top_detail, bottom_detail), shifts.both);
-    }
-    top_sum.wrapping_add(bottom_sum)
 }

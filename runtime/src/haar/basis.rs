@@ -141,7 +141,7 @@ const fn both_mass(rows: Pair, cols: Pair) -> u64 {
 }
 
 /// Input shifts of the details of one node: columns, rows, both.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct NodeShifts {
     pub(crate) columns: u32,
     pub(crate) rows: u32,
@@ -200,8 +200,8 @@ impl Basis {
         self.levels.len()
     }
 
-    /// Elements that the second buffer of a transform needs: the values that are
-    /// left after the first merge.
+    /// Elements that each of the two buffers of a transform needs: the values that
+    /// are left after the first merge.
     #[must_use]
     pub fn scratch_len(&self) -> usize {
         self.levels.first().map_or(0, Level::merged_nodes)

@@ -1,5 +1,7 @@
 //! One level of the pyramid: which nodes merge, and with what weights.
 
+use super::basis::NodeShifts;
+
 /// How two adjacent nodes of one axis merge, or that a last one stays alone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pair {
@@ -114,6 +116,8 @@ pub(crate) struct Level {
     row_pairs: [Pair; 2],
     /// Pair of columns anywhere but at the end, and the last one.
     col_pairs: [Pair; 2],
+    /// Input shifts of the nodes, by kind of row pair and of column pair.
+    shifts: [[NodeShifts; 2]; 2],
     /// Index of the level's first detail coefficient.
     pub(crate) first: usize,
 }
@@ -121,11 +125,13 @@ pub(crate) struct Level {
 impl Level {
     pub(crate) fn new(rows: Axis, cols: Axis, first: usize) -> Self {
         let pairs = |axis: Axis| [axis.pair(0), axis.pair(axis.nodes.div_ceil(2) - 1)];
+        let (row_pairs, col_pairs) = (pairs(rows), pairs(cols));
         Self {
             rows,
             cols,
-            row_pairs: pairs(rows),
-            col_pairs: pairs(cols),
+            row_pairs,
+            col_pairs,
+            shifts: row_pairs.map(|row| col_pairs.map(|col| NodeShifts::new(row, col))),
             first,
         }
     }
@@ -169,6 +175,26 @@ impl Level {
         } else {
             inner
         }
+    }
+
+    pub(crate) fn shifts(&self, merged_row: usize, merged_col: usize) -> NodeShifts {
+        let [inner, last] = self.shifts;
+        let [inner, last] = if merged_row + 1 == self.merged_rows() {
+            last
+        } else {
+            inner
+        };
+        if merged_col + 1 == self.merged_cols() {
+            last
+        } else {
+            inner
+        }
+    }
+
+    /// Whether all nodes have four equal quarters.
+    pub(crate) fn is_plain(&self) -> bool {
+        let plain = |pairs: [Pair; 2]| pairs.iter().all(|pair| pair.is_plain());
+        plain(self.row_pairs) && plain(self.col_pairs)
     }
 
     /// How many merged columns, from the left, have a plain difference.

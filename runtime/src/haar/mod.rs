@@ -28,11 +28,13 @@ mod analysis;
 mod basis;
 mod level;
 mod reconstruction;
+mod source;
 mod synthesis;
 
-pub use analysis::{Sink, analyse, analyse_rounded};
+pub use analysis::{Coefficient, analyse};
 pub use basis::{Basis, Function, Functions, Split};
 pub use reconstruction::reconstruct;
+pub use source::{Block, Cells, Row, Source};
 pub use synthesis::synthesise;
 
 #[cfg(test)]

@@ -36,6 +36,10 @@ impl Rule<i64> for Solve {
         Self::weighted(sum, columns, rows, both, (equal, equal))
     }
 
+    fn halves(sum: i64, detail: i64, pair: Pair) -> [i64; 2] {
+        halves(pair, sum, detail).into()
+    }
+
     fn weighted(
         sum: i64,
         columns: i64,
@@ -51,10 +55,11 @@ impl Rule<i64> for Solve {
     }
 }
 
-/// Computes the cells `x` from their exact coefficients `S^T x`.
+/// Computes the cells `x`, row by row, from their exact coefficients `S^T x`.
 ///
 /// The frame pipeline does not need this; it shows that the transform loses
-/// nothing, and turns stored coefficients back into pictures.
+/// nothing, and turns stored coefficients back into pictures. `buffers` are memory,
+/// [`Basis::scratch_len`] elements each.
 ///
 /// # Errors
 /// [`ShortSlice`] if a slice is too short.
@@ -62,15 +67,7 @@ pub fn reconstruct(
     basis: &Basis,
     coefficients: &[i64],
     cells: &mut [i64],
-    scratch: &mut [i64],
+    buffers: [&mut [i64]; 2],
 ) -> Result<(), ShortSlice> {
-    let needed = basis.grid().cells();
-    let coefficients = coefficients.get(..needed).ok_or(ShortSlice {
-        what: "coefficient",
-        needed,
-        given: coefficients.len(),
-    })?;
-    descend::<i64, Solve>(basis, cells, scratch, |index| {
-        coefficients.get(index).copied().unwrap_or(0)
-    })
+    descend::<i64, Solve>(basis, coefficients, buffers, cells)
 }

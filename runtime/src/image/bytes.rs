@@ -25,6 +25,10 @@ impl<'a> Halfwords<'a> {
         }
     }
 
+    pub(super) const fn words(self) -> &'a [[u8; 2]] {
+        self.0
+    }
+
     pub(super) const fn len(self) -> usize {
         self.0.len()
     }

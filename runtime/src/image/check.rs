@@ -9,6 +9,7 @@ use super::{FineGain, ImageError, SectionProblem, Table, TierInfo, crc32};
 use crate::haar::Basis;
 use crate::operator::{Channels, Operator, OperatorError, Segment};
 use crate::pipeline::RESPONSE_KNOTS;
+use crate::pipeline::codes::{CODES, code};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U1F15, U8F24};
@@ -42,7 +43,7 @@ pub(super) fn check(image: &[u8]) -> Result<Table<'_>, ImageError> {
         .transpose()?;
     let operator = operator(&sections, &meta, &basis, tiers.len())?;
     check_costs(operator.as_ref(), &tiers, meta.channels)?;
-    Ok(Table {
+    let mut table = Table {
         basis,
         channels: meta.channels,
         gain_fraction: meta.gain_fraction,
@@ -52,11 +53,15 @@ pub(super) fn check(image: &[u8]) -> Result<Table<'_>, ImageError> {
         gain,
         ambient,
         response,
+        codes: &[],
         fine_gain,
         operator,
         provenance: optional(&sections, SectionKind::Provenance).map_or(Ok(""), provenance)?,
         bytes: image.len(),
-    })
+        id: u32_at(image, header::CRC).unwrap_or(0),
+    };
+    table.codes = codes(optional(&sections, SectionKind::Codes), &table)?;
+    Ok(table)
 }
 
 /// Header, section table and checksums.
@@ -310,6 +315,35 @@ fn response(section: Section<'_>, channels: u8) -> Result<Halfwords<'_>, ImageEr
     Ok(words)
 }
 
+/// The 8-bit codes, which must be those of the response that the table has.
+fn codes<'a>(
+    section: Option<Section<'a>>,
+    table: &Table<'_>,
+) -> Result<&'a [[u8; CODES]], ImageError> {
+    let Some(section) = section else {
+        return match table.response {
+            None => Ok(&[]),
+            Some(_) => Err(ImageError::Section {
+                section: SectionKind::Codes,
+                problem: SectionProblem::Missing,
+            }),
+        };
+    };
+    let curves = table.response.map_or(0, Halfwords::len) / RESPONSE_KNOTS;
+    let (codes, rest) = section.bytes.as_chunks::<CODES>();
+    if !rest.is_empty() || codes.len() != curves {
+        return Err(section.length_error());
+    }
+    for (channel, curve) in codes.iter().enumerate() {
+        let response = table.response(channel);
+        let differs = |(index, stored): (usize, &u8)| *stored != code(index, response);
+        if let Some(index) = curve.iter().enumerate().position(differs) {
+            return Err(section.field_error("code", channel * CODES + index));
+        }
+    }
+    Ok(codes)
+}
+
 fn fine_gains(section: Section<'_>, cells: Grid, channels: u8) -> Result<FineGain<'_>, ImageError> {
     let (head, rest) = section
         .bytes
@@ -337,19 +371,14 @@ fn operator<'a>(
     basis: &Basis,
     tiers: usize,
 ) -> Result<Option<Operator<'a>>, ImageError> {
-    let Some(row_shifts) = optional(sections, SectionKind::RowShifts) else {
-        let bounds = (meta.accumulator_bound, meta.correction_bound);
-        return match optional(sections, SectionKind::Operator) {
-            None if bounds == (0, 0) => Ok(None),
-            None => Err(ImageError::Operator(OperatorError::BoundsDiffer)),
-            Some(_) => Err(ImageError::Section {
-                section: SectionKind::RowShifts,
-                problem: SectionProblem::Missing,
-            }),
-        };
-    };
-    let mut segments: Vec<Segment<'a>, MAX_SEGMENTS> = Vec::new();
     let of_operator = |section: &&Section<'a>| section.kind == SectionKind::Operator;
+    if !sections.iter().any(|section| of_operator(&section)) {
+        return match (meta.accumulator_bound, meta.correction_bound) {
+            (0, 0) => Ok(None),
+            _ => Err(ImageError::Operator(OperatorError::BoundsDiffer)),
+        };
+    }
+    let mut segments: Vec<Segment<'a>, MAX_SEGMENTS> = Vec::new();
     for (index, section) in sections.iter().filter(of_operator).enumerate() {
         let [tier, channel] = section.selector.to_le_bytes();
         let channels = match channel {
@@ -368,8 +397,8 @@ fn operator<'a>(
             .push(segment)
             .map_err(|_| ImageError::Operator(OperatorError::Segments))?;
     }
-    let operator = Operator::new(basis, segments, row_shifts.bytes, meta.channel_scales)
-        .map_err(ImageError::Operator)?;
+    let operator =
+        Operator::new(basis, segments, meta.channel_scales).map_err(ImageError::Operator)?;
     let bounds = operator.bounds();
     if (bounds.accumulator, bounds.correction) != (meta.accumulator_bound, meta.correction_bound) {
         return Err(ImageError::Operator(OperatorError::BoundsDiffer));

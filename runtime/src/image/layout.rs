@@ -93,13 +93,14 @@ pub enum SectionKind {
     /// Projector codes by drive, [`RESPONSE_KNOTS`](crate::pipeline::RESPONSE_KNOTS)
     /// `u16` for all channels, or that many for each.
     Response = 5,
+    /// 8-bit projector codes by drive, [`CODES`](crate::pipeline::CODES) `u8` for
+    /// all channels, or that many for each: what [`Response`](Self::Response) says
+    /// at those drives. The two occur together or not at all.
+    Codes = 6,
     /// Gain on a grid finer than the cells; see [`fine_gain`].
-    FineGain = 6,
-    /// Bits by which the sum of each operator row is shifted right, one byte a
-    /// cell.
-    RowShifts = 7,
-    /// Operator entries of one tier; the selector is the tier plus 256 times the
-    /// channel number (0: all channels, 1: the first, ...). Selectors ascend.
+    FineGain = 7,
+    /// All operator entries of one tier; the selector is the tier plus 256 times
+    /// the channel number (0: all channels, 1: the first, ...). Selectors ascend.
     /// See [`segment`].
     Operator = 8,
     /// Where the table comes from: UTF-8 text for people and host tools.
@@ -116,8 +117,8 @@ impl SectionKind {
             3 => Self::Gain,
             4 => Self::Ambient,
             5 => Self::Response,
-            6 => Self::FineGain,
-            7 => Self::RowShifts,
+            6 => Self::Codes,
+            7 => Self::FineGain,
             8 => Self::Operator,
             9 => Self::Provenance,
             _ => return None,
@@ -133,8 +134,8 @@ impl SectionKind {
             Self::Gain => "gain",
             Self::Ambient => "ambient",
             Self::Response => "response",
+            Self::Codes => "codes",
             Self::FineGain => "fine gain",
-            Self::RowShifts => "row shifts",
             Self::Operator => "operator",
             Self::Provenance => "provenance",
         }
@@ -178,7 +179,7 @@ pub mod tier {
     use super::Range;
     /// Predicted error of what the tier leaves out, `u32` with 32 fraction bits.
     pub const PREDICTED_ERROR: Range<usize> = 0..4;
-    /// Operator entries read a frame, this tier and all below, `u32`.
+    /// Operator entries read a frame, `u32`.
     pub const ENTRIES: Range<usize> = 4..8;
     /// Multiplications by operator entries a frame, `u32`.
     pub const MULTIPLICATIONS: Range<usize> = 8..12;
@@ -200,13 +201,36 @@ pub mod fine_gain {
 
 /// The words of an operator section, `u32` each.
 ///
-/// For every row that has entries, in ascending order: a word with the row's
-/// index in the low half and its number of entries in the high half; then its
-/// entries in ascending order of their index, which is the low half; the high
-/// half is the value, `i16`.
+/// Entries stand in pairs: the values `v` of two neighbouring input coefficients,
+/// zero where one of them has no entry, so that a device multiplies both at once.
+/// Rows of one number of pairs stand together, so that a device runs through them
+/// without counting. For each number there is, in ascending order, a group: a word
+/// with the number of pairs in the low half and the number of rows in the high half,
+/// then the rows in ascending order of their index.
+///
+/// A row is a word with its index in the low half and its shift in the high half,
+/// then its pairs in ascending order, two by two: the values of the first pair
+/// (`i16` each, the first in the low half), those of the second, and a word with the
+/// index of the first pair's first coefficient in the low half and that of the
+/// second's in the high half. A last pair alone has its values and a word with its
+/// index.
+///
+/// Rows longer than [`MAX_SHORT`](segment::MAX_SHORT) pairs share one group, the
+/// last, whose stated number is 0. The words of all its rows are counted in a word
+/// of their own, before the rows; and the first word of each row is followed by one
+/// with the number of its pairs in the low half and zero in the high half.
 pub mod segment {
     /// Length of a word in bytes.
     pub const WORD: usize = 4;
+
+    /// Most pairs of rows that have a group of their own.
+    pub const MAX_SHORT: usize = 8;
+
+    /// Words of `pairs` pairs.
+    #[must_use]
+    pub const fn pair_words(pairs: usize) -> usize {
+        pairs + pairs.div_ceil(2)
+    }
 
     /// A word from its halves.
     #[must_use]

@@ -6,6 +6,7 @@ use super::check;
 use super::layout::MAX_TIERS;
 use crate::haar::Basis;
 use crate::operator::Operator;
+use crate::pipeline::{CODES, RESPONSE_KNOTS, Response};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U8F24};
@@ -26,10 +27,12 @@ pub struct Table<'a> {
     pub(super) gain: Halfwords<'a>,
     pub(super) ambient: Option<Halfwords<'a>>,
     pub(super) response: Option<Halfwords<'a>>,
+    pub(super) codes: &'a [[u8; CODES]],
     pub(super) fine_gain: Option<FineGain<'a>>,
     pub(super) operator: Option<Operator<'a>>,
     pub(super) provenance: &'a str,
     pub(super) bytes: usize,
+    pub(super) id: u32,
 }
 
 /// What one tier promises and costs.
@@ -119,6 +122,13 @@ impl<'a> Table<'a> {
         self.channels
     }
 
+    /// What tells it from other tables: the CRC-32 in its header, which covers those
+    /// of all sections.
+    #[must_use]
+    pub const fn id(&self) -> u32 {
+        self.id
+    }
+
     /// Bytes of the image.
     #[must_use]
     pub const fn bytes(&self) -> usize {
@@ -176,14 +186,40 @@ impl<'a> Table<'a> {
         Some(row.map(Light::from_bits))
     }
 
-    /// Projector code (full scale 65,535) at one knot of a channel's response;
-    /// `None` if the projector is linear.
+    /// The projector's response in a channel; [`has_response`](Self::has_response)
+    /// says whether it is more than a straight line.
     #[must_use]
-    pub fn response_code(&self, knot: usize, channel: usize) -> Option<u16> {
-        let response = self.response?;
-        let knots = crate::pipeline::RESPONSE_KNOTS;
-        let curve = if response.len() == knots { 0 } else { channel };
-        Some(response.get(curve * knots + knot))
+    pub fn response(&self, channel: usize) -> Response<'a> {
+        let knots = self.response.map_or(&[][..], Halfwords::words);
+        let curve = |channel: usize| {
+            let start = channel.checked_mul(RESPONSE_KNOTS)?;
+            knots.get(start..)?.get(..RESPONSE_KNOTS)
+        };
+        Response::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
+    }
+
+    /// Whether codes follow a response; otherwise they are proportional to drives.
+    #[must_use]
+    pub const fn has_response(&self) -> bool {
+        self.response.is_some()
+    }
+
+    /// 8-bit projector codes of a channel by the upper bits of the drive
+    /// ([`codes`](crate::pipeline::codes)); `None` if the projector is linear.
+    #[must_use]
+    pub fn codes(&self, channel: usize) -> Option<&'a [u8; CODES]> {
+        self.codes.get(channel).or(self.codes.first())
+    }
+
+    /// Gains of all cells, little-endian `u16`, channels of a cell side by side.
+    pub(crate) const fn gains(&self) -> &'a [[u8; 2]] {
+        self.gain.words()
+    }
+
+    /// Ambient light of all cells in the same way, [`Light`] bits; `None` if the
+    /// scene is dark.
+    pub(crate) fn ambient(&self) -> Option<&'a [[u8; 2]]> {
+        self.ambient.map(Halfwords::words)
     }
 
     /// Gains finer than the cells, where the table has them.

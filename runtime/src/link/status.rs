@@ -53,7 +53,7 @@ pub struct Status {
 /// What tells one table from another.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct TableName {
-    /// CRC-32 of its image.
+    /// CRC-32 in its header, which covers those of all sections.
     pub id: u32,
     /// Its version; 0 if it has none.
     pub version: u32,

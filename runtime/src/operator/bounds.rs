@@ -6,13 +6,14 @@
 //! level do not overlap between nodes, so a correction is at most the sum over
 //! the levels of the largest node's `sum_i z_i * peak_i`.
 
-use super::{Channels, OperatorError, Rows, Segment};
+use super::{Channels, Group, OperatorError, Rows, Segment};
 use crate::haar::Basis;
-use crate::image::layout::MAX_SEGMENTS;
+use crate::image::layout::segment::MAX_SHORT;
 use crate::units::INPUT_COEFFICIENT_MAX;
+use core::iter::Peekable;
 use heapless::Vec;
 
-/// Largest magnitudes that any frame can lead to.
+/// Largest magnitudes that any frame can lead to, at any tier.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Bounds {
     /// Of a row's sum, before its shift.
@@ -22,49 +23,47 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Largest accumulator, with the half that rounding adds to it.
+    /// Largest accumulator.
     pub const MAX_ACCUMULATOR: u64 = i32::MAX as u64;
 
     /// Largest correction: half the type, so that the difference of two
     /// corrections, which interpolation takes, still fits it.
     pub const MAX_CORRECTION: u64 = (1 << 30) - 1;
 
+    /// Proves one tier. `segments` are all of the operator's, in their order.
     pub(super) fn prove(
         basis: &Basis,
         segments: &[Segment<'_>],
-        row_shifts: &[u8],
+        tier: u8,
     ) -> Result<Self, OperatorError> {
-        let mut cursors: Vec<Cursor<'_>, MAX_SEGMENTS> = segments.iter().map(Cursor::new).collect();
+        let of_tier = segments.iter().enumerate();
+        let of_tier = of_tier.filter(|(_, segment)| segment.tier == tier);
+        // A tier has one segment for all channels and one for each at most.
+        let mut cursors: Vec<Cursor<'_>, 4> = Vec::new();
+        for (index, segment) in of_tier {
+            let cursor = Cursor::new(index, segment);
+            cursors.push(cursor).map_err(|_| OperatorError::Segments)?;
+        }
         let mut accumulator = 0;
         let mut levels = LevelMaxima::default();
-        for (row, (function, shift)) in basis.functions().zip(row_shifts).enumerate() {
-            let mut shared = 0_u64;
-            let mut own = [0_u64; 3];
+        for (row, function) in basis.functions().enumerate() {
+            let mut shared = 0;
+            let mut widest = 0;
             for cursor in &mut cursors {
-                let magnitude = cursor.magnitude_of(row);
+                let Some((sum, coefficient)) = cursor.bounds_of(row)? else {
+                    continue;
+                };
+                if sum > Self::MAX_ACCUMULATOR {
+                    return Err(OperatorError::AccumulatorOverflow { row, bound: sum });
+                }
+                accumulator = accumulator.max(sum);
                 match cursor.channels {
-                    Channels::All => shared += magnitude,
-                    Channels::One(channel) => {
-                        if let Some(own) = own.get_mut(usize::from(channel)) {
-                            *own += magnitude;
-                        }
-                    }
+                    Channels::All => shared = coefficient,
+                    Channels::One(_) => widest = coefficient.max(widest),
                 }
             }
-            let widest = own.into_iter().max().unwrap_or(0);
-            let sum = (shared + widest).saturating_mul(u64::from(INPUT_COEFFICIENT_MAX));
-            let half = (1_u64 << shift) >> 1;
-            let rounded = sum.saturating_add(half);
-            if rounded > Self::MAX_ACCUMULATOR {
-                return Err(OperatorError::AccumulatorOverflow {
-                    row,
-                    bound: rounded,
-                });
-            }
-            accumulator = accumulator.max(sum);
-            let coefficient = rounded >> shift;
             let place = (function.level, function.row, function.col);
-            levels.add(place, coefficient.saturating_mul(function.peak()));
+            levels.add(place, (shared + widest).saturating_mul(function.peak()));
         }
         let correction = levels.total();
         if correction > Self::MAX_CORRECTION {
@@ -75,27 +74,51 @@ impl Bounds {
             correction: correction as u32,
         })
     }
+
+    /// The larger of each.
+    pub(super) fn max(self, other: Self) -> Self {
+        Self {
+            accumulator: self.accumulator.max(other.accumulator),
+            correction: self.correction.max(other.correction),
+        }
+    }
 }
 
-/// A segment's rows, read in step with the rows of the operator.
+/// A segment's groups, each read in step with the rows of the operator.
 struct Cursor<'a> {
+    segment: usize,
     channels: Channels,
-    rows: core::iter::Peekable<Rows<'a>>,
+    groups: Vec<Peekable<Rows<'a>>, { MAX_SHORT + 1 }>,
 }
 
 impl<'a> Cursor<'a> {
-    fn new(segment: &Segment<'a>) -> Self {
+    fn new(index: usize, segment: &Segment<'a>) -> Self {
+        let rows = |group: Group<'a>| group.rows().peekable();
         Self {
+            segment: index,
             channels: segment.channels,
-            rows: segment.rows().peekable(),
+            groups: segment.groups().take(MAX_SHORT + 1).map(rows).collect(),
         }
     }
 
-    /// Sum of magnitudes of the row, 0 if the segment does not have it.
-    fn magnitude_of(&mut self, row: usize) -> u64 {
-        self.rows
-            .next_if(|next| usize::from(next.index) == row)
-            .map_or(0, |row| row.magnitude())
+    /// Bounds of the row's sum and of its coefficient, if the segment has it.
+    fn bounds_of(&mut self, row: usize) -> Result<Option<(u64, u64)>, OperatorError> {
+        let mut found = None;
+        for rows in &mut self.groups {
+            let Some(next) = rows.next_if(|next| usize::from(next.index) == row) else {
+                continue;
+            };
+            if found.is_some() {
+                let segment = self.segment;
+                return Err(OperatorError::Row { segment, row });
+            }
+            let sum = next
+                .magnitude()
+                .saturating_mul(INPUT_COEFFICIENT_MAX.into());
+            // Rounding down can add one to the magnitude.
+            found = Some((sum, (sum >> next.shift) + 1));
+        }
+        Ok(found)
     }
 }
 

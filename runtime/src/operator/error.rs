@@ -8,17 +8,10 @@ use core::fmt;
 pub enum OperatorError {
     /// There are more segments than a table may have.
     Segments,
-    /// Not one shift a cell.
-    RowShiftCount {
-        /// Cells of the grid.
-        needed: usize,
-        /// Shifts given.
-        given: usize,
-    },
-    /// A row is shifted by more bits than there are.
-    RowShift {
-        /// Row of the operator.
-        row: usize,
+    /// A group of rows is empty, out of order, or longer than its segment.
+    Group {
+        /// Index of the segment.
+        segment: usize,
     },
     /// A channel's scale is above 1.
     ChannelScale,
@@ -27,7 +20,8 @@ pub enum OperatorError {
         /// Index of the segment.
         segment: usize,
     },
-    /// A row is empty, beyond the grid, out of order, or longer than its segment.
+    /// A row is beyond the grid, out of order, in two groups, in the wrong one,
+    /// longer than its segment, or shifted by a number of bits that there cannot be.
     Row {
         /// Index of the segment.
         segment: usize,
@@ -66,10 +60,9 @@ impl fmt::Display for OperatorError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Segments => f.write_str("it has too many segments"),
-            Self::RowShiftCount { needed, given } => {
-                write!(f, "{given} row shifts for {needed} cells")
+            Self::Group { segment } => {
+                write!(f, "a group of rows in segment {segment} is malformed")
             }
-            Self::RowShift { row } => write!(f, "row {row} is shifted by more than 31 bits"),
             Self::ChannelScale => f.write_str("a channel's scale is above 1"),
             Self::Words { segment } => write!(f, "segment {segment} ends within a word"),
             Self::Row { segment, row } => {

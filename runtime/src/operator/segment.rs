@@ -1,8 +1,7 @@
 //! One tier's entries, as they lie in the image.
 
 use super::OperatorError;
-use crate::image::layout::segment::{WORD, halves};
-use crate::units::InputCoefficient;
+use crate::image::layout::segment::{MAX_SHORT, WORD, halves, pair_words};
 
 /// Which channels a segment applies to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -13,13 +12,23 @@ pub enum Channels {
     One(u8),
 }
 
-/// The entries that one tier adds.
+/// All entries of one tier, for all channels or for one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Segment<'a> {
-    /// The tier that first needs them, 1 or above.
+    /// The tier that they make, 1 or above.
     pub tier: u8,
     /// The channels that they apply to.
     pub channels: Channels,
+    words: &'a [[u8; WORD]],
+}
+
+/// Rows of one number of pairs, or all rows too long to have a group of their own.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Group<'a> {
+    /// Pairs of each row; `None` if every row says how many it has.
+    pub pairs: Option<u16>,
+    /// Number of rows.
+    pub count: u16,
     words: &'a [[u8; WORD]],
 }
 
@@ -28,19 +37,28 @@ pub struct Segment<'a> {
 pub struct Row<'a> {
     /// Index of the output coefficient.
     pub index: u16,
-    entries: &'a [[u8; WORD]],
+    /// Bits by which the row's sum is shifted right.
+    pub shift: u16,
+    pairs: u16,
+    words: &'a [[u8; WORD]],
 }
 
-/// One entry of a row.
+/// Two neighbouring entries of a row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Entry {
-    /// Index of the input coefficient.
+pub struct Pair {
+    /// Index of the first input coefficient.
     pub index: u16,
-    /// Its factor `v`.
-    pub value: i16,
+    /// The factors `v` of that and of the next; zero where there is no entry.
+    pub values: [i16; 2],
 }
 
 impl<'a> Segment<'a> {
+    /// Least shift of a row: the scale of a channel takes two bits of its own.
+    pub const MIN_SHIFT: u16 = 2;
+
+    /// Largest shift of a row: the bits of an accumulator.
+    pub const MAX_SHIFT: u16 = 31;
+
     /// A segment over the bytes of its section; [`Operator::new`](super::Operator::new)
     /// checks them.
     ///
@@ -64,107 +82,189 @@ impl<'a> Segment<'a> {
         })
     }
 
-    /// Its rows in ascending order. A malformed end is left out.
+    /// Its bytes in the image.
     #[must_use]
-    pub const fn rows(&self) -> Rows<'a> {
-        Rows { words: self.words }
+    pub const fn bytes(&self) -> usize {
+        self.words.len() * WORD
     }
 
-    /// Checks every row and index against a grid of `cells` cells.
+    /// Its groups in ascending order of their pairs. A malformed end is left out.
+    #[must_use]
+    pub const fn groups(&self) -> Groups<'a> {
+        Groups { words: self.words }
+    }
+
+    /// Its rows, group by group. Malformed ends are left out.
+    pub fn rows(&self) -> impl Iterator<Item = Row<'a>> + use<'a> {
+        self.groups().flat_map(|group| group.rows())
+    }
+
+    /// Checks every group, row and index against a grid of `cells` cells. That no
+    /// row is in two groups is left to the proof of the bounds.
     pub(super) fn check(&self, segment: usize, cells: usize) -> Result<(), OperatorError> {
-        let mut rows = self.rows();
-        let mut least_row = 0;
-        while let Some([head, ..]) = rows.words.first_chunk::<1>() {
-            let row = usize::from(halves(*head).0);
-            let malformed = OperatorError::Row { segment, row };
-            let entries = rows.next().ok_or(malformed)?.entries();
-            if entries.len() == 0 || row < least_row || row >= cells {
-                return Err(malformed);
+        let mut groups = self.groups();
+        let mut least = 1;
+        while !groups.words.is_empty() {
+            let group = groups.next().ok_or(OperatorError::Group { segment })?;
+            let pairs = group.pairs.map_or(MAX_SHORT + 1, usize::from);
+            if pairs < least || pairs > MAX_SHORT + 1 || group.count == 0 {
+                return Err(OperatorError::Group { segment });
             }
-            least_row = row + 1;
-            let mut least_index = 0;
-            for entry in entries {
-                let index = usize::from(entry.index);
-                if index < least_index || index >= cells {
-                    return Err(OperatorError::Index { segment, row });
-                }
-                least_index = index + 1;
-            }
+            least = pairs + 1;
+            group.check(segment, cells)?;
         }
         Ok(())
     }
+}
 
-    /// Adds the products of every row to its sums, all channels at once.
-    pub(super) fn accumulate<const C: usize>(
-        &self,
-        inputs: &[[InputCoefficient; C]],
-        sums: &mut [[i32; C]],
-    ) {
-        for row in self.rows() {
-            let Some(sum) = sums.get_mut(usize::from(row.index)) else {
-                continue;
-            };
-            let mut total = *sum;
-            for entry in row.entries() {
-                if let Some(input) = inputs.get(usize::from(entry.index)) {
-                    for (total, input) in total.iter_mut().zip(input) {
-                        let product = i32::from(entry.value).wrapping_mul(i32::from(*input));
-                        *total = total.wrapping_add(product);
-                    }
-                }
-            }
-            *sum = total;
+impl<'a> Group<'a> {
+    /// Its rows in ascending order. A malformed end is left out.
+    #[must_use]
+    pub const fn rows(&self) -> Rows<'a> {
+        Rows {
+            pairs: self.pairs,
+            left: self.count,
+            words: self.words,
         }
     }
 
-    /// Adds the products of every row to its sum in one channel.
-    pub(super) fn accumulate_one<const C: usize>(
-        &self,
-        inputs: &[[InputCoefficient; C]],
-        sums: &mut [[i32; C]],
-        channel: usize,
-    ) {
-        for row in self.rows() {
-            let sum = sums.get_mut(usize::from(row.index));
-            let Some(sum) = sum.and_then(|channels| channels.get_mut(channel)) else {
-                continue;
+    /// The words of its rows.
+    #[cfg(target_arch = "arm")]
+    pub(crate) const fn words(&self) -> &'a [[u8; WORD]] {
+        self.words
+    }
+
+    fn check(&self, segment: usize, cells: usize) -> Result<(), OperatorError> {
+        let mut least_row = 0;
+        let mut rows = self.rows();
+        for _ in 0..self.count {
+            let head = rows.words.first().copied().unwrap_or_default();
+            let malformed = OperatorError::Row {
+                segment,
+                row: usize::from(halves(head).0),
             };
-            for entry in row.entries() {
-                let input = inputs.get(usize::from(entry.index));
-                if let Some(input) = input.and_then(|channels| channels.get(channel)) {
-                    let product = i32::from(entry.value).wrapping_mul(i32::from(*input));
-                    *sum = sum.wrapping_add(product);
-                }
+            let row = rows.next().ok_or(malformed)?;
+            let index = usize::from(row.index);
+            let long_enough = self.pairs.is_some() || usize::from(row.pairs) > MAX_SHORT;
+            let shifts = Segment::MIN_SHIFT..=Segment::MAX_SHIFT;
+            if index < least_row || index >= cells || !long_enough || !shifts.contains(&row.shift) {
+                return Err(malformed);
             }
+            least_row = index + 1;
+            row.check(segment, cells)?;
+        }
+        if rows.words.is_empty() {
+            Ok(())
+        } else {
+            Err(OperatorError::Group { segment })
         }
     }
 }
 
-impl<'a> Row<'a> {
-    /// Its entries in ascending order of their index.
-    #[must_use]
-    pub fn entries(&self) -> impl ExactSizeIterator<Item = Entry> + use<'a> {
-        self.entries.iter().map(|word| {
-            let (index, value) = halves(*word);
-            Entry {
+impl Row<'_> {
+    /// Goes through its pairs in ascending order of their index.
+    #[inline]
+    pub fn fold<A>(&self, start: A, mut step: impl FnMut(A, Pair) -> A) -> A {
+        let pair = |index, values: [u8; WORD]| {
+            let (first, second) = halves(values);
+            Pair {
                 index,
-                value: value.cast_signed(),
+                values: [first.cast_signed(), second.cast_signed()],
             }
-        })
+        };
+        let (twos, last) = self.words.as_chunks::<3>();
+        let mut result = start;
+        for [first, second, indices] in twos {
+            let (first_index, second_index) = halves(*indices);
+            result = step(result, pair(first_index, *first));
+            result = step(result, pair(second_index, *second));
+        }
+        match last {
+            [values, index] => step(result, pair(halves(*index).0, *values)),
+            _ => result,
+        }
+    }
+
+    /// Number of its pairs.
+    #[must_use]
+    pub const fn pairs(&self) -> u16 {
+        self.pairs
+    }
+
+    /// Number of its entries that are not zero.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        let count = |pair: Pair| pair.values.into_iter().filter(|value| *value != 0).count();
+        self.fold(0, |sum, pair| sum + count(pair))
     }
 
     /// Sum of the magnitudes of its values.
     #[must_use]
     pub fn magnitude(&self) -> u64 {
-        self.entries()
-            .map(|entry| u64::from(entry.value.unsigned_abs()))
-            .sum()
+        let magnitude = |value: i16| u64::from(value.unsigned_abs());
+        self.fold(0, |sum, Pair { values: [a, b], .. }| {
+            sum + magnitude(a) + magnitude(b)
+        })
+    }
+
+    /// Both coefficients of each pair are on the grid, and pairs ascend.
+    fn check(&self, segment: usize, cells: usize) -> Result<(), OperatorError> {
+        let (least, fits) = self.fold((0, true), |(least, fits), pair| {
+            let index = usize::from(pair.index);
+            (index + 1, fits && index >= least && index + 1 < cells)
+        });
+        // Nothing follows the index of a last pair alone.
+        let odd = self.pairs % 2 == 1;
+        let ends = self
+            .words
+            .last()
+            .is_none_or(|last| !odd || halves(*last).1 == 0);
+        if least > 0 && fits && ends {
+            Ok(())
+        } else {
+            Err(OperatorError::Index {
+                segment,
+                row: usize::from(self.index),
+            })
+        }
     }
 }
 
-/// Iterator over the rows of a [`Segment`].
+/// Iterator over the groups of a [`Segment`].
+#[derive(Clone, Debug)]
+pub struct Groups<'a> {
+    words: &'a [[u8; WORD]],
+}
+
+impl<'a> Iterator for Groups<'a> {
+    type Item = Group<'a>;
+
+    fn next(&mut self) -> Option<Group<'a>> {
+        let (head, rest) = self.words.split_first()?;
+        let (pairs, count) = halves(*head);
+        let pairs = (pairs > 0).then_some(pairs);
+        let (size, rest) = if let Some(pairs) = pairs {
+            let row = 1 + pair_words(usize::from(pairs));
+            (usize::from(count).checked_mul(row)?, rest)
+        } else {
+            let (size, rest) = rest.split_first()?;
+            (u32::from_le_bytes(*size) as usize, rest)
+        };
+        let (words, rest) = rest.split_at_checked(size)?;
+        self.words = rest;
+        Some(Group {
+            pairs,
+            count,
+            words,
+        })
+    }
+}
+
+/// Iterator over the rows of a [`Group`].
 #[derive(Clone, Debug)]
 pub struct Rows<'a> {
+    pairs: Option<u16>,
+    left: u16,
     words: &'a [[u8; WORD]],
 }
 
@@ -173,10 +273,25 @@ impl<'a> Iterator for Rows<'a> {
 
     #[inline]
     fn next(&mut self) -> Option<Row<'a>> {
+        let left = self.left.checked_sub(1)?;
         let (head, rest) = self.words.split_first()?;
-        let (index, count) = halves(*head);
-        let (entries, rest) = rest.split_at_checked(usize::from(count))?;
-        self.words = rest;
-        Some(Row { index, entries })
+        let (index, shift) = halves(*head);
+        let (pairs, rest) = if let Some(pairs) = self.pairs {
+            (pairs, rest)
+        } else {
+            let (count, rest) = rest.split_first()?;
+            match halves(*count) {
+                (pairs, 0) => (pairs, rest),
+                _ => return None,
+            }
+        };
+        let (words, rest) = rest.split_at_checked(pair_words(usize::from(pairs)))?;
+        (self.left, self.words) = (left, rest);
+        Some(Row {
+            index,
+            shift,
+            pairs,
+            words,
+        })
     }
 }

@@ -4,6 +4,7 @@
 //! its light over the cells ([`FullPipeline::average_row`]), once to apply gain
 //! and correction ([`FullPipeline::finish_row`]). Rows may come in any order and
 //! from several threads; nothing of the frame is kept here.
+//! [`FullPipeline::compensate`] does a whole frame on one thread.
 
 #![allow(
     clippy::inline_always,
@@ -103,16 +104,17 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.table.grid().cols().max(fine)
     }
 
-    /// Takes the ambient light of one channel away from row `y`.
+    /// Interpolates the ambient light of one channel along row `y` into `row.spread`,
+    /// [`Light`] bits; `false` in a dark room.
     #[inline(always)]
-    pub fn remove_ambient(&self, y: usize, channel: usize, light: &mut [Light], row: &mut Row<'_>) {
+    pub fn ambient_row(&self, y: usize, channel: usize, row: &mut Row<'_>) -> bool {
         let [rows, cols] = self.cells;
         let place = rows.place(y);
         let (Some(before), Some(after)) = (
             self.table.ambient_row(place.before, channel),
             self.table.ambient_row(place.after, channel),
         ) else {
-            return;
+            return false;
         };
         let widen = |light: Light| i32::from(light.to_bits()) << GAIN_GUARD_BITS;
         let count = self.table.grid().cols();
@@ -120,45 +122,69 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
             *slot = blend(widen(before), widen(after), place.fraction);
         }
         cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
-        for (light, ambient) in light.iter_mut().zip(row.spread.iter()) {
-            let ambient = Light::from_bits((ambient >> GAIN_GUARD_BITS) as u16);
-            subtract_ambient(core::slice::from_mut(light), &[ambient]);
+        for ambient in row.spread.iter_mut() {
+            *ambient >>= GAIN_GUARD_BITS;
         }
+        true
+    }
+
+    /// Takes the ambient light of one channel away from row `y`.
+    #[inline(always)]
+    pub fn remove_ambient(&self, y: usize, channel: usize, light: &mut [Light], row: &mut Row<'_>) {
+        if self.ambient_row(y, channel, row) {
+            for (light, ambient) in light.iter_mut().zip(row.spread.iter()) {
+                *light = subtract_ambient(*light, Light::from_bits(*ambient as u16));
+            }
+        }
+    }
+
+    /// Adds up the light of a frame by cells: `add` adds the light of a row of pixels,
+    /// times a weight, to columns. `columns` has two elements a pixel of a row.
+    pub(super) fn average(
+        &self,
+        columns: &mut [u32],
+        sums: &mut [u64],
+        add: impl Fn(usize, u32, &mut [u32]),
+    ) {
+        self.average.add_frame(columns, sums, add);
     }
 
     /// Adds the light (without ambient) of row `y` of one channel to the sums of
     /// its cells; `sums` has `N` elements and starts at zero.
     #[inline(always)]
-    pub fn average_row(&self, y: usize, channel: usize, light: &[Light], sums: &mut [[u64; C]]) {
-        self.average.add_row(y, light, channel, sums);
+    pub fn average_row(&self, y: usize, light: &[Light], sums: &mut [u64]) {
+        self.average.add_row(y, light, sums);
     }
 
-    /// Turns the sums of a whole frame into the corrections of its cells, which
-    /// stay in `workspace.values`.
+    /// Turns the sums of a whole frame into the corrections of its cells, both `N`
+    /// for each channel.
     ///
     /// # Errors
     /// [`FrameError`] if the tier does not exist or a slice is too short.
     pub fn correct(
         &self,
         tier: u8,
-        sums: &[[u64; C]],
-        workspace: &mut Workspace<'_, C>,
+        sums: &[u64],
+        corrections: &mut [i32],
+        workspace: &mut Workspace<'_>,
     ) -> Result<(), FrameError> {
-        let (top, needed) = (self.table.top_tier(), self.table.grid().cells());
+        let (top, needed) = (self.table.top_tier(), C * self.table.grid().cells());
         if tier > top {
             return Err(FrameError::NoSuchTier { tier, top });
         }
-        if sums.len() < needed {
-            return Err(FrameError::Short(ShortSlice {
-                what: "sums",
-                needed,
-                given: sums.len(),
-            }));
+        for (what, given) in [("sums", sums.len()), ("corrections", corrections.len())] {
+            if given < needed {
+                return Err(FrameError::Short(ShortSlice {
+                    what,
+                    needed,
+                    given,
+                }));
+            }
         }
-        for (value, sum) in workspace.values.iter_mut().zip(sums) {
-            *value = sum.map(|sum| i32::from(self.average.mean(sum).to_bits()));
+        for (value, sum) in corrections.iter_mut().zip(sums).take(needed) {
+            *value = i32::from(self.average.mean(*sum).to_bits());
         }
-        Ok(correct(self.table, tier, workspace)?)
+        Ok(correct(self.table, tier, corrections, workspace)?)
     }
 
     /// Gains of one channel along row `y`, to nearest.
@@ -190,34 +216,38 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         }
     }
 
-    /// Drives of one channel along row `y`; returns how many were clipped.
-    ///
-    /// `light` is the row without ambient and `gain` its
-    /// [`gain_row`](Self::gain_row), side by side; `corrections` is what
-    /// [`correct`](Self::correct) left in the workspace.
+    /// Interpolates the corrections of one channel along row `y` into `row.spread`.
     #[inline(always)]
-    pub fn finish_row(
-        &self,
-        y: usize,
-        channel: usize,
-        (light, gain): (&[Light], &[u16]),
-        corrections: &[[i32; C]],
-        row: &mut Row<'_>,
-        drives: &mut [Drive],
-    ) -> u32 {
+    pub fn correct_row(&self, y: usize, corrections: &[i32], row: &mut Row<'_>) {
         let [rows, cols] = self.cells;
         let place = rows.place(y);
         let count = self.table.grid().cols();
         let line = |at: usize| {
             let line = corrections.get(at * count..).unwrap_or_default();
-            line.iter()
-                .map(move |cell| cell.get(channel).copied().unwrap_or(0))
+            line.iter().copied()
         };
         let pairs = line(place.before).zip(line(place.after));
         for (slot, (before, after)) in row.line.iter_mut().take(count).zip(pairs) {
             *slot = blend(before, after, place.fraction);
         }
         cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
+    }
+
+    /// Drives of one channel along row `y`; returns how many were clipped.
+    ///
+    /// `light` is the row without ambient and `gain` its
+    /// [`gain_row`](Self::gain_row), side by side; `corrections` are the channel's,
+    /// as [`correct`](Self::correct) left them.
+    #[inline(always)]
+    pub fn finish_row(
+        &self,
+        y: usize,
+        (light, gain): (&[Light], &[u16]),
+        corrections: &[i32],
+        row: &mut Row<'_>,
+        drives: &mut [Drive],
+    ) -> u32 {
+        self.correct_row(y, corrections, row);
         let fraction = u32::from(self.table.gain_fraction());
         drive_row(light, gain, fraction, row.spread, drives)
     }

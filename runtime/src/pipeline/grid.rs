@@ -1,12 +1,11 @@
 //! Frames of one pixel a cell.
 
 use super::FrameError;
-use super::response::Response;
+use super::pixels::Pixels;
 use super::sample::{Encoding, Sample};
-use super::stages::{Workspace, correct, drive};
+use super::stages::Workspace;
 use crate::haar::ShortSlice;
 use crate::image::Table;
-use crate::units::Light;
 
 /// Compensates frames of the grid's own size, `C` channels side by side.
 #[derive(Clone, Copy, Debug)]
@@ -42,83 +41,115 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
         encoding: Encoding,
         wanted: &[[S; C]],
         input: &mut [[S; C]],
-        workspace: &mut Workspace<'_, C>,
+        workspace: &mut Workspace<'_>,
     ) -> Result<u32, FrameError> {
-        let (top, needed) = (self.table.top_tier(), self.table.grid().cells());
+        let top = self.table.top_tier();
         if tier > top {
             return Err(FrameError::NoSuchTier { tier, top });
         }
-        for (what, given) in [("wanted", wanted.len()), ("input", input.len())] {
-            if given < needed {
-                return Err(FrameError::Short(ShortSlice {
-                    what,
-                    needed,
-                    given,
-                }));
-            }
+        self.check("input", input.len())?;
+        if self.operates(tier) {
+            self.analyse(encoding, wanted, workspace)?;
+            self.operate(tier, workspace)?;
         }
+        self.finish((tier, encoding), wanted, input, workspace)
+    }
+
+    /// First stage: from pixels to input coefficients, which stay in the workspace.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn analyse<S: Sample>(
+        &self,
+        encoding: Encoding,
+        wanted: &[[S; C]],
+        workspace: &mut Workspace<'_>,
+    ) -> Result<(), FrameError> {
+        self.check("wanted", wanted.len())?;
+        workspace.check(self.table)?;
         for channel in 0..C {
-            let light = self.light(encoding, wanted, channel);
-            for (cell, light) in workspace.values.iter_mut().zip(light) {
-                if let Some(cell) = cell.get_mut(channel) {
-                    *cell = i32::from(light.to_bits());
-                }
-            }
+            let pixels = self.pixels(encoding, wanted, channel);
+            workspace.analyse(self.table, channel, &pixels)?;
         }
-        correct(self.table, tier, workspace)?;
+        Ok(())
+    }
+
+    /// Second stage: from input coefficients to those of the corrections.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if the workspace is too short.
+    pub fn operate(&self, tier: u8, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
+        workspace.check(self.table)?;
+        workspace.operate(self.table, tier);
+        Ok(())
+    }
+
+    /// Third stage: corrections, gain, clip and code; returns how many samples were
+    /// clipped. At a tier without operator there are no corrections.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn finish<S: Sample>(
+        &self,
+        (tier, encoding): (u8, Encoding),
+        wanted: &[[S; C]],
+        input: &mut [[S; C]],
+        workspace: &mut Workspace<'_>,
+    ) -> Result<u32, FrameError> {
+        self.check("wanted", wanted.len())?;
+        self.check("input", input.len())?;
+        workspace.check(self.table)?;
+        let cells = self.table.grid().cells();
+        let operates = self.operates(tier);
+        if !operates {
+            let unused = workspace.cells.get_mut(..cells).unwrap_or_default();
+            unused.fill(0);
+        }
+        let gains = self.table.gains().as_chunks::<C>().0;
+        let fraction = u32::from(self.table.gain_fraction());
         let mut clipped = 0;
         for channel in 0..C {
-            clipped += self.finish(encoding, wanted, input, workspace, channel);
+            if operates {
+                workspace.synthesise(self.table, channel)?;
+            }
+            let corrections = workspace.cells.get(..cells).unwrap_or_default();
+            let pixels = self.pixels(encoding, wanted, channel);
+            clipped += S::finish(&pixels, fraction, gains, corrections, input);
         }
         Ok(clipped)
     }
 
-    /// Light without ambient of one channel, cell by cell.
-    fn light<S: Sample>(
-        &self,
-        encoding: Encoding,
-        wanted: &[[S; C]],
-        channel: usize,
-    ) -> impl Iterator<Item = Light> {
-        let cols = self.table.grid().cols();
-        let lines = wanted.chunks_exact(cols).take(self.table.grid().rows());
-        lines.enumerate().flat_map(move |(row, line)| {
-            let mut ambient = self.table.ambient_row(row, channel);
-            line.iter().map(move |pixel| {
-                let sample = pixel.get(channel).copied().unwrap_or_default();
-                let ambient = ambient.as_mut().and_then(Iterator::next);
-                sample
-                    .light(encoding)
-                    .saturating_sub(ambient.unwrap_or_default())
-            })
-        })
+    /// Whether frames of `tier` go through the operator.
+    #[must_use]
+    pub const fn operates(&self, tier: u8) -> bool {
+        tier > 0 && self.table.operator().is_some()
     }
 
-    /// Gain, correction, clip and code of one channel.
-    fn finish<S: Sample>(
-        self,
-        encoding: Encoding,
-        wanted: &[[S; C]],
-        input: &mut [[S; C]],
-        workspace: &Workspace<'_, C>,
-        channel: usize,
-    ) -> u32 {
-        let fraction = u32::from(self.table.gain_fraction());
-        let response = Response::new(self.table, channel);
-        let gains = (0..self.table.grid().rows()).flat_map(|row| self.table.gain_row(row, channel));
-        let light = self.light(encoding, wanted, channel);
-        let corrections = workspace.values.iter();
-        let mut clipped = 0;
-        for (((pixel, light), gain), correction) in
-            input.iter_mut().zip(light).zip(gains).zip(corrections)
-        {
-            let correction = correction.get(channel).copied().unwrap_or(0);
-            let (reached, was_clipped) = drive(light, gain, fraction, correction);
-            clipped += u32::from(was_clipped);
-            if let Some(sample) = pixel.get_mut(channel) {
-                *sample = S::code(reached, encoding, response);
-            }
+    fn check(self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
+        let needed = self.table.grid().cells();
+        if given < needed {
+            return Err(ShortSlice {
+                what,
+                needed,
+                given,
+            });
         }
-        clipped
+        Ok(())
+    }
+
+    fn pixels<'f, S: Sample>(
+        &'f self,
+        encoding: Encoding,
+        wanted: &'f [[S; C]],
+        channel: usize,
+    ) -> Pixels<'f, S, C> {
+        let grid = self.table.grid();
+        Pixels {
+            codes: wanted.get(..grid.cells()).unwrap_or_default(),
+            ambient: self.table.ambient().map(|light| light.as_chunks::<C>().0),
+            cols: grid.cols(),
+            channel,
+            curves: S::curves(self.table, encoding, channel),
+        }
     }
 }

@@ -12,23 +12,29 @@
 //! made, without a response codes are proportional to drives.
 //!
 //! All arithmetic is in integers and rounds in named places only
-//! ([`Sample`], [`analyse_rounded`](crate::haar::analyse_rounded),
+//! ([`Sample`], [`analyse`](crate::haar::analyse),
 //! [`Operator::apply`](crate::operator::Operator::apply), [`stages::drive`],
 //! [`resample`](crate::resample)), so a frame comes out the same, bit for bit, on
 //! the device and on the host.
 
+pub mod codes;
 mod full;
 mod grid;
+mod pixels;
 mod response;
 mod sample;
 pub mod srgb;
 pub mod stages;
+mod whole;
 
+pub use codes::CODES;
 pub use full::{FullPipeline, Row};
 pub use grid::GridPipeline;
-pub use response::{RESPONSE_KNOTS, Response, knot_drive, linear_code, nearest_knot};
+pub use pixels::{Halfword, Pixels};
+pub use response::{RESPONSE_KNOTS, Response, knot_drive, linear_code};
 pub use sample::{Encoding, Sample};
 pub use stages::Workspace;
+pub use whole::FullMemory;
 
 use crate::haar::ShortSlice;
 use core::fmt;

@@ -2,10 +2,9 @@
 //!
 //! A projector's light is not proportional to its code. The table holds the
 //! codes for [`RESPONSE_KNOTS`] drives, dense in the darks where the curve is
-//! steep: every drive below 1/16, every sixteenth above. With that, an 8-bit code
-//! is within one of the exact one for any response up to twice as steep as sRGB.
+//! steep: every drive below 1/16, every sixteenth above, and interpolates between.
+//! 8-bit frames use the same curve at fewer drives ([`codes`](super::codes)).
 
-use crate::image::Table;
 use crate::units::Drive;
 
 /// Drives below this have a knot each.
@@ -36,55 +35,39 @@ pub const fn knot_drive(knot: usize) -> Drive {
     }
 }
 
-/// The knot nearest to a drive between 0 and 1.
-#[inline]
-#[must_use]
-pub const fn nearest_knot(drive: Drive) -> usize {
-    let bits = drive.to_bits() as u32;
-    if bits < DENSE {
-        bits as usize
-    } else {
-        (OFFSET + ((bits + (1 << (COARSE_SHIFT - 1))) >> COARSE_SHIFT)) as usize
-    }
-}
-
 /// The response of one channel.
 #[derive(Clone, Copy, Debug)]
-pub struct Response<'t, 'a> {
-    table: &'t Table<'a>,
-    channel: usize,
+pub struct Response<'a> {
+    knots: &'a [[u8; 2]],
 }
 
-impl<'t, 'a> Response<'t, 'a> {
-    /// The response of a channel of a table; without one in the table, codes are
-    /// proportional to drives.
+impl<'a> Response<'a> {
+    /// The response with these little-endian codes, full scale 65,535, at its
+    /// [`RESPONSE_KNOTS`] knots; without any, codes are proportional to drives.
     #[must_use]
-    pub const fn new(table: &'t Table<'a>, channel: usize) -> Self {
-        Self { table, channel }
+    pub const fn new(knots: &'a [[u8; 2]]) -> Self {
+        Self { knots }
     }
 
-    /// Code, full scale 65,535, at the knot nearest to `drive`.
-    #[inline]
-    #[must_use]
-    pub fn code(&self, drive: Drive) -> u16 {
-        self.table
-            .response_code(nearest_knot(drive), self.channel)
-            .unwrap_or_else(|| linear_code(drive))
+    fn knot(&self, knot: usize) -> Option<u16> {
+        self.knots.get(knot).copied().map(u16::from_le_bytes)
     }
 
     /// Code, full scale 65,535, interpolated between the knots around `drive`.
     #[must_use]
     pub fn fine_code(&self, drive: Drive) -> u16 {
         let bits = u32::from(drive.to_bits());
-        let at = |knot: usize| self.table.response_code(knot, self.channel);
         if bits < DENSE {
-            return at(bits as usize).unwrap_or_else(|| linear_code(drive));
+            return self
+                .knot(bits as usize)
+                .unwrap_or_else(|| linear_code(drive));
         }
         let knot = (OFFSET + (bits >> COARSE_SHIFT)) as usize;
-        let Some(below) = at(knot) else {
+        let Some(below) = self.knot(knot) else {
             return linear_code(drive);
         };
-        let above = at((knot + 1).min(RESPONSE_KNOTS - 1)).unwrap_or(below);
+        let above = self.knot((knot + 1).min(RESPONSE_KNOTS - 1));
+        let above = above.unwrap_or(below);
         let rest = bits & ((1 << COARSE_SHIFT) - 1);
         let rise = u32::from(above.saturating_sub(below)) * rest;
         let half = 1 << (COARSE_SHIFT - 1);
@@ -103,17 +86,6 @@ pub const fn linear_code(drive: Drive) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_nearest_knot_is_the_nearest() {
-        for bits in 0..=Drive::ONE.to_bits() {
-            let knot = nearest_knot(Drive::from_bits(bits));
-            assert!(knot < RESPONSE_KNOTS);
-            let distance = |knot| knot_drive(knot).to_bits().abs_diff(bits);
-            assert!(distance(knot) <= distance(knot.saturating_sub(1)));
-            assert!(distance(knot) <= distance((knot + 1).min(RESPONSE_KNOTS - 1)));
-        }
-    }
 
     #[test]
     fn knots_rise_from_zero_to_one() {

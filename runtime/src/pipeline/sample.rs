@@ -1,8 +1,16 @@
 //! Frame samples: from codes to light, and from drive to codes.
 
+use super::codes::{self, CODES, INDEX_SHIFT};
+use super::pixels::{Halfword, Pixels};
 use super::response::{Response, linear_code};
 use super::srgb;
-use crate::units::{Drive, Light};
+use super::stages::drive;
+use super::whole::add_plainly;
+use crate::haar::Block;
+use crate::image::Table;
+use crate::kernel::pixels;
+use crate::units::{Drive, InputCoefficient, Light};
+use core::fmt;
 
 /// What the codes of a frame mean.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -15,38 +23,164 @@ pub enum Encoding {
 
 /// One sample of a frame: `u8`, or `u16` with full scale 65,535.
 ///
-/// Both conversions round to nearest; they are named rounding places.
-pub trait Sample: Copy + Default {
+/// Both conversions are named rounding places: to nearest.
+pub trait Sample: Copy + Default + fmt::Debug + 'static {
+    /// What the samples of one channel go through.
+    type Curves<'a>: Copy + fmt::Debug;
+
+    /// The curves of a channel of a table.
+    fn curves<'a>(table: &'a Table<'_>, encoding: Encoding, channel: usize) -> Self::Curves<'a>;
+
     /// Light of a code.
-    fn light(self, encoding: Encoding) -> Light;
-    /// Code of a drive between 0 and 1.
-    fn code(drive: Drive, encoding: Encoding, response: Response<'_, '_>) -> Self;
+    fn light(self, curves: Self::Curves<'_>) -> Light;
+
+    /// Code of a drive in units of [`Drive`] that may lie outside 0 to 1; says
+    /// whether it did.
+    fn code(wanted: i32, curves: Self::Curves<'_>) -> (Self, bool);
+
+    /// [`Source::merge`](crate::haar::Source::merge) of pixels.
+    #[inline]
+    fn merge<const C: usize>(
+        pixels: &Pixels<'_, Self, C>,
+        (block, shift): (Block, u32),
+        sums: &mut [i32],
+        details: &mut [[InputCoefficient; 3]],
+    ) -> bool {
+        let _ = (pixels, block, shift, sums, details);
+        false
+    }
+
+    /// Adds the light of a row of pixels, times a weight, to columns.
+    fn add_light<const C: usize>(pixels: &Pixels<'_, Self, C>, weight: u32, columns: &mut [u32]) {
+        add_plainly(pixels, weight, columns);
+    }
+
+    /// Gain, correction, clip and code of one channel of as many pixels as there are
+    /// corrections; returns how many were clipped.
+    fn finish<const C: usize>(
+        wanted: &Pixels<'_, Self, C>,
+        gain_fraction: u32,
+        gains: &[[Halfword; C]],
+        corrections: &[i32],
+        input: &mut [[Self; C]],
+    ) -> u32 {
+        finish_plainly(wanted, gain_fraction, gains, corrections, input)
+    }
+}
+
+/// [`Sample::finish`] sample by sample.
+fn finish_plainly<S: Sample, const C: usize>(
+    wanted: &Pixels<'_, S, C>,
+    gain_fraction: u32,
+    gains: &[[Halfword; C]],
+    corrections: &[i32],
+    input: &mut [[S; C]],
+) -> u32 {
+    let mut clipped = 0;
+    let pixels = input.iter_mut().zip(gains).zip(corrections);
+    for (index, ((pixel, gain), correction)) in pixels.enumerate() {
+        let gain = gain.get(wanted.channel).copied().unwrap_or_default();
+        let light = wanted.light(index);
+        let wanted_drive = drive(light, u16::from_le_bytes(gain), gain_fraction, *correction);
+        let (code, was_clipped) = S::code(wanted_drive, wanted.curves);
+        if let Some(sample) = pixel.get_mut(wanted.channel) {
+            *sample = code;
+        }
+        clipped += u32::from(was_clipped);
+    }
+    clipped
+}
+
+/// Curves of 8-bit samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Curves<'a> {
+    light: &'a [u16; 256],
+    codes: &'a [u8; CODES],
 }
 
 impl Sample for u8 {
-    #[inline]
-    fn light(self, encoding: Encoding) -> Light {
+    type Curves<'a> = Curves<'a>;
+
+    fn curves<'a>(table: &'a Table<'_>, encoding: Encoding, channel: usize) -> Curves<'a> {
         match encoding {
-            Encoding::Display => srgb::decode(self),
-            Encoding::Linear => Light::from_bits(((u32::from(self) * 32_768 + 127) / 255) as u16),
+            Encoding::Display => Curves {
+                light: &srgb::DECODED,
+                codes: table.codes(channel).unwrap_or(&codes::LINEAR),
+            },
+            Encoding::Linear => Curves {
+                light: &LINEAR_LIGHT,
+                codes: &codes::LINEAR,
+            },
         }
     }
 
     #[inline]
-    fn code(drive: Drive, encoding: Encoding, response: Response<'_, '_>) -> Self {
-        let code = match encoding {
-            Encoding::Display => response.code(drive),
-            Encoding::Linear => linear_code(drive),
-        };
-        // 65,535 / 255 = 257 codes a step.
-        ((u32::from(code) + 128) / 257) as Self
+    fn light(self, curves: Curves<'_>) -> Light {
+        // A `u8` indexes 256 elements: the compiler sees that it cannot fail.
+        #[allow(clippy::indexing_slicing)]
+        Light::from_bits(curves.light[usize::from(self)])
+    }
+
+    #[inline]
+    fn code(wanted: i32, curves: Curves<'_>) -> (Self, bool) {
+        // Negative drives become the largest indices.
+        let index = (wanted.cast_unsigned() >> INDEX_SHIFT) as usize;
+        if let Some(code) = curves.codes.get(index) {
+            return (*code, false);
+        }
+        let (drive, clipped) = clip(wanted);
+        (codes::at(curves.codes, drive), clipped)
+    }
+
+    #[inline]
+    fn merge<const C: usize>(
+        pixels: &Pixels<'_, Self, C>,
+        block: (Block, u32),
+        sums: &mut [i32],
+        details: &mut [[InputCoefficient; 3]],
+    ) -> bool {
+        pixels::merge(pixels, pixels.curves.light, block, sums, details)
+    }
+
+    fn add_light<const C: usize>(pixels: &Pixels<'_, Self, C>, weight: u32, columns: &mut [u32]) {
+        if !pixels::add_light(pixels, pixels.curves.light, weight, columns) {
+            add_plainly(pixels, weight, columns);
+        }
+    }
+
+    fn finish<const C: usize>(
+        wanted: &Pixels<'_, Self, C>,
+        gain_fraction: u32,
+        gains: &[[Halfword; C]],
+        corrections: &[i32],
+        input: &mut [[Self; C]],
+    ) -> u32 {
+        let curves = (wanted.curves.light, wanted.curves.codes);
+        let done = pixels::finish(wanted, curves, gain_fraction, gains, corrections, input);
+        done.unwrap_or_else(|| finish_plainly(wanted, gain_fraction, gains, corrections, input))
     }
 }
 
+/// Curves of 16-bit samples.
+#[derive(Clone, Copy, Debug)]
+pub struct WideCurves<'a> {
+    encoding: Encoding,
+    response: Response<'a>,
+}
+
 impl Sample for u16 {
+    type Curves<'a> = WideCurves<'a>;
+
+    fn curves<'a>(table: &'a Table<'_>, encoding: Encoding, channel: usize) -> WideCurves<'a> {
+        WideCurves {
+            encoding,
+            response: table.response(channel),
+        }
+    }
+
     #[inline]
-    fn light(self, encoding: Encoding) -> Light {
-        match encoding {
+    fn light(self, curves: WideCurves<'_>) -> Light {
+        match curves.encoding {
             Encoding::Linear => {
                 Light::from_bits(((u32::from(self) * 32_768 + 32_767) / 65_535) as Self)
             }
@@ -60,13 +194,37 @@ impl Sample for u16 {
     }
 
     #[inline]
-    fn code(drive: Drive, encoding: Encoding, response: Response<'_, '_>) -> Self {
-        match encoding {
-            Encoding::Display => response.fine_code(drive),
+    fn code(wanted: i32, curves: WideCurves<'_>) -> (Self, bool) {
+        let (drive, clipped) = clip(wanted);
+        let code = match curves.encoding {
+            Encoding::Display => curves.response.fine_code(drive),
             Encoding::Linear => linear_code(drive),
-        }
+        };
+        (code, clipped)
     }
 }
+
+/// A drive between 0 and 1; says whether it was outside.
+#[inline]
+#[must_use]
+pub(super) fn clip(wanted: i32) -> (Drive, bool) {
+    let reached = wanted.clamp(0, i32::from(Drive::ONE.to_bits()));
+    (Drive::from_bits(reached as u16), wanted != reached)
+}
+
+/// Light of every 8-bit code that is in proportion to it, to nearest.
+static LINEAR_LIGHT: [u16; 256] = {
+    let mut light = [0; 256];
+    let mut code = 0;
+    while code < 256 {
+        #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
+        {
+            light[code] = ((code as u32 * 32_768 + 127) / 255) as u16;
+        }
+        code += 1;
+    }
+    light
+};
 
 #[cfg(test)]
 mod tests {
@@ -74,25 +232,27 @@ mod tests {
 
     #[test]
     fn linear_codes_round_to_the_nearest_light() {
-        for code in 0..=u8::MAX {
-            let exact = f64::from(code) / 255.0;
-            assert!((code.light(Encoding::Linear).to_num::<f64>() - exact).abs() <= 0.5 / 32_768.0);
-        }
-        for code in 0..=u16::MAX {
-            let exact = f64::from(code) / 65_535.0;
-            assert!((code.light(Encoding::Linear).to_num::<f64>() - exact).abs() <= 0.5 / 32_768.0);
+        for (code, light) in LINEAR_LIGHT.iter().enumerate() {
+            let exact = code as f64 / 255.0;
+            assert!((f64::from(*light) / 32_768.0 - exact).abs() <= 0.5 / 32_768.0);
         }
     }
 
     #[test]
-    fn wide_codes_decode_like_the_narrow_ones_they_extend() {
-        for code in 0..=u8::MAX {
-            for encoding in [Encoding::Display, Encoding::Linear] {
-                assert_eq!(
-                    (u16::from(code) * 257).light(encoding),
-                    code.light(encoding)
-                );
-            }
+    fn what_is_clipped_is_what_lies_outside() {
+        let curves = Curves {
+            light: &LINEAR_LIGHT,
+            codes: &codes::LINEAR,
+        };
+        for (wanted, expected) in [
+            (i32::MIN, (0, true)),
+            (-1, (0, true)),
+            (0, (0, false)),
+            (32_768, (255, false)),
+            (32_769, (255, true)),
+            (i32::MAX, (255, true)),
+        ] {
+            assert_eq!(u8::code(wanted, curves), expected, "{wanted}");
         }
     }
 }

@@ -9,39 +9,39 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use crate::haar::{ShortSlice, analyse_rounded, synthesise};
+use super::sample::clip;
+use crate::haar::{Cells, ShortSlice, Source, analyse, synthesise};
 use crate::image::Table;
 use crate::units::{CORRECTION_GUARD_BITS, Drive, InputCoefficient, Light};
 
 /// Takes the ambient light away; light below it becomes none, since no projector
 /// input can reach it.
 #[inline(always)]
-pub fn subtract_ambient(light: &mut [Light], ambient: &[Light]) {
-    for (light, ambient) in light.iter_mut().zip(ambient) {
-        *light = light.saturating_sub(*ambient);
-    }
+#[must_use]
+pub fn subtract_ambient(light: Light, ambient: Light) -> Light {
+    light.saturating_sub(ambient)
 }
 
-/// `gain * light - correction`, between 0 and 1; says whether it was clipped.
+/// Half of the last place that a drive keeps of a correction. It is added to the
+/// constant function's coefficient, hence to every correction, and so costs
+/// nothing a pixel.
+const CORRECTION_HALF: i32 = 1 << (CORRECTION_GUARD_BITS - 1);
+
+/// `gain * light - correction` in units of [`Drive`], not yet between 0 and 1.
 ///
-/// A named rounding place: the product and the correction are each rounded to
-/// the nearest 2^-15.
+/// A named rounding place: the product is rounded to the nearest 2^-15, and so is
+/// the correction, which [`correct`] has left half a step too large.
 #[inline(always)]
 #[must_use]
-pub fn drive(light: Light, gain: u16, gain_fraction: u32, correction: i32) -> (Drive, bool) {
-    const CORRECTION_HALF: i32 = 1 << (CORRECTION_GUARD_BITS - 1);
-    const ONE: i32 = Drive::ONE.to_bits() as i32;
+pub fn drive(light: Light, gain: u16, gain_fraction: u32, correction: i32) -> i32 {
     // At most 2^31 - 1: light is at most 2^15.
-    let product = u32::from(gain) * u32::from(light.to_bits());
-    let half = (1_u32 << gain_fraction) >> 1;
-    let direct = (product.wrapping_add(half) >> gain_fraction) as i32;
-    let taken = correction.wrapping_add(CORRECTION_HALF) >> CORRECTION_GUARD_BITS;
-    let wanted = direct.wrapping_sub(taken);
-    let reached = wanted.clamp(0, ONE);
-    (Drive::from_bits(reached as u16), wanted != reached)
+    let product = u32::from(gain).wrapping_mul(u32::from(light.to_bits()));
+    let half = 1_u32.wrapping_shl(gain_fraction) >> 1;
+    let direct = product.wrapping_add(half).wrapping_shr(gain_fraction) as i32;
+    direct.wrapping_sub(correction >> CORRECTION_GUARD_BITS)
 }
 
-/// A row of [`drive`]s; returns how many were clipped.
+/// A row of [`drive`]s between 0 and 1; returns how many were clipped.
 #[inline(always)]
 pub fn drive_row(
     light: &[Light],
@@ -53,69 +53,127 @@ pub fn drive_row(
     let inputs = light.iter().zip(gain).zip(corrections);
     let mut clipped = 0;
     for (slot, ((light, gain), correction)) in drives.iter_mut().zip(inputs) {
-        let (reached, was_clipped) = drive(*light, *gain, gain_fraction, *correction);
+        let (reached, was_clipped) = clip(drive(*light, *gain, gain_fraction, *correction));
         *slot = reached;
         clipped += u32::from(was_clipped);
     }
     clipped
 }
 
-/// Memory for the operator on one grid: `N` cells and `C` channels.
+/// Memory for the operator on a grid of `N` cells. Channels lie one after the
+/// other.
 #[derive(Debug)]
-pub struct Workspace<'w, const C: usize> {
-    /// `N` elements.
+pub struct Workspace<'w> {
+    /// Values of the levels of a transform,
+    /// [`Basis::scratch_len`](crate::haar::Basis::scratch_len) elements each.
+    pub buffers: [&'w mut [i32]; 2],
+    /// Cells of one channel, `N` elements.
     pub cells: &'w mut [i32],
-    /// [`Basis::scratch_len`](crate::haar::Basis::scratch_len) elements, at most
-    /// `N`.
-    pub scratch: &'w mut [i32],
-    /// `N` elements.
-    pub inputs: &'w mut [[InputCoefficient; C]],
-    /// `N` elements: light on the way in, corrections on the way out.
-    pub values: &'w mut [[i32; C]],
+    /// Input coefficients, `N` for each channel.
+    pub inputs: &'w mut [InputCoefficient],
+    /// Coefficients of the corrections, `N` for each channel.
+    pub sums: &'w mut [i32],
 }
 
-/// Replaces the light of every cell in `workspace.values` (bits of [`Light`]) by
-/// its correction `K d'` (bits of [`Correction`](crate::units::Correction)).
+impl Workspace<'_> {
+    /// Whether every part is long enough for `table`.
+    pub(super) fn check(&self, table: &Table<'_>) -> Result<(), ShortSlice> {
+        let (basis, channels) = (table.basis(), usize::from(table.channels()));
+        let values = channels * basis.grid().cells();
+        let [first, second] = &self.buffers;
+        for (what, needed, given) in [
+            ("first buffer", basis.scratch_len(), first.len()),
+            ("second buffer", basis.scratch_len(), second.len()),
+            ("cells", basis.grid().cells(), self.cells.len()),
+            ("inputs", values, self.inputs.len()),
+            ("sums", values, self.sums.len()),
+        ] {
+            if given < needed {
+                return Err(ShortSlice {
+                    what,
+                    needed,
+                    given,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes the input coefficients of one channel.
+    pub(super) fn analyse(
+        &mut self,
+        table: &Table<'_>,
+        channel: usize,
+        cells: &impl Source,
+    ) -> Result<(), ShortSlice> {
+        let start = channel * table.grid().cells();
+        let inputs = self.inputs.get_mut(start..).unwrap_or_default();
+        let [first, second] = &mut self.buffers;
+        analyse(table.basis(), cells, [first, second], inputs)
+    }
+
+    /// Computes the corrections' coefficients of all channels at `tier`.
+    pub(super) fn operate(&mut self, table: &Table<'_>, tier: u8) {
+        let Some(operator) = table.operator() else {
+            return;
+        };
+        operator.apply(tier, table.channels(), self.inputs, self.sums);
+        let cells = table.grid().cells();
+        for constant in self.sums.iter_mut().skip(cells - 1).step_by(cells) {
+            *constant = constant.wrapping_add(CORRECTION_HALF);
+        }
+    }
+
+    /// Computes the corrections of one channel, which stay in `cells`.
+    pub(super) fn synthesise(
+        &mut self,
+        table: &Table<'_>,
+        channel: usize,
+    ) -> Result<(), ShortSlice> {
+        let start = channel * table.grid().cells();
+        let sums = self.sums.get(start..).unwrap_or_default();
+        let [first, second] = &mut self.buffers;
+        synthesise(table.basis(), sums, [first, second], self.cells)
+    }
+}
+
+/// Replaces the light of every cell (bits of [`Light`], `N` for each channel) by
+/// its correction `K d'` (bits of [`Correction`](crate::units::Correction), half a
+/// step of a drive too large).
 ///
 /// # Errors
-/// [`ShortSlice`] if a part of the workspace is too short.
-pub fn correct<const C: usize>(
+/// [`ShortSlice`] if a slice is too short.
+pub fn correct(
     table: &Table<'_>,
     tier: u8,
-    workspace: &mut Workspace<'_, C>,
+    cells: &mut [i32],
+    workspace: &mut Workspace<'_>,
 ) -> Result<(), ShortSlice> {
-    let Some(operator) = table.operator().filter(|_| tier > 0) else {
-        workspace.values.fill([0; C]);
+    let (channels, count) = (usize::from(table.channels()), table.grid().cells());
+    let given = cells.len();
+    let cells = cells.get_mut(..channels * count).ok_or(ShortSlice {
+        what: "cells",
+        needed: channels * count,
+        given,
+    })?;
+    if tier == 0 || table.operator().is_none() {
+        cells.fill(0);
         return Ok(());
-    };
-    let basis = table.basis();
-    for channel in 0..C {
-        let light = workspace.values.iter().map(|cell| cell.get(channel));
-        for (cell, light) in workspace.cells.iter_mut().zip(light) {
-            *cell = light.copied().unwrap_or(0);
-        }
-        analyse_rounded(
-            basis,
-            workspace.cells,
-            workspace.scratch,
-            workspace.inputs,
-            channel,
-        )?;
     }
-    operator.apply(tier, workspace.inputs, workspace.values);
-    for channel in 0..C {
-        synthesise(
-            basis,
-            workspace.values,
-            channel,
-            workspace.cells,
-            workspace.scratch,
-        )?;
-        let slots = workspace.values.iter_mut();
-        for (slot, cell) in slots.zip(workspace.cells.iter()) {
-            if let Some(slot) = slot.get_mut(channel) {
-                *slot = *cell;
-            }
+    workspace.check(table)?;
+    let cols = table.grid().cols();
+    for (channel, light) in cells.chunks_exact(count).enumerate() {
+        let values = Cells {
+            values: light,
+            cols,
+        };
+        workspace.analyse(table, channel, &values)?;
+    }
+    workspace.operate(table, tier);
+    for (channel, corrections) in cells.chunks_exact_mut(count).enumerate() {
+        workspace.synthesise(table, channel)?;
+        for (slot, correction) in corrections.iter_mut().zip(workspace.cells.iter()) {
+            *slot = *correction;
         }
     }
     Ok(())

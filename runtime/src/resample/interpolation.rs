@@ -12,6 +12,8 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
+use crate::kernel::lines::{self, Between};
+
 /// One axis of an interpolation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Axis {
@@ -95,11 +97,32 @@ impl Axis {
         let mut past = start * 2 * cells - before;
         let (whole, part) = (length / cells, 2 * (length % cells));
         let mut rest = fill_front(pixels, start as usize, |run| run.fill(first));
+        let last = values.last().copied().unwrap_or(0);
+        if let (Ok(step), Ok(half_cell)) = (self.step.try_into(), self.half_cell.try_into()) {
+            let between = Between {
+                step,
+                half_cell,
+                past,
+                part,
+                whole,
+                cell: 2 * cells,
+            };
+            if lines::expand(&between, values, rest) {
+                // The pixel at or after the last centre: half a cell before the end.
+                let after = (2 * length * (cells - 1) + before).div_ceil(2 * cells) - start;
+                rest.get_mut(after as usize..)
+                    .unwrap_or_default()
+                    .fill(last);
+                return;
+            }
+        }
         let pairs = values.iter().zip(values.iter().skip(1));
         for (value, next) in pairs {
-            let difference = i64::from(*next) - i64::from(*value);
+            let difference = i64::from(next.wrapping_sub(*value));
             let step = (difference * self.step as i64 + (1 << 31)) >> 32;
-            let offset = (step * i64::from(past) * self.half_cell as i64) >> 32;
+            // `past` is below `2 cells`, so this is below 2^32.
+            let past_pixels = u64::from(past) * self.half_cell;
+            let offset = (step * past_pixels as i64) >> 32;
             let begin = value.wrapping_add(offset as i32);
             // The next centre is `whole` pixels and `part` units further on.
             let mut run = whole;
@@ -111,7 +134,6 @@ impl Axis {
             let fill = |run: &mut [i32]| progression(begin, step as i32, run);
             rest = fill_front(rest, run as usize, fill);
         }
-        let last = values.last().copied().unwrap_or(0);
         rest.fill(last);
     }
 }

@@ -2,8 +2,7 @@
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;
-use super::Work;
-use super::memory::OperatorMemory;
+use super::{OperatorMemory, Work};
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{FrameError, GridPipeline};
 
@@ -14,7 +13,6 @@ pub(super) struct Cells<'t, 'a, S, const C: usize> {
     codes: Vec<S>,
     wanted: Vec<[S; C]>,
     input: Vec<[S; C]>,
-    values: Vec<[i32; C]>,
 }
 
 impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
@@ -25,7 +23,6 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
             codes: vec![S::default(); cells * work.colours],
             wanted: vec![[S::default(); C]; cells],
             input: vec![[S::default(); C]; cells],
-            values: vec![[0; C]; cells],
         })
     }
 
@@ -33,7 +30,7 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
     pub(super) fn compensate<P: Bands<Code = S>>(
         &mut self,
         work: &Work,
-        operator: &mut OperatorMemory<C>,
+        operator: &mut OperatorMemory,
         frame: &mut P,
     ) -> Result<u64, FrameError> {
         let (width, colours) = (work.size.width(), work.colours);
@@ -60,7 +57,7 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
                 work.encoding,
                 &self.wanted,
                 &mut self.input,
-                &mut operator.workspace(&mut self.values),
+                &mut operator.workspace(),
             )?);
             for (cell, input) in self.input.iter().enumerate() {
                 for (channel, code) in input.iter().enumerate() {

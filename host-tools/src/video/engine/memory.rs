@@ -2,48 +2,19 @@
 
 use super::super::bands::STRIP;
 use super::Work;
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Row, Workspace};
-use iltm_runtime::units::{Drive, InputCoefficient};
+use iltm_runtime::pipeline::Row;
+use iltm_runtime::units::Drive;
 use std::sync::{Mutex, PoisonError};
 
-/// What the operator needs beside its values.
-pub(super) struct OperatorMemory<const C: usize> {
-    cells: Vec<i32>,
-    scratch: Vec<i32>,
-    inputs: Vec<[InputCoefficient; C]>,
-}
-
-impl<const C: usize> OperatorMemory<C> {
-    pub(super) fn new(table: &Table<'_>) -> Self {
-        let cells = table.grid().cells();
-        Self {
-            cells: vec![0; cells],
-            scratch: vec![0; table.basis().scratch_len()],
-            inputs: vec![[0; C]; cells],
-        }
-    }
-
-    /// The runtime's workspace, with `values` to work on.
-    pub(super) fn workspace<'w>(&'w mut self, values: &'w mut [[i32; C]]) -> Workspace<'w, C> {
-        Workspace {
-            cells: &mut self.cells,
-            scratch: &mut self.scratch,
-            inputs: &mut self.inputs,
-            values,
-        }
-    }
-}
-
 /// What one thread needs beside the frame.
-pub(super) struct BandMemory<S, M, const C: usize> {
+pub(super) struct BandMemory<S, M> {
     /// Of the frame's layout.
     pub(super) conversion: M,
     /// The rows of a strip, in a row colour by colour.
     pub(super) codes: Vec<S>,
     pub(super) row: RowMemory,
-    /// Sums of the light of each cell, for each group of `C` colours.
-    pub(super) sums: Vec<Vec<[u64; C]>>,
+    /// Sums of the light of each cell, colour by colour.
+    pub(super) sums: Vec<u64>,
 }
 
 /// What one row needs.
@@ -73,14 +44,14 @@ impl RowMemory {
 }
 
 /// As many memories as threads have worked at the same time.
-pub(super) struct Memories<S, M, const C: usize> {
-    free: Mutex<Vec<BandMemory<S, M, C>>>,
+pub(super) struct Memories<S, M> {
+    free: Mutex<Vec<BandMemory<S, M>>>,
     line: usize,
     work: Work,
     cells: usize,
 }
 
-impl<S: Copy + Default, M: Default, const C: usize> Memories<S, M, C> {
+impl<S: Copy + Default, M: Default> Memories<S, M> {
     /// For rows whose [`Row::line`] needs `line` elements.
     pub(super) fn new(line: usize, cells: usize, work: Work) -> Self {
         Self {
@@ -92,7 +63,7 @@ impl<S: Copy + Default, M: Default, const C: usize> Memories<S, M, C> {
     }
 
     /// Lends one to `job`.
-    pub(super) fn lend<T>(&self, job: impl FnOnce(&mut BandMemory<S, M, C>) -> T) -> T {
+    pub(super) fn lend<T>(&self, job: impl FnOnce(&mut BandMemory<S, M>) -> T) -> T {
         // A thread that panicked took its memory with it: the list is whole.
         let taken = self
             .free
@@ -106,25 +77,23 @@ impl<S: Copy + Default, M: Default, const C: usize> Memories<S, M, C> {
         result
     }
 
-    fn create(&self) -> BandMemory<S, M, C> {
+    fn create(&self) -> BandMemory<S, M> {
         let (width, colours) = (self.work.size.width(), self.work.colours);
         BandMemory {
             conversion: M::default(),
             codes: vec![S::default(); STRIP * width * colours],
             row: RowMemory::new(self.line, width),
-            sums: vec![vec![[0; C]; self.cells]; colours / C],
+            sums: vec![0; self.cells * colours],
         }
     }
 
-    /// Moves the sums of all threads for one group into `total`.
-    pub(super) fn take_sums(&self, group: usize, total: &mut [[u64; C]]) {
-        total.fill([0; C]);
+    /// Moves the sums of all threads into `total`.
+    pub(super) fn take_sums(&self, total: &mut [u64]) {
+        total.fill(0);
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
         for memory in free.iter_mut() {
-            for (total, sum) in total.iter_mut().zip(&mut memory.sums[group]) {
-                for (total, sum) in total.iter_mut().zip(sum) {
-                    *total += std::mem::take(sum);
-                }
+            for (total, sum) in total.iter_mut().zip(&mut memory.sums) {
+                *total += std::mem::take(sum);
             }
         }
     }

@@ -14,20 +14,19 @@ mod cells;
 mod memory;
 mod rows;
 
-use super::VideoError;
 use super::bands::Bands;
+use super::{OperatorMemory, VideoError};
 use cells::Cells;
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{Encoding, FrameError};
-use memory::OperatorMemory;
 use rayon::ThreadPool;
 use rows::FullFrames;
 
 /// Compensates frames of type `P` with a table of `C` channels.
 pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
     work: Work,
-    operator: OperatorMemory<C>,
+    operator: OperatorMemory,
     path: Path<'t, 'a, P, C>,
 }
 

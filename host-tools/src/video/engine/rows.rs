@@ -7,8 +7,8 @@
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
-use super::Work;
-use super::memory::{BandMemory, Memories, OperatorMemory, RowMemory};
+use super::memory::{BandMemory, Memories, RowMemory};
+use super::{OperatorMemory, Work};
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{FrameError, FullPipeline};
 use iltm_runtime::units::Light;
@@ -25,12 +25,13 @@ pub(super) struct FullFrames<'t, 'a, P: Bands, const C: usize> {
     stages: Stages<'t, 'a, P::Code, C>,
     threads: &'t ThreadPool,
     arch: Arch,
-    memories: Memories<P::Code, P::Memory, C>,
+    memories: Memories<P::Code, P::Memory>,
     /// Light without ambient: row by row, in a row colour by colour.
     light: Vec<Light>,
-    sums: Vec<[u64; C]>,
-    /// Of the cells, for each group of `C` colours.
-    corrections: Vec<Vec<[i32; C]>>,
+    /// Of the cells, colour by colour.
+    sums: Vec<u64>,
+    /// Of the cells, colour by colour.
+    corrections: Vec<i32>,
 }
 
 /// What is done to every row.
@@ -62,8 +63,8 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
             arch: Arch::new(),
             memories: Memories::new(pipeline.line_len(), cells, *work),
             light: vec![Light::ZERO; pixels * work.colours],
-            sums: vec![[0; C]; cells],
-            corrections: vec![vec![[0; C]; cells]; work.colours / C],
+            sums: vec![0; cells * work.colours],
+            corrections: vec![0; cells * work.colours],
         })
     }
 
@@ -71,16 +72,17 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     pub(super) fn compensate(
         &mut self,
         work: &Work,
-        operator: &mut OperatorMemory<C>,
+        operator: &mut OperatorMemory,
         frame: &mut P,
     ) -> Result<u64, FrameError> {
         self.read(frame);
-        for (group, values) in self.corrections.iter_mut().enumerate() {
-            self.memories.take_sums(group, &mut self.sums);
-            let mut workspace = operator.workspace(values);
-            self.stages
-                .pipeline
-                .correct(work.tier, &self.sums, &mut workspace)?;
+        self.memories.take_sums(&mut self.sums);
+        let group = C * self.stages.cells();
+        let groups = self.sums.chunks_exact(group);
+        for (sums, corrections) in groups.zip(self.corrections.chunks_exact_mut(group)) {
+            let mut workspace = operator.workspace();
+            let pipeline = &self.stages.pipeline;
+            pipeline.correct(work.tier, sums, corrections, &mut workspace)?;
         }
         Ok(self.write(frame))
     }
@@ -143,6 +145,11 @@ impl<S: Code, const C: usize> Stages<'_, '_, S, C> {
     fn row_len(&self) -> usize {
         self.pipeline.frame().width() * self.colours
     }
+
+    /// Cells of the grid.
+    fn cells(&self) -> usize {
+        self.pipeline.table().grid().cells()
+    }
 }
 
 /// From the samples of a band to its light, which is added to the sums.
@@ -155,7 +162,7 @@ struct ReadBand<'w, 't, 'a, B: Band, const C: usize> {
     first_row: usize,
     band: &'w B,
     light: &'w mut [Light],
-    memory: &'w mut BandMemory<B::Code, B::Memory, C>,
+    memory: &'w mut BandMemory<B::Code, B::Memory>,
 }
 
 impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
@@ -165,6 +172,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
     fn call(self) {
         let (stages, memory) = (self.stages, self.memory);
         let (width, colours) = (stages.pipeline.frame().width(), stages.colours);
+        let cells = stages.cells();
         let strips = self.light.chunks_mut(STRIP * stages.row_len());
         for (strip, light) in strips.enumerate() {
             let codes = &mut memory.codes[..light.len()];
@@ -172,12 +180,12 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
             let lines = codes.chunks_exact(width).zip(light.chunks_exact_mut(width));
             for (line, (codes, light)) in lines.enumerate() {
                 let y = self.first_row + STRIP * strip + line / colours;
-                let (group, channel) = (line % colours / C, line % colours % C);
+                let (colour, channel) = (line % colours, line % colours % C);
                 let (mut row, _) = memory.row.split();
                 stages.curves.decode(codes, light);
                 stages.pipeline.remove_ambient(y, channel, light, &mut row);
-                let sums = &mut memory.sums[group];
-                stages.pipeline.average_row(y, channel, light, sums);
+                let sums = &mut memory.sums[colour * cells..][..cells];
+                stages.pipeline.average_row(y, light, sums);
             }
         }
     }
@@ -189,9 +197,9 @@ struct WriteBand<'w, 't, 'a, B: Band, const C: usize> {
     stages: &'w Stages<'t, 'a, B::Code, C>,
     first_row: usize,
     light: &'w [Light],
-    corrections: &'w [Vec<[i32; C]>],
+    corrections: &'w [i32],
     band: &'w mut B,
-    memory: &'w mut BandMemory<B::Code, B::Memory, C>,
+    memory: &'w mut BandMemory<B::Code, B::Memory>,
 }
 
 impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
@@ -201,6 +209,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
     fn call(self) -> u64 {
         let (stages, memory) = (self.stages, self.memory);
         let (width, colours) = (stages.pipeline.frame().width(), stages.colours);
+        let cells = stages.cells();
         let strips = self.light.chunks(STRIP * stages.row_len());
         let mut clipped = 0;
         for (strip, light) in strips.enumerate() {
@@ -208,14 +217,13 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
             let lines = codes.chunks_exact_mut(width).zip(light.chunks_exact(width));
             for (line, (codes, light)) in lines.enumerate() {
                 let y = self.first_row + STRIP * strip + line / colours;
-                let (group, channel) = (line % colours / C, line % colours % C);
+                let (colour, channel) = (line % colours, line % colours % C);
                 let gain = &stages.gains[(y * C + channel) * width..][..width];
                 let (mut row, drives) = memory.row.split();
                 clipped += u64::from(stages.pipeline.finish_row(
                     y,
-                    channel,
                     (light, gain),
-                    &self.corrections[group],
+                    &self.corrections[colour * cells..][..cells],
                     &mut row,
                     drives,
                 ));

@@ -6,7 +6,8 @@ mod reference;
 mod sample_table;
 mod streams;
 
-use crate::compile::image::ImageWriter;
+use crate::compile::image::{ImageWriter, StoredRow, segment_bytes};
+use crate::compile::response::codes as response_codes;
 use crate::video::{Picture, Samples, VideoError};
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::Encoding;

@@ -3,7 +3,6 @@
 
 use super::*;
 use iltm_runtime::haar::Basis;
-use iltm_runtime::pipeline::Sample;
 
 /// Fraction bits of light and drive.
 const UNIT: f64 = 32_768.0;
@@ -153,7 +152,7 @@ fn worst(table: &SampleTable, tier: u8, frame: FrameSize, picture: &Picture) -> 
         };
         let light: Vec<f64> = own(wanted)
             .into_iter()
-            .map(|code| code.light(Encoding::Linear).to_num())
+            .map(|code| (f64::from(code) / 65_535.0 * UNIT).round() / UNIT)
             .collect();
         let drives = reference(table, channel, frame, &light);
         for (drive, code) in drives.into_iter().zip(own(result)) {
@@ -198,7 +197,9 @@ fn frames_of_any_size_are_the_formula_within_three_steps() {
             let white = Picture::new(frame, Samples::Sixteen(white)).unwrap();
             for picture in [random, white] {
                 let without = worst(&table, 0, frame, &picture);
-                assert!(without >= 50.0, "the operator does little: {without}");
+                // A single cell lights no other and has no operator.
+                let does = without >= 50.0 || grid.cells() == 1;
+                assert!(does, "the operator does little: {without}");
                 let worst = worst(&table, 2, frame, &picture);
                 println!("{grid} to {frame}, {channels} channels: {worst:.2} steps of 2^-15");
                 assert!(

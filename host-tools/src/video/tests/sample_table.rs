@@ -3,11 +3,11 @@
 //!
 //! The bench includes this file too, so it takes the writer from its parent.
 
-use super::ImageWriter;
+use super::{ImageWriter, StoredRow, response_codes, segment_bytes};
 use fixed::types::U1F15;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
-use iltm_runtime::image::layout::{SectionKind, meta, segment, tier};
+use iltm_runtime::image::layout::{SectionKind, meta, tier};
 use iltm_runtime::operator::{Channels, Operator, Segment};
 use iltm_runtime::pipeline::{RESPONSE_KNOTS, knot_drive};
 use std::ops::Range;
@@ -82,7 +82,9 @@ impl SampleTable {
         let basis = Basis::new(grid);
         table.row_shifts = vec![6; grid.cells()];
         table.tiers = vec![Vec::new(); 2];
-        for (row, function) in basis.functions().enumerate() {
+        // A single cell lights no other.
+        let rows = if grid.cells() > 1 { grid.cells() } else { 0 };
+        for (row, function) in basis.functions().enumerate().take(rows) {
             let most = (12_000 / function.peak() / entries as u64).max(1) as i16;
             let mut cols: Vec<u16> = (0..entries)
                 .map(|_| random.u16(..grid.cells() as u16))
@@ -99,20 +101,17 @@ impl SampleTable {
 
     /// The bytes of the image.
     pub(crate) fn image(&self) -> Vec<u8> {
-        let segments: Vec<Vec<u8>> = self.tiers.iter().map(|tier| words(tier)).collect();
+        let segments: Vec<Vec<u8>> = (1..=self.tiers.len())
+            .map(|tier| self.words(tier))
+            .collect();
         let basis = Basis::new(self.grid);
         let operator = (!self.row_shifts.is_empty()).then(|| {
             let segments = (1..).zip(&segments).map(|(tier, bytes)| {
                 let index = usize::from(tier) - 1;
                 Segment::new(index, tier, Channels::All, bytes).expect("whole words")
             });
-            Operator::new(
-                &basis,
-                segments.collect(),
-                &self.row_shifts,
-                self.channel_scales,
-            )
-            .expect("a sample operator does not overflow")
+            Operator::new(&basis, segments.collect(), self.channel_scales)
+                .expect("a sample operator does not overflow")
         });
         let mut writer = ImageWriter::default();
         writer.section(SectionKind::Meta, 0, self.meta(operator.as_ref()));
@@ -132,18 +131,30 @@ impl SampleTable {
         }
         if let Some(response) = &self.response {
             writer.section(SectionKind::Response, 0, halfwords(response));
+            writer.section(SectionKind::Codes, 0, response_codes(response));
         }
         if let Some((rows, cols, gains)) = &self.fine_gains {
             let bytes = [halfwords(&[*rows, *cols]), halfwords(gains)].concat();
             writer.section(SectionKind::FineGain, 0, bytes);
         }
         if operator.is_some() {
-            writer.section(SectionKind::RowShifts, 0, self.row_shifts.clone());
             for (selector, bytes) in (1..).zip(segments.clone()) {
                 writer.section(SectionKind::Operator, selector, bytes);
             }
         }
         writer.finish()
+    }
+
+    /// The segment of a tier: its own entries and those of the tiers below.
+    fn words(&self, tier: usize) -> Vec<u8> {
+        let mut entries: Vec<_> = self.tiers[..tier].concat();
+        entries.sort_unstable();
+        let rows = entries.chunk_by(|a, b| a.0 == b.0).map(|row| StoredRow {
+            index: row[0].0,
+            shift: self.row_shifts[usize::from(row[0].0)].into(),
+            entries: row.iter().map(|(_, col, value)| (*col, *value)).collect(),
+        });
+        segment_bytes(self.grid.cells(), &rows.collect::<Vec<_>>())
     }
 
     fn meta(&self, operator: Option<&Operator<'_>>) -> Vec<u8> {
@@ -196,16 +207,6 @@ pub(crate) fn srgb_response() -> Vec<u16> {
         (value * 65_535.0).round() as u16
     };
     (0..RESPONSE_KNOTS).map(code).collect()
-}
-
-fn words(entries: &[(u16, u16, i16)]) -> Vec<u8> {
-    let mut words = Vec::new();
-    for row in entries.chunk_by(|a, b| a.0 == b.0) {
-        words.push(segment::word(row[0].0, row.len() as u16));
-        let entries = row.iter();
-        words.extend(entries.map(|(_, col, value)| segment::word(*col, value.cast_unsigned())));
-    }
-    words.concat()
 }
 
 fn halfwords(values: &[u16]) -> Vec<u8> {

@@ -1,0 +1,458 @@
+//! The same as the plain way ([`pipeline`](crate::pipeline)) for Arm's DSP extension.
+//!
+//! A compiler keeps some twenty addresses and values of these loops, more than there
+//! are registers, and spends a third of its instructions on moving them. Written
+//! out, everything stays in registers; two details are packed and stored at once
+//! (`pkhbt`); and a drive is clipped and shifted by one instruction (`usat`), which
+//! also remembers that something was clipped: only then is a block looked through
+//! again to count how many.
+//!
+//! `docs/firmware.md` says what that brings and how to repeat it.
+
+use crate::haar::Block;
+use crate::kernel::levels::arm::span;
+use crate::pipeline::{CODES, Halfword, Pixels};
+use crate::units::InputCoefficient;
+use core::arch::global_asm;
+
+/// Input shift of the nodes of two by two cells, which the loop has built in.
+const FINEST_SHIFT: u32 = 2;
+
+/// What the merging loop needs. The assembler below knows the order of the fields.
+#[repr(C)]
+struct Merge {
+    top: *const u8,
+    light: *const u16,
+    sums: *mut i32,
+    details: *mut i16,
+    /// Nodes of a row.
+    nodes: usize,
+    /// Rows of nodes.
+    rows: usize,
+    ambient: *const u8,
+    /// Bytes from a row of pixels to the next.
+    stride: usize,
+}
+
+/// What the finishing loop needs. The assembler below knows the order of the fields.
+#[repr(C)]
+struct Finish {
+    corrections: *const i32,
+    wanted: *const u8,
+    gain: *const u8,
+    input: *mut u8,
+    light: *const u16,
+    codes: *const u8,
+    gain_fraction: u32,
+    half: u32,
+    count: usize,
+    ambient: *const u8,
+}
+
+/// What the adding loop needs. The assembler below knows the order of the fields.
+#[repr(C)]
+struct AddLight {
+    pixels: *const u8,
+    columns: *mut u32,
+    light: *const u16,
+    weight: u32,
+    count: usize,
+    ambient: *const u8,
+}
+
+unsafe extern "C" {
+    fn iltm_add_1_dark(add: *const AddLight);
+    fn iltm_add_1_lit(add: *const AddLight);
+    fn iltm_add_3_dark(add: *const AddLight);
+    fn iltm_add_3_lit(add: *const AddLight);
+    fn iltm_merge_1_dark(merge: *const Merge);
+    fn iltm_merge_1_lit(merge: *const Merge);
+    fn iltm_merge_3_dark(merge: *const Merge);
+    fn iltm_merge_3_lit(merge: *const Merge);
+    fn iltm_finish_1_dark(finish: *const Finish) -> u32;
+    fn iltm_finish_1_lit(finish: *const Finish) -> u32;
+    fn iltm_finish_3_dark(finish: *const Finish) -> u32;
+    fn iltm_finish_3_lit(finish: *const Finish) -> u32;
+}
+
+/// Address of the first sample of a channel in pixels of `C` samples; `None` if there
+/// are fewer than `count` pixels.
+fn samples<T, const C: usize>(pixels: &[[T; C]], channel: usize, count: usize) -> Option<*const T> {
+    let pixels = pixels.get(..count)?;
+    Some(pixels.as_flattened().get(channel..)?.as_ptr())
+}
+
+/// Address of the first sample of the ambient light, null in a dark room.
+fn ambient<const C: usize>(pixels: &Pixels<'_, u8, C>, count: usize) -> Option<*const u8> {
+    match pixels.ambient {
+        Some(ambient) => Some(samples(ambient, pixels.channel, count)?.cast()),
+        None => Some(core::ptr::null()),
+    }
+}
+
+/// See [`merge`](super::merge).
+pub(super) fn merge<const C: usize>(
+    pixels: &Pixels<'_, u8, C>,
+    light: &[u16; 256],
+    (block, shift): (Block, u32),
+    sums: &mut [i32],
+    details: &mut [[InputCoefficient; 3]],
+) -> bool {
+    let (count, pixels) = (
+        block.nodes * block.rows,
+        pixels.from(block.row * block.cols),
+    );
+    let Some(span) = span(block) else {
+        return false;
+    };
+    if sums.len() < count || details.len() < count || shift != FINEST_SHIFT {
+        return false;
+    }
+    let top = samples(pixels.codes, pixels.channel, span);
+    let (Some(top), Some(ambient)) = (top, ambient(&pixels, span)) else {
+        return false;
+    };
+    let merge = Merge {
+        top,
+        light: light.as_ptr(),
+        sums: sums.as_mut_ptr(),
+        details: details.as_mut_ptr().cast(),
+        nodes: block.nodes,
+        rows: block.rows,
+        ambient,
+        stride: block.cols * C,
+    };
+    let merge = &raw const merge;
+    // SAFETY: `samples` made sure of the pixels that the block spans, and of their
+    // ambient light where it is read; `sums` has one element for each of its nodes and
+    // `details` three; `light` has one for every value of a byte. Halfwords and the
+    // words of two details need no alignment.
+    unsafe {
+        match (C, pixels.ambient.is_some()) {
+            (1, false) => iltm_merge_1_dark(merge),
+            (1, true) => iltm_merge_1_lit(merge),
+            (3, false) => iltm_merge_3_dark(merge),
+            (3, true) => iltm_merge_3_lit(merge),
+            _ => return false,
+        }
+    }
+    true
+}
+
+/// See [`finish`](super::finish).
+pub(super) fn finish<const C: usize>(
+    wanted: &Pixels<'_, u8, C>,
+    (light, codes): (&[u16; 256], &[u8; CODES]),
+    gain_fraction: u32,
+    gains: &[[Halfword; C]],
+    corrections: &[i32],
+    input: &mut [[u8; C]],
+) -> Option<u32> {
+    let (count, channel) = (corrections.len(), wanted.channel);
+    if count == 0 {
+        return None;
+    }
+    let finish = Finish {
+        corrections: corrections.as_ptr(),
+        wanted: samples(wanted.codes, channel, count)?,
+        gain: samples(gains, channel, count)?.cast(),
+        input: samples(input, channel, count)?.cast_mut(),
+        light: light.as_ptr(),
+        codes: codes.as_ptr(),
+        gain_fraction,
+        half: 1_u32.wrapping_shl(gain_fraction) >> 1,
+        count,
+        ambient: ambient(wanted, count)?,
+    };
+    let finish = &raw const finish;
+    // SAFETY: all slices have `count` pixels, of which the loop touches one channel;
+    // `light` has an element for every value of a byte, and `codes` for every index
+    // that `usat` leaves, below 2^13.
+    unsafe {
+        Some(match (C, wanted.ambient.is_some()) {
+            (1, false) => iltm_finish_1_dark(finish),
+            (1, true) => iltm_finish_1_lit(finish),
+            (3, false) => iltm_finish_3_dark(finish),
+            (3, true) => iltm_finish_3_lit(finish),
+            _ => return None,
+        })
+    }
+}
+
+/// See [`add_light`](super::add_light).
+pub(super) fn add_light<const C: usize>(
+    pixels: &Pixels<'_, u8, C>,
+    light: &[u16; 256],
+    weight: u32,
+    columns: &mut [u32],
+) -> bool {
+    let count = columns.len();
+    let first = samples(pixels.codes, pixels.channel, count);
+    let (Some(first), Some(ambient)) = (first, ambient(pixels, count)) else {
+        return false;
+    };
+    let add = AddLight {
+        pixels: first,
+        columns: columns.as_mut_ptr(),
+        light: light.as_ptr(),
+        weight,
+        count,
+        ambient,
+    };
+    let add = &raw const add;
+    // SAFETY: `samples` made sure of `count` pixels and of their ambient light where it
+    // is read; `columns` has `count` elements and `light` one for every value of a
+    // byte.
+    unsafe {
+        match (C, pixels.ambient.is_some()) {
+            (1, false) => iltm_add_1_dark(add),
+            (1, true) => iltm_add_1_lit(add),
+            (3, false) => iltm_add_3_dark(add),
+            (3, true) => iltm_add_3_lit(add),
+            _ => return false,
+        }
+    }
+    true
+}
+
+// r0 pixels, r1 columns, r2 light, r3 weight, r4 pixels left, r5 ambient, r6-r8 one
+// pixel.
+global_asm!(
+    r#"
+    .syntax unified
+    .macro iltm_add_pixel channels, lit
+        ldrb r6, [r0], #\channels
+        ldr r8, [r1]
+        ldrh r6, [r2, r6, lsl #1]
+    .if \lit
+        ldrh r7, [r5], #2*\channels
+        uqsub16 r6, r6, r7
+    .endif
+        mla r8, r6, r3, r8
+        str r8, [r1], #4
+    .endm
+
+    .macro iltm_add name, channels, lit
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    \name:
+        push {{r4-r8, lr}}
+        ldmia r0, {{r0-r5}}
+        subs r4, #4
+        blt 2f
+    1:
+        iltm_add_pixel \channels, \lit
+        iltm_add_pixel \channels, \lit
+        iltm_add_pixel \channels, \lit
+        iltm_add_pixel \channels, \lit
+        subs r4, #4
+        bge 1b
+    2:
+        adds r4, #4
+        beq 4f
+    3:
+        iltm_add_pixel \channels, \lit
+        subs r4, #1
+        bne 3b
+    4:
+        pop {{r4-r8, pc}}
+    .size \name, . - \name
+    .endm
+
+    iltm_add iltm_add_1_dark, 1, 0
+    iltm_add iltm_add_1_lit, 1, 1
+    iltm_add iltm_add_3_dark, 3, 0
+    iltm_add iltm_add_3_lit, 3, 1
+    .text
+    "#
+);
+
+// r0 top, r1 bottom, r2 light, r3 sums, r4 details, r5 nodes left in the row, r6-r9
+// the four values of a node, r10 and r11 ambient light of top and bottom, r12 and lr
+// what comes of them. On the stack: nodes of a row, rows left, stride.
+global_asm!(
+    r#"
+    .syntax unified
+    .macro iltm_merge name, channels, lit
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    \name:
+        push {{r4-r11, lr}}
+        ldr r10, [r0, #24]
+        ldr r7, [r0, #28]
+        ldmia r0, {{r1-r6}}
+        mov r0, r1
+        push {{r5, r6, r7}}
+    1:
+        ldr r6, [sp, #8]
+        ldr r5, [sp]
+        add r1, r0, r6
+        add r11, r10, r6, lsl #1
+    2:
+        ldrb r6, [r0], #\channels
+        ldrb r7, [r0], #\channels
+        ldrb r8, [r1], #\channels
+        ldrb r9, [r1], #\channels
+        ldrh r6, [r2, r6, lsl #1]
+        ldrh r7, [r2, r7, lsl #1]
+        ldrh r8, [r2, r8, lsl #1]
+        ldrh r9, [r2, r9, lsl #1]
+    .if \lit
+        ldrh r12, [r10], #2*\channels
+        ldrh lr, [r10], #2*\channels
+        uqsub16 r6, r6, r12
+        uqsub16 r7, r7, lr
+        ldrh r12, [r11], #2*\channels
+        ldrh lr, [r11], #2*\channels
+        uqsub16 r8, r8, r12
+        uqsub16 r9, r9, lr
+    .endif
+        add r12, r6, r7
+        sub r6, r6, r7
+        add lr, r8, r9
+        sub r8, r8, r9
+        add r7, r12, lr
+        sub r12, r12, lr
+        str r7, [r3], #4
+        add r6, #2
+        add r12, #2
+        add r7, r6, r8
+        sub r6, r6, r8
+        asr r7, #2
+        asr r6, #2
+        pkhbt r7, r7, r12, lsl #14
+        strh r6, [r4, #4]
+        str r7, [r4], #6
+        subs r5, #1
+        bne 2b
+        mov r0, r1
+        mov r10, r11
+        ldr r6, [sp, #4]
+        subs r6, #1
+        str r6, [sp, #4]
+        bne 1b
+        add sp, #12
+        pop {{r4-r11, pc}}
+    .size \name, . - \name
+    .endm
+
+    iltm_merge iltm_merge_1_dark, 1, 0
+    iltm_merge iltm_merge_1_lit, 1, 1
+    iltm_merge iltm_merge_3_dark, 3, 0
+    iltm_merge iltm_merge_3_lit, 3, 1
+    .text
+    "#
+);
+
+// r0 corrections, r1 wanted, r2 gain, r3 input, r4 light, r5 codes, r6 gain
+// fraction, r7 half, r8 pixels left in the block, r9 and r10 drive and index, r11
+// ambient, r12 and lr more of the next pixel. On the stack: pixels left, clipped.
+//
+// The saturation flag is cleared before a block. Where it is set after it, the block
+// is counted: its end is known, so the addresses are taken back by its length.
+global_asm!(
+    r#"
+    .macro iltm_drive channels, lit
+        ldrb r9, [r1], #\channels
+        ldrh r10, [r2], #2*\channels
+        ldrh r9, [r4, r9, lsl #1]
+    .if \lit
+        ldrh r12, [r11], #2*\channels
+        uqsub16 r9, r9, r12
+    .endif
+        ldr r12, [r0], #4
+        mla r9, r9, r10, r7
+        lsr r9, r6
+        sub r9, r9, r12, asr #8
+    .endm
+
+    .macro iltm_pixel channels, lit
+        iltm_drive \channels, \lit
+        usat r9, #13, r9, asr #2
+        ldrb r9, [r5, r9]
+        strb r9, [r3], #\channels
+    .endm
+
+    .macro iltm_finish name, channels, lit
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    \name:
+        push {{r4-r11, lr}}
+        mov r9, #0
+        ldr r10, [r0, #32]
+        push {{r9, r10}}
+        ldr r11, [r0, #36]
+        ldmia r0, {{r0-r7}}
+    1:
+        ldr r8, [sp, #4]
+        cmp r8, #64
+        it gt
+        movgt r8, #64
+        mov lr, r8
+        mov r12, #0
+        msr APSR_nzcvq, r12
+        subs r8, #4
+        blt 3f
+    2:
+        iltm_pixel \channels, \lit
+        iltm_pixel \channels, \lit
+        iltm_pixel \channels, \lit
+        iltm_pixel \channels, \lit
+        subs r8, #4
+        bge 2b
+    3:
+        adds r8, #4
+        beq 5f
+    4:
+        iltm_pixel \channels, \lit
+        subs r8, #1
+        bne 4b
+    5:
+        mrs r12, APSR
+        lsls r12, #5
+        bcc 8f
+        sub r0, r0, lr, lsl #2
+    .if \channels == 1
+        sub r1, r1, lr
+        sub r2, r2, lr, lsl #1
+        sub r11, r11, lr, lsl #1
+    .else
+        add r12, lr, lr, lsl #1
+        sub r1, r1, r12
+        sub r2, r2, r12, lsl #1
+        sub r11, r11, r12, lsl #1
+    .endif
+        mov r8, lr
+    6:
+        iltm_drive \channels, \lit
+        cmp r9, #32768
+        bls 7f
+        ldr r10, [sp]
+        add r10, #1
+        str r10, [sp]
+    7:
+        subs r8, #1
+        bne 6b
+    8:
+        ldr r12, [sp, #4]
+        subs r12, lr
+        str r12, [sp, #4]
+        bne 1b
+        pop {{r0, r1}}
+        pop {{r4-r11, pc}}
+    .size \name, . - \name
+    .endm
+
+    iltm_finish iltm_finish_1_dark, 1, 0
+    iltm_finish iltm_finish_1_lit, 1, 1
+    iltm_finish iltm_finish_3_dark, 3, 0
+    iltm_finish iltm_finish_3_lit, 3, 1
+    .text
+    "#
+);

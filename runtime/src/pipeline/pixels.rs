@@ -1,0 +1,104 @@
+//! The pixels of a frame of the grid's size, as the transforms read them.
+
+use super::sample::Sample;
+use super::stages::subtract_ambient;
+use crate::haar::{Block, Row, Source};
+use crate::units::{InputCoefficient, Light};
+
+/// One `u16` of a table, little-endian.
+pub type Halfword = [u8; 2];
+
+/// One channel of pixels of `C` samples, a cell each.
+#[derive(Clone, Copy, Debug)]
+pub struct Pixels<'f, S: Sample, const C: usize> {
+    /// The codes.
+    pub codes: &'f [[S; C]],
+    /// Ambient light; `None` in a dark room.
+    pub ambient: Option<&'f [[Halfword; C]]>,
+    /// Columns of the grid.
+    pub cols: usize,
+    /// The channel.
+    pub channel: usize,
+    /// Its curves.
+    pub curves: S::Curves<'f>,
+}
+
+impl<S: Sample, const C: usize> Pixels<'_, S, C> {
+    /// Those from an index on.
+    #[must_use]
+    pub fn from(&self, start: usize) -> Self {
+        let ambient = self
+            .ambient
+            .map(|cells| cells.get(start..).unwrap_or_default());
+        Self {
+            codes: self.codes.get(start..).unwrap_or_default(),
+            ambient,
+            ..*self
+        }
+    }
+
+    /// Light of a pixel without the ambient light; none past the end.
+    #[inline]
+    #[must_use]
+    pub fn light(&self, index: usize) -> Light {
+        let code = self
+            .codes
+            .get(index)
+            .and_then(|pixel| pixel.get(self.channel));
+        let light = code.map_or(Light::ZERO, |code| code.light(self.curves));
+        let Some(ambient) = self.ambient else {
+            return light;
+        };
+        let ambient = ambient.get(index).and_then(|pixel| pixel.get(self.channel));
+        let ambient = ambient.map_or(Light::ZERO, |bits| {
+            Light::from_bits(u16::from_le_bytes(*bits))
+        });
+        subtract_ambient(light, ambient)
+    }
+}
+
+/// One row of [`Pixels`].
+#[derive(Clone, Copy, Debug)]
+pub struct PixelRow<'r, 'f, S: Sample, const C: usize> {
+    pixels: &'r Pixels<'f, S, C>,
+    start: usize,
+}
+
+impl<S: Sample, const C: usize> Row for PixelRow<'_, '_, S, C> {
+    #[inline]
+    fn pairs(self) -> impl Iterator<Item = [i32; 2]> {
+        (0..self.pixels.cols / 2).map(move |pair| [self.at(2 * pair), self.at(2 * pair + 1)])
+    }
+
+    #[inline]
+    fn at(self, index: usize) -> i32 {
+        self.pixels.light(self.start + index).to_bits().into()
+    }
+}
+
+impl<'f, S: Sample, const C: usize> Source for Pixels<'f, S, C> {
+    type Row<'r>
+        = PixelRow<'r, 'f, S, C>
+    where
+        Self: 'r;
+
+    #[inline]
+    fn rows(&self) -> impl Iterator<Item = PixelRow<'_, 'f, S, C>> {
+        let starts = (0..self.codes.len()).step_by(self.cols.max(1));
+        starts.map(|start| PixelRow {
+            pixels: self,
+            start,
+        })
+    }
+
+    #[inline]
+    fn merge(
+        &self,
+        block: Block,
+        shift: u32,
+        sums: &mut [i32],
+        details: &mut [[InputCoefficient; 3]],
+    ) -> bool {
+        S::merge(self, (block, shift), sums, details)
+    }
+}

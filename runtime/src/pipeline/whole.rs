@@ -1,0 +1,229 @@
+//! Whole frames larger than the grid, on one thread: what a device does.
+//!
+//! The result is that of the rows of [`FullPipeline`], bit for bit, by a way that
+//! suits a small processor: gains and ambient light of all pixels are computed once
+//! for a table; light is added up by columns of pixels first, which makes a row of
+//! pixels one plain loop, and by cells once for every row of cells.
+
+use super::FrameError;
+use super::full::{FullPipeline, Row};
+use super::pixels::{Halfword, Pixels};
+use super::sample::{Encoding, Sample};
+use super::stages::Workspace;
+use crate::haar::ShortSlice;
+use crate::units::Light;
+
+/// Memory for frames of `W x H` pixels of `C` channels over `N` cells.
+#[derive(Debug)]
+pub struct FullMemory<'m, const C: usize> {
+    /// Gains of the pixels, `W * H` elements.
+    pub gains: &'m mut [[Halfword; C]],
+    /// Ambient light of the pixels, `W * H` elements; unused in a dark room.
+    pub ambient: &'m mut [[Halfword; C]],
+    /// Sums of the light of the cells, `C * N` elements.
+    pub sums: &'m mut [u64],
+    /// Corrections of the cells, `C * N` elements.
+    pub corrections: &'m mut [i32],
+    /// Light of the pixels of one channel, added up by columns: two rows of cells,
+    /// `2 * W` elements for each channel.
+    pub columns: &'m mut [u32],
+    /// For one row, as wide as the frame.
+    pub row: Row<'m>,
+    /// One row of values of one channel, `W` elements.
+    pub values: &'m mut [u16],
+}
+
+impl<const C: usize> FullPipeline<'_, '_, C> {
+    fn check(&self, memory: &FullMemory<'_, C>) -> Result<(), ShortSlice> {
+        let (cells, width) = (C * self.table().grid().cells(), self.frame().width());
+        let pixels = self.frame().pixels();
+        let ambient = if self.table().ambient().is_some() {
+            pixels
+        } else {
+            0
+        };
+        for (what, needed, given) in [
+            ("gains", pixels, memory.gains.len()),
+            ("ambient light", ambient, memory.ambient.len()),
+            ("sums", cells, memory.sums.len()),
+            ("corrections", cells, memory.corrections.len()),
+            ("columns", 2 * C * width, memory.columns.len()),
+            ("line", self.line_len(), memory.row.line.len()),
+            ("spread", width, memory.row.spread.len()),
+            ("values", width, memory.values.len()),
+        ] {
+            if given < needed {
+                return Err(ShortSlice {
+                    what,
+                    needed,
+                    given,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes gains and ambient light of all pixels: once for a table and a size
+    /// of frames.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn prepare(&self, memory: &mut FullMemory<'_, C>) -> Result<(), FrameError> {
+        self.check(memory)?;
+        let (width, height) = (self.frame().width(), self.frame().height());
+        for (y, line) in memory
+            .gains
+            .chunks_exact_mut(width)
+            .take(height)
+            .enumerate()
+        {
+            for channel in 0..C {
+                self.gain_row(y, channel, &mut memory.row, memory.values);
+                store(line, channel, memory.values);
+            }
+        }
+        let lines = memory.ambient.chunks_exact_mut(width).take(height);
+        for (y, line) in lines.enumerate() {
+            for channel in 0..C {
+                if self.ambient_row(y, channel, &mut memory.row) {
+                    let values = memory.values.iter_mut().zip(memory.row.spread.iter());
+                    values.for_each(|(value, ambient)| *value = *ambient as u16);
+                    store(line, channel, memory.values);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Compensates one frame at `tier` with memory that was
+    /// [prepared](Self::prepare); returns how many samples were clipped.
+    ///
+    /// # Errors
+    /// [`FrameError`] if the tier does not exist or a slice is too short; `input` is
+    /// left as it was then.
+    pub fn compensate<S: Sample>(
+        &self,
+        (tier, encoding): (u8, Encoding),
+        wanted: &[[S; C]],
+        input: &mut [[S; C]],
+        memory: &mut FullMemory<'_, C>,
+        workspace: &mut Workspace<'_>,
+    ) -> Result<u32, FrameError> {
+        self.check_pixels("input", input.len())?;
+        self.average_frame(encoding, wanted, memory)?;
+        self.correct(tier, memory.sums, memory.corrections, workspace)?;
+        self.finish_frame(encoding, wanted, input, memory)
+    }
+
+    /// First stage: adds up the light of a frame by cells.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn average_frame<S: Sample>(
+        &self,
+        encoding: Encoding,
+        wanted: &[[S; C]],
+        memory: &mut FullMemory<'_, C>,
+    ) -> Result<(), FrameError> {
+        self.check(memory)?;
+        self.check_pixels("wanted", wanted.len())?;
+        let (cells, width) = (self.table().grid().cells(), self.frame().width());
+        memory.sums.fill(0);
+        let ambient = &*memory.ambient;
+        let sums = memory.sums.chunks_exact_mut(cells);
+        let columns = memory.columns.chunks_exact_mut(2 * width);
+        for (channel, (sums, columns)) in sums.zip(columns).enumerate().take(C) {
+            self.average(columns, sums, |y, weight, columns| {
+                let pixels = self.pixels(encoding, wanted, ambient, (y, channel));
+                S::add_light(&pixels, weight, columns);
+            });
+        }
+        Ok(())
+    }
+
+    /// Last stage: gain, interpolated corrections, clip and code; returns how many
+    /// samples were clipped.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn finish_frame<S: Sample>(
+        &self,
+        encoding: Encoding,
+        wanted: &[[S; C]],
+        input: &mut [[S; C]],
+        memory: &mut FullMemory<'_, C>,
+    ) -> Result<u32, FrameError> {
+        self.check(memory)?;
+        self.check_pixels("wanted", wanted.len())?;
+        self.check_pixels("input", input.len())?;
+        let (cells, width) = (self.table().grid().cells(), self.frame().width());
+        let fraction = u32::from(self.table().gain_fraction());
+        let mut clipped = 0;
+        let lines = input.chunks_exact_mut(width).take(self.frame().height());
+        let gains = memory.gains.chunks_exact(width);
+        for (y, (line, gains)) in lines.zip(gains).enumerate() {
+            let corrections = memory.corrections.chunks_exact(cells);
+            for (channel, corrections) in corrections.enumerate().take(C) {
+                self.correct_row(y, corrections, &mut memory.row);
+                let spread = memory.row.spread.get(..width).unwrap_or_default();
+                let pixels = self.pixels(encoding, wanted, memory.ambient, (y, channel));
+                clipped += S::finish(&pixels, fraction, gains, spread, line);
+            }
+        }
+        Ok(clipped)
+    }
+
+    fn check_pixels(&self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
+        let needed = self.frame().pixels();
+        if given < needed {
+            return Err(ShortSlice {
+                what,
+                needed,
+                given,
+            });
+        }
+        Ok(())
+    }
+
+    /// One channel of the pixels from row `y` on.
+    fn pixels<'f, S: Sample>(
+        &'f self,
+        encoding: Encoding,
+        wanted: &'f [[S; C]],
+        ambient: &'f [[Halfword; C]],
+        (y, channel): (usize, usize),
+    ) -> Pixels<'f, S, C> {
+        let (table, start) = (self.table(), y * self.frame().width());
+        let ambient = table
+            .ambient()
+            .map(|_| ambient.get(start..).unwrap_or_default());
+        Pixels {
+            codes: wanted.get(start..).unwrap_or_default(),
+            ambient,
+            cols: self.frame().width(),
+            channel,
+            curves: S::curves(table, encoding, channel),
+        }
+    }
+}
+
+/// Stores a row of one channel.
+fn store<const C: usize>(line: &mut [[Halfword; C]], channel: usize, values: &[u16]) {
+    for (pixel, value) in line.iter_mut().zip(values) {
+        if let Some(slot) = pixel.get_mut(channel) {
+            *slot = value.to_le_bytes();
+        }
+    }
+}
+
+/// [`Sample::add_light`] sample by sample.
+pub(super) fn add_plainly<S: Sample, const C: usize>(
+    pixels: &Pixels<'_, S, C>,
+    weight: u32,
+    columns: &mut [u32],
+) {
+    for (index, column) in columns.iter_mut().enumerate() {
+        let light = u32::from(Light::to_bits(pixels.light(index)));
+        *column = column.wrapping_add(weight.wrapping_mul(light));
+    }
+}
