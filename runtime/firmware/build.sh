@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Builds the firmware: build.sh [BOARD] [BIN], by default mps2-an500 and firmware.
+# ILTM_FIRMWARE_FEATURES names features beside the board.
 # Finds a Rust that can build for the board, installing what is missing: rustup's
 # target, or else Debian's packages. The last line on standard output is the path
 # of the ELF file; everything else goes to standard error.
@@ -67,11 +68,12 @@ fi
 
 # A folder for each board and route: each has flags of its own, and cargo would
 # build everything anew at every change between them.
-folder=$PWD/target/$board
+more=${ILTM_FIRMWARE_FEATURES:-}
+folder=$PWD/target/$board${more:+-$more}
 flags="-C target-cpu=$cpu"
-options=(--release --locked --target "$target" --no-default-features --features "$board" --bin "$bin")
+options=(--release --locked --target "$target" --no-default-features --features "$board${more:+,$more}" --bin "$bin")
 if [ $route = debian ]; then
-    folder=$PWD/target/debian-$board
+    folder=$PWD/target/debian-$board${more:+-$more}
     RUSTC_BOOTSTRAP=1 RUSTC=/usr/bin/rustc RUSTFLAGS="$flags -C linker=arm-none-eabi-ld" \
         CARGO_TARGET_DIR=$folder \
         /usr/bin/cargo build "${options[@]}" -Zbuild-std=core >&2

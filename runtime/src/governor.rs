@@ -36,7 +36,7 @@ const RATIO_BITS: u32 = 12;
 const SAME: u32 = 1 << RATIO_BITS;
 
 /// The largest ratio that is kept.
-const MOST: u32 = 1 << 20;
+const MOST: u32 = u32::MAX;
 
 /// Cost of one sample outside the operator, and of one multiplication in it, in
 /// instructions. Only their ratio counts, and only until it has been measured;
@@ -268,8 +268,13 @@ impl Step {
 
     /// The least that the upper tier may take, if the lower takes `time`.
     fn up(self, time: u32) -> u32 {
-        let product = (u64::from(time) * u64::from(self.ratio)) >> RATIO_BITS;
-        let product = product.min(u64::from(u32::MAX)) as u32;
+        // A ratio at the end of its range may be any larger one.
+        let product = if self.ratio == MOST {
+            u32::MAX
+        } else {
+            let product = (u64::from(time) * u64::from(self.ratio)) >> RATIO_BITS;
+            product.min(u64::from(u32::MAX)) as u32
+        };
         let sum = self.difference.map(|more| time.saturating_add(more));
         sum.map_or(product, |sum| sum.min(product))
     }
@@ -377,6 +382,14 @@ mod tests {
         assert_eq!(governor.frame(1_000), None);
         assert_eq!(governor.frame(1), None);
         assert_eq!((governor.tier(), governor.overruns()), (0, 1));
+    }
+
+    #[test]
+    fn a_tier_hundreds_of_times_as_slow_is_not_tried_again_and_again() {
+        let mut governor = Governor::new([1, u64::MAX >> 20], 292);
+        run(&mut governor, &[1, 333], 20_000);
+        assert!(run(&mut governor, &[1, 333], 20_000).is_empty());
+        assert!(governor.overruns() <= 1);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 pub mod fake_device;
 pub mod firmware;
 pub mod fuzz;
+pub mod instructions;
 
 use iltm::capture::Response;
 use iltm::compile::{CompileOptions, compile};
@@ -81,28 +82,6 @@ pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
 #[must_use]
 pub fn wedge_table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
     wedge_table_for(Response::Srgb, rows, cols, channels)
-}
-
-/// The table image of [`wedge`].
-///
-/// # Panics
-/// If it cannot be compiled: then the test that asked for it has failed.
-#[must_use]
-pub fn bench_table(rows: u16, cols: u16, channels: usize, targets: &[f64]) -> Vec<u8> {
-    let grid = Grid::new(rows, cols).expect("a small grid");
-    let mut inverse = wedge(grid, channels);
-    for channel in &mut inverse.channels {
-        channel.deviation = None;
-    }
-    let options = CompileOptions {
-        projector: Response::Srgb,
-        inverse_error: 0.005,
-        provenance: "scene = \"wedge\"\n".to_owned(),
-        targets: Some(targets.to_vec()),
-        ..CompileOptions::default()
-    };
-    let compiled = compile(&inverse, None, &options);
-    compiled.expect("the wedge is a plain scene").image
 }
 
 /// The table image of [`wedge`].

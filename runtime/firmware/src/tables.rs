@@ -90,7 +90,8 @@ impl Tables {
 
 /// The image at the start of a slot, as long as it says that it is, or the whole
 /// slot if that is longer.
-fn image(slot: &[u8]) -> &[u8] {
+#[must_use]
+pub fn image(slot: &[u8]) -> &[u8] {
     let length = slot
         .get(header::LENGTH)
         .and_then(|field| field.try_into().ok());

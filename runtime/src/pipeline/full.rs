@@ -17,7 +17,7 @@ use crate::FrameSize;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
 use crate::resample::area::AreaAverage;
-use crate::resample::interpolation::{Axis, blend};
+use crate::resample::interpolation::{Axis, blend, blend_rows};
 use crate::units::{Drive, Light};
 
 /// Fraction bits that gains have beyond their own while they are interpolated.
@@ -224,13 +224,16 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         let count = self.table.grid().cols();
         let line = |at: usize| {
             let line = corrections.get(at * count..).unwrap_or_default();
-            line.iter().copied()
+            line.get(..count).unwrap_or(line)
         };
-        let pairs = line(place.before).zip(line(place.after));
-        for (slot, (before, after)) in row.line.iter_mut().take(count).zip(pairs) {
-            *slot = blend(before, after, place.fraction);
-        }
-        cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
+        let blended = row.line.get_mut(..count).unwrap_or_default();
+        blend_rows(
+            line(place.before),
+            line(place.after),
+            place.fraction,
+            blended,
+        );
+        cols.expand(blended, row.spread);
     }
 
     /// Drives of one channel along row `y`; returns how many were clipped.

@@ -93,12 +93,17 @@ impl AreaAverage {
                 add(y, past as u32, next.get_mut(..width).unwrap_or_default());
             }
             let line = lines.next().unwrap_or_default();
-            for (sum, light) in line.iter_mut().zip(self.row_sums(columns)) {
-                *sum = sum.wrapping_add(light);
-            }
+            self.add_columns(columns, line);
             columns.fill(0);
             core::mem::swap(&mut columns, &mut next);
             end += height;
+        }
+    }
+
+    /// Adds columns to the sums of a row of cells.
+    fn add_columns(self, columns: &[u32], line: &mut [u64]) {
+        for (sum, light) in line.iter_mut().zip(self.row_sums(columns)) {
+            *sum = sum.wrapping_add(light);
         }
     }
 

@@ -154,6 +154,16 @@ fn progression(begin: i32, step: i32, run: &mut [i32]) {
     }
 }
 
+/// [`blend`] of every element of two rows into `line`.
+pub fn blend_rows(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) {
+    if lines::blend(before, after, fraction, line) {
+        return;
+    }
+    for (slot, (before, after)) in line.iter_mut().zip(before.iter().zip(after)) {
+        *slot = blend(*before, *after, fraction);
+    }
+}
+
 /// `before + fraction * (after - before)`, rounded down; `fraction` has 31 bits.
 #[inline(always)]
 #[must_use]

@@ -203,7 +203,7 @@ global_asm!(
         ldr r4, [r0], #4
         ldr lr, [r0], #4
         mov r12, #0
-        subs lr, #4
+        subs lr, #8
         blt 3f
     2:
         ldmia r0!, {{r5-r10}}
@@ -211,9 +211,22 @@ global_asm!(
         iltm_high_one r6, r7
         iltm_low_one r8, r10
         iltm_high_one r9, r10
-        subs lr, #4
+        ldmia r0!, {{r5-r10}}
+        iltm_low_one r5, r7
+        iltm_high_one r6, r7
+        iltm_low_one r8, r10
+        iltm_high_one r9, r10
+        subs lr, #8
         bge 2b
     3:
+        lsls r11, lr, #30
+        bcc 6f
+        ldmia r0!, {{r5-r10}}
+        iltm_low_one r5, r7
+        iltm_high_one r6, r7
+        iltm_low_one r8, r10
+        iltm_high_one r9, r10
+    6:
         lsls lr, #31
         bcc 4f
         ldmia r0!, {{r5-r7}}

@@ -18,6 +18,13 @@ struct Expand {
 }
 
 unsafe extern "C" {
+    fn iltm_blend(
+        before: *const i32,
+        after: *const i32,
+        fraction: u32,
+        line: *mut i32,
+        count: usize,
+    );
     fn iltm_expand(expand: *const Expand);
 }
 
@@ -52,9 +59,56 @@ pub(super) fn expand(between: &Between, values: &[i32], pixels: &mut [i32]) -> b
     true
 }
 
+/// See [`blend`](super::blend).
+pub(super) fn blend(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) -> bool {
+    let count = line.len();
+    if count == 0 || before.len() < count || after.len() < count || fraction >> 31 != 0 {
+        return false;
+    }
+    // SAFETY: all three have `count` elements.
+    unsafe {
+        iltm_blend(
+            before.as_ptr(),
+            after.as_ptr(),
+            fraction,
+            line.as_mut_ptr(),
+            count,
+        );
+    }
+    true
+}
+
+// r0 before, r1 after, r2 fraction, r3 line, r4 elements left, r5 and r6 values, r7
+// and r8 low and high half of the product.
+global_asm!(
+    r#"
+    .syntax unified
+    .section .text.iltm_blend, "ax", %progbits
+    .global iltm_blend
+    .type iltm_blend, %function
+    .thumb_func
+    iltm_blend:
+        push {{r4-r8, lr}}
+        ldr r4, [sp, #24]
+    1:
+        ldr r5, [r0], #4
+        ldr r6, [r1], #4
+        sub r6, r6, r5
+        smull r7, r8, r6, r2
+        add r5, r5, r8, lsl #1
+        add r5, r5, r7, lsr #31
+        str r5, [r3], #4
+        subs r4, #1
+        bne 1b
+        pop {{r4-r8, pc}}
+    .size iltm_blend, . - iltm_blend
+    .text
+    "#
+);
+
 // r0 values, r1 pixels, r2 runs left, r3 step of the axis, r4 half a cell, r5 past,
 // r6 part, r7 whole, r8 cell, r9 value, r10 next value and sign, r11 low half and
-// pixels of the run, r12 step of the run, lr offset.
+// pixels of the run, r12 step of the run, lr offset and every second pixel.
 global_asm!(
     r#"
     .syntax unified
@@ -88,14 +142,12 @@ global_asm!(
         subs r11, #4
         blt 3f
     2:
-        str r10, [r1], #4
-        add r10, r12
-        str r10, [r1], #4
-        add r10, r12
-        str r10, [r1], #4
-        add r10, r12
-        str r10, [r1], #4
-        add r10, r12
+        add lr, r10, r12
+        strd r10, lr, [r1], #8
+        add r10, lr, r12
+        add lr, r10, r12
+        strd r10, lr, [r1], #8
+        add r10, lr, r12
         subs r11, #4
         bge 2b
     3:

@@ -1,4 +1,4 @@
-//! Values of cells along a row to values of pixels.
+//! Values of cells to values of a row of pixels.
 
 #[cfg(all(target_arch = "arm", not(feature = "reference-kernel")))]
 #[allow(unsafe_code, reason = "assembler; the file says why each use is sound")]
@@ -25,6 +25,20 @@ pub(crate) struct Between {
     pub(crate) whole: u32,
     /// `2 cells`.
     pub(crate) cell: u32,
+}
+
+/// `before + fraction * (after - before)` for every element of `line`, rounded down;
+/// `fraction` has 31 bits. `false`, and nothing done, if that has to be done the plain
+/// way.
+#[inline]
+pub(crate) fn blend(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) -> bool {
+    #[cfg(all(target_arch = "arm", not(feature = "reference-kernel")))]
+    return arm::blend(before, after, fraction, line);
+    #[cfg(not(all(target_arch = "arm", not(feature = "reference-kernel"))))]
+    {
+        let _ = (before, after, fraction, line);
+        false
+    }
 }
 
 /// Spreads `values` over the pixels from the first centre to the last; `pixels` has

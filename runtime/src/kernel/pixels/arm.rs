@@ -3,9 +3,8 @@
 //! A compiler keeps some twenty addresses and values of these loops, more than there
 //! are registers, and spends a third of its instructions on moving them. Written
 //! out, everything stays in registers; two details are packed and stored at once
-//! (`pkhbt`); and a drive is clipped and shifted by one instruction (`usat`), which
-//! also remembers that something was clipped: only then is a block looked through
-//! again to count how many.
+//! (`pkhbt`); a drive is clipped and shifted by one instruction (`usat`); and only
+//! samples that were clipped are counted, on a way of their own.
 //!
 //! `docs/firmware.md` says what that brings and how to repeat it.
 
@@ -215,21 +214,26 @@ pub(super) fn add_light<const C: usize>(
     true
 }
 
-// r0 pixels, r1 columns, r2 light, r3 weight, r4 pixels left, r5 ambient, r6-r8 one
-// pixel.
+// r0 pixels, r1 columns, r2 light, r3 weight, r4 pixels left, r5 ambient, r6 and r7
+// light of two pixels, r8 and r9 their columns, r10 ambient light.
 global_asm!(
     r#"
     .syntax unified
-    .macro iltm_add_pixel channels, lit
+    .macro iltm_add_two channels, lit
+        ldrd r8, r9, [r1]
         ldrb r6, [r0], #\channels
-        ldr r8, [r1]
+        ldrb r7, [r0], #\channels
         ldrh r6, [r2, r6, lsl #1]
+        ldrh r7, [r2, r7, lsl #1]
     .if \lit
-        ldrh r7, [r5], #2*\channels
-        uqsub16 r6, r6, r7
+        ldrh r10, [r5], #2*\channels
+        uqsub16 r6, r6, r10
+        ldrh r10, [r5], #2*\channels
+        uqsub16 r7, r7, r10
     .endif
         mla r8, r6, r3, r8
-        str r8, [r1], #4
+        mla r9, r7, r3, r9
+        strd r8, r9, [r1], #8
     .endm
 
     .macro iltm_add name, channels, lit
@@ -238,26 +242,32 @@ global_asm!(
     .type \name, %function
     .thumb_func
     \name:
-        push {{r4-r8, lr}}
+        push {{r4-r10, lr}}
         ldmia r0, {{r0-r5}}
         subs r4, #4
         blt 2f
     1:
-        iltm_add_pixel \channels, \lit
-        iltm_add_pixel \channels, \lit
-        iltm_add_pixel \channels, \lit
-        iltm_add_pixel \channels, \lit
+        iltm_add_two \channels, \lit
+        iltm_add_two \channels, \lit
         subs r4, #4
         bge 1b
     2:
         adds r4, #4
         beq 4f
     3:
-        iltm_add_pixel \channels, \lit
+        ldrb r6, [r0], #\channels
+        ldr r8, [r1]
+        ldrh r6, [r2, r6, lsl #1]
+    .if \lit
+        ldrh r10, [r5], #2*\channels
+        uqsub16 r6, r6, r10
+    .endif
+        mla r8, r6, r3, r8
+        str r8, [r1], #4
         subs r4, #1
         bne 3b
     4:
-        pop {{r4-r8, pc}}
+        pop {{r4-r10, pc}}
     .size \name, . - \name
     .endm
 
@@ -349,11 +359,8 @@ global_asm!(
 );
 
 // r0 corrections, r1 wanted, r2 gain, r3 input, r4 light, r5 codes, r6 gain
-// fraction, r7 half, r8 pixels left in the block, r9 and r10 drive and index, r11
-// ambient, r12 and lr more of the next pixel. On the stack: pixels left, clipped.
-//
-// The saturation flag is cleared before a block. Where it is set after it, the block
-// is counted: its end is known, so the addresses are taken back by its length.
+// fraction, r7 half, r8 pixels left, r9 drive, r10 gain and index, r11 ambient, r12
+// correction, lr samples clipped.
 global_asm!(
     r#"
     .macro iltm_drive channels, lit
@@ -368,13 +375,19 @@ global_asm!(
         mla r9, r9, r10, r7
         lsr r9, r6
         sub r9, r9, r12, asr #8
+        usat r10, #13, r9, asr #2
+        cmp r10, r9, asr #2
     .endm
 
-    .macro iltm_pixel channels, lit
-        iltm_drive \channels, \lit
-        usat r9, #13, r9, asr #2
-        ldrb r9, [r5, r9]
-        strb r9, [r3], #\channels
+    .macro iltm_code channels
+        ldrb r10, [r5, r10]
+        strb r10, [r3], #\channels
+    .endm
+
+    .macro iltm_clip
+        cmp r9, #32768
+        it ne
+        addne lr, #1
     .endm
 
     .macro iltm_finish name, channels, lit
@@ -384,68 +397,58 @@ global_asm!(
     .thumb_func
     \name:
         push {{r4-r11, lr}}
-        mov r9, #0
-        ldr r10, [r0, #32]
-        push {{r9, r10}}
+        mov lr, #0
         ldr r11, [r0, #36]
-        ldmia r0, {{r0-r7}}
+        ldmia r0, {{r0-r8}}
+        subs r8, #4
+        blt 5f
     1:
-        ldr r8, [sp, #4]
-        cmp r8, #64
-        it gt
-        movgt r8, #64
-        mov lr, r8
-        mov r12, #0
-        msr APSR_nzcvq, r12
+        iltm_drive \channels, \lit
+        bne 11f
+    21:
+        iltm_code \channels
+        iltm_drive \channels, \lit
+        bne 12f
+    22:
+        iltm_code \channels
+        iltm_drive \channels, \lit
+        bne 13f
+    23:
+        iltm_code \channels
+        iltm_drive \channels, \lit
+        bne 14f
+    24:
+        iltm_code \channels
         subs r8, #4
-        blt 3f
-    2:
-        iltm_pixel \channels, \lit
-        iltm_pixel \channels, \lit
-        iltm_pixel \channels, \lit
-        iltm_pixel \channels, \lit
-        subs r8, #4
-        bge 2b
-    3:
-        adds r8, #4
-        beq 5f
-    4:
-        iltm_pixel \channels, \lit
-        subs r8, #1
-        bne 4b
+        bge 1b
     5:
-        mrs r12, APSR
-        lsls r12, #5
-        bcc 8f
-        sub r0, r0, lr, lsl #2
-    .if \channels == 1
-        sub r1, r1, lr
-        sub r2, r2, lr, lsl #1
-        sub r11, r11, lr, lsl #1
-    .else
-        add r12, lr, lr, lsl #1
-        sub r1, r1, r12
-        sub r2, r2, r12, lsl #1
-        sub r11, r11, r12, lsl #1
-    .endif
-        mov r8, lr
+        adds r8, #4
+        beq 7f
     6:
         iltm_drive \channels, \lit
-        cmp r9, #32768
-        bls 7f
-        ldr r10, [sp]
-        add r10, #1
-        str r10, [sp]
-    7:
+        bne 16f
+    26:
+        iltm_code \channels
         subs r8, #1
         bne 6b
-    8:
-        ldr r12, [sp, #4]
-        subs r12, lr
-        str r12, [sp, #4]
-        bne 1b
-        pop {{r0, r1}}
+    7:
+        mov r0, lr
         pop {{r4-r11, pc}}
+    11:
+        iltm_clip
+        b 21b
+    12:
+        iltm_clip
+        b 22b
+    13:
+        iltm_clip
+        b 23b
+    14:
+        iltm_clip
+        b 24b
+    16:
+        iltm_clip
+        b 26b
     .size \name, . - \name
     .endm
 

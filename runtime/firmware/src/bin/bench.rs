@@ -1,0 +1,154 @@
+//! Counts what a frame takes, stage by stage, at every tier.
+//!
+//! The table lies in slot A, the frame in the frame memory, its size in the first
+//! word of the self-test's part (width in the low half, height in the high half),
+//! all written before the start. Under an emulator that counts instructions
+//! (`-icount shift=0`) a tick is 40 of them. Findings go to standard output through
+//! semihosting, a line a tier: tier, then instructions of the stages and of the
+//! whole frame, then samples clipped.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use cortex_m_semihosting::{debug, hprintln};
+use iltm_firmware::board::{Board, Clock, TableFlash};
+use iltm_firmware::boards::{Chosen, psram};
+use iltm_firmware::fault;
+use iltm_firmware::memory::{MAX_PIXELS, Memory};
+use iltm_firmware::tables::image;
+use iltm_runtime::FrameSize;
+use iltm_runtime::exchange::ControlWords;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
+use static_cell::ConstStaticCell;
+
+/// Instructions a tick: a nanosecond each, at 25 MHz.
+const INSTRUCTIONS: u64 = 40;
+
+/// Frames that are counted come in and go out like video.
+const ENCODING: Encoding = Encoding::Display;
+
+static INPUT: ConstStaticCell<[u8; 3 * MAX_PIXELS]> = ConstStaticCell::new([0; 3 * MAX_PIXELS]);
+
+/// Moments between the stages.
+struct Laps<'c, K: Clock> {
+    clock: &'c K,
+    ticks: [u64; 4],
+    lap: usize,
+}
+
+impl<'c, K: Clock> Laps<'c, K> {
+    fn new(clock: &'c K) -> Self {
+        let mut laps = Self {
+            clock,
+            ticks: [0; 4],
+            lap: 0,
+        };
+        laps.mark();
+        laps
+    }
+
+    fn mark(&mut self) {
+        self.ticks[self.lap] = self.clock.ticks();
+        self.lap += 1;
+    }
+
+    /// Instructions of the three stages and of all.
+    fn instructions(&self) -> [u64; 4] {
+        let between = |from: usize, to: usize| (self.ticks[to] - self.ticks[from]) * INSTRUCTIONS;
+        [between(0, 1), between(1, 2), between(2, 3), between(0, 3)]
+    }
+}
+
+fn grid<const C: usize>(
+    table: &Table<'_>,
+    tier: u8,
+    (wanted, input): (&[u8], &mut [u8]),
+    memory: &mut Memory,
+    clock: &impl Clock,
+) -> Result<([u64; 4], u32), FrameError> {
+    let pipeline = GridPipeline::<C>::new(table)?;
+    let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
+    let mut workspace = memory.workspace();
+    let mut laps = Laps::new(clock);
+    if pipeline.operates(tier) {
+        pipeline.analyse(ENCODING, wanted, &mut workspace)?;
+    }
+    laps.mark();
+    if pipeline.operates(tier) {
+        pipeline.operate(tier, &mut workspace)?;
+    }
+    laps.mark();
+    let clipped = pipeline.finish((tier, ENCODING), wanted, input, &mut workspace)?;
+    laps.mark();
+    Ok((laps.instructions(), clipped))
+}
+
+fn full<const C: usize>(
+    table: &Table<'_>,
+    (tier, size): (u8, FrameSize),
+    (wanted, input): (&[u8], &mut [u8]),
+    memory: &mut Memory,
+    clock: &impl Clock,
+) -> Result<([u64; 4], u32), FrameError> {
+    let pipeline = FullPipeline::<C>::new(table, size)?;
+    let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
+    let prepared = memory.is_prepared(table, size);
+    let (mut frame, mut workspace) = memory.full::<C>(table.grid().cells(), size.width());
+    if !prepared {
+        pipeline.prepare(&mut frame)?;
+    }
+    let mut laps = Laps::new(clock);
+    pipeline.average_frame(ENCODING, wanted, &mut frame)?;
+    laps.mark();
+    pipeline.correct(tier, frame.sums, frame.corrections, &mut workspace)?;
+    laps.mark();
+    let clipped = pipeline.finish_frame(ENCODING, wanted, input, &mut frame)?;
+    laps.mark();
+    Ok((laps.instructions(), clipped))
+}
+
+#[entry]
+fn main() -> ! {
+    let (Some(board), Some(memory), Some(input)) =
+        (Chosen::take(), Memory::take(), INPUT.try_take())
+    else {
+        fault::restart();
+    };
+    let words = psram::self_test_words().load(0);
+    let size = FrameSize::new(words as u16, (words >> 16) as u16);
+    let (Ok(table), Some(size)) = (Table::check(image(board.flash.slot(0))), size) else {
+        hprintln!("no table or no frame");
+        debug::exit(debug::EXIT_FAILURE);
+        fault::restart();
+    };
+    let bytes = size.pixels() * usize::from(table.channels());
+    let wanted = psram::outside_pixels(0..bytes);
+    let input = &mut input[..bytes];
+    for tier in 0..=table.top_tier() {
+        let pixels = (wanted, &mut *input);
+        let alike = size == FrameSize::of_grid(table.grid());
+        let counted = match (table.channels(), alike) {
+            (1, true) => grid::<1>(&table, tier, pixels, memory, &board.clock),
+            (_, true) => grid::<3>(&table, tier, pixels, memory, &board.clock),
+            (1, false) => full::<1>(&table, (tier, size), pixels, memory, &board.clock),
+            (_, false) => full::<3>(&table, (tier, size), pixels, memory, &board.clock),
+        };
+        match counted {
+            Ok(([first, second, third, whole], clipped)) => {
+                hprintln!(
+                    "{} {} {} {} {} {}",
+                    tier,
+                    first,
+                    second,
+                    third,
+                    whole,
+                    clipped
+                );
+            }
+            Err(_) => hprintln!("tier {} cannot be counted", tier),
+        }
+    }
+    debug::exit(debug::EXIT_SUCCESS);
+    fault::restart();
+}

@@ -1,0 +1,230 @@
+//! What frames take on the reference board, in instructions.
+//!
+//! Counted by the firmware's `bench` in the emulator; the same binary, table and
+//! frame give the same count every time. `docs/firmware.md` shows the result,
+//! `docs/instructions.csv` holds it, and a test compares the two.
+
+mod made_up;
+
+use crate::firmware::{elf, order};
+use iltm::capture::{CaptureOptions, Response};
+use iltm::compile::content::natural_images;
+use iltm::compile::{CompileOptions, compile};
+use iltm::device::emulator::Board;
+use iltm::device::memory::Memory;
+use iltm::learn::learn;
+use iltm::progress::Silent;
+use iltm::solve::{ChannelInverse, SolveOptions};
+use iltm_runtime::exchange::psram;
+use iltm_runtime::image::Table;
+use iltm_runtime::{FrameSize, Grid};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+/// A table and frames to count.
+pub struct Case {
+    /// Its name in the lists.
+    pub name: &'static str,
+    /// Where the table comes from.
+    pub source: &'static str,
+    image: Vec<u8>,
+    size: FrameSize,
+}
+
+/// What one tier takes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Count {
+    /// The case's name.
+    pub case: String,
+    /// The tier.
+    pub tier: u8,
+    /// Predicted error of what the tier leaves out; `None` for a made-up operator.
+    pub error: Option<f64>,
+    /// Operator entries a row, all parts together.
+    pub entries: f64,
+    /// Instructions of the three stages.
+    pub stages: [u64; 3],
+    /// Instructions of the whole frame.
+    pub frame: u64,
+    /// Samples clipped.
+    pub clipped: u64,
+}
+
+/// The tables and frames of the list.
+///
+/// # Panics
+/// If one cannot be made: then whoever asked for them has failed.
+#[must_use]
+pub fn cases() -> Vec<Case> {
+    let grid = |rows, cols| Grid::new(rows, cols).expect("a small grid");
+    let sample = |name: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/samples");
+        let options = (CaptureOptions::default(), SolveOptions::default());
+        let learned = learn(&path.join(name), &options.0, &options.1, None, &Silent);
+        learned.expect("the sample is good")
+    };
+    let compiled = |inverse: &_, targets: &[f64]| {
+        let options = CompileOptions {
+            projector: Response::Srgb,
+            targets: Some(targets.to_vec()),
+            ..CompileOptions::default()
+        };
+        let compiled = compile(inverse, None, &options);
+        compiled.expect("a plain scene").image
+    };
+    // The grey sample's scene in three colours: as it is, and with less light.
+    let mut panels = sample("m-panels").inverse;
+    let grey = panels.channels.remove(0);
+    panels
+        .channels
+        .extend([1.0, 0.9, 0.7].map(|light| ChannelInverse {
+            gain: grey.gain.iter().map(|gain| gain / light).collect(),
+            scale: grey.scale / light,
+            ..grey.clone()
+        }));
+    let colour = sample("m-panels-colour").compiled.image;
+    let mut wedge = crate::wedge(grid(32, 32), 1);
+    wedge.channels[0].deviation = None;
+    let targets = [1.0 / 64.0, 1.0 / 255.0, 1.0 / 750.0];
+    let lit = compiled(&wedge, &targets);
+    wedge.channels[0].ambient.fill(0.0);
+    let dark = compiled(&wedge, &targets);
+    let shape = Table::check(&dark).expect("compile checked it");
+    let made_up = |rows, cols, entries| made_up::table(grid(rows, cols), 3, entries, &shape);
+    let case = |name, source, image: Vec<u8>, size: Option<(u16, u16)>| {
+        let own = FrameSize::of_grid(Table::check(&image).expect("a table").grid());
+        let size = size.and_then(|(width, height)| FrameSize::new(width, height));
+        Case {
+            name,
+            source,
+            size: size.unwrap_or(own),
+            image,
+        }
+    };
+    vec![
+        case("32x32 dark room", "wedge", dark.clone(), None),
+        case("32x32", "wedge", lit, None),
+        case(
+            "13x21 colour",
+            "sample m-panels, in three colours",
+            compiled(&panels, &[1.0 / 64.0, 1.0 / 255.0]),
+            None,
+        ),
+        case(
+            "16x24 colour",
+            "sample m-panels-colour: the demo",
+            colour,
+            None,
+        ),
+        case("64x64 colour", "made up", made_up(64, 64, 8.0), None),
+        case("96x128 colour", "made up", made_up(96, 128, 3.0), None),
+        case(
+            "320x240 over 48x64 colour",
+            "made up",
+            made_up(48, 64, 8.0),
+            Some((320, 240)),
+        ),
+    ]
+}
+
+/// A natural-looking frame of a size, sRGB codes.
+fn frame(size: FrameSize, channels: usize) -> Vec<u8> {
+    // Content comes for grids; a larger frame repeats each of its cells.
+    let factor = if size.pixels() > Grid::MAX_CELLS {
+        2
+    } else {
+        1
+    };
+    let (rows, cols) = (size.height() / factor, size.width() / factor);
+    let grid = Grid::new(rows as u16, cols as u16).expect("within a grid's limits");
+    let images = natural_images(grid);
+    let code = |light: f64| (Response::Srgb.value(light) * 255.0).round() as u8;
+    let mut frame = Vec::new();
+    for y in 0..size.height() {
+        for x in 0..size.width() {
+            let cell = y / factor * cols + x / factor;
+            frame.extend((0..channels).map(|channel| code(images[(cell, channel)])));
+        }
+    }
+    frame
+}
+
+/// Counts all tiers of a case.
+///
+/// # Panics
+/// If the bench cannot be built or run.
+#[must_use]
+pub fn count(case: &Case) -> Vec<Count> {
+    let table = Table::check(&case.image).expect("a table");
+    let channels = usize::from(table.channels());
+    let memory = Memory::temporary().expect("a temporary file");
+    memory.write(&psram::SLOT_A, &case.image).expect("room");
+    let wanted = frame(case.size, channels);
+    let frames = psram::FRAMES.start..psram::FRAMES.start + wanted.len();
+    memory.write(&frames, &wanted).expect("room");
+    let size = case.size.width() as u32 | (case.size.height() as u32) << 16;
+    order(&memory, 0, size);
+    let output = Command::new("qemu-system-arm")
+        .arg("-machine")
+        .arg(format!("{},memory-backend=psram", Board::An500))
+        .arg("-object")
+        .arg(format!(
+            "memory-backend-file,id=psram,size={},mem-path={},share=on",
+            psram::SIZE,
+            memory.path().display()
+        ))
+        .args(["-icount", "shift=0,sleep=off", "-display", "none"])
+        .args(["-monitor", "none", "-serial", "null"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .arg("-kernel")
+        .arg(elf(Board::An500, "bench"))
+        .output()
+        .expect("qemu-system-arm is installed: tests/run.sh does it");
+    // What semihosting prints goes to the emulator's standard error.
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(output.status.success(), "{}: {said}", case.name);
+    let cells = table.grid().cells() as f64;
+    let read = |line: &str| {
+        let numbers: Vec<u64> = line
+            .split(' ')
+            .map_while(|field| field.parse().ok())
+            .collect();
+        let &[tier, first, second, third, frame, clipped] = numbers.as_slice() else {
+            panic!("{}: {said}", case.name);
+        };
+        let info = &table.tiers()[tier as usize];
+        let error: f64 = info.predicted_error.to_num();
+        Count {
+            case: case.name.to_owned(),
+            tier: tier as u8,
+            error: (error > 0.0).then_some(error),
+            entries: f64::from(info.entries) / cells,
+            stages: [first, second, third],
+            frame,
+            clipped,
+        }
+    };
+    said.lines().map(read).collect()
+}
+
+/// The list as `docs/instructions.csv` holds it.
+#[must_use]
+pub fn csv(counts: &[Count]) -> String {
+    let mut text =
+        String::from("case,tier,error,entries a row,first,operator,last,frame,clipped\n");
+    for count in counts {
+        let [first, operator, last] = count.stages;
+        let error = count
+            .error
+            .map_or_else(String::new, |error| format!("1/{:.0}", 1.0 / error));
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{},{},{error},{:.1},{first},{operator},{last},{},{}",
+            count.case, count.tier, count.entries, count.frame, count.clipped
+        );
+    }
+    text
+}
