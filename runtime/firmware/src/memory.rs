@@ -37,7 +37,7 @@ pub struct Memory {
     prepared: Option<(u32, FrameSize)>,
 }
 
-/// Its name is how `size.sh` finds it.
+/// Its name is how the tests find its size.
 #[unsafe(no_mangle)]
 static FRAME_WORKSPACE: ConstStaticCell<Memory> = ConstStaticCell::new(Memory {
     buffers: [[0; MAX_CELLS / 2 + 1]; 2],
