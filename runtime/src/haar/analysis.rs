@@ -106,7 +106,7 @@ fn merge<'c, T: Coefficient>(
         nodes: level.merged_cols(),
         rows: level.merged_rows(),
     };
-    if level.is_plain() && merge_block(all, level.shifts(0, 0), values, to, details) {
+    if level.is_plain() && merge_block(all, *level.shifts(0, 0), values, to, details) {
         return details.get_mut(level.details()..).unwrap_or_default();
     }
     let mut details = details;
@@ -128,8 +128,8 @@ fn merge<'c, T: Coefficient>(
                 nodes: plain,
                 rows: 1,
             };
-            if !merge_block(block, shifts, values, sums, own) {
-                merge_plain(shifts, (top, bottom), sums, own);
+            if !merge_block(block, *shifts, values, sums, own) {
+                merge_plain(*shifts, (top, bottom), sums, own);
             }
         }
         for (col, sum) in sums.iter_mut().enumerate().skip(plain) {
@@ -147,15 +147,15 @@ fn merge<'c, T: Coefficient>(
                 if let Some(row) = row {
                     let second = row.at(at);
                     *sum = first.wrapping_add(second);
-                    let detail = T::narrow(first.wrapping_sub(second), shift);
+                    let detail = T::narrow(first.wrapping_sub(second), shift.into());
                     details = put_first(details, detail);
                 }
                 continue;
             }
-            let node = merge_weighted((pair, cols), shifts, (top, bottom), col);
+            let node = merge_weighted((*pair, *cols), *shifts, (top, bottom), col);
             *sum = node.sum;
             for (value, shift) in node.details.into_iter().flatten() {
-                details = put_first(details, T::wide(value, shift));
+                details = put_first(details, T::wide(value, shift.into()));
             }
         }
     }
@@ -175,7 +175,9 @@ fn merge_block<T: Coefficient>(
     let alike = shifts.columns == shifts.both && shifts.rows == shifts.both;
     let details = details.as_chunks_mut::<3>().0.get_mut(..count);
     match (details.and_then(T::inputs), sums.get_mut(..count)) {
-        (Some(inputs), Some(sums)) if alike => values.merge(block, shifts.both, sums, inputs),
+        (Some(inputs), Some(sums)) if alike => {
+            values.merge(block, shifts.both.into(), sums, inputs)
+        }
         _ => false,
     }
 }
@@ -208,10 +210,13 @@ fn merge_plain<R: Row, T: Coefficient>(
         *slots = [
             T::narrow(
                 top_difference.wrapping_add(bottom_difference),
-                shifts.columns,
+                shifts.columns.into(),
             ),
-            T::narrow(top_sum.wrapping_sub(bottom_sum), shifts.rows),
-            T::narrow(top_difference.wrapping_sub(bottom_difference), shifts.both),
+            T::narrow(top_sum.wrapping_sub(bottom_sum), shifts.rows.into()),
+            T::narrow(
+                top_difference.wrapping_sub(bottom_difference),
+                shifts.both.into(),
+            ),
         ];
     }
 }
@@ -219,7 +224,7 @@ fn merge_plain<R: Row, T: Coefficient>(
 /// A merged node: its sum, and its details with their shifts.
 struct Merged {
     sum: i32,
-    details: [Option<(i64, u32)>; 3],
+    details: [Option<(i64, u8)>; 3],
 }
 
 /// Any node.

@@ -143,17 +143,17 @@ const fn both_mass(rows: Pair, cols: Pair) -> u64 {
 /// Input shifts of the details of one node: columns, rows, both.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct NodeShifts {
-    pub(crate) columns: u32,
-    pub(crate) rows: u32,
-    pub(crate) both: u32,
+    pub(crate) columns: u8,
+    pub(crate) rows: u8,
+    pub(crate) both: u8,
 }
 
 impl NodeShifts {
     pub(crate) const fn new(rows: Pair, cols: Pair) -> Self {
         Self {
-            columns: input_shift(columns_mass(rows, cols)),
-            rows: input_shift(columns_mass(cols, rows)),
-            both: input_shift(both_mass(rows, cols)),
+            columns: input_shift(columns_mass(rows, cols)) as u8,
+            rows: input_shift(columns_mass(cols, rows)) as u8,
+            both: input_shift(both_mass(rows, cols)) as u8,
         }
     }
 }
@@ -292,7 +292,7 @@ impl Iterator for Functions<'_> {
             let Some(level) = self.basis.levels.get(self.level) else {
                 return self.constant();
             };
-            let (rows, cols) = (level.row_pair(self.row), level.col_pair(self.col));
+            let (rows, cols) = (*level.row_pair(self.row), *level.col_pair(self.col));
             let (exists, split) = match self.split {
                 0 => (cols.splits(), Split::Columns),
                 1 => (rows.splits(), Split::Rows),

@@ -137,11 +137,11 @@ impl Level {
     }
 
     pub(crate) fn merged_rows(&self) -> usize {
-        self.rows.merged().nodes
+        self.rows.nodes.div_ceil(2)
     }
 
     pub(crate) fn merged_cols(&self) -> usize {
-        self.cols.merged().nodes
+        self.cols.nodes.div_ceil(2)
     }
 
     /// Values before the merge.
@@ -159,8 +159,9 @@ impl Level {
         self.nodes() - self.merged_nodes()
     }
 
-    pub(crate) fn row_pair(&self, merged_row: usize) -> Pair {
-        let [inner, last] = self.row_pairs;
+    #[inline]
+    pub(crate) fn row_pair(&self, merged_row: usize) -> &Pair {
+        let [inner, last] = &self.row_pairs;
         if merged_row + 1 == self.merged_rows() {
             last
         } else {
@@ -168,8 +169,9 @@ impl Level {
         }
     }
 
-    pub(crate) fn col_pair(&self, merged_col: usize) -> Pair {
-        let [inner, last] = self.col_pairs;
+    #[inline]
+    pub(crate) fn col_pair(&self, merged_col: usize) -> &Pair {
+        let [inner, last] = &self.col_pairs;
         if merged_col + 1 == self.merged_cols() {
             last
         } else {
@@ -177,8 +179,9 @@ impl Level {
         }
     }
 
-    pub(crate) fn shifts(&self, merged_row: usize, merged_col: usize) -> NodeShifts {
-        let [inner, last] = self.shifts;
+    #[inline]
+    pub(crate) fn shifts(&self, merged_row: usize, merged_col: usize) -> &NodeShifts {
+        let [inner, last] = &self.shifts;
         let [inner, last] = if merged_row + 1 == self.merged_rows() {
             last
         } else {

@@ -122,7 +122,7 @@ fn split<T: Copy + Default, R: Rule<T>>(
                 } else {
                     (cols, None)
                 };
-                let [first, second] = R::halves(*value, take(along.splits()), along);
+                let [first, second] = R::halves(*value, take(along.splits()), *along);
                 if let Some(slot) = place {
                     *slot = second;
                 } else if let (true, Some(slot)) = (along.splits(), top.get_mut(2 * col + 1)) {
@@ -136,8 +136,8 @@ fn split<T: Copy + Default, R: Rule<T>>(
             let columns = take(cols.splits());
             let rows = take(pair.splits());
             let both = take(cols.splits() && pair.splits());
-            let quarters = R::weighted(*value, columns, rows, both, (pair, cols));
-            store(quarters, (&mut *top, &mut *bottom), col, cols);
+            let quarters = R::weighted(*value, columns, rows, both, (*pair, *cols));
+            store(quarters, (&mut *top, &mut *bottom), col, *cols);
         }
     }
 }
