@@ -6,7 +6,7 @@
 
 mod made_up;
 
-use crate::firmware::{elf, order};
+use crate::firmware::{counted, elf, order};
 use iltm::capture::{CaptureOptions, Response};
 use iltm::compile::content::natural_images;
 use iltm::compile::{CompileOptions, compile};
@@ -20,14 +20,12 @@ use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
+use std::process::Stdio;
 
 /// A table and frames to count.
 pub struct Case {
     /// Its name in the lists.
     pub name: &'static str,
-    /// Where the table comes from.
-    pub source: &'static str,
     image: Vec<u8>,
     size: FrameSize,
 }
@@ -92,36 +90,28 @@ pub fn cases() -> Vec<Case> {
     let dark = compiled(&wedge, &targets);
     let shape = Table::check(&dark).expect("compile checked it");
     let made_up = |rows, cols, entries| made_up::table(grid(rows, cols), 3, entries, &shape);
-    let case = |name, source, image: Vec<u8>, size: Option<(u16, u16)>| {
+    let case = |name, image: Vec<u8>, size: Option<(u16, u16)>| {
         let own = FrameSize::of_grid(Table::check(&image).expect("a table").grid());
         let size = size.and_then(|(width, height)| FrameSize::new(width, height));
         Case {
             name,
-            source,
             size: size.unwrap_or(own),
             image,
         }
     };
     vec![
-        case("32x32 dark room", "wedge", dark.clone(), None),
-        case("32x32", "wedge", lit, None),
+        case("32x32 dark room", dark.clone(), None),
+        case("32x32", lit, None),
         case(
             "13x21 colour",
-            "sample m-panels, in three colours",
             compiled(&panels, &[1.0 / 64.0, 1.0 / 255.0]),
             None,
         ),
-        case(
-            "16x24 colour",
-            "sample m-panels-colour: the demo",
-            colour,
-            None,
-        ),
-        case("64x64 colour", "made up", made_up(64, 64, 8.0), None),
-        case("96x128 colour", "made up", made_up(96, 128, 3.0), None),
+        case("16x24 colour", colour, None),
+        case("64x64 colour", made_up(64, 64, 8.0), None),
+        case("96x128 colour", made_up(96, 128, 3.0), None),
         case(
             "320x240 over 48x64 colour",
-            "made up",
             made_up(48, 64, 8.0),
             Some((320, 240)),
         ),
@@ -165,22 +155,9 @@ pub fn count(case: &Case) -> Vec<Count> {
     memory.write(&frames, &wanted).expect("room");
     let size = case.size.width() as u32 | (case.size.height() as u32) << 16;
     order(&memory, 0, size);
-    let output = Command::new("qemu-system-arm")
-        .arg("-machine")
-        .arg(format!("{},memory-backend=psram", Board::An500))
-        .arg("-object")
-        .arg(format!(
-            "memory-backend-file,id=psram,size={},mem-path={},share=on",
-            psram::SIZE,
-            memory.path().display()
-        ))
-        .args(["-icount", "shift=0,sleep=off", "-display", "none"])
-        .args(["-monitor", "none", "-serial", "null"])
-        .args(["-semihosting-config", "enable=on,target=native"])
-        .arg("-kernel")
-        .arg(elf(Board::An500, "bench"))
-        .output()
-        .expect("qemu-system-arm is installed: tests/run.sh does it");
+    let mut qemu = counted(Board::An500, &elf(Board::An500, "bench"), &memory, "null");
+    let output = qemu.stdout(Stdio::piped()).output();
+    let output = output.expect("qemu-system-arm is installed: tests/run.sh does it");
     // What semihosting prints goes to the emulator's standard error.
     let said = [output.stdout, output.stderr].concat();
     let said = String::from_utf8_lossy(&said).into_owned();

@@ -46,6 +46,9 @@ fn every_frame_equals_the_hosts(board: Board) {
         (8, 7, 3, without(|effects| effects.response = false)),
         (6, 10, 3, without(|effects| effects.deviation = false)),
         (9, 5, 3, without(|effects| effects.fine = false)),
+        // Even all the way, so that whole levels are done at once.
+        (16, 8, 3, Effects::ALL),
+        (8, 16, 3, without(|effects| effects.ambient = false)),
         (10, 6, 1, without(|effects| effects.operator = false)),
     ];
     let mut frames = 0;
@@ -495,7 +498,9 @@ fn governed(board: Board) -> Vec<u32> {
     order(&memory, word::SLOW_BY, 7_000);
     order(&memory, word::SLOW_BY_TIER, 2_500);
     let mut qemu = counted(board, &elf(board, "selftest"), &memory, "null");
-    let status = qemu.wait().expect("it ends by itself");
+    let status = qemu
+        .status()
+        .expect("qemu-system-arm is installed: tests/run.sh does it");
     assert!(status.success(), "{status}");
     (0..256).map(|word| finding(&memory, word)).collect()
 }
@@ -564,7 +569,9 @@ fn a_million_bytes_of_garbage_on_the_line_disturb_no_frame() {
     let path = folder.path().join("line");
     let serial = format!("unix:{},server=on,wait=off", path.display());
     let board = Board::An500;
-    let mut qemu = counted(board, &elf(board, "selftest"), &memory, &serial);
+    let mut qemu = counted(board, &elf(board, "selftest"), &memory, &serial)
+        .spawn()
+        .expect("qemu-system-arm is installed: tests/run.sh does it");
     let result = std::panic::catch_unwind(|| {
         let mut line = Socket::connect(&path);
         let start = Instant::now();

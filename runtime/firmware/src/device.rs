@@ -368,6 +368,11 @@ impl<B: Board, R: Rehearsal> Device<B, R> {
         if self.session.is_subscribed() && self.session.pending().is_empty() {
             let mut frames = [0; MAX_PAYLOAD];
             let used = logger::take(&mut frames);
+            // There is room for this one now.
+            let dropped = logger::take_dropped();
+            if dropped > 0 {
+                defmt::warn!("{=u32} log messages found no room", dropped);
+            }
             if used > 0 {
                 self.session.log(frames.get(..used).unwrap_or_default());
             }

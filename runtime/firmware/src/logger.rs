@@ -32,9 +32,9 @@ pub fn set_time(milliseconds: u64) {
     MILLISECONDS.store(milliseconds as u32, Ordering::Relaxed);
 }
 
-/// Frames that were dropped.
-pub fn dropped() -> u32 {
-    DROPPED.load(Ordering::Relaxed)
+/// Frames that were dropped since this was asked last.
+pub fn take_dropped() -> u32 {
+    DROPPED.swap(0, Ordering::Relaxed)
 }
 
 /// Moves whole frames into `bytes`, one behind the other, and returns how many

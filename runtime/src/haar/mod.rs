@@ -51,6 +51,20 @@ pub struct ShortSlice {
     pub given: usize,
 }
 
+impl ShortSlice {
+    /// An error if fewer elements are given than needed.
+    pub(crate) const fn check(what: &'static str, needed: usize, given: usize) -> Result<(), Self> {
+        if given < needed {
+            return Err(Self {
+                what,
+                needed,
+                given,
+            });
+        }
+        Ok(())
+    }
+}
+
 impl core::fmt::Display for ShortSlice {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(

@@ -58,7 +58,7 @@ impl Bounds {
                 }
                 accumulator = accumulator.max(sum);
                 match cursor.channels {
-                    Channels::All => shared = coefficient,
+                    Channels::All => shared += coefficient,
                     Channels::One(_) => widest = coefficient.max(widest),
                 }
             }

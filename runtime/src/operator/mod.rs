@@ -97,15 +97,6 @@ impl<'a> Operator<'a> {
         &self.segments
     }
 
-    /// Scale of a channel; zero for a channel there cannot be.
-    #[must_use]
-    pub fn channel_scale(&self, channel: usize) -> U1F15 {
-        self.channel_scales
-            .get(channel)
-            .copied()
-            .unwrap_or(U1F15::ZERO)
-    }
-
     /// Entries that a frame of `tier` reads, and multiplications by them that it
     /// does in a table of `channels` channels: those by the zero in a pair count.
     #[must_use]

@@ -173,13 +173,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
             return Err(FrameError::NoSuchTier { tier, top });
         }
         for (what, given) in [("sums", sums.len()), ("corrections", corrections.len())] {
-            if given < needed {
-                return Err(FrameError::Short(ShortSlice {
-                    what,
-                    needed,
-                    given,
-                }));
-            }
+            ShortSlice::check(what, needed, given)?;
         }
         for (value, sum) in corrections.iter_mut().zip(sums).take(needed) {
             *value = i32::from(self.average.mean(*sum).to_bits());

@@ -127,14 +127,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
 
     fn check(self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
         let needed = self.table.grid().cells();
-        if given < needed {
-            return Err(ShortSlice {
-                what,
-                needed,
-                given,
-            });
-        }
-        Ok(())
+        ShortSlice::check(what, needed, given)
     }
 
     fn pixels<'f, S: Sample>(

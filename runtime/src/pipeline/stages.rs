@@ -88,13 +88,7 @@ impl Workspace<'_> {
             ("inputs", values, self.inputs.len()),
             ("sums", values, self.sums.len()),
         ] {
-            if given < needed {
-                return Err(ShortSlice {
-                    what,
-                    needed,
-                    given,
-                });
-            }
+            ShortSlice::check(what, needed, given)?;
         }
         Ok(())
     }

@@ -52,13 +52,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
             ("spread", width, memory.row.spread.len()),
             ("values", width, memory.values.len()),
         ] {
-            if given < needed {
-                return Err(ShortSlice {
-                    what,
-                    needed,
-                    given,
-                });
-            }
+            ShortSlice::check(what, needed, given)?;
         }
         Ok(())
     }
@@ -175,14 +169,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
 
     fn check_pixels(&self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
         let needed = self.frame().pixels();
-        if given < needed {
-            return Err(ShortSlice {
-                what,
-                needed,
-                given,
-            });
-        }
-        Ok(())
+        ShortSlice::check(what, needed, given)
     }
 
     /// One channel of the pixels from row `y` on.
