@@ -22,6 +22,8 @@
 //! | [`exchange`] | frame buffers shared with the hardware that fills and shows them |
 //! | [`governor`] | the tier that fits the frame budget |
 //! | [`link`] | the serial line: frames, channels, messages |
+//! | [`trust`] | who signed a table, and whether it may run here |
+//! | [`store`] | two slots in NOR flash: updates that may be cut anywhere |
 //! | [`ring`] | bytes between an interrupt and the loop |
 #![no_std]
 #![warn(
@@ -43,10 +45,14 @@
     )
 )]
 
+#[cfg(any(test, feature = "fault-tools"))]
+extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
 pub mod exchange;
+#[cfg(feature = "fault-tools")]
+pub mod fault;
 mod frame;
 pub mod governor;
 mod grid;
@@ -58,6 +64,8 @@ pub mod operator;
 pub mod pipeline;
 pub mod resample;
 pub mod ring;
+pub mod store;
+pub mod trust;
 pub mod units;
 
 pub use frame::FrameSize;

@@ -1,0 +1,1 @@
+//! Two table slots in NOR flash.

@@ -1,0 +1,1 @@
+//! Who signed a table, and whether it may run here.
