@@ -45,7 +45,7 @@
     )
 )]
 
-#[cfg(any(test, feature = "fault-tools"))]
+#[cfg(feature = "fault-tools")]
 extern crate alloc;
 #[cfg(test)]
 extern crate std;

@@ -4,7 +4,8 @@
 use iltm::device::Line;
 use iltm_runtime::link::{
     Clipping, DELIMITER, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode,
-    Name, PROTOCOL_VERSION, SerialCounts, Session, SlotState, Stack, Status, TableName, Version,
+    Name, PROTOCOL_VERSION, Refusal, Request, Response, SerialCounts, Session, SlotState, Stack,
+    Status, TableName, Version,
 };
 use std::io::{self, Read, Write};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -96,6 +97,14 @@ impl FakeDevice {
 }
 
 impl Device for FakeDevice {
+    fn identity(&self) -> Hello {
+        Self::identity(self)
+    }
+
+    fn carry_out(&mut self, _: Request<'_>, _: u64) -> Response {
+        Response::Refused(Refusal::ReadOnly)
+    }
+
     fn status(&self) -> Status {
         let mut status = self.status.clone();
         status.uptime_ms = self.uptime_ms;
@@ -160,7 +169,7 @@ impl FakeLine {
     #[must_use]
     pub fn new(device: FakeDevice, harm: Harm, seed: u64) -> Self {
         Self {
-            session: Session::new(device.identity()),
+            session: Session::new(),
             device,
             harm,
             random: fastrand::Rng::with_seed(seed),
@@ -203,7 +212,8 @@ impl Line for FakeLine {
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         for frame in bytes.split_inclusive(|byte| *byte == DELIMITER) {
             let frame = self.harm.to(frame, &mut self.random);
-            self.session.receive(&frame, self.now(), &self.device);
+            let now = self.now();
+            self.session.receive(&frame, now, &mut self.device);
         }
         self.pump();
         Ok(())
@@ -286,7 +296,7 @@ impl Drop for FakePort {
 /// The firmware's loop, as it were.
 #[cfg(unix)]
 fn run(line: &mut (impl Read + Write), mut device: FakeDevice, orders: &Receiver<Order>) {
-    let mut session = Session::new(device.identity());
+    let mut session = Session::new();
     let mut started = Instant::now();
     let mut bytes = [0; 256];
     loop {
@@ -294,14 +304,14 @@ fn run(line: &mut (impl Read + Write), mut device: FakeDevice, orders: &Receiver
         let now = device.uptime_ms;
         // Nothing to read is an error here, and nothing to do.
         let count = line.read(&mut bytes).unwrap_or(0);
-        session.receive(&bytes[..count], now, &device);
+        session.receive(&bytes[..count], now, &mut device);
         session.poll(now, &device);
         for order in orders.try_iter() {
             match order {
                 Order::Event(event) => session.event(&event),
                 Order::Log(bytes) => session.log(&bytes),
                 Order::Restart => {
-                    session = Session::new(device.identity());
+                    session = Session::new();
                     started = Instant::now();
                 }
                 Order::Noise(bytes) => {

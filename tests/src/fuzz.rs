@@ -111,20 +111,20 @@ pub const SUBSCRIBE: [u8; 12] = [
 /// If the device does not answer a hello after them, or says something that is no
 /// frame.
 pub fn link(bytes: &[u8]) {
-    let device = FakeDevice::default();
-    let mut session = Session::new(device.identity());
+    let mut device = FakeDevice::default();
+    let mut session = Session::new();
     // The first byte of each piece says how long to wait before the rest.
     let (mut now, mut decoder) = (0, Decoder::new());
     for piece in bytes.chunks(64) {
         now += u64::from(piece[0]) * 16;
-        session.receive(piece, now, &device);
+        session.receive(piece, now, &mut device);
         session.poll(now, &device);
         session.log(piece);
         say(&mut session, &mut decoder);
     }
-    session.receive(&[DELIMITER], now, &device);
+    session.receive(&[DELIMITER], now, &mut device);
     say(&mut session, &mut decoder);
-    session.receive(&HELLO, now, &device);
+    session.receive(&HELLO, now, &mut device);
     assert!(!session.pending().is_empty(), "a hello is answered");
     say(&mut session, &mut decoder);
 

@@ -9,10 +9,9 @@ use iltm::device::{Client, Incoming, Line, Patience, Port};
 use iltm_runtime::exchange::layout::descriptor;
 use iltm_runtime::exchange::{ControlWords, Format, Layout, psram};
 use iltm_runtime::image::{Table, crc32};
-use iltm_runtime::link::{
-    Event, Fault, FaultyFrame, Mode, PassThrough, SlotState, Status, TableFault,
-};
+use iltm_runtime::link::{Event, Fault, FaultyFrame, Mode, PassThrough, SlotState, Status};
 use iltm_runtime::pipeline::Encoding;
+use iltm_runtime::trust::Rejected;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::firmware::{
     Effects, PATIENCE, counted, elf, finding, on_host, order, random_frame, random_table, through,
@@ -208,10 +207,10 @@ fn a_device_without_a_usable_table_passes_frames_through_and_says_why() {
     let middle = corrupted.len() / 2;
     corrupted[middle] ^= 0x10;
     let status = passes_through(&corrupted, PassThrough::BrokenTable);
-    broken(&status, TableFault::Checksum);
+    broken(&status, Rejected::Damaged);
     // Behind half an image, the slot is zeros.
     let status = passes_through(&image[..middle], PassThrough::BrokenTable);
-    broken(&status, TableFault::Checksum);
+    broken(&status, Rejected::Damaged);
 
     let grey = random_table(Grid::new(6, 8).expect("small"), 1, Effects::ALL, 3);
     passes_through(&grey, PassThrough::OtherFrames);

@@ -4,8 +4,9 @@
 use iltm::device::{Client, DeviceError, Incoming, Patience};
 use iltm_runtime::link::{
     Channel, Decoder, Event, Fault, FaultyFrame, Frame, MAX_ENCODED, MAX_PAYLOAD, Refusal, Request,
-    Response, SlotState, TableFault, TierReason, encode,
+    Response, SlotState, TierReason, encode,
 };
+use iltm_runtime::trust::Rejected;
 use iltm_tests::fake_device::{FakeDevice, FakeLine, Harm};
 use iltm_tests::fuzz;
 use std::collections::BTreeMap;
@@ -133,7 +134,7 @@ fn examples() -> BTreeMap<&'static str, (Vec<u8>, Vec<u8>)> {
     let mut faulty = status.clone();
     faulty.last_fault = Some(Fault::Table {
         slot: 1,
-        cause: TableFault::Checksum,
+        cause: Rejected::Damaged,
     });
     let mut examples = BTreeMap::new();
     let mut add = |name, channel, sequence, payload: &[u8]| {
@@ -155,7 +156,7 @@ fn examples() -> BTreeMap<&'static str, (Vec<u8>, Vec<u8>)> {
         let length = message(&mut bytes);
         bytes[..length].to_vec()
     };
-    let request = |request: Request| {
+    let request = |request: Request<'static>| {
         move |bytes: &mut [u8]| postcard::to_slice(&request, bytes).expect("short").len()
     };
     let response = |response: Response| {
@@ -273,12 +274,16 @@ fn the_fuzz_target_says_what_it_thinks_it_says() {
     for byte in [&fuzz::HELLO[..], &fuzz::SUBSCRIBE].concat() {
         if let Some(frame) = decoder.push(byte) {
             let frame = frame.expect("whole");
-            requests.push((frame.sequence, Request::parse(frame.payload)));
+            requests.push((frame.sequence, frame.payload.to_vec()));
         }
     }
     let expected = [
         (7, Ok(Request::Hello { protocol: 1 })),
         (8, Ok(Request::Subscribe { period_ms: 500 })),
     ];
+    let requests = requests.iter();
+    let requests: Vec<_> = requests
+        .map(|(sequence, payload)| (*sequence, Request::parse(payload)))
+        .collect();
     assert_eq!(requests, expected);
 }

@@ -4,7 +4,7 @@ use super::args;
 use super::failure::Failure;
 use super::output::Output;
 use crate::device::{Client, DeviceError, Patience, Port};
-use iltm_runtime::link::{Hello, Mode, PassThrough, Status};
+use iltm_runtime::link::{Hello, Mode, PassThrough, Status, TableName};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -41,6 +41,16 @@ pub(super) fn identity(device: &Hello) -> Value {
     })
 }
 
+/// What a table is called, for programs.
+pub(super) fn table_name(table: Option<TableName>) -> Option<Value> {
+    table.map(|table| {
+        json!({
+            "id": format!("{:08x}", table.id),
+            "version": table.version,
+        })
+    })
+}
+
 /// How a device is, for programs.
 pub(super) fn data(status: &Status) -> Value {
     let (mode, reason) = match status.mode {
@@ -57,10 +67,7 @@ pub(super) fn data(status: &Status) -> Value {
         "firmware": status.firmware.to_string(),
         "board": status.board.as_str(),
         "uptime_ms": status.uptime_ms,
-        "table": status.table.map(|table| json!({
-            "id": format!("{:08x}", table.id),
-            "version": table.version,
-        })),
+        "table": table_name(status.table),
         "mode": mode,
         "reason": reason.map(name),
         "tier": status.tier,

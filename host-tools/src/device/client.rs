@@ -128,7 +128,7 @@ impl<L: Line> Client<L> {
     }
 }
 
-const fn unexpected(request: Request, response: &Response) -> DeviceError {
+const fn unexpected(request: Request<'_>, response: &Response) -> DeviceError {
     let request = name(request);
     match response {
         Response::Refused(refusal) => DeviceError::Refused {

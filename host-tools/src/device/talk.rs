@@ -61,7 +61,7 @@ impl<L: Line> Talk<L> {
     }
 
     /// Sends a request until it is answered.
-    pub(super) fn ask(&mut self, request: Request) -> Result<Response, DeviceError> {
+    pub(super) fn ask(&mut self, request: Request<'_>) -> Result<Response, DeviceError> {
         self.sequence = self.sequence.wrapping_add(1);
         let sequence = self.sequence;
         let bytes = encoded(sequence, request);
@@ -149,7 +149,7 @@ const fn gone(source: io::Error) -> DeviceError {
 
 /// A request as it goes on the line: after a delimiter, which ends whatever the
 /// device may have heard before.
-fn encoded(sequence: u16, request: Request) -> Vec<u8> {
+fn encoded(sequence: u16, request: Request<'_>) -> Vec<u8> {
     let mut payload = [0; MAX_PAYLOAD];
     let mut bytes = [DELIMITER; 1 + MAX_ENCODED];
     let payload = postcard::to_slice(&request, &mut payload).expect("a request fits a frame");
@@ -163,10 +163,18 @@ fn encoded(sequence: u16, request: Request) -> Vec<u8> {
 }
 
 /// What a request is called in messages.
-pub(super) const fn name(request: Request) -> &'static str {
+pub(super) const fn name(request: Request<'_>) -> &'static str {
     match request {
         Request::Hello { .. } => "hello",
         Request::Status => "status",
         Request::Subscribe { .. } => "subscribe",
+        Request::Slots => "slots",
+        Request::Sectors { .. } => "sectors",
+        Request::Begin { .. } => "begin",
+        Request::Write { .. } => "write",
+        Request::Activate { .. } => "activate",
+        Request::Confirm { .. } => "confirm",
+        Request::Rollback { .. } => "roll back",
+        Request::Provision { .. } => "provision",
     }
 }

@@ -15,11 +15,13 @@ mod table;
 pub use error::{ImageError, SectionProblem};
 pub use table::{FineGain, Table, TierInfo};
 
+/// CRC-32 (ISO-HDLC), piece by piece.
+pub(crate) static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
 /// CRC-32 as the layout uses it.
 #[must_use]
 pub fn crc32(bytes: &[&[u8]]) -> u32 {
-    const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-    let mut digest = CRC.digest();
+    let mut digest = CRC_32.digest();
     for part in bytes {
         digest.update(part);
     }

@@ -5,7 +5,9 @@
 //! variants and fields is the wire format: do not reorder.** New variants go at
 //! the end; any other change needs a new [`PROTOCOL_VERSION`].
 
-use super::status::{Fault, Name, Status};
+use super::status::{Fault, Name, Status, TableName};
+use super::update::{Digest, InUse, Receiving, Sectors, Slots};
+use crate::trust::Rejected;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +17,7 @@ pub const PROTOCOL_VERSION: u16 = 1;
 
 /// What a host asks. Every request may be repeated without harm.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub enum Request {
+pub enum Request<'a> {
     /// Starts a conversation, and ends what an earlier host had subscribed to.
     /// Answered by [`Response::Hello`].
     Hello {
@@ -30,17 +32,72 @@ pub enum Request {
         /// Milliseconds between two [`Event::Status`]; 0 ends the subscription.
         period_ms: u16,
     },
+    /// Answered by [`Response::Slots`].
+    Slots,
+    /// Asks what is in the slot that the next table would go to, so that only what
+    /// differs is sent. Answered by [`Response::Sectors`].
+    Sectors {
+        /// Bytes of the table: the CRC of its last sector ends with it.
+        length: u32,
+        /// Index of the first sector.
+        first: u32,
+    },
+    /// A table is about to come. Whatever was received of another one is forgotten;
+    /// what was received of this one stays. Answered by [`Response::Receiving`].
+    Begin {
+        /// Bytes of the file, seal included.
+        length: u32,
+        /// Of the file.
+        digest: Digest,
+    },
+    /// A chunk of it. Answered by [`Response::Written`] when the flash holds it.
+    Write {
+        /// [`Digest::transfer`] of the file.
+        transfer: u32,
+        /// Of its first byte: a multiple of [`Receiving::chunk`].
+        offset: u32,
+        /// [`Receiving::chunk`] bytes, or fewer up to the end of the file.
+        #[serde(borrow)]
+        bytes: &'a [u8],
+    },
+    /// Checks what was received and uses it from the next frame on, on trial.
+    /// Answered by [`Response::InUse`].
+    Activate {
+        /// [`Digest::transfer`] of the file.
+        transfer: u32,
+        /// Seconds until the device goes back by itself, if nobody confirms.
+        trial_s: u16,
+    },
+    /// Keeps the table that is on trial. Answered by [`Response::InUse`].
+    Confirm {
+        /// [`TableName::id`] of the table.
+        table: u32,
+    },
+    /// Goes back to the table before: that of the other slot. Answered by
+    /// [`Response::InUse`].
+    Rollback {
+        /// [`TableName::id`] of the table that is to go.
+        table: u32,
+    },
+    /// Gives a new device its key and its number, once and for all. Answered by
+    /// [`Response::Provisioned`].
+    Provision {
+        /// Ed25519 public key.
+        key: [u8; 32],
+        /// The device's number; 0 for none.
+        device: u64,
+    },
 }
 
-impl Request {
+impl<'a> Request<'a> {
     /// Number of variants: what is not below it is of a later version.
-    const VARIANTS: u8 = 3;
+    const VARIANTS: u8 = 11;
 
     /// Reads the payload of a request.
     ///
     /// # Errors
     /// [`Refusal::Unknown`] or [`Refusal::Malformed`].
-    pub fn parse(payload: &[u8]) -> Result<Self, Refusal> {
+    pub fn parse(payload: &'a [u8]) -> Result<Self, Refusal> {
         match postcard::take_from_bytes(payload) {
             Ok((request, [])) => Ok(request),
             _ if payload.first().is_some_and(|kind| *kind >= Self::VARIANTS) => {
@@ -68,6 +125,18 @@ pub enum Response {
     },
     /// The request was not carried out.
     Refused(Refusal),
+    /// What is in the slots.
+    Slots(Slots),
+    /// What is in some sectors.
+    Sectors(Sectors),
+    /// The device is ready for chunks.
+    Receiving(Receiving),
+    /// The flash holds the chunk.
+    Written,
+    /// The table that is in use now.
+    InUse(InUse),
+    /// The device has the key and the number.
+    Provisioned,
 }
 
 /// Why a request is refused.
@@ -80,6 +149,37 @@ pub enum Refusal {
     Unknown,
     /// The request's fields cannot be read.
     Malformed,
+    /// No such transfer has begun since the device started.
+    NoTransfer,
+    /// The table is longer than a slot.
+    TooLong {
+        /// Bytes of a slot.
+        limit: u32,
+    },
+    /// A table is on trial: it must be confirmed or rolled back first.
+    OnTrial,
+    /// A chunk that is not one of the file's.
+    Chunk,
+    /// The flash does not hold what was written to it.
+    Flash {
+        /// Where in the slot.
+        offset: u32,
+    },
+    /// Not everything of the file has come, or not as it is.
+    Incomplete,
+    /// The table must not be used.
+    Table(Rejected),
+    /// Another table is in use than the request is about.
+    NotInUse {
+        /// The one that is.
+        table: Option<TableName>,
+    },
+    /// There is no table to go back to.
+    NoOther,
+    /// The device has another key or number already.
+    HasKey,
+    /// The device cannot be updated.
+    ReadOnly,
 }
 
 impl fmt::Display for Refusal {
@@ -88,6 +188,27 @@ impl fmt::Display for Refusal {
             Self::HelloFirst => "the device has started anew and waits for a hello",
             Self::Unknown => "the device's firmware does not know the request",
             Self::Malformed => "the device cannot read the request",
+            Self::NoTransfer => "the device does not know the transfer",
+            Self::TooLong { limit } => {
+                return write!(f, "the device has room for tables of {limit} bytes");
+            }
+            Self::OnTrial => "another table is on trial",
+            Self::Chunk => "the chunk does not belong to the table",
+            Self::Flash { offset } => {
+                return write!(
+                    f,
+                    "the flash does not hold what is written to byte {offset}"
+                );
+            }
+            Self::Incomplete => "not all of the table has arrived as it is",
+            Self::Table(rejected) => return write!(f, "the table {rejected}"),
+            Self::NotInUse { table: None } => "no table is in use",
+            Self::NotInUse { table: Some(table) } => {
+                return write!(f, "table {table} is in use");
+            }
+            Self::NoOther => "there is no other table",
+            Self::HasKey => "the device has another key or number",
+            Self::ReadOnly => "the device cannot be updated",
         })
     }
 }
@@ -143,6 +264,39 @@ pub enum Event {
     },
     /// Something went wrong.
     Fault(Fault),
+    /// Another table is in use, or the same one for another reason.
+    TableChanged {
+        /// The table; none passes frames through.
+        table: Option<TableName>,
+        /// Why.
+        reason: TableReason,
+        /// Number of the first frame with it.
+        frame: u32,
+    },
+}
+
+/// Why the table in use changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum TableReason {
+    /// It is on trial.
+    Trial,
+    /// It has been confirmed.
+    Confirmed,
+    /// The trial of the other one ended without confirmation.
+    TrialOver,
+    /// A host went back to it.
+    RolledBack,
+}
+
+impl fmt::Display for TableReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Trial => "on trial",
+            Self::Confirmed => "confirmed",
+            Self::TrialOver => "nobody confirmed the other one",
+            Self::RolledBack => "rolled back",
+        })
+    }
 }
 
 /// Why the tier changed.

@@ -23,17 +23,20 @@ mod status;
 mod test_device;
 #[cfg(test)]
 mod tests;
+mod update;
 
 pub use decoder::Decoder;
 pub use frame::{
     Channel, DELIMITER, Frame, FrameError, MAX_ENCODED, MAX_FRAME, MAX_PAYLOAD, encode,
 };
 pub use message::{
-    Event, Hello, Limits, PROTOCOL_VERSION, Refusal, Request, Response, TierReason, Version,
+    Event, Hello, Limits, PROTOCOL_VERSION, Refusal, Request, Response, TableReason, TierReason,
+    Version,
 };
 pub use outbox::Outbox;
 pub use session::{Device, LAPSE_MS, MIN_PERIOD_MS, OUTBOX, Session};
 pub use status::{
     Clipping, Fault, FaultyFrame, FrameCounts, FrameTime, MAX_NAME, Mode, Name, PassThrough,
-    SerialCounts, SlotState, SourceFault, Stack, Status, TableFault, TableName,
+    SerialCounts, SlotState, SourceFault, Stack, Status, TableName,
 };
+pub use update::{Digest, InUse, MAX_SECTORS, Receiving, Sectors, SlotInfo, Slots};

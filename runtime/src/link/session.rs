@@ -25,8 +25,15 @@ pub const OUTBOX: usize = 2 * MAX_ENCODED;
 
 /// What a session asks of the device around it.
 pub trait Device {
+    /// Who it is.
+    fn identity(&self) -> Hello;
+
     /// How it is. The session fills in [`Status::serial`].
     fn status(&self) -> Status;
+
+    /// Does what a request says that is about tables; the session answers hello,
+    /// status and subscribe itself. Repeating it must do no harm.
+    fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response;
 }
 
 /// A conversation with whatever host is at the other end.
@@ -36,8 +43,13 @@ pub trait Device {
 /// Times are milliseconds on any clock that does not run backwards.
 #[derive(Debug)]
 pub struct Session {
-    identity: Hello,
     decoder: Decoder,
+    talk: Talk,
+}
+
+/// All of it but the frame that comes in, which a request may lie in.
+#[derive(Debug)]
+struct Talk {
     outbox: Outbox<OUTBOX>,
     greeted: bool,
     subscription: Option<Subscription>,
@@ -54,52 +66,127 @@ struct Subscription {
     heard: u64,
 }
 
+impl Default for Session {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Session {
-    /// Of a device that has just started and says of itself what `identity` says.
+    /// Of a device that has just started.
     #[must_use]
-    pub const fn new(identity: Hello) -> Self {
+    pub const fn new() -> Self {
         Self {
-            identity,
             decoder: Decoder::new(),
-            outbox: Outbox::new(),
-            greeted: false,
-            subscription: None,
-            events: 0,
-            logs: 0,
+            talk: Talk {
+                outbox: Outbox::new(),
+                greeted: false,
+                subscription: None,
+                events: 0,
+                logs: 0,
+            },
         }
     }
 
     /// Takes bytes from the line and answers the requests that they complete.
-    pub fn receive(&mut self, bytes: &[u8], now_ms: u64, device: &impl Device) {
+    pub fn receive(&mut self, bytes: &[u8], now_ms: u64, device: &mut impl Device) {
+        let Self { decoder, talk } = self;
         for byte in bytes {
-            let Some(Ok(frame)) = self.decoder.push(*byte) else {
+            let bad = decoder.bad();
+            let Some(Ok(frame)) = decoder.push(*byte) else {
                 continue;
             };
             // A host hears nothing on this channel, and says nothing on others.
             if frame.channel != Channel::Request {
                 continue;
             }
-            let (sequence, request) = (frame.sequence, Request::parse(frame.payload));
-            if let Some(subscription) = &mut self.subscription {
+            if let Some(subscription) = &mut talk.subscription {
                 subscription.heard = now_ms;
             }
-            let response = match request {
-                Ok(request) => self.answer(request, now_ms, device),
+            let response = match Request::parse(frame.payload) {
+                Ok(request) => talk.answer(request, now_ms, bad, device),
                 Err(refusal) => Response::Refused(refusal),
             };
-            self.send(Channel::Response, sequence, &response);
+            talk.send(Channel::Response, frame.sequence, &response);
         }
     }
 
-    fn answer(&mut self, request: Request, now_ms: u64, device: &impl Device) -> Response {
+    /// Sends what is due by now. Call it a few times per [`MIN_PERIOD_MS`].
+    pub fn poll(&mut self, now_ms: u64, device: &impl Device) {
+        let Some(subscription) = &mut self.talk.subscription else {
+            return;
+        };
+        if now_ms.saturating_sub(subscription.heard) > u64::from(LAPSE_MS) {
+            self.talk.subscription = None;
+        } else if now_ms >= subscription.due {
+            subscription.due = now_ms.saturating_add(u64::from(subscription.period_ms));
+            let status = self.talk.status(device, self.decoder.bad());
+            self.talk.event(&Event::Status(status));
+        }
+    }
+
+    /// Tells a subscribed host of something; nothing happens without one.
+    pub fn event(&mut self, event: &Event) {
+        self.talk.event(event);
+    }
+
+    /// Sends whole defmt frames, at most [`MAX_PAYLOAD`] bytes, to a subscribed
+    /// host; nothing happens without one.
+    pub fn log(&mut self, frames: &[u8]) {
+        if self.is_subscribed() {
+            let sequence = self.talk.logs;
+            self.talk.logs = sequence.wrapping_add(1);
+            self.talk.outbox.push(Frame {
+                channel: Channel::Log,
+                sequence,
+                payload: frames,
+            });
+        }
+    }
+
+    /// Whether a host wants events and logs.
+    #[must_use]
+    pub const fn is_subscribed(&self) -> bool {
+        self.talk.subscription.is_some()
+    }
+
+    /// Bytes for the line, as many as lie side by side; empty if there are none.
+    #[must_use]
+    pub fn pending(&self) -> &[u8] {
+        self.talk.outbox.pending()
+    }
+
+    /// The first `count` bytes of [`pending`](Self::pending) are on the line.
+    pub fn sent(&mut self, count: usize) {
+        self.talk.outbox.sent(count);
+    }
+
+    /// What went wrong on the line so far.
+    #[must_use]
+    pub const fn trouble(&self) -> SerialCounts {
+        SerialCounts {
+            bad: self.decoder.bad(),
+            unsent: self.talk.outbox.refused(),
+        }
+    }
+}
+
+impl Talk {
+    fn answer(
+        &mut self,
+        request: Request<'_>,
+        now_ms: u64,
+        bad: u32,
+        device: &mut impl Device,
+    ) -> Response {
         match request {
             Request::Hello { .. } => {
                 self.greeted = true;
                 self.subscription = None;
-                Response::Hello(self.identity.clone())
+                Response::Hello(device.identity())
             }
             _ if !self.greeted => Response::Refused(Refusal::HelloFirst),
-            Request::Status => Response::Status(self.status(device)),
+            Request::Status => Response::Status(self.status(device, bad)),
             Request::Subscribe { period_ms: 0 } => {
                 self.subscription = None;
                 Response::Subscribed {
@@ -122,75 +209,25 @@ impl Session {
                     lapse_ms: LAPSE_MS,
                 }
             }
+            about_tables => device.carry_out(about_tables, now_ms),
         }
     }
 
-    /// Sends what is due by now. Call it a few times per [`MIN_PERIOD_MS`].
-    pub fn poll(&mut self, now_ms: u64, device: &impl Device) {
-        let Some(subscription) = &mut self.subscription else {
-            return;
-        };
-        if now_ms.saturating_sub(subscription.heard) > u64::from(LAPSE_MS) {
-            self.subscription = None;
-        } else if now_ms >= subscription.due {
-            subscription.due = now_ms.saturating_add(u64::from(subscription.period_ms));
-            let status = self.status(device);
-            self.event(&Event::Status(status));
-        }
-    }
-
-    /// Tells a subscribed host of something; nothing happens without one.
-    pub fn event(&mut self, event: &Event) {
-        if self.is_subscribed() {
+    fn event(&mut self, event: &Event) {
+        if self.subscription.is_some() {
             let sequence = self.events;
             self.events = sequence.wrapping_add(1);
             self.send(Channel::Event, sequence, event);
         }
     }
 
-    /// Sends whole defmt frames, at most [`MAX_PAYLOAD`] bytes, to a subscribed
-    /// host; nothing happens without one.
-    pub fn log(&mut self, frames: &[u8]) {
-        if self.is_subscribed() {
-            let sequence = self.logs;
-            self.logs = sequence.wrapping_add(1);
-            self.outbox.push(Frame {
-                channel: Channel::Log,
-                sequence,
-                payload: frames,
-            });
-        }
-    }
-
-    /// Whether a host wants events and logs.
-    #[must_use]
-    pub const fn is_subscribed(&self) -> bool {
-        self.subscription.is_some()
-    }
-
-    /// Bytes for the line, as many as lie side by side; empty if there are none.
-    #[must_use]
-    pub fn pending(&self) -> &[u8] {
-        self.outbox.pending()
-    }
-
-    /// The first `count` bytes of [`pending`](Self::pending) are on the line.
-    pub fn sent(&mut self, count: usize) {
-        self.outbox.sent(count);
-    }
-
-    /// What went wrong on the line so far.
-    #[must_use]
-    pub const fn trouble(&self) -> SerialCounts {
-        SerialCounts {
-            bad: self.decoder.bad(),
-            unsent: self.outbox.refused(),
-        }
-    }
-
-    fn status(&self, device: &impl Device) -> Status {
+    /// `bad` are the line's bad frames.
+    fn status(&self, device: &impl Device, bad: u32) -> Status {
         Status {
-            serial: self.trouble(),
+            serial: SerialCounts {
+                bad,
+                unsent: self.outbox.refused(),
+            },
             ..device.status()
         }
     }

@@ -4,7 +4,7 @@
 
 use super::message::Version;
 use crate::exchange::{AttachError, Broken};
-use crate::image::ImageError;
+use crate::trust::Rejected;
 use core::fmt;
 use heapless::String;
 use serde::{Deserialize, Serialize};
@@ -199,7 +199,7 @@ pub enum Fault {
         /// Index of the slot.
         slot: u8,
         /// Why.
-        cause: TableFault,
+        cause: Rejected,
     },
     /// A frame was not shown.
     Frame {
@@ -214,19 +214,6 @@ pub enum Fault {
     Watchdog,
     /// The firmware stopped itself and started anew: a defect.
     Crash,
-}
-
-/// Why a table is refused.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub enum TableFault {
-    /// It is no table, or not all of one.
-    NotATable,
-    /// It has another format version.
-    Version,
-    /// It does not match its checksums.
-    Checksum,
-    /// Its contents contradict each other, or could overflow.
-    Contents,
 }
 
 /// Why a frame is not shown.
@@ -251,19 +238,6 @@ pub enum SourceFault {
     Format,
     /// They do not fit in the frame memory.
     TooLarge,
-}
-
-impl From<&ImageError> for TableFault {
-    fn from(error: &ImageError) -> Self {
-        match error {
-            ImageError::Truncated { .. } | ImageError::NotATable | ImageError::Length { .. } => {
-                Self::NotATable
-            }
-            ImageError::Version { .. } => Self::Version,
-            ImageError::HeaderChecksum | ImageError::SectionChecksum { .. } => Self::Checksum,
-            _ => Self::Contents,
-        }
-    }
 }
 
 impl From<Broken> for FaultyFrame {
@@ -299,17 +273,6 @@ impl fmt::Display for Fault {
             Self::Watchdog => f.write_str("the watchdog restarted the device"),
             Self::Crash => f.write_str("the firmware crashed and started anew"),
         }
-    }
-}
-
-impl fmt::Display for TableFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotATable => "is not a whole table",
-            Self::Version => "has a format version that the firmware does not read",
-            Self::Checksum => "does not match its checksums",
-            Self::Contents => "contradicts itself",
-        })
     }
 }
 

@@ -33,7 +33,38 @@ pub(super) fn identity() -> Hello {
     }
 }
 
+pub(super) fn slots() -> Slots {
+    const MOST: u32 = u32::MAX;
+    let slot = SlotInfo {
+        state: SlotState::Trial,
+        table: Some(TableName {
+            id: MOST,
+            version: MOST,
+        }),
+        length: MOST,
+        erases: MOST,
+    };
+    Slots {
+        slots: [slot; 2],
+        target: u8::MAX,
+        trial_ms: MOST,
+        oldest: MOST,
+        key: Some([u8::MAX; _]),
+        device: u64::MAX,
+        sector: MOST,
+        record_erases: MOST,
+    }
+}
+
 impl Device for FullDevice {
+    fn identity(&self) -> Hello {
+        identity()
+    }
+
+    fn carry_out(&mut self, _: Request<'_>, _: u64) -> Response {
+        Response::Slots(slots())
+    }
+
     fn status(&self) -> Status {
         const MOST: u32 = u32::MAX;
         Status {

@@ -2,7 +2,7 @@
 
 use super::super::status;
 use crate::device::logs::Message;
-use iltm_runtime::link::{Event, Fault, Hello, Status, TierReason};
+use iltm_runtime::link::{Event, Fault, Hello, Status, TableName, TableReason, TierReason};
 use serde_json::{Value, json};
 
 /// Something that happened to or at a device.
@@ -18,6 +18,11 @@ pub(super) enum Happening {
     },
     Fault(Fault),
     Log(Message),
+    TableChanged {
+        table: Option<TableName>,
+        reason: TableReason,
+        frame: u32,
+    },
     /// Log messages whose words nobody gave.
     UnreadLog {
         bytes: usize,
@@ -49,6 +54,15 @@ impl From<Event> for Happening {
                 frame,
             },
             Event::Fault(fault) => Self::Fault(fault),
+            Event::TableChanged {
+                table,
+                reason,
+                frame,
+            } => Self::TableChanged {
+                table,
+                reason,
+                frame,
+            },
         }
     }
 }
@@ -71,6 +85,16 @@ impl Happening {
                 frame,
             } => format!("tier {from} to {to} at frame {frame}: {reason}"),
             Self::Fault(fault) => fault.to_string(),
+            Self::TableChanged {
+                table: Some(table),
+                reason,
+                frame,
+            } => format!("table {table} from frame {frame} on: {reason}"),
+            Self::TableChanged {
+                table: None,
+                reason,
+                frame,
+            } => format!("no table from frame {frame} on: {reason}"),
             Self::Log(message) => {
                 let words = [&message.time, &message.level, &message.text];
                 let words: Vec<&str> = words.into_iter().map(|word| word.trim()).collect();
@@ -115,6 +139,21 @@ impl Happening {
                 "frame": frame,
             }),
             Self::Fault(fault) => json!({ "event": "fault", "message": fault.to_string() }),
+            Self::TableChanged {
+                table,
+                reason,
+                frame,
+            } => json!({
+                "event": "table",
+                "table": status::table_name(*table),
+                "reason": match reason {
+                    TableReason::Trial => "trial",
+                    TableReason::Confirmed => "confirmed",
+                    TableReason::TrialOver => "trial-over",
+                    TableReason::RolledBack => "rolled-back",
+                },
+                "frame": frame,
+            }),
             Self::Log(message) => json!({
                 "event": "log",
                 "time": message.time,

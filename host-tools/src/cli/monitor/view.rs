@@ -108,6 +108,7 @@ impl View {
                 self.log.extend(happening.words());
             }
             Happening::TierChanged { .. }
+            | Happening::TableChanged { .. }
             | Happening::Fault(_)
             | Happening::Missed { .. }
             | Happening::Restarted => self.event(happening),

@@ -1,0 +1,130 @@
+//! Commit records, one behind the other, in two parts of the flash in turn.
+
+use super::StoreError;
+use super::flash;
+use super::map::Part;
+use super::record::{self, Commit, Place, places};
+use embedded_storage::nor_flash::NorFlash;
+
+/// Where the last record is and where the next one goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Journal {
+    parts: [Part; 2],
+    /// Index of the part with the record that counts.
+    part: usize,
+    /// Place of the next record there.
+    next: u32,
+    last: Option<Commit>,
+    /// Places between the last record and the next one, which hold something that is
+    /// no record now.
+    spoiled: u32,
+}
+
+impl Journal {
+    /// Finds the record that counts. A place that cannot be read counts as spoiled.
+    pub(super) fn find<F: NorFlash>(flash: &mut F, parts: [Part; 2]) -> Self {
+        let mut journal = Self {
+            parts,
+            part: 0,
+            next: 0,
+            last: None,
+            spoiled: 0,
+        };
+        for (index, part) in parts.into_iter().enumerate() {
+            let (mut newest, mut next, mut spoiled) = (None::<Commit>, 0, 0);
+            for place in 0..places(part) {
+                let found = record::look::<F, Commit>(flash, part, place);
+                match found.unwrap_or(Place::Spoiled) {
+                    Place::Blank => {}
+                    Place::Spoiled => {
+                        next = place + 1;
+                        spoiled += 1;
+                    }
+                    Place::Record(commit) => {
+                        next = place + 1;
+                        if newest.is_none_or(|newest| newest.sequence <= commit.sequence) {
+                            newest = Some(commit);
+                            spoiled = 0;
+                        }
+                    }
+                }
+            }
+            let newer = match (newest, journal.last) {
+                (Some(new), Some(old)) => new.sequence > old.sequence,
+                (Some(_), None) => true,
+                // Without any record, the part with more room.
+                (None, None) => index > 0 && next < journal.next,
+                (None, Some(_)) => false,
+            };
+            if index == 0 || newer {
+                journal.part = index;
+                journal.next = next;
+                journal.last = newest;
+                journal.spoiled = spoiled;
+            }
+        }
+        journal
+    }
+
+    /// The record that counts.
+    pub(super) const fn last(&self) -> Option<Commit> {
+        self.last
+    }
+
+    /// Whether a record was cut after the one that counts. It might be read as whole
+    /// another time; a record behind it, with a higher number, ends that.
+    pub(super) const fn is_cut(&self) -> bool {
+        self.spoiled > 0
+    }
+
+    /// Writes a record behind the last one; from then on it counts. Returns how
+    /// many erases that took.
+    ///
+    /// # Errors
+    /// [`StoreError`]; the record before still counts then.
+    pub(super) fn append<F: NorFlash>(
+        &mut self,
+        flash: &mut F,
+        mut commit: Commit,
+    ) -> Result<u32, StoreError> {
+        commit.sequence = match self.last {
+            // 2^32 records outlast any flash.
+            Some(last) => last.sequence.saturating_add(1),
+            None => 0,
+        };
+        commit.sequence = commit.sequence.saturating_add(self.spoiled);
+        let here = self.part();
+        // A place that fails is passed over: it may have been cut before any of its
+        // bits changed, and look blank.
+        while self.next < places(here) {
+            let place = self.next;
+            self.next += 1;
+            if record::write(flash, here, place, &commit).is_ok() {
+                self.last = Some(commit);
+                self.spoiled = 0;
+                return Ok(0);
+            }
+            self.spoiled += 1;
+        }
+        let other = 1 - self.part;
+        let there = *self.parts.get(other).unwrap_or(&here);
+        let [.., records] = &mut commit.erases;
+        *records = records.saturating_add(1);
+        flash::erase(flash, there, 0, there.length)?;
+        for place in 0..places(there) {
+            if record::write(flash, there, place, &commit).is_ok() {
+                self.part = other;
+                self.next = place + 1;
+                self.last = Some(commit);
+                self.spoiled = 0;
+                return Ok(1);
+            }
+        }
+        Err(StoreError::Full)
+    }
+
+    fn part(&self) -> Part {
+        let [first, second] = self.parts;
+        if self.part == 0 { first } else { second }
+    }
+}

@@ -1,0 +1,196 @@
+//! Records of 64 bytes that count only when they are whole.
+
+use super::flash::{self, ERASED, PIECE};
+use super::map::Part;
+use super::{Slot, StoreError};
+use crate::image::crc32;
+use core::ops::Range;
+use embedded_storage::nor_flash::NorFlash;
+
+/// Bytes of a record, whatever the unit in which the flash is written.
+pub const RECORD: usize = PIECE;
+
+/// Where the fields of every record are.
+mod field {
+    use super::Range;
+    /// What kind of record it is.
+    pub(super) const MAGIC: Range<usize> = 0..4;
+    /// CRC-32 of the bytes before it.
+    pub(super) const CRC: Range<usize> = 60..64;
+}
+
+/// The fields of a commit record.
+mod commit {
+    use super::Range;
+    pub(super) const SEQUENCE: Range<usize> = 4..8;
+    /// 0 or 1; anything else is none.
+    pub(super) const SLOT: Range<usize> = 8..12;
+    pub(super) const ID: Range<usize> = 12..16;
+    pub(super) const FLOOR: Range<usize> = 16..20;
+    pub(super) const ERASES_A: Range<usize> = 20..24;
+    pub(super) const ERASES_B: Range<usize> = 24..28;
+    pub(super) const ERASES_RECORDS: Range<usize> = 28..32;
+}
+
+/// The fields of an identity record.
+mod identity {
+    use super::Range;
+    pub(super) const KEY: Range<usize> = 4..36;
+    pub(super) const DEVICE: Range<usize> = 36..44;
+}
+
+/// The table that counts, and what goes with it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) struct Commit {
+    /// The record with the highest one counts.
+    pub(super) sequence: u32,
+    /// The slot whose table is to be used, and the table's id.
+    pub(super) table: Option<(Slot, u32)>,
+    /// Tables of a lower version are refused.
+    pub(super) floor: u32,
+    /// Times that sectors of slot A, slot B and the records were erased.
+    pub(super) erases: [u32; 3],
+}
+
+/// Who the device is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Identity {
+    pub(super) key: [u8; 32],
+    pub(super) device: u64,
+}
+
+/// What can be written as a record.
+pub(super) trait Record: Sized {
+    const MAGIC: [u8; 4];
+    fn read(bytes: &[u8; RECORD]) -> Self;
+    fn write(&self, bytes: &mut [u8; RECORD]);
+}
+
+fn u32_at(bytes: &[u8; RECORD], field: Range<usize>) -> u32 {
+    let bytes = bytes.get(field).and_then(|field| field.try_into().ok());
+    bytes.map_or(0, u32::from_le_bytes)
+}
+
+fn put(bytes: &mut [u8; RECORD], field: Range<usize>, value: &[u8]) {
+    let places = bytes.get_mut(field).unwrap_or_default();
+    for (place, byte) in places.iter_mut().zip(value) {
+        *place = *byte;
+    }
+}
+
+impl Record for Commit {
+    const MAGIC: [u8; 4] = *b"ILTC";
+
+    fn read(bytes: &[u8; RECORD]) -> Self {
+        let slot = match u32_at(bytes, commit::SLOT) {
+            0 => Some(Slot::A),
+            1 => Some(Slot::B),
+            _ => None,
+        };
+        let erases = [commit::ERASES_A, commit::ERASES_B, commit::ERASES_RECORDS];
+        Self {
+            sequence: u32_at(bytes, commit::SEQUENCE),
+            table: slot.map(|slot| (slot, u32_at(bytes, commit::ID))),
+            floor: u32_at(bytes, commit::FLOOR),
+            erases: erases.map(|field| u32_at(bytes, field)),
+        }
+    }
+
+    fn write(&self, bytes: &mut [u8; RECORD]) {
+        let slot = self.table.map_or(u32::MAX, |(slot, _)| slot as u32);
+        let id = self.table.map_or(0, |(_, id)| id);
+        let [a, b, records] = self.erases;
+        for (field, value) in [
+            (commit::SEQUENCE, self.sequence),
+            (commit::SLOT, slot),
+            (commit::ID, id),
+            (commit::FLOOR, self.floor),
+            (commit::ERASES_A, a),
+            (commit::ERASES_B, b),
+            (commit::ERASES_RECORDS, records),
+        ] {
+            put(bytes, field, &value.to_le_bytes());
+        }
+    }
+}
+
+impl Record for Identity {
+    const MAGIC: [u8; 4] = *b"ILTI";
+
+    fn read(bytes: &[u8; RECORD]) -> Self {
+        let key = bytes.get(identity::KEY).and_then(|key| key.try_into().ok());
+        let device = bytes.get(identity::DEVICE);
+        let device = device.and_then(|device| device.try_into().ok());
+        Self {
+            key: key.unwrap_or_default(),
+            device: device.map_or(0, u64::from_le_bytes),
+        }
+    }
+
+    fn write(&self, bytes: &mut [u8; RECORD]) {
+        put(bytes, identity::KEY, &self.key);
+        put(bytes, identity::DEVICE, &self.device.to_le_bytes());
+    }
+}
+
+/// What is at a record's place.
+#[derive(Debug)]
+pub(super) enum Place<R> {
+    /// Erased bytes.
+    Blank,
+    /// A whole record.
+    Record(R),
+    /// Something else, such as a record that was cut.
+    Spoiled,
+}
+
+/// Looks at place `index` of a part.
+pub(super) fn look<F: NorFlash, R: Record>(
+    flash: &mut F,
+    part: Part,
+    index: u32,
+) -> Result<Place<R>, StoreError> {
+    let mut bytes = [0; RECORD];
+    flash::read(flash, part, place(index), RECORD as u32, |piece| {
+        if let Ok(piece) = piece.try_into() {
+            bytes = piece;
+        }
+        true
+    })?;
+    if bytes.iter().all(|byte| *byte == ERASED) {
+        return Ok(Place::Blank);
+    }
+    let covered = bytes.get(..field::CRC.start).unwrap_or_default();
+    let whole = u32_at(&bytes, field::CRC) == crc32(&[covered]);
+    let ours = bytes.get(field::MAGIC) == Some(&R::MAGIC);
+    Ok(if whole && ours {
+        Place::Record(R::read(&bytes))
+    } else {
+        Place::Spoiled
+    })
+}
+
+/// Writes a record to a blank place of a part.
+pub(super) fn write<F: NorFlash, R: Record>(
+    flash: &mut F,
+    part: Part,
+    index: u32,
+    record: &R,
+) -> Result<(), StoreError> {
+    let mut bytes = [0; RECORD];
+    put(&mut bytes, field::MAGIC, &R::MAGIC);
+    record.write(&mut bytes);
+    let covered = bytes.get(..field::CRC.start).unwrap_or_default();
+    let crc = crc32(&[covered]);
+    put(&mut bytes, field::CRC, &crc.to_le_bytes());
+    flash::write(flash, part, place(index), &bytes)
+}
+
+/// Records that a part has places for.
+pub(super) const fn places(part: Part) -> u32 {
+    part.length / RECORD as u32
+}
+
+const fn place(index: u32) -> u32 {
+    index.saturating_mul(RECORD as u32)
+}
