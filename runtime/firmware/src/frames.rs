@@ -1,0 +1,372 @@
+//! Frames: from the source through the table in use to the display.
+//!
+//! ```text
+//! round: pet watchdog -> follow source -> frame, if one waits
+//! frame: claim -> pixels at the governor's tier -> release -> publish if it was whole
+//! ```
+//!
+//! What takes longer than a frame, such as the check of a new table, calls
+//! [`Frames::round`] now and then (see [`Shelf::pause`](iltm_runtime::store::Shelf)),
+//! so that no frame waits for it.
+
+use crate::board::{Board, Clock, FrameSink, FrameSource, Peripherals, Watchdog};
+use crate::memory::Memory;
+use crate::rehearsal::{Outcome, Rehearsal};
+use crate::shelf::Tables;
+use crate::stage::Stage;
+use crate::vitals::Vitals;
+use embedded_hal::digital::OutputPin;
+use heapless::Deque;
+use iltm_runtime::exchange::{Format, Lateness};
+use iltm_runtime::governor::{Change, Governor, Reason};
+use iltm_runtime::image::Table;
+use iltm_runtime::link::{Event, Fault, Mode, PassThrough, TableName, TableReason, TierReason};
+use iltm_runtime::store::Slot;
+
+/// Things to tell the host that may wait for a round: more happen only while a
+/// table is checked.
+const NOTICES: usize = 8;
+
+/// The board's frame side, and what is done with frames.
+pub struct Frames<B: Board, R> {
+    pub(crate) clock: B::Clock,
+    source: B::Source,
+    sink: B::Sink,
+    watchdog: B::Watchdog,
+    lamp: B::Lamp,
+    memory: &'static mut Memory,
+    rehearsal: R,
+    pub(crate) tables: &'static mut Tables,
+    pub(crate) in_use: Result<Slot, PassThrough>,
+    pub(crate) vitals: Vitals,
+    stream: Option<Stream>,
+    /// Late frames of earlier streams.
+    late: u32,
+    notices: Deque<Notice, NOTICES>,
+    /// Number of the next frame.
+    next: u32,
+    /// Whether frames are worked on: not before the tables have been looked at, so
+    /// that none is shown that will be compensated a moment later.
+    live: bool,
+}
+
+/// Frames of one format.
+struct Stream {
+    format: Format,
+    stage: Stage,
+    governor: Governor,
+    lateness: Lateness,
+}
+
+/// Something to tell the host.
+#[derive(Clone, Copy)]
+enum Notice {
+    Tier(Change, u32),
+    Fault(Fault),
+    Table(Option<TableName>, TableReason, u32),
+}
+
+impl<B: Board, R: Rehearsal> Frames<B, R> {
+    pub(crate) fn new(
+        board: FrameSide<B>,
+        memory: &'static mut Memory,
+        tables: &'static mut Tables,
+        rehearsal: R,
+        vitals: Vitals,
+    ) -> Self {
+        Self {
+            clock: board.clock,
+            source: board.source,
+            sink: board.sink,
+            watchdog: board.watchdog,
+            lamp: board.lamp,
+            memory,
+            rehearsal,
+            tables,
+            in_use: Err(PassThrough::NoTable),
+            vitals,
+            stream: None,
+            late: 0,
+            notices: Deque::new(),
+            next: 0,
+            live: false,
+        }
+    }
+
+    /// Frames are worked on from now on, and the loop comes round within so many
+    /// milliseconds.
+    pub(crate) fn begin(&mut self, watchdog_ms: u32) {
+        self.watchdog.start(watchdog_ms);
+        self.live = true;
+        if let Err(why) = self.in_use {
+            self.vitals.set_mode(Mode::PassThrough(why), 0, 0, 0);
+        }
+    }
+
+    /// Looks after the next frame, if there is one; says whether there was.
+    pub fn round(&mut self) -> bool {
+        self.watchdog.pet();
+        if !self.live {
+            return false;
+        }
+        self.rehearsal.round(&self.clock);
+        self.follow();
+        self.frame()
+    }
+
+    /// Bytes of the largest frame there is memory for.
+    pub(crate) fn capacity(&self) -> usize {
+        self.source.capacity()
+    }
+
+    /// The next thing to tell the host.
+    pub(crate) fn take_event(&mut self) -> Option<Event> {
+        Some(match self.notices.pop_front()? {
+            Notice::Tier(change, frame) => Event::TierChanged {
+                from: change.from,
+                to: change.to,
+                reason: match change.reason {
+                    Reason::OverBudget { .. } => TierReason::OverBudget,
+                    Reason::TimeToSpare { .. } => TierReason::TimeToSpare,
+                },
+                frame,
+            },
+            Notice::Fault(fault) => Event::Fault(fault),
+            Notice::Table(table, reason, frame) => Event::TableChanged {
+                table,
+                reason,
+                frame,
+            },
+        })
+    }
+
+    /// Another table is in use from the next frame on.
+    pub(crate) fn table_changed(&mut self, table: Option<TableName>, reason: TableReason) {
+        defmt::info!(
+            "table {=u32:08x} from frame {=u32} on, reason {=u8}",
+            table.map_or(0, |table| table.id),
+            self.next,
+            reason as u8
+        );
+        self.notice(Notice::Table(table, reason, self.next));
+    }
+
+    /// The table in use, or why there is none.
+    fn table(&self) -> Result<&Table<'static>, PassThrough> {
+        let slot = self.in_use?;
+        let table = slot.of(self.tables).as_ref();
+        table.ok_or(PassThrough::BrokenTable)
+    }
+
+    /// Starts anew where the source announces other frames.
+    fn follow(&mut self) {
+        match self.source.follow() {
+            None => {}
+            Some(Ok(format)) => {
+                self.end();
+                self.start(format);
+            }
+            Some(Err(fault)) => self.fault(Fault::Source(fault)),
+        }
+    }
+
+    fn start(&mut self, format: Format) {
+        self.sink.start(format);
+        let lateness = Lateness::new(ticks::<B::Clock>(format.period_us()));
+        self.stage(format, lateness);
+        defmt::info!(
+            "frames of {=usize} x {=usize}, {=u8} channels, every {=u32} us",
+            format.size().width(),
+            format.size().height(),
+            format.channels(),
+            format.period_us()
+        );
+    }
+
+    /// The table in use is another one; frames stay as they are.
+    pub(crate) fn restage(&mut self) {
+        match self.stream.take() {
+            Some(stream) => self.stage(stream.format, stream.lateness),
+            None => {
+                if let Err(why) = self.in_use {
+                    self.vitals.set_mode(Mode::PassThrough(why), 0, 0, 0);
+                }
+            }
+        }
+    }
+
+    fn stage(&mut self, format: Format, lateness: Lateness) {
+        let table = self.table();
+        let stage = Stage::new(table, format);
+        let period = ticks::<B::Clock>(format.period_us());
+        let samples = format.bytes() as u32;
+        // An eighth of the time is for everything else.
+        let budget = u32::try_from(period - period / 8).unwrap_or(u32::MAX);
+        let (governor, mode, top) = match (stage, table) {
+            (Stage::PassThrough(why), _) | (_, Err(why)) => {
+                (Governor::new([1], budget), Mode::PassThrough(why), 0)
+            }
+            (Stage::Grid(_) | Stage::Full(..), Ok(table)) => (
+                Governor::for_table(table, samples as usize, budget),
+                Mode::Compensating,
+                table.top_tier(),
+            ),
+        };
+        self.vitals.set_mode(mode, top, samples, budget);
+        // Nothing to do about a lamp that fails.
+        let _ = match mode {
+            Mode::Compensating => self.lamp.set_high(),
+            Mode::PassThrough(_) => self.lamp.set_low(),
+        };
+        defmt::info!("compensated: {=bool}", mode == Mode::Compensating);
+        self.stream = Some(Stream {
+            format,
+            stage,
+            governor,
+            lateness,
+        });
+    }
+
+    /// Ends the frames of the last format.
+    fn end(&mut self) {
+        if let Some(stream) = self.stream.take() {
+            self.late = self.late.saturating_add(stream.lateness.late());
+        }
+    }
+
+    /// Works on the next frame, if there is one and a buffer for what becomes of
+    /// it; says whether there was.
+    fn frame(&mut self) -> bool {
+        let Some(stream) = &mut self.stream else {
+            return false;
+        };
+        if !self.sink.has_room() {
+            return false;
+        }
+        let start = self.clock.ticks();
+        let Some(sequence) = self.source.claim() else {
+            stream.lateness.waiting(start);
+            self.count();
+            return false;
+        };
+        stream.lateness.arrived(start);
+        self.next = sequence.wrapping_add(1);
+        let chosen = stream.governor.tier();
+        let tier = self.rehearsal.tier(chosen);
+        let wanted = self.source.wanted();
+        let input = self.sink.begin(sequence);
+        let table = self.in_use.ok().and_then(|slot| slot.of(self.tables).as_ref());
+        let result = stream.stage.frame(table, tier, wanted, input, self.memory);
+        self.rehearsal.during_frame(sequence, tier, &self.clock);
+        let whole = self.source.release();
+        if whole.is_ok() {
+            self.sink.publish();
+        }
+        let ticks = self.clock.ticks().saturating_sub(start);
+        let ticks = u32::try_from(ticks).unwrap_or(u32::MAX);
+        let change = stream.governor.frame(ticks);
+        let outcome = Outcome {
+            sequence,
+            tier,
+            ticks,
+            over: ticks > stream.governor.budget(),
+            change,
+        };
+        match (whole, result) {
+            (Ok(()), Ok(clipped)) => self.vitals.frame(ticks, tier, clipped),
+            // No frame of the stage's format can fail; it was sized by it.
+            (Ok(()), Err(_)) => defmt::error!("frame {=u32} could not be worked on", sequence),
+            // Counted by the source.
+            (Err(_), _) => {}
+        }
+        self.count();
+        self.rehearsal.after_frame(outcome, &self.vitals);
+        if let Some(change) = change {
+            self.changed(sequence, change);
+        }
+        true
+    }
+
+    fn changed(&mut self, sequence: u32, change: Change) {
+        match change.reason {
+            Reason::OverBudget { took } => defmt::warn!(
+                "tier {=u8} -> {=u8}: a frame took {=u32} ticks",
+                change.from,
+                change.to,
+                took
+            ),
+            Reason::TimeToSpare { expected } => defmt::info!(
+                "tier {=u8} -> {=u8}: {=u32} ticks expected",
+                change.from,
+                change.to,
+                expected
+            ),
+        }
+        self.notice(Notice::Tier(change, sequence.wrapping_add(1)));
+    }
+
+    fn fault(&mut self, fault: Fault) {
+        match fault {
+            Fault::Frame { sequence, cause } => {
+                defmt::warn!("frame {=u32} is broken, cause {=u8}", sequence, cause as u8);
+            }
+            Fault::Source(cause) => {
+                defmt::warn!("the source cannot be followed, cause {=u8}", cause as u8);
+            }
+            Fault::Table { .. } | Fault::Watchdog | Fault::Crash => {}
+        }
+        self.vitals.set_fault(fault);
+        self.notice(Notice::Fault(fault));
+    }
+
+    /// Keeps the latest where there is no room for all.
+    fn notice(&mut self, notice: Notice) {
+        if self.notices.is_full() {
+            self.notices.pop_front();
+        }
+        let _ = self.notices.push_back(notice);
+    }
+
+    /// Brings the counts up to date, and reports what has broken since.
+    fn count(&mut self) {
+        let now = self
+            .stream
+            .as_ref()
+            .map_or(0, |stream| stream.lateness.late());
+        let late = self.late.saturating_add(now);
+        let counts = self.source.counts();
+        let more_broken = counts.broken != self.vitals.frame_counts().broken;
+        self.vitals.set_inputs(counts, late);
+        if let Some((sequence, broken)) = counts.last_broken.filter(|_| more_broken) {
+            self.fault(Fault::Frame {
+                sequence,
+                cause: broken.into(),
+            });
+        }
+    }
+}
+
+/// What of a board is about frames.
+pub(crate) struct FrameSide<B: Board> {
+    clock: B::Clock,
+    source: B::Source,
+    sink: B::Sink,
+    watchdog: B::Watchdog,
+    lamp: B::Lamp,
+}
+
+/// Parts a board: frames, and the serial line, flash and rest.
+pub(crate) fn part<B: Board>(board: Peripherals<B>) -> (FrameSide<B>, B::Serial, B::Flash, B::Rest) {
+    let frames = FrameSide {
+        clock: board.clock,
+        source: board.source,
+        sink: board.sink,
+        watchdog: board.watchdog,
+        lamp: board.lamp,
+    };
+    (frames, board.serial, board.flash, board.rest)
+}
+
+fn ticks<C: Clock>(microseconds: u32) -> u64 {
+    u64::from(microseconds) * u64::from(C::HERTZ) / 1_000_000
+}

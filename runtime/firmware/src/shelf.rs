@@ -1,0 +1,50 @@
+//! The tables of both slots, checked, and the one that frames go through.
+
+use crate::board::{Board, TableFlash};
+use crate::frames::Frames;
+use crate::rehearsal::Rehearsal;
+use iltm_runtime::image::Table;
+use iltm_runtime::link::PassThrough;
+use iltm_runtime::store::{Shelf, Slot};
+use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
+use static_cell::ConstStaticCell;
+
+/// The tables of slot A and slot B, where they are good.
+pub type Tables = [Option<Table<'static>>; 2];
+
+/// Not on the stack: each has room for all segments that an operator may have.
+static TABLES: ConstStaticCell<Tables> = ConstStaticCell::new([None, None]);
+
+/// The places for the tables, once.
+pub(crate) fn take() -> Option<&'static mut Tables> {
+    TABLES.try_take()
+}
+
+impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
+    fn load(
+        &mut self,
+        flash: &B::Flash,
+        slot: Slot,
+        terms: &Terms,
+    ) -> Result<Accepted, Rejected> {
+        *slot.of_mut(self.tables) = None;
+        let (table, accepted) = admit(flash.slot(slot), terms, &mut || {
+            self.round();
+        })?;
+        *slot.of_mut(self.tables) = Some(table);
+        Ok(accepted)
+    }
+
+    fn unload(&mut self, slot: Slot) {
+        *slot.of_mut(self.tables) = None;
+    }
+
+    fn select(&mut self, table: Result<Slot, PassThrough>) {
+        self.in_use = table;
+        self.restage();
+    }
+
+    fn pause(&mut self) {
+        self.round();
+    }
+}
