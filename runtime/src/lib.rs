@@ -61,6 +61,7 @@ pub mod image;
 mod kernel;
 pub mod link;
 pub mod operator;
+mod pace;
 pub mod pipeline;
 pub mod resample;
 pub mod ring;

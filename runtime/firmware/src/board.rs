@@ -5,9 +5,10 @@
 
 use embedded_hal::digital::OutputPin;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
-use embedded_storage::nor_flash::ReadNorFlash;
+use embedded_storage::nor_flash::NorFlash;
 use iltm_runtime::exchange::{Broken, Format, InputCounts};
 use iltm_runtime::link::SourceFault;
+use iltm_runtime::store::{Map, MapError, Slot};
 
 /// A board.
 pub trait Board: Sized {
@@ -109,11 +110,22 @@ pub trait FrameSink {
 }
 
 /// Flash with table slots that the processor can read like memory.
-pub trait TableFlash: ReadNorFlash {
-    /// All bytes of a slot (0 or 1), where they lie.
+///
+/// Frames go on while it is written, up to one write or the erase of one sector at a
+/// time: a board whose flash cannot be read meanwhile, or whose sectors take longer to
+/// erase than a frame has to spare, shows the last frame that much longer.
+pub trait TableFlash: NorFlash {
+    /// What lies where.
     ///
-    /// The slot of a table that is in use is not written to.
-    fn slot(&self, slot: usize) -> &'static [u8];
+    /// # Errors
+    /// [`MapError`] if the board's own numbers do not fit its flash.
+    fn map(&self) -> Result<Map, MapError>;
+
+    /// All bytes of a slot, where they lie.
+    ///
+    /// They are not written to while somebody holds them: the store forgets the table
+    /// of a slot before it changes the slot.
+    fn slot(&self, slot: Slot) -> &'static [u8];
 }
 
 /// A watchdog.

@@ -4,9 +4,11 @@
 //! |---|---|
 //! | [`board`] | what a board provides: the only thing to write for another one |
 //! | [`boards`] | the boards there are |
-//! | [`device`] | the frame loop |
+//! | [`device`] | the loop: frames, then the serial line |
+//! | [`frames`] | from the source through the table in use to the display |
 //! | [`stage`] | one frame through a table, or past it |
-//! | [`tables`] | which slot's table is used, and why not |
+//! | [`shelf`] | the tables of both slots, and the one in use |
+//! | [`rehearsal`] | what a self-test may do to the loop |
 //! | [`memory`] | the workspace of a frame |
 //! | [`vitals`] | what the device knows of itself |
 //! | [`logger`] | defmt frames on their way to the serial line |
@@ -23,10 +25,12 @@ pub mod board;
 pub mod boards;
 pub mod device;
 pub mod fault;
+pub mod frames;
 pub mod logger;
 pub mod memory;
+pub mod rehearsal;
 pub mod retained;
+pub mod shelf;
 pub mod stack;
 pub mod stage;
-pub mod tables;
 pub mod vitals;

@@ -3,7 +3,7 @@
 use crate::board::{Board, TableFlash};
 use crate::frames::Frames;
 use crate::rehearsal::Rehearsal;
-use iltm_runtime::image::Table;
+use iltm_runtime::image::{Table, content};
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::store::{Shelf, Slot};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
@@ -25,10 +25,16 @@ impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
         &mut self,
         flash: &B::Flash,
         slot: Slot,
+        length: Option<u32>,
         terms: &Terms,
     ) -> Result<Accepted, Rejected> {
         *slot.of_mut(self.tables) = None;
-        let (table, accepted) = admit(flash.slot(slot), terms, &mut || {
+        let bytes = flash.slot(slot);
+        let file = match length {
+            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
+            None => content(bytes),
+        };
+        let (table, accepted) = admit(file, terms, &mut || {
             self.round();
         })?;
         *slot.of_mut(self.tables) = Some(table);

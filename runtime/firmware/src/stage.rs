@@ -9,19 +9,19 @@ use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 
 /// What is done to the frames of a format.
 #[derive(Clone, Copy)]
-pub enum Stage<'t> {
+pub enum Stage {
     /// They are shown as they are.
     PassThrough(PassThrough),
     /// They have one pixel a cell.
-    Grid(&'t Table<'static>, Encoding),
+    Grid(Encoding),
     /// They are larger than the grid.
-    Full(&'t Table<'static>, Encoding, FrameSize),
+    Full(Encoding, FrameSize),
 }
 
-impl<'t> Stage<'t> {
-    /// What can be done to frames of `format`, and if nothing, why.
+impl Stage {
+    /// What can be done to frames of `format` with a table, and if nothing, why.
     #[must_use]
-    pub fn new(table: Result<&'t Table<'static>, PassThrough>, format: Format) -> Self {
+    pub fn new(table: Result<&Table<'_>, PassThrough>, format: Format) -> Self {
         let table = match table {
             Ok(table) => table,
             Err(why) => return Self::PassThrough(why),
@@ -34,47 +34,39 @@ impl<'t> Stage<'t> {
             return Self::PassThrough(PassThrough::Memory);
         }
         if size == FrameSize::of_grid(table.grid()) {
-            return Self::Grid(table, format.encoding());
+            return Self::Grid(format.encoding());
         }
         if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
             return Self::PassThrough(PassThrough::Memory);
         }
-        Self::Full(table, format.encoding(), size)
+        Self::Full(format.encoding(), size)
     }
 
-    /// The table that frames go through.
-    #[must_use]
-    pub const fn table(&self) -> Option<&'t Table<'static>> {
-        match self {
-            Self::PassThrough(_) => None,
-            Self::Grid(table, _) | Self::Full(table, _, _) => Some(table),
-        }
-    }
-
-    /// Makes the projector's input of a wanted frame; returns how many samples
-    /// were clipped.
+    /// Makes the projector's input of a wanted frame with the table that the stage
+    /// was made for; returns how many samples were clipped.
     ///
     /// # Errors
     /// [`FrameError`], which no frame of the stage's format gives.
     pub fn frame(
         &self,
+        table: Option<&Table<'static>>,
         tier: u8,
         wanted: &[u8],
         input: &mut [u8],
         memory: &mut Memory,
     ) -> Result<u32, FrameError> {
-        match *self {
-            Self::PassThrough(_) => {
+        match (*self, table) {
+            (Self::PassThrough(_), _) | (_, None) => {
                 for (input, wanted) in input.iter_mut().zip(wanted) {
                     *input = *wanted;
                 }
                 Ok(0)
             }
-            Self::Grid(table, encoding) => match table.channels() {
+            (Self::Grid(encoding), Some(table)) => match table.channels() {
                 1 => grid::<1>(table, tier, encoding, wanted, input, memory),
                 _ => grid::<3>(table, tier, encoding, wanted, input, memory),
             },
-            Self::Full(table, encoding, size) => match table.channels() {
+            (Self::Full(encoding, size), Some(table)) => match table.channels() {
                 1 => full::<1>(table, size, (tier, encoding), wanted, input, memory),
                 _ => full::<3>(table, size, (tier, encoding), wanted, input, memory),
             },

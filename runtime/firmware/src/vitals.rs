@@ -5,10 +5,9 @@ use crate::retained::{Cause, Restart};
 use crate::stack;
 use iltm_runtime::exchange::InputCounts;
 use iltm_runtime::link::{
-    Clipping, Device, Fault, FrameCounts, FrameTime, Mode, Name, PassThrough, SerialCounts, Status,
-    TableName, Version,
+    Clipping, Fault, FrameCounts, FrameTime, Mode, Name, PassThrough, SerialCounts, SlotState, Stack,
+    Status, Version,
 };
-use iltm_runtime::link::{SlotState, Stack};
 
 /// Everything that a status says, kept up to date by the frame loop.
 pub struct Vitals {
@@ -58,12 +57,6 @@ impl Vitals {
         self.status.uptime_ms = milliseconds;
     }
 
-    /// The slots and the table in use.
-    pub fn set_tables(&mut self, slots: [SlotState; 2], table: Option<TableName>) {
-        self.status.slots = slots;
-        self.status.table = table;
-    }
-
     /// Frames of another kind: what is done with them, and how long they may take.
     pub fn set_mode(&mut self, mode: Mode, top_tier: u8, samples: u32, budget: u32) {
         self.status.mode = mode;
@@ -111,10 +104,10 @@ impl Vitals {
     pub const fn frame_counts(&self) -> FrameCounts {
         self.status.frames
     }
-}
 
-impl Device for Vitals {
-    fn status(&self) -> Status {
+    /// All of it, but for what the store knows.
+    #[must_use]
+    pub fn status(&self) -> Status {
         Status {
             stack: stack::depth(),
             ..self.status.clone()

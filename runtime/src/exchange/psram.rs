@@ -16,8 +16,20 @@ pub const SLOT_A: Range<usize> = 0..2 << 20;
 /// Table slot B.
 pub const SLOT_B: Range<usize> = 2 << 20..4 << 20;
 
-/// Records of the slots and the device's own settings.
-pub const RECORDS: Range<usize> = 4 << 20..5 << 20;
+/// Bytes that the part that stands for flash is erased in.
+pub const SECTOR: usize = 4 << 10;
+
+/// Commit records of the slots, in two sectors in turn.
+pub const RECORDS: [Range<usize>; 2] = [
+    4 << 20..(4 << 20) + SECTOR,
+    (4 << 20) + SECTOR..(4 << 20) + 2 * SECTOR,
+];
+
+/// The device's key and number.
+pub const IDENTITY: Range<usize> = (4 << 20) + 2 * SECTOR..(4 << 20) + 3 * SECTOR;
+
+/// All that stands for flash: erased, it is all ones.
+pub const FLASH: Range<usize> = 0..5 << 20;
 
 /// Orders to the firmware's self-test and its findings; the product leaves it
 /// alone.

@@ -1,13 +1,14 @@
-//! The check of an image, section by section.
+//! The check of what an image's sections say.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
 use super::layout::{
-    ALIGNMENT, FORMAT_VERSION, MAGIC, MAX_PROVENANCE, MAX_SECTIONS, MAX_SEGMENTS, MAX_TIERS,
-    SectionKind, entry, fine_gain, header, meta, tier,
+    MAX_PROVENANCE, MAX_SEGMENTS, MAX_TIERS, SectionKind, fine_gain, header, meta, tier,
 };
-use super::{FineGain, ImageError, SectionProblem, Table, TierInfo, crc32};
+use super::sections::{Section, Whole};
+use super::{FineGain, ImageError, SectionProblem, Table, TierInfo};
 use crate::haar::Basis;
 use crate::operator::{Channels, Operator, OperatorError, Segment};
+use crate::pace::{Pace, cost};
 use crate::pipeline::RESPONSE_KNOTS;
 use crate::pipeline::codes::{CODES, code};
 use crate::units::Light;
@@ -15,34 +16,32 @@ use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U1F15, U8F24};
 use heapless::Vec;
 
-/// One section whose checksum holds.
-#[derive(Clone, Copy)]
-struct Section<'a> {
-    kind: SectionKind,
-    selector: u16,
-    bytes: &'a [u8],
-}
-
-type Sections<'a> = Vec<Section<'a>, MAX_SECTIONS>;
-
-pub(super) fn check(image: &[u8]) -> Result<Table<'_>, ImageError> {
-    let sections = sections(image)?;
-    let meta = Meta::read(required(&sections, SectionKind::Meta)?)?;
+pub(super) fn contents<'a>(
+    whole: &Whole<'a>,
+    pace: &mut Pace<'_>,
+) -> Result<Table<'a>, ImageError> {
+    let meta = Meta::read(whole.required(SectionKind::Meta)?)?;
     let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
     let basis = Basis::new(grid);
-    let tiers = tiers(required(&sections, SectionKind::Tiers)?)?;
-    let gain = halfwords(required(&sections, SectionKind::Gain)?, values)?;
-    let ambient = optional(&sections, SectionKind::Ambient)
-        .map(|section| ambient(section, values))
+    let tiers = tiers(whole.required(SectionKind::Tiers)?)?;
+    let gain = halfwords(whole.required(SectionKind::Gain)?, values)?;
+    let ambient = whole
+        .optional(SectionKind::Ambient)
+        .map(|section| ambient(section, values, pace))
         .transpose()?;
-    let response = optional(&sections, SectionKind::Response)
-        .map(|section| response(section, meta.channels))
+    let response = whole
+        .optional(SectionKind::Response)
+        .map(|section| response(section, meta.channels, pace))
         .transpose()?;
-    let fine_gain = optional(&sections, SectionKind::FineGain)
+    let fine_gain = whole
+        .optional(SectionKind::FineGain)
         .map(|section| fine_gains(section, grid, meta.channels))
         .transpose()?;
-    let operator = operator(&sections, &meta, &basis, tiers.len())?;
-    check_costs(operator.as_ref(), &tiers, meta.channels)?;
+    let operator = operator(whole, &meta, &basis, tiers.len(), pace)?;
+    check_costs(operator.as_ref(), &tiers, meta.channels, pace)?;
+    let provenance = whole
+        .optional(SectionKind::Provenance)
+        .map_or(Ok(&[][..]), |section| provenance(section, pace))?;
     let mut table = Table {
         basis,
         channels: meta.channels,
@@ -56,149 +55,12 @@ pub(super) fn check(image: &[u8]) -> Result<Table<'_>, ImageError> {
         codes: &[],
         fine_gain,
         operator,
-        provenance: optional(&sections, SectionKind::Provenance).map_or(Ok(""), provenance)?,
-        bytes: image.len(),
-        id: u32_at(image, header::CRC).unwrap_or(0),
+        provenance,
+        bytes: whole.image.len(),
+        id: u32_at(whole.image, header::CRC).unwrap_or(0),
     };
-    table.codes = codes(optional(&sections, SectionKind::Codes), &table)?;
+    table.codes = codes(whole.optional(SectionKind::Codes), &table, pace)?;
     Ok(table)
-}
-
-/// Header, section table and checksums.
-fn sections(image: &[u8]) -> Result<Sections<'_>, ImageError> {
-    let given = image.len();
-    let truncated = |needed: usize| ImageError::Truncated { needed, given };
-    let head = image.get(..header::SIZE).ok_or(truncated(header::SIZE))?;
-    if head.get(header::MAGIC) != Some(&MAGIC) {
-        return Err(ImageError::NotATable);
-    }
-    let short = truncated(header::SIZE);
-    let found = u16_at(head, header::VERSION).ok_or(short)?;
-    if found != FORMAT_VERSION {
-        return Err(ImageError::Version { found });
-    }
-    let stated = u32_at(head, header::LENGTH).ok_or(short)? as usize;
-    if given < stated {
-        return Err(truncated(stated));
-    }
-    if given > stated {
-        return Err(ImageError::Length { stated, given });
-    }
-    let count = usize::from(u16_at(head, header::SECTIONS).ok_or(short)?);
-    let table_end = header::SIZE + count * entry::SIZE;
-    let table = image
-        .get(header::SIZE..table_end)
-        .ok_or(truncated(table_end))?;
-    let covered = head.get(..header::CRC.start).ok_or(short)?;
-    if u32_at(head, header::CRC) != Some(crc32(&[covered, table])) {
-        return Err(ImageError::HeaderChecksum);
-    }
-    let mut sections = Sections::new();
-    let mut place = table_end;
-    for (index, bytes) in table.chunks_exact(entry::SIZE).enumerate() {
-        let section = section(image, index, bytes, &mut place)?;
-        let in_order = sections
-            .last()
-            .is_none_or(|last| (last.kind, last.selector) < (section.kind, section.selector));
-        let only = section.kind == SectionKind::Operator || section.selector == 0;
-        let problem = |problem| ImageError::Section {
-            section: section.kind,
-            problem,
-        };
-        if !in_order {
-            return Err(problem(SectionProblem::Order));
-        }
-        if !only {
-            return Err(problem(SectionProblem::Selector));
-        }
-        sections
-            .push(section)
-            .map_err(|section| ImageError::Section {
-                section: section.kind,
-                problem: SectionProblem::Order,
-            })?;
-    }
-    if place != given {
-        return Err(ImageError::Length {
-            stated: place,
-            given,
-        });
-    }
-    Ok(sections)
-}
-
-/// One entry of the section table; `place` is where the section must start and
-/// becomes where the next one must.
-fn section<'a>(
-    image: &'a [u8],
-    index: usize,
-    bytes: &[u8],
-    place: &mut usize,
-) -> Result<Section<'a>, ImageError> {
-    let number = u16_at(bytes, entry::KIND).unwrap_or(0);
-    let kind = SectionKind::from_number(number).ok_or(ImageError::UnknownSection {
-        index,
-        kind: number,
-    })?;
-    let problem = |problem| ImageError::Section {
-        section: kind,
-        problem,
-    };
-    let field = |field| u32_at(bytes, field).unwrap_or(0) as usize;
-    let (start, length) = (field(entry::OFFSET), field(entry::LENGTH));
-    let end = start
-        .checked_add(length)
-        .ok_or(problem(SectionProblem::Place))?;
-    let padded = end
-        .checked_next_multiple_of(ALIGNMENT)
-        .ok_or(problem(SectionProblem::Place))?;
-    let (content, padding) = match (image.get(start..end), image.get(end..padded)) {
-        (Some(content), Some(padding)) if start == *place => (content, padding),
-        _ => return Err(problem(SectionProblem::Place)),
-    };
-    if padding.iter().any(|byte| *byte != 0) {
-        return Err(problem(SectionProblem::Padding));
-    }
-    if u32_at(bytes, entry::CRC) != Some(crc32(&[content])) {
-        return Err(ImageError::SectionChecksum { section: kind });
-    }
-    *place = padded;
-    Ok(Section {
-        kind,
-        selector: u16_at(bytes, entry::SELECTOR).unwrap_or(0),
-        bytes: content,
-    })
-}
-
-fn optional<'a>(sections: &Sections<'a>, kind: SectionKind) -> Option<Section<'a>> {
-    sections
-        .iter()
-        .copied()
-        .find(|section| section.kind == kind)
-}
-
-fn required<'a>(sections: &Sections<'a>, kind: SectionKind) -> Result<Section<'a>, ImageError> {
-    optional(sections, kind).ok_or(ImageError::Section {
-        section: kind,
-        problem: SectionProblem::Missing,
-    })
-}
-
-impl Section<'_> {
-    fn length_error(self) -> ImageError {
-        ImageError::Section {
-            section: self.kind,
-            problem: SectionProblem::Length,
-        }
-    }
-
-    fn field_error(self, field: &'static str, offset: usize) -> ImageError {
-        ImageError::Field {
-            section: self.kind,
-            field,
-            offset,
-        }
-    }
 }
 
 /// The fields of the meta section.
@@ -289,25 +151,37 @@ fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageE
         .ok_or(section.length_error())
 }
 
-fn ambient(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageError> {
+fn ambient<'a>(
+    section: Section<'a>,
+    count: usize,
+    pace: &mut Pace<'_>,
+) -> Result<Halfwords<'a>, ImageError> {
     let words = halfwords(section, count)?;
-    match words
-        .run(0, count)
-        .position(|bits| Light::from_bits(bits) > Light::ONE)
-    {
+    let too_much = |bits| {
+        pace.done(1, cost::VALUE);
+        Light::from_bits(bits) > Light::ONE
+    };
+    match words.run(0, count).position(too_much) {
         None => Ok(words),
         Some(index) => Err(section.field_error("ambient light", 2 * index)),
     }
 }
 
-fn response(section: Section<'_>, channels: u8) -> Result<Halfwords<'_>, ImageError> {
+fn response<'a>(
+    section: Section<'a>,
+    channels: u8,
+    pace: &mut Pace<'_>,
+) -> Result<Halfwords<'a>, ImageError> {
     let words = Halfwords::new(section.bytes).ok_or(section.length_error())?;
     let own = usize::from(channels) * RESPONSE_KNOTS;
     if words.len() != RESPONSE_KNOTS && words.len() != own {
         return Err(section.length_error());
     }
     for start in (0..words.len()).step_by(RESPONSE_KNOTS) {
-        let falls = |index: &usize| words.get(*index) < words.get(index.saturating_sub(1));
+        let falls = |index: &usize| {
+            pace.done(1, cost::VALUE);
+            words.get(*index) < words.get(index.saturating_sub(1))
+        };
         if let Some(index) = (start + 1..start + RESPONSE_KNOTS).find(falls) {
             return Err(section.field_error("response", 2 * index));
         }
@@ -319,6 +193,7 @@ fn response(section: Section<'_>, channels: u8) -> Result<Halfwords<'_>, ImageEr
 fn codes<'a>(
     section: Option<Section<'a>>,
     table: &Table<'_>,
+    pace: &mut Pace<'_>,
 ) -> Result<&'a [[u8; CODES]], ImageError> {
     let Some(section) = section else {
         return match table.response {
@@ -336,7 +211,10 @@ fn codes<'a>(
     }
     for (channel, curve) in codes.iter().enumerate() {
         let response = table.response(channel);
-        let differs = |(index, stored): (usize, &u8)| *stored != code(index, response);
+        let differs = |(index, stored): (usize, &u8)| {
+            pace.done(1, cost::CODE);
+            *stored != code(index, response)
+        };
         if let Some(index) = curve.iter().enumerate().position(differs) {
             return Err(section.field_error("code", channel * CODES + index));
         }
@@ -365,21 +243,16 @@ fn fine_gains(section: Section<'_>, cells: Grid, channels: u8) -> Result<FineGai
     })
 }
 
+/// The operator; bounds that the image states must be those of its entries.
 fn operator<'a>(
-    sections: &Sections<'a>,
+    whole: &Whole<'a>,
     meta: &Meta,
     basis: &Basis,
     tiers: usize,
+    pace: &mut Pace<'_>,
 ) -> Result<Option<Operator<'a>>, ImageError> {
-    let of_operator = |section: &&Section<'a>| section.kind == SectionKind::Operator;
-    if !sections.iter().any(|section| of_operator(&section)) {
-        return match (meta.accumulator_bound, meta.correction_bound) {
-            (0, 0) => Ok(None),
-            _ => Err(ImageError::Operator(OperatorError::BoundsDiffer)),
-        };
-    }
     let mut segments: Vec<Segment<'a>, MAX_SEGMENTS> = Vec::new();
-    for (index, section) in sections.iter().filter(of_operator).enumerate() {
+    for (index, section) in whole.of_kind(SectionKind::Operator).enumerate() {
         let [tier, channel] = section.selector.to_le_bytes();
         let channels = match channel {
             0 => Channels::All,
@@ -397,10 +270,17 @@ fn operator<'a>(
             .push(segment)
             .map_err(|_| ImageError::Operator(OperatorError::Segments))?;
     }
-    let operator =
-        Operator::new(basis, segments, meta.channel_scales).map_err(ImageError::Operator)?;
+    let stated = (meta.accumulator_bound, meta.correction_bound);
+    if segments.is_empty() {
+        return match stated {
+            (0, 0) => Ok(None),
+            _ => Err(ImageError::Operator(OperatorError::BoundsDiffer)),
+        };
+    }
+    let operator = Operator::with_pace(basis, segments, meta.channel_scales, pace)
+        .map_err(ImageError::Operator)?;
     let bounds = operator.bounds();
-    if (bounds.accumulator, bounds.correction) != (meta.accumulator_bound, meta.correction_bound) {
+    if (bounds.accumulator, bounds.correction) != stated {
         return Err(ImageError::Operator(OperatorError::BoundsDiffer));
     }
     Ok(Some(operator))
@@ -411,9 +291,12 @@ fn check_costs(
     operator: Option<&Operator<'_>>,
     tiers: &[TierInfo],
     channels: u8,
+    pace: &mut Pace<'_>,
 ) -> Result<(), ImageError> {
     for (tier, info) in (0_u8..).zip(tiers) {
-        let cost = operator.map_or((0, 0), |operator| operator.cost(tier, channels));
+        let cost = operator.map_or((0, 0), |operator| {
+            operator.cost_with_pace(tier, channels, pace)
+        });
         if cost != (info.entries, info.multiplications) {
             return Err(ImageError::Operator(OperatorError::CostDiffers { tier }));
         }
@@ -421,10 +304,28 @@ fn check_costs(
     Ok(())
 }
 
-fn provenance(section: Section<'_>) -> Result<&str, ImageError> {
+/// Checks the text piece by piece, for it may be long.
+fn provenance<'a>(section: Section<'a>, pace: &mut Pace<'_>) -> Result<&'a [u8], ImageError> {
+    const PIECE: usize = 256;
     if section.bytes.len() > MAX_PROVENANCE {
         return Err(section.length_error());
     }
-    core::str::from_utf8(section.bytes)
-        .map_err(|error| section.field_error("text", error.valid_up_to()))
+    let mut rest = section.bytes;
+    while !rest.is_empty() {
+        let piece = rest.get(..PIECE).unwrap_or(rest);
+        let good = match core::str::from_utf8(piece) {
+            Ok(text) => text.len(),
+            // Cut in the middle of a character.
+            Err(error) if error.error_len().is_none() && piece.len() < rest.len() => {
+                error.valid_up_to()
+            }
+            Err(error) => {
+                let at = section.bytes.len() - rest.len() + error.valid_up_to();
+                return Err(section.field_error("text", at));
+            }
+        };
+        rest = rest.get(good..).unwrap_or_default();
+        pace.done(piece.len(), cost::VALUE);
+    }
+    Ok(section.bytes)
 }

@@ -1,5 +1,6 @@
 //! Why an image is refused.
 
+use super::SealError;
 use super::layout::{FORMAT_VERSION, SectionKind};
 use crate::GridError;
 use crate::operator::OperatorError;
@@ -64,6 +65,8 @@ pub enum ImageError {
     },
     /// The operator is malformed, or could overflow.
     Operator(OperatorError),
+    /// What follows the image is not a seal that this runtime can read.
+    Seal(SealError),
 }
 
 /// What is wrong with a section as a whole.
@@ -133,6 +136,7 @@ impl fmt::Display for ImageError {
                 section.name()
             ),
             Self::Operator(error) => write!(f, "the table's operator is unusable: {error}"),
+            Self::Seal(error) => write!(f, "the table's seal {error}"),
         }
     }
 }

@@ -5,15 +5,23 @@
 //! trusts no length, and proves that no frame can overflow; after it, no
 //! accessor can fail and none looks at a length again. The bytes stay where they
 //! are (flash, a file in memory): a table holds references only.
+//!
+//! A file is an image, or an image and the [`Seal`] of who signed it.
 
 mod bytes;
 mod check;
 mod error;
 pub mod layout;
+pub mod seal;
+mod sections;
 mod table;
 
 pub use error::{ImageError, SectionProblem};
+pub use seal::{Seal, SealError, content, unseal};
+pub(crate) use sections::Whole;
 pub use table::{FineGain, Table, TierInfo};
+
+use crate::pace::{Pace, cost};
 
 /// CRC-32 (ISO-HDLC), piece by piece.
 pub(crate) static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -24,6 +32,17 @@ pub fn crc32(bytes: &[&[u8]]) -> u32 {
     let mut digest = CRC_32.digest();
     for part in bytes {
         digest.update(part);
+    }
+    digest.finalize()
+}
+
+/// The same of bytes that may be many.
+fn checksum(bytes: &[&[u8]], pace: &mut Pace<'_>) -> u32 {
+    const PIECE: usize = 256;
+    let mut digest = CRC_32.digest();
+    for piece in bytes.iter().flat_map(|part| part.chunks(PIECE)) {
+        digest.update(piece);
+        pace.done(piece.len(), cost::CRC_BYTE);
     }
     digest.finalize()
 }

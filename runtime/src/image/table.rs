@@ -2,10 +2,11 @@
 
 use super::ImageError;
 use super::bytes::Halfwords;
-use super::check;
 use super::layout::MAX_TIERS;
+use super::sections::Whole;
 use crate::haar::Basis;
 use crate::operator::Operator;
+use crate::pace::Pace;
 use crate::pipeline::{CODES, RESPONSE_KNOTS, Response};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
@@ -30,7 +31,7 @@ pub struct Table<'a> {
     pub(super) codes: &'a [[u8; CODES]],
     pub(super) fine_gain: Option<FineGain<'a>>,
     pub(super) operator: Option<Operator<'a>>,
-    pub(super) provenance: &'a str,
+    pub(super) provenance: &'a [u8],
     pub(super) bytes: usize,
     pub(super) id: u32,
 }
@@ -101,7 +102,17 @@ impl<'a> Table<'a> {
     /// Total: any bytes give a table or an error. `tests/fuzz/fuzz_targets/image.rs`
     /// holds it to that.
     pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
-        check::check(image)
+        Self::check_with(image, &mut || {})
+    }
+
+    /// The same, with a `pause` every few thousand instructions for what cannot wait
+    /// until the check is done.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check).
+    pub fn check_with(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
+        let mut pace = Pace::new(pause);
+        Whole::new(image, &mut pace)?.table(&mut pace)
     }
 
     /// The grid of cells.
@@ -236,7 +247,7 @@ impl<'a> Table<'a> {
 
     /// Where the table comes from, for people and host tools.
     #[must_use]
-    pub const fn provenance(&self) -> &'a str {
-        self.provenance
+    pub fn provenance(&self) -> &'a str {
+        core::str::from_utf8(self.provenance).unwrap_or_default()
     }
 }

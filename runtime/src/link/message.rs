@@ -201,7 +201,7 @@ impl fmt::Display for Refusal {
                 );
             }
             Self::Incomplete => "not all of the table has arrived as it is",
-            Self::Table(rejected) => return write!(f, "the table {rejected}"),
+            Self::Table(rejected) => return write!(f, "{rejected}"),
             Self::NotInUse { table: None } => "no table is in use",
             Self::NotInUse { table: Some(table) } => {
                 return write!(f, "table {table} is in use");

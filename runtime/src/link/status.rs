@@ -267,7 +267,9 @@ impl SourceFault {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Table { slot, cause } => write!(f, "the table in slot {slot} {cause}"),
+            Self::Table { slot, cause } => {
+                write!(f, "slot {}: {cause}", if *slot == 0 { 'A' } else { 'B' })
+            }
             Self::Frame { sequence, cause } => write!(f, "frame {sequence} {cause}"),
             Self::Source(cause) => write!(f, "the source of frames {cause}"),
             Self::Watchdog => f.write_str("the watchdog restarted the device"),

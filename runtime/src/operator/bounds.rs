@@ -9,6 +9,7 @@
 use super::{Channels, Group, OperatorError, Rows, Segment};
 use crate::haar::Basis;
 use crate::image::layout::segment::MAX_SHORT;
+use crate::pace::{Pace, cost};
 use crate::units::INPUT_COEFFICIENT_MAX;
 use core::iter::Peekable;
 use heapless::Vec;
@@ -35,6 +36,7 @@ impl Bounds {
         basis: &Basis,
         segments: &[Segment<'_>],
         tier: u8,
+        pace: &mut Pace<'_>,
     ) -> Result<Self, OperatorError> {
         let of_tier = segments.iter().enumerate();
         let of_tier = of_tier.filter(|(_, segment)| segment.tier == tier);
@@ -49,8 +51,9 @@ impl Bounds {
         for (row, function) in basis.functions().enumerate() {
             let mut shared = 0;
             let mut widest = 0;
+            pace.done(1, cost::FUNCTION);
             for cursor in &mut cursors {
-                let Some((sum, coefficient)) = cursor.bounds_of(row)? else {
+                let Some((sum, coefficient)) = cursor.bounds_of(row, pace)? else {
                     continue;
                 };
                 if sum > Self::MAX_ACCUMULATOR {
@@ -102,8 +105,13 @@ impl<'a> Cursor<'a> {
     }
 
     /// Bounds of the row's sum and of its coefficient, if the segment has it.
-    fn bounds_of(&mut self, row: usize) -> Result<Option<(u64, u64)>, OperatorError> {
+    fn bounds_of(
+        &mut self,
+        row: usize,
+        pace: &mut Pace<'_>,
+    ) -> Result<Option<(u64, u64)>, OperatorError> {
         let mut found = None;
+        pace.done(1, cost::FUNCTION);
         for rows in &mut self.groups {
             let Some(next) = rows.next_if(|next| usize::from(next.index) == row) else {
                 continue;
@@ -113,7 +121,7 @@ impl<'a> Cursor<'a> {
                 return Err(OperatorError::Row { segment, row });
             }
             let sum = next
-                .magnitude()
+                .magnitude(pace)
                 .saturating_mul(INPUT_COEFFICIENT_MAX.into());
             // Rounding down can add one to the magnitude.
             found = Some((sum, (sum >> next.shift) + 1));

@@ -38,6 +38,7 @@ pub use segment::{Channels, Group, Groups, Pair, Row, Rows, Segment};
 use crate::haar::Basis;
 use crate::image::layout::MAX_SEGMENTS;
 use crate::kernel::gather::{self, Sums};
+use crate::pace::{Pace, cost};
 use crate::units::InputCoefficient;
 use fixed::types::{I2F30, U1F15};
 use heapless::Vec;
@@ -64,18 +65,28 @@ impl<'a> Operator<'a> {
         segments: Vec<Segment<'a>, MAX_SEGMENTS>,
         channel_scales: [U1F15; 3],
     ) -> Result<Self, OperatorError> {
+        Self::with_pace(basis, segments, channel_scales, &mut Pace::new(&mut || {}))
+    }
+
+    /// [`new`](Self::new) in short pieces.
+    pub(crate) fn with_pace(
+        basis: &Basis,
+        segments: Vec<Segment<'a>, MAX_SEGMENTS>,
+        channel_scales: [U1F15; 3],
+        pace: &mut Pace<'_>,
+    ) -> Result<Self, OperatorError> {
         let cells = basis.grid().cells();
         if channel_scales.iter().any(|scale| *scale > U1F15::ONE) {
             return Err(OperatorError::ChannelScale);
         }
         let mut top = 0;
         for (index, segment) in segments.iter().enumerate() {
-            segment.check(index, cells)?;
+            segment.check(index, cells, pace)?;
             top = segment.tier.max(top);
         }
         let mut bounds = Bounds::default();
         for tier in 1..=top {
-            bounds = bounds.max(Bounds::prove(basis, &segments, tier)?);
+            bounds = bounds.max(Bounds::prove(basis, &segments, tier, pace)?);
         }
         Ok(Self {
             cells,
@@ -101,7 +112,12 @@ impl<'a> Operator<'a> {
     /// does in a table of `channels` channels: those by the zero in a pair count.
     #[must_use]
     pub fn cost(&self, tier: u8, channels: u8) -> (u32, u32) {
-        let mut cost = (0_u32, 0_u32);
+        self.cost_with_pace(tier, channels, &mut Pace::new(&mut || {}))
+    }
+
+    /// [`cost`](Self::cost) in short pieces.
+    pub(crate) fn cost_with_pace(&self, tier: u8, channels: u8, pace: &mut Pace<'_>) -> (u32, u32) {
+        let mut total = (0_u32, 0_u32);
         for segment in self.of_tier(tier) {
             let shared_by = match segment.channels {
                 Channels::All => u32::from(channels),
@@ -109,11 +125,12 @@ impl<'a> Operator<'a> {
             };
             for row in segment.rows() {
                 let values = 2 * u32::from(row.pairs());
-                cost.0 = cost.0.saturating_add(row.entries() as u32);
-                cost.1 = cost.1.saturating_add(values.saturating_mul(shared_by));
+                total.0 = total.0.saturating_add(row.entries_with_pace(pace) as u32);
+                total.1 = total.1.saturating_add(values.saturating_mul(shared_by));
+                pace.done(1, cost::ROW);
             }
         }
-        cost
+        total
     }
 
     fn of_tier(&self, tier: u8) -> impl Iterator<Item = &Segment<'a>> {

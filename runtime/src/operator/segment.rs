@@ -2,6 +2,7 @@
 
 use super::OperatorError;
 use crate::image::layout::segment::{MAX_SHORT, WORD, halves, pair_words};
+use crate::pace::{Pace, cost};
 
 /// Which channels a segment applies to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -101,7 +102,12 @@ impl<'a> Segment<'a> {
 
     /// Checks every group, row and index against a grid of `cells` cells. That no
     /// row is in two groups is left to the proof of the bounds.
-    pub(super) fn check(&self, segment: usize, cells: usize) -> Result<(), OperatorError> {
+    pub(super) fn check(
+        &self,
+        segment: usize,
+        cells: usize,
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OperatorError> {
         let mut groups = self.groups();
         let mut least = 1;
         while !groups.words.is_empty() {
@@ -111,7 +117,7 @@ impl<'a> Segment<'a> {
                 return Err(OperatorError::Group { segment });
             }
             least = pairs + 1;
-            group.check(segment, cells)?;
+            group.check(segment, cells, pace)?;
         }
         Ok(())
     }
@@ -134,7 +140,12 @@ impl<'a> Group<'a> {
         self.words
     }
 
-    fn check(&self, segment: usize, cells: usize) -> Result<(), OperatorError> {
+    fn check(
+        &self,
+        segment: usize,
+        cells: usize,
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OperatorError> {
         let mut least_row = 0;
         let mut rows = self.rows();
         for _ in 0..self.count {
@@ -151,7 +162,8 @@ impl<'a> Group<'a> {
                 return Err(malformed);
             }
             least_row = index + 1;
-            row.check(segment, cells)?;
+            row.check(segment, cells, pace)?;
+            pace.done(1, cost::ROW);
         }
         if rows.words.is_empty() {
             Ok(())
@@ -194,22 +206,34 @@ impl Row<'_> {
     /// Number of its entries that are not zero.
     #[must_use]
     pub fn entries(&self) -> usize {
-        let count = |pair: Pair| pair.values.into_iter().filter(|value| *value != 0).count();
-        self.fold(0, |sum, pair| sum + count(pair))
+        self.entries_with_pace(&mut Pace::new(&mut || {}))
+    }
+
+    pub(super) fn entries_with_pace(&self, pace: &mut Pace<'_>) -> usize {
+        self.fold(0, |sum, pair| {
+            pace.done(1, cost::PAIR);
+            sum + pair.values.iter().filter(|value| **value != 0).count()
+        })
     }
 
     /// Sum of the magnitudes of its values.
-    #[must_use]
-    pub fn magnitude(&self) -> u64 {
+    pub(super) fn magnitude(&self, pace: &mut Pace<'_>) -> u64 {
         let magnitude = |value: i16| u64::from(value.unsigned_abs());
         self.fold(0, |sum, Pair { values: [a, b], .. }| {
+            pace.done(1, cost::PAIR);
             sum + magnitude(a) + magnitude(b)
         })
     }
 
     /// Both coefficients of each pair are on the grid, and pairs ascend.
-    fn check(&self, segment: usize, cells: usize) -> Result<(), OperatorError> {
+    fn check(
+        &self,
+        segment: usize,
+        cells: usize,
+        pace: &mut Pace<'_>,
+    ) -> Result<(), OperatorError> {
         let (least, fits) = self.fold((0, true), |(least, fits), pair| {
+            pace.done(1, cost::PAIR);
             let index = usize::from(pair.index);
             (index + 1, fits && index >= least && index + 1 < cells)
         });

@@ -89,12 +89,20 @@ impl Slot {
 
 /// Where checked tables are kept, one a slot, and where frames are worked on.
 pub trait Shelf<F> {
-    /// Checks the table in a slot with [`admit`](crate::trust::admit) and keeps it.
-    /// Frames go on with the one in use.
+    /// Checks the file of `length` bytes in a slot with
+    /// [`admit`](crate::trust::admit) and keeps its table; where nobody has noted the
+    /// length, [`content`](crate::image::content) tells it. Frames go on with the table
+    /// in use.
     ///
     /// # Errors
     /// [`Rejected`]; nothing is kept for the slot then.
-    fn load(&mut self, flash: &F, slot: Slot, terms: &Terms) -> Result<Accepted, Rejected>;
+    fn load(
+        &mut self,
+        flash: &F,
+        slot: Slot,
+        length: Option<u32>,
+        terms: &Terms,
+    ) -> Result<Accepted, Rejected>;
 
     /// Forgets the table of a slot: its bytes are about to change. It is not the one
     /// in use.

@@ -30,6 +30,8 @@ mod commit {
     pub(super) const ERASES_A: Range<usize> = 20..24;
     pub(super) const ERASES_B: Range<usize> = 24..28;
     pub(super) const ERASES_RECORDS: Range<usize> = 28..32;
+    pub(super) const LENGTH_A: Range<usize> = 32..36;
+    pub(super) const LENGTH_B: Range<usize> = 36..40;
 }
 
 /// The fields of an identity record.
@@ -46,6 +48,8 @@ pub(super) struct Commit {
     pub(super) sequence: u32,
     /// The slot whose table is to be used, and the table's id.
     pub(super) table: Option<(Slot, u32)>,
+    /// Bytes of the file in slot A and in slot B, 0 if unknown.
+    pub(super) lengths: [u32; 2],
     /// Tables of a lower version are refused.
     pub(super) floor: u32,
     /// Times that sectors of slot A, slot B and the records were erased.
@@ -88,10 +92,12 @@ impl Record for Commit {
             _ => None,
         };
         let erases = [commit::ERASES_A, commit::ERASES_B, commit::ERASES_RECORDS];
+        let lengths = [commit::LENGTH_A, commit::LENGTH_B];
         Self {
             sequence: u32_at(bytes, commit::SEQUENCE),
             table: slot.map(|slot| (slot, u32_at(bytes, commit::ID))),
             floor: u32_at(bytes, commit::FLOOR),
+            lengths: lengths.map(|field| u32_at(bytes, field)),
             erases: erases.map(|field| u32_at(bytes, field)),
         }
     }
@@ -100,6 +106,7 @@ impl Record for Commit {
         let slot = self.table.map_or(u32::MAX, |(slot, _)| slot as u32);
         let id = self.table.map_or(0, |(_, id)| id);
         let [a, b, records] = self.erases;
+        let [length_a, length_b] = self.lengths;
         for (field, value) in [
             (commit::SEQUENCE, self.sequence),
             (commit::SLOT, slot),
@@ -108,6 +115,8 @@ impl Record for Commit {
             (commit::ERASES_A, a),
             (commit::ERASES_B, b),
             (commit::ERASES_RECORDS, records),
+            (commit::LENGTH_A, length_a),
+            (commit::LENGTH_B, length_b),
         ] {
             put(bytes, field, &value.to_le_bytes());
         }

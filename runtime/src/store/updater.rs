@@ -110,8 +110,11 @@ impl<F: NorFlash> Updater<F> {
         if empty {
             return;
         }
-        let loaded = shelf.load(&self.flash, slot, &self.terms());
-        let meant = self.journal.last().and_then(|last| last.table);
+        let last = self.journal.last();
+        let noted = last.map(|last| *slot.of(&last.lengths));
+        let length = noted.filter(|length| *length > 0);
+        let loaded = shelf.load(&self.flash, slot, length, &self.terms());
+        let meant = last.and_then(|last| last.table);
         let loaded = loaded.and_then(|accepted| match meant {
             // Something else was put there past this code.
             Some((meant, id)) if meant == slot && id != accepted.id => {
@@ -125,9 +128,7 @@ impl<F: NorFlash> Updater<F> {
             Err(cause) => {
                 *slot.of_mut(&mut self.broken) = true;
                 // An unfinished table in the other slot is nothing wrong.
-                if meant.is_none_or(|(meant, _)| meant == slot)
-                    && self.journal.last().is_none_or(|last| last.table.is_some())
-                {
+                if last.is_none() || meant.is_some_and(|(meant, _)| meant == slot) {
                     let slot = slot as u8;
                     self.fault = Some(Fault::Table { slot, cause });
                 }
@@ -235,6 +236,12 @@ impl<F: NorFlash> Updater<F> {
     #[must_use]
     pub const fn trust(&self) -> &Trust {
         &self.trust
+    }
+
+    /// What lies where in it.
+    #[must_use]
+    pub const fn map(&self) -> &Map {
+        &self.map
     }
 
     /// The flash.
@@ -423,12 +430,8 @@ impl<F: NorFlash> Updater<F> {
         };
         *slot.of_mut(&mut self.tables) = None;
         *slot.of_mut(&mut self.broken) = true;
-        let accepted = shelf.load(&self.flash, slot, &terms);
+        let accepted = shelf.load(&self.flash, slot, Some(running.length), &terms);
         let accepted = accepted.map_err(Refusal::Table)?;
-        if accepted.length != running.length {
-            shelf.unload(slot);
-            return Err(Refusal::Table(Rejected::NotATable));
-        }
         *slot.of_mut(&mut self.tables) = Some(accepted);
         *slot.of_mut(&mut self.broken) = false;
         let trial_ms = (u64::from(trial_s.max(1)) * 1_000).min(MAX_TRIAL_MS);
@@ -528,6 +531,7 @@ impl<F: NorFlash> Updater<F> {
             sequence: 0,
             table,
             floor,
+            lengths: Slot::ALL.map(|slot| slot.of(&self.tables).map_or(0, |table| table.length)),
             erases: self.erases,
         };
         self.append(commit).map_err(|error| match error {

@@ -15,10 +15,10 @@ use iltm_firmware::board::{Board, Clock, TableFlash};
 use iltm_firmware::boards::{Chosen, psram};
 use iltm_firmware::fault;
 use iltm_firmware::memory::{MAX_PIXELS, Memory};
-use iltm_firmware::tables::image;
 use iltm_runtime::FrameSize;
 use iltm_runtime::exchange::ControlWords;
-use iltm_runtime::image::Table;
+use iltm_runtime::image::{Table, content, unseal};
+use iltm_runtime::store::Slot;
 use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 use static_cell::ConstStaticCell;
 
@@ -117,7 +117,9 @@ fn main() -> ! {
     };
     let words = psram::self_test_words().load(0);
     let size = FrameSize::new(words as u16, (words >> 16) as u16);
-    let (Ok(table), Some(size)) = (Table::check(image(board.flash.slot(0))), size) else {
+    let image = unseal(content(board.flash.slot(Slot::A)));
+    let table = image.ok().and_then(|(image, _)| Table::check(image).ok());
+    let (Some(table), Some(size)) = (table, size) else {
         hprintln!("no table or no frame");
         debug::exit(debug::EXIT_FAILURE);
         fault::restart();

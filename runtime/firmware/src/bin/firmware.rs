@@ -4,7 +4,8 @@
 
 use cortex_m_rt::entry;
 use iltm_firmware::boards::Chosen;
-use iltm_firmware::device::{Live, start};
+use iltm_firmware::device::start;
+use iltm_firmware::rehearsal::Live;
 
 #[entry]
 fn main() -> ! {

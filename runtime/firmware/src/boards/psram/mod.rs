@@ -34,11 +34,26 @@ fn address(offset: usize) -> *mut u8 {
 fn bytes(range: Range<usize>) -> &'static [u8] {
     let range = range.start.min(psram::SIZE)..range.end.min(psram::SIZE);
     // SAFETY: the range lies in the PSRAM, which is memory for as long as the
-    // program runs. Slots are not written by the firmware; claimed inputs are not
+    // program runs. The store gives a slot back before it is written; claimed inputs are not
     // written by a source that keeps to the protocol, and one that does not is
     // found out by `Receiver::release` before anything is made of the pixels
     // other than pixels.
     unsafe { core::slice::from_raw_parts(address(range.start), range.len()) }
+}
+
+/// A byte of the part that stands for flash. Volatile, as flash is: it may be read
+/// after it was written through another pointer.
+fn load(offset: usize) -> u8 {
+    let place = address(offset.min(psram::FLASH.end - 1));
+    // SAFETY: in the PSRAM, of which this part holds bytes only.
+    unsafe { place.read_volatile() }
+}
+
+/// Changes a byte of the part that stands for flash.
+fn store(offset: usize, byte: u8) {
+    let place = address(offset.min(psram::FLASH.end - 1));
+    // SAFETY: as in `load`; nobody holds a slice of it, see `bytes`.
+    unsafe { place.write_volatile(byte) };
 }
 
 /// Pixels of an output buffer.

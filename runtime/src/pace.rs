@@ -1,0 +1,77 @@
+//! Long work in short pieces.
+//!
+//! A table is checked while frames arrive. So whoever asks for the check passes a
+//! *pause*: work of his own, done whenever the check has worked for a while. The
+//! check counts its work here instead of calling at every step, so that pauses are
+//! neither far apart nor many, whatever the shape of the table.
+
+/// What work costs, in instructions of a Cortex-M7, rounded up. Counted in the
+/// emulator; they need not be exact, only not far too low.
+pub(crate) mod cost {
+    /// A byte through CRC-32.
+    pub(crate) const CRC_BYTE: usize = 10;
+    /// A byte through SHA-512.
+    pub(crate) const HASH_BYTE: usize = 60;
+    /// A sum of two points of the curve.
+    pub(crate) const POINT: usize = 8_000;
+    /// One value looked at.
+    pub(crate) const VALUE: usize = 10;
+    /// A code made from a response.
+    pub(crate) const CODE: usize = 50;
+    /// A pair of operator entries.
+    pub(crate) const PAIR: usize = 20;
+    /// A row of an operator, beside its pairs.
+    pub(crate) const ROW: usize = 60;
+    /// A function of the basis.
+    pub(crate) const FUNCTION: usize = 200;
+}
+
+/// Counts work and pauses when there was enough.
+pub(crate) struct Pace<'p> {
+    pause: &'p mut dyn FnMut(),
+    worked: usize,
+}
+
+impl<'p> Pace<'p> {
+    /// Work between two pauses, in instructions. Frames are tens of milliseconds
+    /// apart, so this could be longer; it is short enough that nobody has to ask.
+    pub(crate) const STRIDE: usize = 10_000;
+
+    /// Starts counting.
+    pub(crate) fn new(pause: &'p mut dyn FnMut()) -> Self {
+        Self { pause, worked: 0 }
+    }
+
+    /// `count` pieces of work of `cost` instructions are done.
+    #[inline]
+    pub(crate) fn done(&mut self, count: usize, cost: usize) {
+        let work = count.saturating_mul(cost);
+        self.worked = self.worked.saturating_add(work);
+        if self.worked >= Self::STRIDE {
+            self.rest();
+        }
+    }
+
+    #[inline(never)]
+    fn rest(&mut self) {
+        self.worked = 0;
+        (self.pause)();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pause_comes_after_a_stride_of_work_and_not_before() {
+        let mut pauses = 0;
+        let mut pause = || pauses += 1;
+        let mut pace = Pace::new(&mut pause);
+        for _ in 0..3 * Pace::STRIDE {
+            pace.done(1, 1);
+        }
+        pace.done(usize::MAX, usize::MAX);
+        assert_eq!(pauses, 4);
+    }
+}

@@ -1,0 +1,71 @@
+//! The gate.
+
+use super::{Accepted, Rejected, Terms, ed25519};
+use crate::image::{Seal, Table, Whole, seal, unseal};
+use crate::pace::Pace;
+
+/// Checks the bytes of a whole file against `terms`, and its table as
+/// [`Table::check`] does. Whoever holds the table that this returns may run it.
+///
+/// `pause` is called every few thousand instructions, and a device works on frames
+/// in it. The longest piece without a pause is a square root or an inverse modulo
+/// `2^255 - 19`, of which a signature takes one each.
+///
+/// # Errors
+/// The first that applies of [`Rejected`]: what is no table, or another format;
+/// damage, which the checksums tell from forgery; then, where the device has a
+/// key, no signature, another key, a false signature, another device, an old version;
+/// last, contents that the runtime cannot use.
+pub fn admit<'a>(
+    file: &'a [u8],
+    terms: &Terms,
+    pause: &mut dyn FnMut(),
+) -> Result<(Table<'a>, Accepted), Rejected> {
+    let (image, seal) = unseal(file)?;
+    let mut pace = Pace::new(pause);
+    let whole = Whole::new(image, &mut pace)?;
+    let oldest = match &terms.trust.key {
+        Some(key) => vouched(file, seal.as_ref(), key, terms, &mut pace)?,
+        None => 0,
+    };
+    let table = whole.table(&mut pace)?;
+    let accepted = Accepted {
+        id: table.id(),
+        version: seal.map_or(0, |seal| seal.version),
+        oldest,
+        length: file.len() as u32,
+    };
+    Ok((table, accepted))
+}
+
+/// The floor that the file brings, if it is signed with `key`, for this device,
+/// and recent enough.
+fn vouched(
+    file: &[u8],
+    seal: Option<&Seal>,
+    key: &[u8; 32],
+    terms: &Terms,
+    pace: &mut Pace<'_>,
+) -> Result<u32, Rejected> {
+    let seal = seal.ok_or(Rejected::Unsigned)?;
+    if seal.key != Seal::key_id(key) {
+        return Err(Rejected::WrongKey);
+    }
+    let signed = file.len().saturating_sub(seal::field::SIGNATURE.len());
+    let message = file.get(..signed).unwrap_or_default();
+    if !ed25519::verify(key, &seal.signature, message, pace) {
+        return Err(Rejected::Signature);
+    }
+    if seal.device != 0 && seal.device != terms.trust.device {
+        return Err(Rejected::OtherDevice {
+            device: seal.device,
+        });
+    }
+    if seal.version < terms.floor {
+        return Err(Rejected::Older {
+            version: seal.version,
+            floor: terms.floor,
+        });
+    }
+    Ok(seal.oldest)
+}
