@@ -7,17 +7,18 @@ use iltm_runtime::image::{Table, content};
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::store::{Shelf, Slot};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
-use static_cell::ConstStaticCell;
+use static_cell::StaticCell;
 
 /// The tables of slot A and slot B, where they are good.
 pub type Tables = [Option<Table<'static>>; 2];
 
 /// Not on the stack: each has room for all segments that an operator may have.
-static TABLES: ConstStaticCell<Tables> = ConstStaticCell::new([None, None]);
+/// Written at the start rather than copied from the image, which would hold it twice.
+static TABLES: StaticCell<Tables> = StaticCell::new();
 
 /// The places for the tables, once.
 pub(crate) fn take() -> Option<&'static mut Tables> {
-    TABLES.try_take()
+    TABLES.try_init_with(|| [None, None])
 }
 
 impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
