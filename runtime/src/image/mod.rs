@@ -12,6 +12,8 @@ mod bytes;
 mod check;
 mod error;
 pub mod layout;
+#[cfg(test)]
+pub(crate) mod made_up;
 pub mod seal;
 mod sections;
 mod table;

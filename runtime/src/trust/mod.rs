@@ -8,6 +8,11 @@ mod admit;
 mod ed25519;
 mod rejected;
 
+#[cfg(test)]
+mod ed25519_tests;
+#[cfg(test)]
+mod tests;
+
 pub use admit::admit;
 pub use rejected::Rejected;
 
