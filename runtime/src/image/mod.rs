@@ -18,6 +18,7 @@ pub mod seal;
 mod sections;
 mod table;
 
+pub use check::Checked;
 pub use error::{ImageError, SectionProblem};
 pub use seal::{Seal, SealError, content, unseal};
 pub(crate) use sections::Whole;
