@@ -8,7 +8,7 @@ use iltm_runtime::link::{
 };
 use std::collections::VecDeque;
 use std::io;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A line with frames on it.
 #[derive(Debug)]
@@ -46,12 +46,12 @@ impl<L: Line> Talk<L> {
 
     /// What the device says next by itself; waits for it at most as long as `wait`.
     pub(super) fn next(&mut self, wait: Duration) -> Result<Option<Incoming>, DeviceError> {
-        let end = Instant::now() + wait;
+        let end = self.line.now() + wait;
         loop {
             if let Some(incoming) = self.incoming.pop_front() {
                 return Ok(Some(incoming));
             }
-            let left = end.saturating_duration_since(Instant::now());
+            let left = end.saturating_duration_since(self.line.now());
             if left.is_zero() {
                 return Ok(None);
             }
@@ -65,7 +65,7 @@ impl<L: Line> Talk<L> {
         self.sequence = self.sequence.wrapping_add(1);
         let sequence = self.sequence;
         let bytes = encoded(sequence, request);
-        let start = Instant::now();
+        let start = self.line.now();
         self.heard = Heard::default();
         for _ in 0..self.patience.tries {
             self.line.write(&bytes).map_err(gone)?;
@@ -77,7 +77,11 @@ impl<L: Line> Talk<L> {
         }
         Err(DeviceError::NoAnswer {
             tries: self.patience.tries,
-            seconds: start.elapsed().as_secs_f64(),
+            seconds: self
+                .line
+                .now()
+                .saturating_duration_since(start)
+                .as_secs_f64(),
             heard: self.heard,
         })
     }
@@ -87,9 +91,9 @@ impl<L: Line> Talk<L> {
         &mut self,
         sequence: u16,
     ) -> Result<Option<Result<Response, postcard::Error>>, DeviceError> {
-        let end = Instant::now() + self.patience.answer;
+        let end = self.line.now() + self.patience.answer;
         loop {
-            let left = end.saturating_duration_since(Instant::now());
+            let left = end.saturating_duration_since(self.line.now());
             if left.is_zero() {
                 return Ok(None);
             }
