@@ -49,7 +49,7 @@ pub trait FarEnd {
 ///
 /// let mut line = PacedLine::new(Echo::default(), 921_600);
 /// line.write(b"hello")?;
-/// let mut heard = Vec::new();
+/// let mut heard = Vec::<u8>::new();
 /// while heard.len() < 5 {
 ///     let mut bytes = [0; 64];
 ///     let count = line.read(&mut bytes, Duration::from_secs(1))?;

@@ -1,37 +1,11 @@
 use super::*;
 use crate::device::Line;
+use crate::device::fault::{Faults, Harm, LossyLine, PacedLine, Tally};
 use fastrand::Rng;
 use std::io::ErrorKind;
-use std::time::Duration;
 
-/// A device that notes what it hears and when, and says what it is told to.
-#[derive(Debug, Default)]
-struct Notes {
-    heard: Vec<u8>,
-    says: Vec<u8>,
-    last: Duration,
-}
-
-impl FarEnd for Notes {
-    fn turn(&mut self, arrived: &[u8], now: Duration) {
-        if !arrived.is_empty() {
-            self.last = now;
-        }
-        self.heard.extend(arrived);
-    }
-
-    fn pending(&self) -> &[u8] {
-        &self.says
-    }
-
-    fn sent(&mut self, count: usize) {
-        self.says.drain(..count);
-    }
-}
-
+/// Fast enough that frames take next to no time.
 const FAST: u32 = 100_000_000;
-const BAUD: u32 = 921_600;
-const SECOND: Duration = Duration::from_secs(1);
 
 fn fast(faults: Faults) -> LossyLine<PacedLine<Notes>> {
     LossyLine::new(PacedLine::new(Notes::default(), FAST), faults)
@@ -55,6 +29,11 @@ fn hear(line: &mut impl Line) -> Vec<u8> {
 fn frame(number: u16) -> [u8; 6] {
     let [low, high] = number.to_le_bytes();
     [1 + (low & 0x7F), 2 + (low >> 7), 1 + (high & 0x7F), 7, 9, 0]
+}
+
+fn number(frame: &&[u8]) -> u32 {
+    let [low, middle, high] = [frame[0] - 1, frame[1] - 2, frame[2] - 1];
+    u32::from(low) + (u32::from(middle) << 7) + (u32::from(high) << 8)
 }
 
 fn frames(count: u16) -> Vec<u8> {
@@ -100,113 +79,141 @@ fn a_delimiter_before_a_frame_belongs_to_it() {
     assert_eq!(line.to_device().frames, 10);
 }
 
+/// Whether `count` of so many draws is what a rate in parts of 1,000 gives, within
+/// five standard deviations.
+fn is_rate(count: u64, rate: u16, draws: u16) -> bool {
+    let (share, draws) = (f64::from(rate) / 1_000.0, f64::from(draws));
+    let off = (count as f64 - share * draws).abs();
+    off <= 5.0 * (share * (1.0 - share) * draws).sqrt()
+}
+
+const COUNT: u16 = 20_000;
+
+/// What became of frames by a tally, and what the device heard of them.
+fn harmed(harm: Harm) -> (Tally, Vec<u8>) {
+    let mut line = fast(Faults {
+        to_device: harm,
+        seed: 7,
+        ..Faults::default()
+    });
+    let heard = sent(&mut line, COUNT);
+    (line.to_device(), heard)
+}
+
 #[test]
 fn every_kind_of_harm_comes_as_often_as_its_rate() {
-    const COUNT: u16 = 20_000;
-    let none = Harm::default();
-    for (rate, harm) in [
-        (100, Harm { drop: 100, ..none }),
-        (
-            150,
-            Harm {
-                duplicate: 150,
-                ..none
-            },
-        ),
-        (
-            50,
-            Harm {
-                corrupt: 50,
-                ..none
-            },
-        ),
-        (
-            200,
-            Harm {
-                reorder: 200,
-                ..none
-            },
-        ),
-        (
-            80,
-            Harm {
-                delay: 80,
-                delay_by: SECOND,
-                ..none
-            },
-        ),
-        (120, Harm { cut: 120, ..none }),
+    let harm = Harm {
+        drop: 100,
+        duplicate: 150,
+        corrupt: 50,
+        reorder: 200,
+        delay: 80,
+        cut: 120,
+        delay_by: SECOND / 2,
+    };
+    let (tally, _) = harmed(harm);
+    for (count, rate) in [
+        (tally.dropped, 100),
+        (tally.duplicated, 150),
+        (tally.corrupted, 50),
+        (tally.reordered, 200),
+        (tally.delayed, 80),
+        (tally.cut, 120),
+        (tally.harmed(), 700),
     ] {
-        let mut line = fast(Faults {
-            to_device: harm,
-            seed: 7,
-            ..Faults::default()
-        });
-        let heard = sent(&mut line, COUNT);
-        let tally = line.to_device();
-        let kinds = [
-            tally.dropped,
-            tally.duplicated,
-            tally.corrupted,
-            tally.reordered,
-            tally.delayed,
-            tally.cut,
-        ];
-        let rates = [
-            harm.drop,
-            harm.duplicate,
-            harm.corrupt,
-            harm.reorder,
-            harm.delay,
-            harm.cut,
-        ];
-        let share = f64::from(rate) / 1_000.0;
-        // Five standard deviations.
-        let allowed = 5.0 * (share * (1.0 - share) * f64::from(COUNT)).sqrt();
-        for (kind, rate) in kinds.iter().zip(rates) {
-            let expected = f64::from(rate) / 1_000.0 * f64::from(COUNT);
-            let off = (*kind as f64 - expected).abs();
-            assert!(
-                off <= if rate == 0 { 0.0 } else { allowed },
-                "{harm:?} {tally:?}"
-            );
-        }
-        assert_eq!(
-            (tally.frames, tally.harmed()),
-            (COUNT.into(), kinds.iter().sum())
-        );
-
-        // And what is counted has happened.
-        let whole = pieces(&heard);
-        let all = frames(COUNT);
-        let all = pieces(&all);
-        let count = u64::from(COUNT);
-        let mut sorted = whole.clone();
-        sorted.sort_unstable();
-        let mut expected = all.clone();
-        expected.sort_unstable();
-        if tally.dropped > 0 {
-            assert_eq!(whole.len() as u64, count - tally.dropped);
-        } else if tally.duplicated > 0 {
-            assert_eq!(whole.len() as u64, count + tally.duplicated);
-            sorted.dedup();
-            assert_eq!(sorted, expected);
-        } else if tally.reordered + tally.delayed > 0 {
-            assert_eq!(sorted, expected, "every frame, whole");
-            assert_ne!(whole, all, "not in their order");
-        } else if tally.cut > 0 {
-            assert!(whole.len() as u64 >= count - tally.cut);
-            assert!(heard.len() < all.concat().len());
-        } else {
-            assert_eq!(heard.len(), all.concat().len());
-            let other = heard
-                .chunks(6)
-                .zip(&all)
-                .filter(|(heard, sent)| heard != *sent);
-            // Bytes of a frame only: the one that has changed.
-            assert_eq!(other.count() as u64, tally.corrupted);
-        }
+        assert!(is_rate(count, rate, COUNT), "{count} for {rate} of 1,000");
     }
+    assert_eq!(tally.frames, u64::from(COUNT));
+}
+
+#[test]
+fn dropped_frames_are_missing_and_no_others() {
+    let (tally, heard) = harmed(Harm {
+        drop: 100,
+        ..Harm::default()
+    });
+    assert!(is_rate(tally.dropped, 100, COUNT) && tally.harmed() == tally.dropped);
+    assert_eq!(
+        pieces(&heard).len() as u64,
+        u64::from(COUNT) - tally.dropped
+    );
+    assert!(pieces(&heard).is_sorted_by_key(number), "in their order");
+}
+
+#[test]
+fn duplicated_frames_come_twice_and_no_others() {
+    let (tally, heard) = harmed(Harm {
+        duplicate: 150,
+        ..Harm::default()
+    });
+    assert!(is_rate(tally.duplicated, 150, COUNT) && tally.harmed() == tally.duplicated);
+    let mut came = pieces(&heard);
+    assert_eq!(came.len() as u64, u64::from(COUNT) + tally.duplicated);
+    came.dedup();
+    assert!(came.concat() == frames(COUNT));
+}
+
+#[test]
+fn reordered_and_delayed_frames_all_arrive() {
+    let delayed = Harm {
+        delay: 80,
+        delay_by: SECOND / 2,
+        ..Harm::default()
+    };
+    for harm in [
+        delayed,
+        Harm {
+            reorder: 200,
+            ..Harm::default()
+        },
+    ] {
+        let (tally, heard) = harmed(harm);
+        assert!(is_rate(
+            tally.delayed + tally.reordered,
+            harm.delay + harm.reorder,
+            COUNT
+        ));
+        let mut came = pieces(&heard);
+        assert!(!came.is_sorted_by_key(number), "{tally:?}");
+        came.sort_unstable_by_key(number);
+        assert!(came.concat() == frames(COUNT), "{tally:?}");
+    }
+}
+
+#[test]
+fn cut_frames_run_into_the_next() {
+    let (tally, heard) = harmed(Harm {
+        cut: 120,
+        ..Harm::default()
+    });
+    assert!(is_rate(tally.cut, 120, COUNT) && tally.harmed() == tally.cut);
+    let whole = pieces(&heard)
+        .iter()
+        .filter(|piece| piece.ends_with(&[0]))
+        .count();
+    assert_eq!(whole as u64, u64::from(COUNT) - tally.cut);
+    // Of six bytes, from none to five stay, each alike often.
+    let left = heard.len() as f64 - 6.0 * (f64::from(COUNT) - tally.cut as f64);
+    assert!(
+        (left / tally.cut as f64 - 2.5).abs() < 0.2,
+        "{left} of {tally:?}"
+    );
+}
+
+#[test]
+fn corrupted_frames_have_other_bytes_and_as_many() {
+    let (tally, heard) = harmed(Harm {
+        corrupt: 50,
+        ..Harm::default()
+    });
+    assert!(is_rate(tally.corrupted, 50, COUNT) && tally.harmed() == tally.corrupted);
+    let sent = frames(COUNT);
+    assert_eq!(heard.len(), sent.len());
+    let pairs = heard.chunks(6).zip(sent.chunks(6));
+    assert_eq!(
+        pairs.filter(|(heard, sent)| heard != sent).count() as u64,
+        tally.corrupted
+    );
 }
 
 #[test]
@@ -345,90 +352,6 @@ fn rates_that_are_shared_evenly_add_up() {
     let mut line = fast(Faults::both_ways(all, 1));
     assert!(sent(&mut line, 100).is_empty());
     assert_eq!(line.to_device().dropped, 100);
-}
-
-/// Bytes that the host has read of a device that never stops, by when.
-fn read_until(line: &mut PacedLine<Notes>, end: Duration) -> u64 {
-    let mut bytes = [0; 64];
-    while line.elapsed() < end {
-        let says = &mut line.far_end_mut().says;
-        says.resize(10_000, 1);
-        let wait = end - line.elapsed();
-        line.read(&mut bytes, wait).expect("a line");
-    }
-    while line.read(&mut bytes, Duration::ZERO).expect("a line") > 0 {}
-    line.bytes_to_host()
-}
-
-#[test]
-fn a_byte_takes_ten_bits_of_time_to_the_host() {
-    let mut line = PacedLine::new(Notes::default(), BAUD);
-    line.far_end_mut().says.resize(10_000, 1);
-    assert_eq!(
-        read_until(&mut line, SECOND - Duration::from_nanos(1)),
-        92_159
-    );
-    let mut line = PacedLine::new(Notes::default(), BAUD);
-    line.far_end_mut().says.resize(10_000, 1);
-    assert_eq!(read_until(&mut line, SECOND), 92_160);
-    assert_eq!(read_until(&mut line, 3 * SECOND), 3 * 92_160);
-}
-
-#[test]
-fn a_byte_takes_ten_bits_of_time_to_the_device() {
-    for (baud, bytes) in [(BAUD, 92_160), (115_200, 11_520), (9_600, 960)] {
-        let line = PacedLine::new(Notes::default(), baud);
-        let mut line = line.with_turns_every(Duration::from_millis(1));
-        line.write(&vec![1; bytes]).expect("a line");
-        // The last 4,096 wait in a buffer.
-        let buffered = bytes.min(4_096) as f64 / bytes as f64;
-        let left = 1.0 - line.elapsed().as_secs_f64() - buffered;
-        assert!(left.abs() < 1e-6, "{left} s");
-        let before = SECOND - line.elapsed() - Duration::from_nanos(1);
-        let nothing = line.read(&mut [0], before).expect("a line");
-        assert_eq!((nothing, line.bytes_to_device() < bytes as u64), (0, true));
-        line.read(&mut [0], Duration::ZERO).expect("a line");
-        assert_eq!(line.bytes_to_device(), bytes as u64);
-        assert_eq!(line.far_end().last, SECOND);
-    }
-}
-
-#[test]
-fn both_ways_are_carried_at_once() {
-    let mut line = PacedLine::new(Notes::default(), BAUD);
-    line.far_end_mut().says.resize(92_160, 1);
-    let mut bytes = [0; 512];
-    let mut unsent = 92_160;
-    while line.elapsed() < SECOND {
-        let count = unsent.min(100);
-        line.write(&[2; 100][..count]).expect("a line");
-        unsent -= count;
-        line.read(&mut bytes, Duration::from_millis(1))
-            .expect("a line");
-    }
-    let both = [line.bytes_to_device(), line.bytes_to_host()];
-    assert!(both.iter().all(|count| *count > 92_000), "{both:?}");
-}
-
-#[test]
-fn latency_delays_bytes_and_costs_no_rate() {
-    let latency = Duration::from_millis(16);
-    let mut line = PacedLine::new(Notes::default(), BAUD).with_latency(latency);
-    line.far_end_mut().says.resize(10_000, 1);
-    assert_eq!(read_until(&mut line, latency), 0);
-    assert_eq!(read_until(&mut line, latency + SECOND), 92_160);
-}
-
-#[test]
-fn a_read_of_nothing_takes_the_wait_and_no_time_of_ours() {
-    let started = std::time::Instant::now();
-    let mut line = PacedLine::new(Notes::default(), BAUD);
-    let before = line.now();
-    for _ in 0..10 {
-        assert_eq!(line.read(&mut [0; 8], 10 * SECOND).expect("a line"), 0);
-    }
-    assert_eq!(line.now() - before, 100 * SECOND);
-    assert!(started.elapsed() < 10 * SECOND);
 }
 
 #[test]
