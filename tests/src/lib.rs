@@ -5,6 +5,7 @@ pub mod fake_device;
 pub mod firmware;
 pub mod fuzz;
 pub mod instructions;
+pub mod slots;
 
 use iltm::capture::Response;
 use iltm::compile::{CompileOptions, compile};

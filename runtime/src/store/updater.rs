@@ -21,7 +21,7 @@ const WINDOW: u8 = 3;
 const MAX_TRIAL_MS: u64 = 65_535_000;
 
 /// Both slots, the records, and what a host may do with them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Updater<F> {
     flash: F,
     map: Map,
@@ -250,6 +250,11 @@ impl<F: NorFlash> Updater<F> {
     #[must_use]
     pub const fn flash(&self) -> &F {
         &self.flash
+    }
+
+    /// The flash, for what else is done with it than storing tables.
+    pub const fn flash_mut(&mut self) -> &mut F {
+        &mut self.flash
     }
 
     /// Gives the flash back.
