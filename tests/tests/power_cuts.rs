@@ -41,9 +41,13 @@ struct Files {
     new: Vec<u8>,
 }
 
-/// What happens to a device from the factory on, with the table that must run after
-/// a cut in each step: the one before it, or the one after it where the step may make
-/// it so.
+impl Files {
+    fn both(&self) -> [&[u8]; 2] {
+        [&self.old, &self.new]
+    }
+}
+
+/// What happens to a device with one file: the transfer, and then this.
 struct Story<'f> {
     file: &'f [u8],
     steps: Vec<Step>,
@@ -84,6 +88,7 @@ struct Counts {
 /// what the device does when it starts again.
 fn cut_everywhere<const W: usize, const E: usize>(
     device: &SimDevice<W, E>,
+    files: &Files,
     (file, step): (&[u8], &Step),
     before: Option<&[u8]>,
     counts: &Counts,
@@ -92,9 +97,7 @@ fn cut_everywhere<const W: usize, const E: usize>(
     let start = whole.flash().steps();
     whole.carry_out(file, step).expect("a good device");
     let work = whole.flash().steps() - start;
-    let after = [file, before.unwrap_or_default()]
-        .into_iter()
-        .find(|file| whole.runs(file));
+    let after = files.both().into_iter().find(|file| whole.runs(file));
     for cut in 0..work {
         let mut device = device.clone();
         let flash = device.updater.flash_mut();
@@ -155,11 +158,10 @@ fn live<const W: usize, const E: usize>(files: &Files, slot: usize, weak: bool, 
         steps.pop();
         steps.extend(&story.steps);
         for step in &steps {
-            cut_everywhere(&device, (story.file, step), confirmed, counts);
+            cut_everywhere(&device, files, (story.file, step), confirmed, counts);
             device.carry_out(story.file, step).expect("a good device");
             if matches!(step, Step::Confirm | Step::Rollback) {
-                let all = [&files.old[..], &files.new];
-                confirmed = all.into_iter().find(|file| device.runs(file));
+                confirmed = files.both().into_iter().find(|file| device.runs(file));
                 assert!(confirmed.is_some());
             }
         }
@@ -178,13 +180,13 @@ fn a_cut_at_any_byte_or_erase_stage_leaves_the_old_table_or_the_new_whole() {
     thread::scope(|scope| {
         // Sectors of four records, so that the records change sectors as well.
         scope.spawn(|| {
-            live::<1, 256>(&files, 24, false, &counts);
-            live::<4, 256>(&files, 24, false, &counts);
-            live::<8, 256>(&files, 24, true, &counts);
+            live::<1, 256>(&files, 48, false, &counts);
+            live::<4, 256>(&files, 48, false, &counts);
+            live::<8, 256>(&files, 48, true, &counts);
         });
         scope.spawn(|| {
-            live::<16, 256>(&files, 24, false, &counts);
-            live::<32, 256>(&files, 24, false, &counts);
+            live::<16, 256>(&files, 48, false, &counts);
+            live::<32, 256>(&files, 48, false, &counts);
             live::<4, 4_096>(&files, 4, true, &counts);
         });
     });
@@ -288,13 +290,13 @@ fn two_cuts_in_a_row_lose_no_table_at_any_pair_of_points() {
     );
 }
 
-/// Random pairs on flash of 4 KiB sectors, with tables like the demo's.
+/// Random pairs on flash with the reference board's sectors of 4 KiB.
 fn random_pairs(count: u64) {
     let files = Files {
-        old: wedge_table_for(Response::Linear, 8, 12, 3),
-        new: wedge_table_for(Response::Linear, 8, 13, 3),
+        old: wedge_table_for(Response::Linear, 6, 8, 1),
+        new: wedge_table_for(Response::Linear, 6, 9, 1),
     };
-    let device = in_use::<4, 4_096>(&files, 8);
+    let device = in_use::<4, 4_096>(&files, 4);
     let all = work(&device, &files);
     thread::scope(|scope| {
         for half in 0..2 {
@@ -335,10 +337,10 @@ fn a_worn_sector_is_found_when_it_is_written_and_the_old_table_stays() {
         iltm_runtime::fault::Wear::StuckBits,
         iltm_runtime::fault::Wear::LostBits,
     ] {
-        let mut device = in_use::<4, 4_096>(&files, 8);
+        let mut device = in_use::<4, 4_096>(&files, 16);
         // The second sector of slot B, which the new table goes to.
         let flash = device.updater.flash_mut();
-        flash.wear_out(9, 0, wear).expect("there");
+        flash.wear_out(17, 0, wear).expect("there");
         let refusal = device.update(&files.new, true).expect_err("it is worn");
         assert!(
             matches!(refusal, Refusal::Flash { offset } if offset / 4_096 == 1),
@@ -356,14 +358,14 @@ fn bits_that_rot_in_the_table_in_use_bring_the_other_one_back() {
         new: signed(6, 9, 2),
     };
     for seed in 0..200 {
-        let mut device = SimDevice::<4, 256>::new(24, seed);
+        let mut device = SimDevice::<4, 256>::new(48, seed);
         device.ask(Request::Provision {
             key: key().verifying_key().to_bytes(),
             device: DEVICE,
         });
         device.update(&files.old, true).expect("a good device");
         device.update(&files.new, true).expect("a good device");
-        let slot = (24 * 256)..(24 * 256 + files.new.len() as u32);
+        let slot = (48 * 256)..(48 * 256 + files.new.len() as u32);
         let flash = device.updater.flash_mut();
         flash.rot(slot, 1 + (seed % 3) as usize).expect("there");
         let device = device.restarted();

@@ -1,8 +1,8 @@
 //! The device's key and number: a record that is written once.
 
-use super::StoreError;
 use super::map::Part;
 use super::record::{self, Identity, Place, places};
+use super::{StoreError, flash};
 use embedded_storage::nor_flash::NorFlash;
 
 /// Finds the identity; the first that is whole counts.
@@ -13,21 +13,17 @@ pub(super) fn find<F: NorFlash>(flash: &mut F, part: Part) -> Option<Identity> {
     })
 }
 
-/// Writes the identity of a device that has none.
+/// Writes the identity of a device that has none. Erases first: what looks blank may
+/// have been cut before.
 pub(super) fn write<F: NorFlash>(
     flash: &mut F,
     part: Part,
     identity: &Identity,
 ) -> Result<(), StoreError> {
-    for place in 0..places(part) {
-        let blank = matches!(
-            record::look::<F, Identity>(flash, part, place),
-            Ok(Place::Blank)
-        );
-        // As in the journal, a place may look blank and not be.
-        if blank && record::write(flash, part, place, identity).is_ok() {
-            return Ok(());
-        }
+    flash::erase(flash, part, 0, part.length)?;
+    let mut places = 0..places(part);
+    if places.any(|place| record::write(flash, part, place, identity).is_ok()) {
+        return Ok(());
     }
     Err(StoreError::Full)
 }

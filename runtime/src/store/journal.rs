@@ -18,6 +18,8 @@ pub(super) struct Journal {
     /// Places between the last record and the next one, which hold something that is
     /// no record now.
     spoiled: u32,
+    /// Whether that part was erased since the start.
+    is_fresh: bool,
 }
 
 impl Journal {
@@ -29,6 +31,7 @@ impl Journal {
             next: 0,
             last: None,
             spoiled: 0,
+            is_fresh: false,
         };
         for (index, part) in parts.into_iter().enumerate() {
             let (mut newest, mut next, mut spoiled) = (None::<Commit>, 0, 0);
@@ -77,8 +80,12 @@ impl Journal {
         self.spoiled > 0
     }
 
-    /// Writes a record behind the last one; from then on it counts. Returns how
-    /// many erases that took.
+    /// Writes a record; from then on it counts. Returns how many parts were erased for
+    /// it.
+    ///
+    /// The first one after a start goes to the other part, erased anew: a place behind
+    /// the last record may look blank and yet have been cut before any of its bits
+    /// changed, and flash must not be written twice.
     ///
     /// # Errors
     /// [`StoreError`]; the record before still counts then.
@@ -93,38 +100,45 @@ impl Journal {
             None => 0,
         };
         commit.sequence = commit.sequence.saturating_add(self.spoiled);
-        let here = self.part();
-        // A place that fails is passed over: it may have been cut before any of its
-        // bits changed, and look blank.
-        while self.next < places(here) {
-            let place = self.next;
-            self.next += 1;
-            if record::write(flash, here, place, &commit).is_ok() {
-                self.last = Some(commit);
-                self.spoiled = 0;
-                return Ok(0);
-            }
-            self.spoiled += 1;
+        let [first, second] = self.parts;
+        let parts = if self.part == 0 {
+            [first, second]
+        } else {
+            [second, first]
+        };
+        let [here, there] = parts;
+        if self.is_fresh && self.try_places(flash, here, &commit) {
+            return Ok(0);
         }
-        let other = 1 - self.part;
-        let there = *self.parts.get(other).unwrap_or(&here);
         let [.., records] = &mut commit.erases;
         *records = records.saturating_add(1);
         flash::erase(flash, there, 0, there.length)?;
-        for place in 0..places(there) {
-            if record::write(flash, there, place, &commit).is_ok() {
-                self.part = other;
-                self.next = place + 1;
-                self.last = Some(commit);
-                self.spoiled = 0;
-                return Ok(1);
-            }
+        let (part, next) = (self.part, self.next);
+        self.part = 1 - part;
+        self.next = 0;
+        if self.try_places(flash, there, &commit) {
+            self.is_fresh = true;
+            return Ok(1);
         }
+        // The part with the record that counts stays the one to keep.
+        self.part = part;
+        self.next = next;
+        self.is_fresh = false;
         Err(StoreError::Full)
     }
 
-    fn part(&self) -> Part {
-        let [first, second] = self.parts;
-        if self.part == 0 { first } else { second }
+    /// Writes to the first place that takes it.
+    fn try_places<F: NorFlash>(&mut self, flash: &mut F, part: Part, commit: &Commit) -> bool {
+        while self.next < places(part) {
+            let place = self.next;
+            self.next += 1;
+            if record::write(flash, part, place, commit).is_ok() {
+                self.last = Some(*commit);
+                self.spoiled = 0;
+                return true;
+            }
+            self.spoiled += 1;
+        }
+        false
     }
 }
