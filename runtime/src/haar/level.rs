@@ -195,6 +195,7 @@ impl Level {
     }
 
     /// Whether all nodes have four equal quarters.
+    #[inline]
     pub(crate) fn is_plain(&self) -> bool {
         let plain = |pairs: [Pair; 2]| pairs.iter().all(|pair| pair.is_plain());
         plain(self.row_pairs) && plain(self.col_pairs)

@@ -260,6 +260,14 @@ pub struct Groups<'a> {
     words: &'a [[u8; WORD]],
 }
 
+#[cfg(target_arch = "arm")]
+impl<'a> Groups<'a> {
+    /// The words that are left.
+    pub(crate) const fn words(&self) -> &'a [[u8; WORD]] {
+        self.words
+    }
+}
+
 impl<'a> Iterator for Groups<'a> {
     type Item = Group<'a>;
 

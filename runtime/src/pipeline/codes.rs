@@ -4,7 +4,7 @@
 //! a response as steep as sRGB's in the darks needs: a code is within one of the
 //! exact one for any response up to twice as steep.
 
-use super::response::{Response, linear_code};
+use super::response::Response;
 use crate::units::Drive;
 
 /// Codes of a curve.
@@ -36,19 +36,13 @@ pub fn code(index: usize, response: Response<'_>) -> u8 {
     narrow(response.fine_code(middle_drive(index)))
 }
 
-/// The codes of a projector whose light is in proportion to its code.
-pub static LINEAR: [u8; CODES] = {
-    let mut codes = [0; CODES];
-    let mut index = 0;
-    while index < CODES {
-        #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
-        {
-            codes[index] = narrow(linear_code(middle_drive(index)));
-        }
-        index += 1;
-    }
-    codes
-};
+/// The code of a drive where codes are in proportion to drives: to nearest.
+#[inline]
+#[must_use]
+pub const fn proportional(drive: Drive) -> u8 {
+    const HALF: u32 = 1 << (Drive::FRAC_NBITS - 1);
+    ((drive.to_bits() as u32 * u8::MAX as u32 + HALF) >> Drive::FRAC_NBITS) as u8
+}
 
 /// The code of a drive.
 #[inline]
@@ -63,11 +57,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn linear_codes_are_within_one_of_the_exact_ones() {
+    fn proportional_codes_are_the_nearest_ones() {
         for bits in 0..=Drive::ONE.to_bits() {
             let exact = f64::from(bits) / 32_768.0 * 255.0;
-            let code = at(&LINEAR, Drive::from_bits(bits));
-            assert!((f64::from(code) - exact).abs() <= 0.52);
+            let code = proportional(Drive::from_bits(bits));
+            assert!((f64::from(code) - exact).abs() <= 0.5);
         }
     }
 }

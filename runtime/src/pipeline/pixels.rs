@@ -25,6 +25,7 @@ pub struct Pixels<'f, S: Sample, const C: usize> {
 
 impl<S: Sample, const C: usize> Pixels<'_, S, C> {
     /// Those from an index on.
+    #[inline]
     #[must_use]
     pub fn from(&self, start: usize) -> Self {
         let ambient = self

@@ -95,7 +95,8 @@ fn finish_plainly<S: Sample, const C: usize>(
 #[derive(Clone, Copy, Debug)]
 pub struct Curves<'a> {
     light: &'a [u16; 256],
-    codes: &'a [u8; CODES],
+    /// `None` if codes are in proportion to drives.
+    codes: Option<&'a [u8; CODES]>,
 }
 
 impl Sample for u8 {
@@ -105,11 +106,11 @@ impl Sample for u8 {
         match encoding {
             Encoding::Display => Curves {
                 light: &srgb::DECODED,
-                codes: table.codes(channel).unwrap_or(&codes::LINEAR),
+                codes: table.codes(channel),
             },
             Encoding::Linear => Curves {
                 light: &LINEAR_LIGHT,
-                codes: &codes::LINEAR,
+                codes: None,
             },
         }
     }
@@ -123,13 +124,17 @@ impl Sample for u8 {
 
     #[inline]
     fn code(wanted: i32, curves: Curves<'_>) -> (Self, bool) {
+        let Some(codes) = curves.codes else {
+            let (drive, clipped) = clip(wanted);
+            return (codes::proportional(drive), clipped);
+        };
         // Negative drives become the largest indices.
         let index = (wanted.cast_unsigned() >> INDEX_SHIFT) as usize;
-        if let Some(code) = curves.codes.get(index) {
+        if let Some(code) = codes.get(index) {
             return (*code, false);
         }
         let (drive, clipped) = clip(wanted);
-        (codes::at(curves.codes, drive), clipped)
+        (codes::at(codes, drive), clipped)
     }
 
     #[inline]
@@ -240,19 +245,23 @@ mod tests {
 
     #[test]
     fn what_is_clipped_is_what_lies_outside() {
-        let curves = Curves {
-            light: &LINEAR_LIGHT,
-            codes: &codes::LINEAR,
-        };
-        for (wanted, expected) in [
-            (i32::MIN, (0, true)),
-            (-1, (0, true)),
-            (0, (0, false)),
-            (32_768, (255, false)),
-            (32_769, (255, true)),
-            (i32::MAX, (255, true)),
-        ] {
-            assert_eq!(u8::code(wanted, curves), expected, "{wanted}");
+        let of_response: [u8; CODES] =
+            core::array::from_fn(|index| codes::code(index, Response::new(&[])));
+        for codes in [None, Some(&of_response)] {
+            let curves = Curves {
+                light: &LINEAR_LIGHT,
+                codes,
+            };
+            for (wanted, expected) in [
+                (i32::MIN, (0, true)),
+                (-1, (0, true)),
+                (0, (0, false)),
+                (32_768, (255, false)),
+                (32_769, (255, true)),
+                (i32::MAX, (255, true)),
+            ] {
+                assert_eq!(u8::code(wanted, curves), expected, "{wanted}");
+            }
         }
     }
 }

@@ -113,8 +113,11 @@ impl Workspace<'_> {
         };
         operator.apply(tier, table.channels(), self.inputs, self.sums);
         let cells = table.grid().cells();
-        for constant in self.sums.iter_mut().skip(cells - 1).step_by(cells) {
-            *constant = constant.wrapping_add(CORRECTION_HALF);
+        let channels = self.sums.chunks_exact_mut(cells);
+        for sums in channels.take(table.channels().into()) {
+            if let Some(constant) = sums.last_mut() {
+                *constant = constant.wrapping_add(CORRECTION_HALF);
+            }
         }
     }
 

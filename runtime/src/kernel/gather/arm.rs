@@ -9,7 +9,7 @@
 //! `docs/firmware.md` says what that brings and how to repeat it.
 
 use super::Sums;
-use crate::operator::Group;
+use crate::operator::Segment;
 use core::arch::global_asm;
 use core::ffi::c_void;
 use fixed::types::I2F30;
@@ -28,29 +28,21 @@ struct Context {
 /// Runs `rows` rows of one number of pairs (or of any) from `words`.
 type Loop = unsafe extern "C" fn(words: *const c_void, context: *const Context, rows: u32);
 
-/// Adds a group to the sums; `false` if it has to be done the plain way.
+/// Adds a segment to the sums; `false` if it has to be done the plain way.
 ///
 /// `fresh` says that the sums are zero.
 pub(super) fn gather(
-    group: &Group<'_>,
+    segment: &Segment<'_>,
     scales: &[I2F30],
     fresh: bool,
     sums: &mut Sums<'_>,
 ) -> bool {
-    let words = group.words().as_ptr();
     let loops = match scales {
         [scale] if fresh && *scale == I2F30::ONE => &STORE_ONE,
         [_] => &ADD_ONE,
         [_, _, _] if fresh => &STORE_THREE,
         _ => return false,
     };
-    let Some(run) = loops.get(usize::from(group.pairs.unwrap_or(0))) else {
-        return false;
-    };
-    // Tables lie at multiples of four in flash; `ldm` needs it.
-    if !words.cast::<u32>().is_aligned() {
-        return false;
-    }
     let mut context = Context {
         inputs: sums.inputs.as_ptr(),
         sums: sums.outputs.as_mut_ptr(),
@@ -60,12 +52,29 @@ pub(super) fn gather(
     for (slot, scale) in context.scales.iter_mut().zip(scales) {
         *slot = scale.to_bits();
     }
-    // SAFETY: the segment was checked, so `words` holds `count` rows as the loop
-    // reads them, every row's index is below `sums.cells` and every pair's below
-    // `sums.cells - 1`; the caller made sure that `inputs` and `sums` have
-    // `sums.cells` elements for each scale. The table lies in flash that nobody
-    // writes while a `Table` borrows it. Words of two inputs need no alignment.
-    unsafe { run(words.cast(), &raw const context, group.count.into()) };
+    let mut groups = segment.groups();
+    // Tables lie at multiples of four in flash; `ldm` needs it.
+    if !groups.words().as_ptr().cast::<u32>().is_aligned() {
+        return false;
+    }
+    while let Some(group) = groups.next() {
+        // A checked segment has no group of other lengths.
+        let Some(run) = loops.get(usize::from(group.pairs.unwrap_or(0))) else {
+            continue;
+        };
+        // SAFETY: the segment was checked, so `words` holds `count` rows as the loop
+        // reads them, every row's index is below `sums.cells` and every pair's below
+        // `sums.cells - 1`; the caller made sure that `inputs` and `sums` have
+        // `sums.cells` elements for each scale. The table lies in flash that nobody
+        // writes while a `Table` borrows it. Words of two inputs need no alignment.
+        unsafe {
+            run(
+                group.words().as_ptr().cast(),
+                &raw const context,
+                group.count.into(),
+            );
+        };
+    }
     true
 }
 

@@ -35,11 +35,11 @@ pub(crate) fn gather<const C: usize>(
     if sums.inputs.len() < needed || sums.outputs.len() < needed {
         return;
     }
+    #[cfg(all(target_arch = "arm", not(feature = "reference-kernel")))]
+    if arm::gather(segment, &scales, fresh, sums) {
+        return;
+    }
     for group in segment.groups() {
-        #[cfg(all(target_arch = "arm", not(feature = "reference-kernel")))]
-        if arm::gather(&group, &scales, fresh, sums) {
-            continue;
-        }
         reference::gather(&group, &scales, sums);
     }
 }

@@ -6,6 +6,7 @@ use crate::units::InputCoefficient;
 use fixed::types::I2F30;
 
 /// Adds the rows of a group to the sums of `C` channels, which are long enough.
+#[inline(never)]
 pub(super) fn gather<const C: usize>(group: &Group<'_>, scales: &[I2F30; C], sums: &mut Sums<'_>) {
     let mut inputs = [&[][..]; C];
     for (channel, of_channel) in inputs

@@ -41,6 +41,7 @@ unsafe extern "C" {
 }
 
 /// Cells that a block spans in memory; `None` if the loops cannot run through it.
+#[inline]
 pub(in crate::kernel) fn span(block: Block) -> Option<usize> {
     let Block {
         cols, nodes, rows, ..
@@ -54,6 +55,7 @@ pub(in crate::kernel) fn span(block: Block) -> Option<usize> {
 }
 
 /// See [`merge`](super::merge).
+#[inline]
 pub(super) fn merge(
     values: &[i32],
     block: Block,
@@ -84,6 +86,7 @@ pub(super) fn merge(
 }
 
 /// See [`split`](super::split).
+#[inline]
 pub(super) fn split(block: Block, values: &[i32], details: &[[i32; 3]], to: &mut [i32]) -> bool {
     let count = block.nodes * block.rows;
     let fits = span(block).is_some_and(|span| to.len() >= span);

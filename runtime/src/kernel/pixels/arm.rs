@@ -11,8 +11,9 @@
 use crate::haar::Block;
 use crate::kernel::levels::arm::span;
 use crate::pipeline::{CODES, Halfword, Pixels};
-use crate::units::InputCoefficient;
+use crate::units::{Drive, InputCoefficient};
 use core::arch::global_asm;
+use core::ptr::without_provenance;
 
 /// Input shift of the nodes of two by two cells, which the loop has built in.
 const FINEST_SHIFT: u32 = 2;
@@ -41,12 +42,16 @@ struct Finish {
     gain: *const u8,
     input: *mut u8,
     light: *const u16,
+    /// Codes by drive, or [`PROPORTIONAL`].
     codes: *const u8,
     gain_fraction: u32,
     half: u32,
     count: usize,
     ambient: *const u8,
 }
+
+/// What a drive is multiplied by to be a code in the high word of the product.
+const PROPORTIONAL: usize = 255 << (32 - Drive::FRAC_NBITS);
 
 /// What the adding loop needs. The assembler below knows the order of the fields.
 #[repr(C)]
@@ -72,6 +77,10 @@ unsafe extern "C" {
     fn iltm_finish_1_lit(finish: *const Finish) -> u32;
     fn iltm_finish_3_dark(finish: *const Finish) -> u32;
     fn iltm_finish_3_lit(finish: *const Finish) -> u32;
+    fn iltm_finish_1_dark_linear(finish: *const Finish) -> u32;
+    fn iltm_finish_1_lit_linear(finish: *const Finish) -> u32;
+    fn iltm_finish_3_dark_linear(finish: *const Finish) -> u32;
+    fn iltm_finish_3_lit_linear(finish: *const Finish) -> u32;
 }
 
 /// Address of the first sample of a channel in pixels of `C` samples; `None` if there
@@ -141,7 +150,7 @@ pub(super) fn merge<const C: usize>(
 /// See [`finish`](super::finish).
 pub(super) fn finish<const C: usize>(
     wanted: &Pixels<'_, u8, C>,
-    (light, codes): (&[u16; 256], &[u8; CODES]),
+    (light, codes): (&[u16; 256], Option<&[u8; CODES]>),
     gain_fraction: u32,
     gains: &[[Halfword; C]],
     corrections: &[i32],
@@ -157,7 +166,7 @@ pub(super) fn finish<const C: usize>(
         gain: samples(gains, channel, count)?.cast(),
         input: samples(input, channel, count)?.cast_mut(),
         light: light.as_ptr(),
-        codes: codes.as_ptr(),
+        codes: codes.map_or(without_provenance(PROPORTIONAL), |codes| codes.as_ptr()),
         gain_fraction,
         half: 1_u32.wrapping_shl(gain_fraction) >> 1,
         count,
@@ -166,13 +175,18 @@ pub(super) fn finish<const C: usize>(
     let finish = &raw const finish;
     // SAFETY: all slices have `count` pixels, of which the loop touches one channel;
     // `light` has an element for every value of a byte, and `codes` for every index
-    // that `usat` leaves, below 2^13.
+    // that `usat` leaves, below 2^13; the loops for codes in proportion take them for
+    // a factor.
     unsafe {
-        Some(match (C, wanted.ambient.is_some()) {
-            (1, false) => iltm_finish_1_dark(finish),
-            (1, true) => iltm_finish_1_lit(finish),
-            (3, false) => iltm_finish_3_dark(finish),
-            (3, true) => iltm_finish_3_lit(finish),
+        Some(match (C, wanted.ambient.is_some(), codes.is_some()) {
+            (1, false, true) => iltm_finish_1_dark(finish),
+            (1, true, true) => iltm_finish_1_lit(finish),
+            (3, false, true) => iltm_finish_3_dark(finish),
+            (3, true, true) => iltm_finish_3_lit(finish),
+            (1, false, false) => iltm_finish_1_dark_linear(finish),
+            (1, true, false) => iltm_finish_1_lit_linear(finish),
+            (3, false, false) => iltm_finish_3_dark_linear(finish),
+            (3, true, false) => iltm_finish_3_lit_linear(finish),
             _ => return None,
         })
     }
@@ -358,12 +372,12 @@ global_asm!(
     "#
 );
 
-// r0 corrections, r1 wanted, r2 gain, r3 input, r4 light, r5 codes, r6 gain
+// r0 corrections, r1 wanted, r2 gain, r3 input, r4 light, r5 codes or factor, r6 gain
 // fraction, r7 half, r8 pixels left, r9 drive, r10 gain and index, r11 ambient, r12
 // correction, lr samples clipped.
 global_asm!(
     r#"
-    .macro iltm_drive channels, lit
+    .macro iltm_drive channels, lit, linear
         ldrb r9, [r1], #\channels
         ldrh r10, [r2], #2*\channels
         ldrh r9, [r4, r9, lsl #1]
@@ -375,12 +389,21 @@ global_asm!(
         mla r9, r9, r10, r7
         lsr r9, r6
         sub r9, r9, r12, asr #8
+    .if \linear
+        usat r10, #15, r9
+        cmp r10, r9
+    .else
         usat r10, #13, r9, asr #2
         cmp r10, r9, asr #2
+    .endif
     .endm
 
-    .macro iltm_code channels
+    .macro iltm_code channels, linear
+    .if \linear
+        smmulr r10, r10, r5
+    .else
         ldrb r10, [r5, r10]
+    .endif
         strb r10, [r3], #\channels
     .endm
 
@@ -390,7 +413,7 @@ global_asm!(
         addne lr, #1
     .endm
 
-    .macro iltm_finish name, channels, lit
+    .macro iltm_finish name, channels, lit, linear
     .section .text.\name, "ax", %progbits
     .global \name
     .type \name, %function
@@ -403,32 +426,32 @@ global_asm!(
         subs r8, #4
         blt 5f
     1:
-        iltm_drive \channels, \lit
+        iltm_drive \channels, \lit, \linear
         bne 11f
     21:
-        iltm_code \channels
-        iltm_drive \channels, \lit
+        iltm_code \channels, \linear
+        iltm_drive \channels, \lit, \linear
         bne 12f
     22:
-        iltm_code \channels
-        iltm_drive \channels, \lit
+        iltm_code \channels, \linear
+        iltm_drive \channels, \lit, \linear
         bne 13f
     23:
-        iltm_code \channels
-        iltm_drive \channels, \lit
+        iltm_code \channels, \linear
+        iltm_drive \channels, \lit, \linear
         bne 14f
     24:
-        iltm_code \channels
+        iltm_code \channels, \linear
         subs r8, #4
         bge 1b
     5:
         adds r8, #4
         beq 7f
     6:
-        iltm_drive \channels, \lit
+        iltm_drive \channels, \lit, \linear
         bne 16f
     26:
-        iltm_code \channels
+        iltm_code \channels, \linear
         subs r8, #1
         bne 6b
     7:
@@ -452,10 +475,14 @@ global_asm!(
     .size \name, . - \name
     .endm
 
-    iltm_finish iltm_finish_1_dark, 1, 0
-    iltm_finish iltm_finish_1_lit, 1, 1
-    iltm_finish iltm_finish_3_dark, 3, 0
-    iltm_finish iltm_finish_3_lit, 3, 1
+    iltm_finish iltm_finish_1_dark, 1, 0, 0
+    iltm_finish iltm_finish_1_dark_linear, 1, 0, 1
+    iltm_finish iltm_finish_1_lit, 1, 1, 0
+    iltm_finish iltm_finish_1_lit_linear, 1, 1, 1
+    iltm_finish iltm_finish_3_dark, 3, 0, 0
+    iltm_finish iltm_finish_3_dark_linear, 3, 0, 1
+    iltm_finish iltm_finish_3_lit, 3, 1, 0
+    iltm_finish iltm_finish_3_lit_linear, 3, 1, 1
     .text
     "#
 );

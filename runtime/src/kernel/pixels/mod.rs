@@ -30,11 +30,12 @@ pub(crate) fn merge<const C: usize>(
 
 /// Gain, correction, clip and code of one channel of as many pixels as there are
 /// corrections; returns how many were clipped, or `None`, and nothing done, if that
-/// has to be done the plain way. `light` is by code, `codes` by drive.
+/// has to be done the plain way. `light` is by code, `codes` by drive, `None` if they
+/// are in proportion to it.
 #[inline]
 pub(crate) fn finish<const C: usize>(
     wanted: &Pixels<'_, u8, C>,
-    (light, codes): (&[u16; 256], &[u8; CODES]),
+    (light, codes): (&[u16; 256], Option<&[u8; CODES]>),
     gain_fraction: u32,
     gains: &[[Halfword; C]],
     corrections: &[i32],
