@@ -3,7 +3,7 @@
 use super::DeviceError;
 use serialport::{ClearBuffer, SerialPort};
 use std::io::{self, ErrorKind};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Speed of a serial line unless something else is said, bits a second.
 pub const BAUD: u32 = 115_200;
@@ -22,6 +22,41 @@ pub trait Line {
     /// # Errors
     /// What the operating system says if the line is not there any more.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// The time by which whoever uses the line measures its own patience. A simulated
+    /// line has a clock of its own, which goes on while something is waited for: an
+    /// hour on it takes as long as there is to compute.
+    fn now(&self) -> Instant {
+        Instant::now()
+    }
+}
+
+impl<L: Line + ?Sized> Line for Box<L> {
+    fn read(&mut self, bytes: &mut [u8], wait: Duration) -> io::Result<usize> {
+        (**self).read(bytes, wait)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).write(bytes)
+    }
+
+    fn now(&self) -> Instant {
+        (**self).now()
+    }
+}
+
+impl<L: Line + ?Sized> Line for &mut L {
+    fn read(&mut self, bytes: &mut [u8], wait: Duration) -> io::Result<usize> {
+        (**self).read(bytes, wait)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).write(bytes)
+    }
+
+    fn now(&self) -> Instant {
+        (**self).now()
+    }
 }
 
 /// A serial port.
@@ -44,6 +79,17 @@ impl Port {
         // and frames are told from the rest anyway.
         let _ = port.clear(ClearBuffer::All);
         Ok(Self { port })
+    }
+}
+
+impl Port {
+    /// Goes on at another speed.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] if the port cannot do it.
+    pub fn set_speed(&mut self, baud: u32) -> Result<(), DeviceError> {
+        let set = self.port.set_baud_rate(baud);
+        set.map_err(|source| DeviceError::Open { source })
     }
 }
 
@@ -72,7 +118,8 @@ impl Line for Port {
     }
 }
 
-fn is_nothing(error: &io::Error) -> bool {
+/// Whether this only says that nothing came, or went, in time.
+pub(super) fn is_nothing(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock
