@@ -70,7 +70,7 @@ fi
 # build everything anew at every change between them.
 more=${ILTM_FIRMWARE_FEATURES:-}
 folder=$PWD/target/$board${more:+-$more}
-flags="-C target-cpu=$cpu"
+flags="-C target-cpu=$cpu --cfg sha2_backend_soft=\"compact\""
 options=(--release --locked --target "$target" --no-default-features --features "$board${more:+,$more}" --bin "$bin")
 if [ $route = debian ]; then
     folder=$PWD/target/debian-$board${more:+-$more}

@@ -2,15 +2,15 @@
 //! of a line in memory or of a pseudo-terminal.
 
 use crate::fake_tables::FakeTables;
-use iltm::device::Line;
+use iltm::device::fault::{FarEnd, PacedLine};
 use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
-    Clipping, DELIMITER, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode,
-    Name, PROTOCOL_VERSION, PassThrough, Refusal, Request, Response, SerialCounts, Session,
-    SlotState, Stack, Status, TableName, Version,
+    Clipping, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode, Name,
+    PROTOCOL_VERSION, PassThrough, Refusal, Request, Response, SerialCounts, Session, SlotState,
+    Stack, Status, TableName, Version,
 };
 use std::fmt;
-use std::io::{self, Read, Write};
+use std::io::{Read, Write};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -175,117 +175,60 @@ impl Device for FakeDevice {
     }
 }
 
-/// What happens to frames on a line, in parts of 100, one after the other.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Harm {
-    /// Are lost.
-    pub lost: u8,
-    /// Have a byte changed.
-    pub changed: u8,
-    /// Come twice.
-    pub doubled: u8,
-    /// Lose their end, delimiter included.
-    pub cut: u8,
-}
-
-impl Harm {
-    fn to(self, frame: &[u8], random: &mut fastrand::Rng) -> Vec<u8> {
-        let mut frame = frame.to_vec();
-        let mut happens = |parts: u8| random.u8(0..100) < parts;
-        let (lost, changed) = (happens(self.lost), happens(self.changed));
-        let (doubled, cut) = (happens(self.doubled), happens(self.cut));
-        if lost {
-            return Vec::new();
-        }
-        if changed {
-            let at = random.usize(0..frame.len());
-            frame[at] ^= random.u8(1..);
-        }
-        if doubled {
-            frame.extend(frame.clone());
-        }
-        if cut {
-            frame.truncate(random.usize(0..frame.len()));
-        }
-        frame
-    }
-}
-
-/// A line in memory with a device at its end, which does frames some harm both
-/// ways, by seed.
+/// A device in memory with its side of the conversation, as the far end of a line.
 #[derive(Debug)]
-pub struct FakeLine {
+pub struct FakeEnd {
     /// The device.
     pub device: FakeDevice,
     /// Its side of the conversation.
     pub session: Session,
-    harm: Harm,
-    random: fastrand::Rng,
-    started: Instant,
-    to_host: Vec<u8>,
 }
 
-impl FakeLine {
-    /// A line that does this harm.
+/// A line in memory with a device at its end, on a clock of its own.
+pub type FakeLine = PacedLine<FakeEnd>;
+
+impl FakeDevice {
+    /// A line with this device at its end.
     #[must_use]
-    pub fn new(device: FakeDevice, harm: Harm, seed: u64) -> Self {
-        Self {
+    pub fn line(self, baud: u32) -> FakeLine {
+        let end = FakeEnd {
             session: Session::new(),
-            device,
-            harm,
-            random: fastrand::Rng::with_seed(seed),
-            started: Instant::now(),
-            to_host: Vec::new(),
-        }
-    }
-
-    fn now_ms(&self) -> u64 {
-        self.started.elapsed().as_millis() as u64
-    }
-
-    fn pump(&mut self) {
-        let mut bytes = Vec::new();
-        while !self.session.pending().is_empty() {
-            bytes.extend(self.session.pending());
-            self.session.sent(usize::MAX);
-        }
-        for frame in bytes.split_inclusive(|byte| *byte == DELIMITER) {
-            self.to_host.extend(self.harm.to(frame, &mut self.random));
-        }
+            device: self,
+        };
+        PacedLine::new(end, baud)
     }
 }
 
-impl Line for FakeLine {
-    fn read(&mut self, bytes: &mut [u8], wait: Duration) -> io::Result<usize> {
-        self.device.uptime_ms = self.now_ms();
-        let now = self.now_ms();
+impl FakeEnd {
+    /// As after a loss of power.
+    pub fn restart(&mut self) {
+        self.session = Session::new();
+        self.device.restart();
+    }
+}
+
+impl FarEnd for FakeEnd {
+    fn turn(&mut self, arrived: &[u8], now: Duration) {
+        let now = now.as_millis() as u64;
+        self.device.uptime_ms = now;
+        let mute = self.device.tables.as_ref().is_some_and(FakeTables::is_mute);
+        let arrived = if mute { &[] } else { arrived };
+        self.session.receive(arrived, now, &mut self.device);
+        if (self.device.tables.as_mut()).is_some_and(FakeTables::restarts) {
+            self.restart();
+        }
         if let Some(event) = self.device.poll(now) {
             self.session.event(&event);
         }
         self.session.poll(now, &self.device);
-        self.pump();
-        if self.to_host.is_empty() {
-            thread::sleep(wait.min(Duration::from_millis(1)));
-        }
-        let count = bytes.len().min(self.to_host.len());
-        let rest = self.to_host.split_off(count);
-        bytes[..count].copy_from_slice(&self.to_host);
-        self.to_host = rest;
-        Ok(count)
     }
 
-    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        for frame in bytes.split_inclusive(|byte| *byte == DELIMITER) {
-            let frame = self.harm.to(frame, &mut self.random);
-            let now = self.now_ms();
-            self.session.receive(&frame, now, &mut self.device);
-            if (self.device.tables.as_mut()).is_some_and(FakeTables::restarts) {
-                self.session = Session::new();
-                self.device.restart();
-            }
-        }
-        self.pump();
-        Ok(())
+    fn pending(&self) -> &[u8] {
+        self.session.pending()
+    }
+
+    fn sent(&mut self, count: usize) {
+        self.session.sent(count);
     }
 }
 

@@ -6,6 +6,7 @@ pub mod fake_tables;
 pub mod firmware;
 pub mod fuzz;
 pub mod instructions;
+pub mod slots;
 
 use iltm::capture::Response;
 use iltm::compile::{CompileOptions, compile};

@@ -1,27 +1,30 @@
 //! Host and device at the two ends of one line, good and bad; and that the
 //! specification says what they do.
 
-use iltm::device::{Client, DeviceError, Incoming, Patience};
+use iltm::device::fault::{Faults, Harm, LossyLine, LossyProxy};
+use iltm::device::port::BAUD;
+use iltm::device::{Client, DeviceError, Incoming, Patience, Port};
 use iltm_runtime::link::{
     Channel, Decoder, Event, Fault, FaultyFrame, Frame, MAX_ENCODED, MAX_PAYLOAD, Refusal, Request,
     Response, SlotState, TierReason, encode,
 };
 use iltm_runtime::trust::Rejected;
-use iltm_tests::fake_device::{FakeDevice, FakeLine, Harm};
+use iltm_tests::fake_device::{FakeDevice, FakeLine, FakePort};
 use iltm_tests::fuzz;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// A line in memory answers at once: what has not come by then has been lost.
-const QUICK: Patience = Patience {
-    answer: Duration::from_millis(5),
+/// Time on a line in memory costs nothing.
+const PATIENT: Patience = Patience {
+    answer: Duration::from_millis(400),
     tries: 40,
 };
 
-fn client(harm: Harm, seed: u64) -> Client<FakeLine> {
-    let line = FakeLine::new(FakeDevice::default(), harm, seed);
-    Client::greet(line, QUICK).expect("40 tries are enough")
+fn client(harm: Harm, seed: u64) -> Client<LossyLine<FakeLine>> {
+    let line = FakeDevice::default().line(BAUD);
+    let line = LossyLine::new(line, Faults::both_ways(harm, seed));
+    Client::greet(line, PATIENT).expect("40 tries are enough")
 }
 
 #[test]
@@ -36,14 +39,8 @@ fn a_host_learns_who_the_device_is_and_how_it_is() {
 
 #[test]
 fn a_line_that_harms_a_fifth_of_all_frames_carries_every_request() {
-    let harm = Harm {
-        lost: 5,
-        changed: 5,
-        doubled: 5,
-        cut: 5,
-    };
     for seed in 0..50 {
-        let mut client = client(harm, seed);
+        let mut client = client(Harm::evenly(200), seed);
         for _ in 0..20 {
             let status = client.status().expect("40 tries are enough");
             assert_eq!((status.tier, status.top_tier), (3, 5), "seed {seed}");
@@ -52,9 +49,70 @@ fn a_line_that_harms_a_fifth_of_all_frames_carries_every_request() {
 }
 
 #[test]
+fn a_line_that_is_unplugged_is_gone_and_serves_the_next_client_when_it_is_back() {
+    let faults = Faults::both_ways(Harm::default(), 1).unplugged_after(6);
+    let mut line = LossyLine::new(FakeDevice::default().line(BAUD), faults);
+    let mut client = Client::greet(&mut line, PATIENT).expect("two frames");
+    for _ in 0..2 {
+        client.status().expect("two frames");
+    }
+    let gone = client.status().expect_err("unplugged");
+    assert!(matches!(gone, DeviceError::Gone { .. }), "{gone:?}");
+    line.plug_in();
+    let mut client = Client::greet(&mut line, PATIENT).expect("back");
+    client.status().expect("back");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_proxy_harms_frames_between_a_port_and_any_client() {
+    let device = FakePort::new(FakeDevice::default());
+    let faults = Faults::both_ways(Harm::evenly(200), 1);
+    let proxy = LossyProxy::start(device.path(), BAUD, faults).expect("a port");
+    for _ in 0..2 {
+        let patience = Patience {
+            answer: Duration::from_millis(60),
+            tries: 40,
+        };
+        let port = Port::open(proxy.path(), BAUD).expect("a pseudo-terminal");
+        let mut client = Client::greet(port, patience).expect("40 tries are enough");
+        for _ in 0..15 {
+            client.status().expect("40 tries are enough");
+        }
+    }
+    let (there, back) = (proxy.to_device(), proxy.to_host());
+    assert!(
+        there.frames >= 32 && back.frames >= 20,
+        "{there:?} {back:?}"
+    );
+    assert!(
+        there.harmed() > 0 && back.harmed() > 0,
+        "{there:?} {back:?}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_proxy_that_is_unplugged_takes_its_port_with_it() {
+    let device = FakePort::new(FakeDevice::default());
+    let faults = Faults::both_ways(Harm::default(), 1).unplugged_after(4);
+    let proxy = LossyProxy::start(device.path(), BAUD, faults).expect("a port");
+    let port = Port::open(proxy.path(), BAUD).expect("a pseudo-terminal");
+    let mut client = Client::greet(port, Patience::default()).expect("two frames");
+    client.status().expect("two frames");
+    let gone = client.status().expect_err("unplugged");
+    assert!(matches!(gone, DeviceError::Gone { .. }), "{gone:?}");
+    assert!(Port::open(proxy.path(), BAUD).is_err(), "no such port");
+    assert_eq!((proxy.to_device().frames, proxy.to_host().frames), (2, 2));
+    // The real port is free again.
+    let port = Port::open(device.path(), BAUD).expect("free");
+    Client::greet(port, Patience::default()).expect("a device");
+}
+
+#[test]
 fn events_that_are_lost_on_the_way_are_missed() {
     let harm = Harm {
-        lost: 30,
+        drop: 300,
         ..Harm::default()
     };
     let mut client = client(harm, 3);
@@ -97,11 +155,8 @@ fn a_silent_line_is_told_from_one_that_talks_nonsense() {
         answer: Duration::from_millis(5),
         tries: 3,
     };
-    let all = Harm {
-        lost: 100,
-        ..Harm::default()
-    };
-    let line = FakeLine::new(FakeDevice::default(), all, 1);
+    let all = Faults::both_ways(Harm::silence(), 1);
+    let line = LossyLine::new(FakeDevice::default().line(BAUD), all);
     let silent = Client::greet(line, patience).expect_err("nothing comes through");
     assert!(silent.to_string().contains("silent"), "{silent}");
 
@@ -119,8 +174,7 @@ fn a_device_of_another_version_is_recognised() {
         protocol: 99,
         ..FakeDevice::default()
     };
-    let line = FakeLine::new(device, Harm::default(), 1);
-    let error = Client::greet(line, QUICK).expect_err("another version");
+    let error = Client::greet(device.line(BAUD), PATIENT).expect_err("another version");
     assert!(matches!(error, DeviceError::Protocol { device: 99 }));
 }
 

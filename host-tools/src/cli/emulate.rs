@@ -96,7 +96,7 @@ fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
 }
 
 fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> {
-    memory.write(&psram::SLOT_A, image).map_err(|error| {
+    memory.put_table(image).map_err(|error| {
         let message = format!(
             "{}: does not fit the board's flash: {error}; a slot has {} bytes and the table {}",
             path.display(),

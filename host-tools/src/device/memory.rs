@@ -29,12 +29,13 @@ impl Memory {
     /// What the operating system says if the file cannot be made.
     pub fn temporary() -> io::Result<Self> {
         let temporary = tempfile::Builder::new().prefix("iltm-board-").tempfile()?;
-        temporary.as_file().set_len(psram::SIZE as u64)?;
-        Ok(Self {
+        let memory = Self {
             file: temporary.as_file().try_clone()?,
             path: temporary.path().to_owned(),
             _temporary: Some(temporary),
-        })
+        };
+        memory.make()?;
+        Ok(memory)
     }
 
     /// Memory that stays in `path`: what an earlier board left there, a new board
@@ -47,8 +48,13 @@ impl Memory {
         let mut options = OpenOptions::new();
         let options = options.read(true).write(true).create(true).truncate(false);
         let file = options.open(path)?;
-        match file.metadata()?.len() {
-            0 => file.set_len(psram::SIZE as u64)?,
+        let memory = Self {
+            file,
+            path: path.to_owned(),
+            _temporary: None,
+        };
+        match memory.file.metadata()?.len() {
+            0 => memory.make()?,
             length if length == psram::SIZE as u64 => {}
             length => {
                 let message = format!(
@@ -58,11 +64,35 @@ impl Memory {
                 return Err(io::Error::new(io::ErrorKind::InvalidData, message));
             }
         }
-        Ok(Self {
-            file,
-            path: path.to_owned(),
-            _temporary: None,
-        })
+        Ok(memory)
+    }
+
+    /// Memory as from the factory: the flash erased, everything else zero.
+    fn make(&self) -> io::Result<()> {
+        self.file.set_len(psram::SIZE as u64)?;
+        self.erase(&psram::FLASH)
+    }
+
+    fn erase(&self, range: &Range<usize>) -> io::Result<()> {
+        self.write(range, &vec![0xFF; range.len()])
+    }
+
+    /// Puts a table's file into slot A past the device, as a debug port would: it is
+    /// the only table then, and nothing is known of earlier ones. The device's key and
+    /// number stay.
+    ///
+    /// # Errors
+    /// What the operating system says, and [`io::ErrorKind::FileTooLarge`] if it is
+    /// larger than a slot.
+    pub fn put_table(&self, file: &[u8]) -> io::Result<()> {
+        if file.len() > psram::SLOT_A.len() {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
+        let [first, second] = psram::RECORDS;
+        for part in [psram::SLOT_A, psram::SLOT_B, first, second] {
+            self.erase(&part)?;
+        }
+        self.write(&psram::SLOT_A, file)
     }
 
     /// The file.

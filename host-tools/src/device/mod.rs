@@ -12,6 +12,7 @@
 //! | the emulated board, its serial line as a port | [`emulator`] |
 //! | the emulated board's memory, which is a file here | [`memory`] |
 //! | frames for it | [`frames`], [`playback`] |
+//! | lines that fail by order, with the feature `fault-tools` | `fault` |
 //!
 //! What goes over the line is defined in [`iltm_runtime::link`], which the device
 //! uses as well.
@@ -20,6 +21,8 @@ pub mod client;
 #[cfg(unix)]
 pub mod emulator;
 mod error;
+#[cfg(feature = "fault-tools")]
+pub mod fault;
 #[cfg(unix)]
 pub mod frames;
 pub mod logs;

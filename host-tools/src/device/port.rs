@@ -31,20 +31,6 @@ pub trait Line {
     }
 }
 
-impl<L: Line + ?Sized> Line for Box<L> {
-    fn read(&mut self, bytes: &mut [u8], wait: Duration) -> io::Result<usize> {
-        (**self).read(bytes, wait)
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        (**self).write(bytes)
-    }
-
-    fn now(&self) -> Instant {
-        (**self).now()
-    }
-}
-
 impl<L: Line + ?Sized> Line for &mut L {
     fn read(&mut self, bytes: &mut [u8], wait: Duration) -> io::Result<usize> {
         (**self).read(bytes, wait)

@@ -43,17 +43,17 @@ const READS: usize = 4;
 const PIECE: usize = 64;
 
 /// The device: a board and what it does with frames.
-struct Device<B: Board, R> {
+struct Device<'a, B: Board, R> {
     serial: B::Serial,
     rest: B::Rest,
     session: Session,
-    desk: Desk<B, R>,
+    desk: Desk<'a, B, R>,
 }
 
 /// What a host can ask about.
-struct Desk<B: Board, R> {
+struct Desk<'a, B: Board, R> {
     updater: Updater<B::Flash>,
-    frames: Frames<B, R>,
+    frames: &'a mut Frames<B, R>,
 }
 
 /// Sets the board up and runs the device for ever.
@@ -95,14 +95,17 @@ fn run<B: Board>(
         serial,
         rest,
         session: Session::new(),
-        desk: Desk { updater, frames },
+        desk: Desk {
+            updater,
+            frames: &mut frames,
+        },
     };
     loop {
         device.round();
     }
 }
 
-impl<B: Board, R: Rehearsal> Answering for Desk<B, R> {
+impl<B: Board, R: Rehearsal> Answering for Desk<'_, B, R> {
     fn identity(&self) -> Hello {
         Hello {
             protocol: PROTOCOL_VERSION,
@@ -128,21 +131,21 @@ impl<B: Board, R: Rehearsal> Answering for Desk<B, R> {
     }
 
     fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
-        self.updater.answer(request, now_ms, &mut self.frames)
+        self.updater.answer(request, now_ms, self.frames)
     }
 }
 
-impl<B: Board, R: Rehearsal> Desk<B, R> {
+impl<B: Board, R: Rehearsal> Desk<'_, B, R> {
     /// What happens to tables by itself.
     fn poll(&mut self, now_ms: u64) {
-        self.updater.poll(now_ms, &mut self.frames);
+        self.updater.poll(now_ms, self.frames);
         if let Some(change) = self.updater.take_change() {
             self.frames.table_changed(change.table, change.reason);
         }
     }
 }
 
-impl<B: Board, R: Rehearsal> Device<B, R> {
+impl<B: Board, R: Rehearsal> Device<'_, B, R> {
     fn round(&mut self) {
         let worked = self.desk.frames.round();
         let talked = self.talk();
@@ -155,10 +158,22 @@ impl<B: Board, R: Rehearsal> Device<B, R> {
     /// went one way or the other. Errors of the line are the line's: what does not
     /// arrive is asked for again.
     fn talk(&mut self) -> bool {
-        let mut talked = false;
         let now = self.desk.frames.clock.ticks() * 1_000 / u64::from(B::Clock::HERTZ);
         logger::set_time(now);
         self.desk.frames.vitals.set_uptime(now);
+        let heard = self.listen(now);
+        self.desk.poll(now);
+        while let Some(event) = self.desk.frames.take_event() {
+            self.session.event(&event);
+        }
+        self.session.poll(now, &self.desk);
+        self.log();
+        self.say() || heard
+    }
+
+    #[inline(never)]
+    fn listen(&mut self, now: u64) -> bool {
+        let mut heard = false;
         let mut piece = [0; PIECE];
         for _ in 0..READS {
             if !matches!(self.serial.read_ready(), Ok(true)) {
@@ -167,13 +182,13 @@ impl<B: Board, R: Rehearsal> Device<B, R> {
             let count = self.serial.read(&mut piece).unwrap_or(0);
             let bytes = piece.get(..count).unwrap_or_default();
             self.session.receive(bytes, now, &mut self.desk);
-            talked |= count > 0;
+            heard |= count > 0;
         }
-        self.desk.poll(now);
-        while let Some(event) = self.desk.frames.take_event() {
-            self.session.event(&event);
-        }
-        self.session.poll(now, &self.desk);
+        heard
+    }
+
+    #[inline(never)]
+    fn log(&mut self) {
         if self.session.is_subscribed() && self.session.pending().is_empty() {
             let mut frames = [0; MAX_PAYLOAD];
             let used = logger::take(&mut frames);
@@ -186,13 +201,17 @@ impl<B: Board, R: Rehearsal> Device<B, R> {
                 self.session.log(frames.get(..used).unwrap_or_default());
             }
         }
+    }
+
+    fn say(&mut self) -> bool {
+        let mut said = false;
         while !self.session.pending().is_empty() && matches!(self.serial.write_ready(), Ok(true)) {
             match self.serial.write(self.session.pending()) {
                 Ok(count) if count > 0 => self.session.sent(count),
                 _ => break,
             }
-            talked = true;
+            said = true;
         }
-        talked
+        said
     }
 }

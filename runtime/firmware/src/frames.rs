@@ -255,7 +255,10 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
         let tier = self.rehearsal.tier(chosen);
         let wanted = self.source.wanted();
         let input = self.sink.begin(sequence);
-        let table = self.in_use.ok().and_then(|slot| slot.of(self.tables).as_ref());
+        let table = self
+            .in_use
+            .ok()
+            .and_then(|slot| slot.of(self.tables).as_ref());
         let result = stream.stage.frame(table, tier, wanted, input, self.memory);
         self.rehearsal.during_frame(sequence, tier, &self.clock);
         let whole = self.source.release();
@@ -356,7 +359,9 @@ pub(crate) struct FrameSide<B: Board> {
 }
 
 /// Parts a board: frames, and the serial line, flash and rest.
-pub(crate) fn part<B: Board>(board: Peripherals<B>) -> (FrameSide<B>, B::Serial, B::Flash, B::Rest) {
+pub(crate) fn part<B: Board>(
+    board: Peripherals<B>,
+) -> (FrameSide<B>, B::Serial, B::Flash, B::Rest) {
     let frames = FrameSide {
         clock: board.clock,
         source: board.source,

@@ -3,21 +3,29 @@
 use crate::board::{Board, TableFlash};
 use crate::frames::Frames;
 use crate::rehearsal::Rehearsal;
-use iltm_runtime::image::{Table, content};
+use iltm_runtime::image::{Checked, Table, content};
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::store::{Shelf, Slot};
-use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
-use static_cell::ConstStaticCell;
+use iltm_runtime::trust::{Accepted, Rejected, Terms, examine};
+use static_cell::StaticCell;
 
 /// The tables of slot A and slot B, where they are good.
 pub type Tables = [Option<Table<'static>>; 2];
 
 /// Not on the stack: each has room for all segments that an operator may have.
-static TABLES: ConstStaticCell<Tables> = ConstStaticCell::new([None, None]);
+/// Written at the start rather than copied from the image, which would hold it twice.
+static TABLES: StaticCell<Tables> = StaticCell::new();
 
 /// The places for the tables, once.
 pub(crate) fn take() -> Option<&'static mut Tables> {
-    TABLES.try_take()
+    TABLES.try_init_with(|| [None, None])
+}
+
+/// Not inlined: the table on its way to its place would lie on the stack under the
+/// check, and under the frames that go on meanwhile.
+#[inline(never)]
+fn put(place: &mut Option<Table<'static>>, checked: &Checked<'static>) {
+    *place = Some(checked.table());
 }
 
 impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
@@ -34,10 +42,10 @@ impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
             Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
             None => content(bytes),
         };
-        let (table, accepted) = admit(file, terms, &mut || {
+        let (checked, accepted) = examine(file, terms, &mut || {
             self.round();
         })?;
-        *slot.of_mut(self.tables) = Some(table);
+        put(slot.of_mut(self.tables), &checked);
         Ok(accepted)
     }
 

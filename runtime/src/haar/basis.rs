@@ -171,21 +171,31 @@ pub(crate) const fn input_shift(positive_mass: u64) -> u32 {
 
 impl Basis {
     /// The basis of `grid`.
+    #[inline]
     #[must_use]
     pub fn new(grid: Grid) -> Self {
-        let mut levels = Vec::new();
-        let (mut rows, mut cols) = (Axis::cells(grid.rows()), Axis::cells(grid.cols()));
+        let mut basis = Self {
+            grid,
+            levels: Vec::new(),
+        };
+        basis.fill();
+        basis
+    }
+
+    /// Adds the levels in place: they are too large to have twice on a small stack.
+    #[inline(never)]
+    fn fill(&mut self) {
+        let (mut rows, mut cols) = (Axis::cells(self.grid.rows()), Axis::cells(self.grid.cols()));
         let mut first = 0;
         while rows.nodes > 1 || cols.nodes > 1 {
             let level = Level::new(rows, cols, first);
             first += level.details();
             (rows, cols) = (rows.merged(), cols.merged());
-            if levels.push(level).is_err() {
+            if self.levels.push(level).is_err() {
                 // Not reachable: a grid has at most 2^15 cells, hence 15 levels.
                 break;
             }
         }
-        Self { grid, levels }
     }
 
     /// The grid it is the basis of.

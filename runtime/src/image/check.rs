@@ -5,9 +5,10 @@ use super::layout::{
     MAX_PROVENANCE, MAX_SEGMENTS, MAX_TIERS, SectionKind, fine_gain, header, meta, tier,
 };
 use super::sections::{Section, Whole};
+use super::table::curve;
 use super::{FineGain, ImageError, SectionProblem, Table, TierInfo};
 use crate::haar::Basis;
-use crate::operator::{Channels, Operator, OperatorError, Segment};
+use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
 use crate::pace::{Pace, cost};
 use crate::pipeline::RESPONSE_KNOTS;
 use crate::pipeline::codes::{CODES, code};
@@ -16,62 +17,104 @@ use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U1F15, U8F24};
 use heapless::Vec;
 
-pub(super) fn contents<'a>(
-    whole: &Whole<'a>,
-    pace: &mut Pace<'_>,
-) -> Result<Table<'a>, ImageError> {
-    let meta = Meta::read(whole.required(SectionKind::Meta)?)?;
-    let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
-    let basis = Basis::new(grid);
-    let tiers = tiers(whole.required(SectionKind::Tiers)?)?;
-    let gain = halfwords(whole.required(SectionKind::Gain)?, values)?;
-    let ambient = whole
-        .optional(SectionKind::Ambient)
-        .map(|section| ambient(section, values, pace))
-        .transpose()?;
-    let response = whole
-        .optional(SectionKind::Response)
-        .map(|section| response(section, meta.channels, pace))
-        .transpose()?;
-    let fine_gain = whole
-        .optional(SectionKind::FineGain)
-        .map(|section| fine_gains(section, grid, meta.channels))
-        .transpose()?;
-    let operator = operator(whole, &meta, &basis, tiers.len(), pace)?;
-    check_costs(operator.as_ref(), &tiers, meta.channels, pace)?;
-    let provenance = whole
-        .optional(SectionKind::Provenance)
-        .map_or(Ok(&[][..]), |section| provenance(section, pace))?;
-    let mut table = Table {
-        basis,
-        channels: meta.channels,
-        gain_fraction: meta.gain_fraction,
-        reference_white: meta.reference_white,
-        inverse_error: meta.inverse_error,
-        tiers,
-        gain,
-        ambient,
-        response,
-        codes: &[],
-        fine_gain,
-        operator,
-        provenance,
-        bytes: whole.image.len(),
-        id: u32_at(whole.image, header::CRC).unwrap_or(0),
-    };
-    table.codes = codes(whole.optional(SectionKind::Codes), &table, pace)?;
-    Ok(table)
+/// An image that passed the check: small, and all that a [`Table`] is made from.
+///
+/// A check needs its memory while it runs and a table needs its own for as long as it
+/// is used; on a small device the two should not be there at once.
+#[derive(Clone, Copy, Debug)]
+pub struct Checked<'a> {
+    whole: Whole<'a>,
+    meta: Meta,
+    gain: Halfwords<'a>,
+    ambient: Option<Halfwords<'a>>,
+    response: Option<Halfwords<'a>>,
+    codes: &'a [[u8; CODES]],
+    fine_gain: Option<FineGain<'a>>,
+    provenance: &'a [u8],
+}
+
+impl<'a> Checked<'a> {
+    /// Checks an image as [`Table::check_with`] does.
+    ///
+    /// # Errors
+    /// [`ImageError`] with the section and field at fault.
+    pub fn new(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
+        let mut pace = Pace::new(pause);
+        Self::of(Whole::new(image, &mut pace)?, &mut pace)
+    }
+
+    /// Checks what the sections of an image say whose checksums hold.
+    pub(crate) fn of(whole: Whole<'a>, pace: &mut Pace<'_>) -> Result<Self, ImageError> {
+        let meta = Meta::read(whole.required(SectionKind::Meta)?)?;
+        let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
+        let _ = tiers(whole.required(SectionKind::Tiers)?)?;
+        let gain = halfwords(whole.required(SectionKind::Gain)?, values)?;
+        let ambient = whole
+            .optional(SectionKind::Ambient)
+            .map(|section| ambient(section, values, pace))
+            .transpose()?;
+        let response = whole
+            .optional(SectionKind::Response)
+            .map(|section| response(section, meta.channels, pace))
+            .transpose()?;
+        let fine_gain = whole
+            .optional(SectionKind::FineGain)
+            .map(|section| fine_gains(section, grid, meta.channels))
+            .transpose()?;
+        check_operator(&whole, &meta, pace)?;
+        Ok(Self {
+            whole,
+            meta,
+            gain,
+            ambient,
+            response,
+            fine_gain,
+            provenance: whole
+                .optional(SectionKind::Provenance)
+                .map_or(Ok(&[][..]), |section| provenance(section, pace))?,
+            codes: codes(whole.optional(SectionKind::Codes), response, pace)?,
+        })
+    }
+
+    /// The table, ready for frames.
+    #[must_use]
+    pub fn table(&self) -> Table<'a> {
+        let tiers = self.whole.required(SectionKind::Tiers).and_then(tiers);
+        Table {
+            basis: Basis::new(self.meta.grid),
+            channels: self.meta.channels,
+            gain_fraction: self.meta.gain_fraction,
+            reference_white: self.meta.reference_white,
+            inverse_error: self.meta.inverse_error,
+            tiers: tiers.map_or(Vec::new(), Iterator::collect),
+            gain: self.gain,
+            ambient: self.ambient,
+            response: self.response,
+            codes: self.codes,
+            fine_gain: self.fine_gain,
+            operator: operator(&self.whole, &self.meta).unwrap_or_default(),
+            provenance: self.provenance,
+            bytes: self.whole.image.len(),
+            id: self.id(),
+        }
+    }
+
+    /// What tells it from other tables; see [`Table::id`].
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        u32_at(self.whole.image, header::CRC).unwrap_or(0)
+    }
 }
 
 /// The fields of the meta section.
+#[derive(Clone, Copy, Debug)]
 struct Meta {
     grid: Grid,
     channels: u8,
     gain_fraction: u8,
     reference_white: U8F24,
     inverse_error: U0F32,
-    accumulator_bound: u32,
-    correction_bound: u32,
+    bounds: Bounds,
     channel_scales: [U1F15; 3],
 }
 
@@ -122,27 +165,28 @@ impl Meta {
             gain_fraction,
             reference_white,
             inverse_error: U0F32::from_bits(wide(meta::INVERSE_ERROR)),
-            accumulator_bound: wide(meta::ACCUMULATOR_BOUND),
-            correction_bound: wide(meta::CORRECTION_BOUND),
+            bounds: Bounds {
+                accumulator: wide(meta::ACCUMULATOR_BOUND),
+                correction: wide(meta::CORRECTION_BOUND),
+            },
             channel_scales,
         })
     }
 }
 
-fn tiers(section: Section<'_>) -> Result<Vec<TierInfo, MAX_TIERS>, ImageError> {
+fn tiers(section: Section<'_>) -> Result<impl ExactSizeIterator<Item = TierInfo>, ImageError> {
     let (entries, rest) = section.bytes.as_chunks::<{ tier::SIZE }>();
     if !rest.is_empty() || entries.is_empty() || entries.len() > MAX_TIERS {
         return Err(section.length_error());
     }
-    let read = |entry: &[u8; tier::SIZE]| {
+    Ok(entries.iter().map(|entry| {
         let field = |field| u32_at(entry, field).unwrap_or(0);
         TierInfo {
             predicted_error: U0F32::from_bits(field(tier::PREDICTED_ERROR)),
             entries: field(tier::ENTRIES),
             multiplications: field(tier::MULTIPLICATIONS),
         }
-    };
-    Ok(entries.iter().map(read).collect())
+    }))
 }
 
 fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageError> {
@@ -192,11 +236,11 @@ fn response<'a>(
 /// The 8-bit codes, which must be those of the response that the table has.
 fn codes<'a>(
     section: Option<Section<'a>>,
-    table: &Table<'_>,
+    response: Option<Halfwords<'_>>,
     pace: &mut Pace<'_>,
 ) -> Result<&'a [[u8; CODES]], ImageError> {
     let Some(section) = section else {
-        return match table.response {
+        return match response {
             None => Ok(&[]),
             Some(_) => Err(ImageError::Section {
                 section: SectionKind::Codes,
@@ -204,18 +248,18 @@ fn codes<'a>(
             }),
         };
     };
-    let curves = table.response.map_or(0, Halfwords::len) / RESPONSE_KNOTS;
+    let curves = response.map_or(0, Halfwords::len) / RESPONSE_KNOTS;
     let (codes, rest) = section.bytes.as_chunks::<CODES>();
     if !rest.is_empty() || codes.len() != curves {
         return Err(section.length_error());
     }
-    for (channel, curve) in codes.iter().enumerate() {
-        let response = table.response(channel);
+    for (channel, of_channel) in codes.iter().enumerate() {
+        let response = curve(response, channel);
         let differs = |(index, stored): (usize, &u8)| {
             pace.done(1, cost::CODE);
             *stored != code(index, response)
         };
-        if let Some(index) = curve.iter().enumerate().position(differs) {
+        if let Some(index) = of_channel.iter().enumerate().position(differs) {
             return Err(section.field_error("code", channel * CODES + index));
         }
     }
@@ -243,14 +287,9 @@ fn fine_gains(section: Section<'_>, cells: Grid, channels: u8) -> Result<FineGai
     })
 }
 
-/// The operator; bounds that the image states must be those of its entries.
-fn operator<'a>(
-    whole: &Whole<'a>,
-    meta: &Meta,
-    basis: &Basis,
-    tiers: usize,
-    pace: &mut Pace<'_>,
-) -> Result<Option<Operator<'a>>, ImageError> {
+/// The operator with the bounds that the image states; `None` for a scene without.
+fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, ImageError> {
+    let tiers = tiers(whole.required(SectionKind::Tiers)?)?.len();
     let mut segments: Vec<Segment<'a>, MAX_SEGMENTS> = Vec::new();
     for (index, section) in whole.of_kind(SectionKind::Operator).enumerate() {
         let [tier, channel] = section.selector.to_le_bytes();
@@ -270,32 +309,35 @@ fn operator<'a>(
             .push(segment)
             .map_err(|_| ImageError::Operator(OperatorError::Segments))?;
     }
-    let stated = (meta.accumulator_bound, meta.correction_bound);
     if segments.is_empty() {
-        return match stated {
-            (0, 0) => Ok(None),
-            _ => Err(ImageError::Operator(OperatorError::BoundsDiffer)),
-        };
+        return Ok(None);
     }
-    let operator = Operator::with_pace(basis, segments, meta.channel_scales, pace)
-        .map_err(ImageError::Operator)?;
-    let bounds = operator.bounds();
-    if (bounds.accumulator, bounds.correction) != stated {
-        return Err(ImageError::Operator(OperatorError::BoundsDiffer));
-    }
-    Ok(Some(operator))
+    Ok(Some(Operator::stated(
+        meta.grid,
+        segments,
+        meta.channel_scales,
+        meta.bounds,
+    )))
 }
 
-/// A tier must cost what the image says: the governor plans with it.
-fn check_costs(
-    operator: Option<&Operator<'_>>,
-    tiers: &[TierInfo],
-    channels: u8,
-    pace: &mut Pace<'_>,
-) -> Result<(), ImageError> {
+/// The bounds and the costs that the image states must be those of its entries: no
+/// frame may overflow, and the governor plans with the costs.
+///
+/// Not inlined: what it needs, other checks need not stand on.
+#[inline(never)]
+fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result<(), ImageError> {
+    let operator = operator(whole, meta)?;
+    let bounds = match &operator {
+        Some(operator) => operator.prove(meta.grid, pace),
+        None => Ok(Bounds::default()),
+    };
+    if bounds.map_err(ImageError::Operator)? != meta.bounds {
+        return Err(ImageError::Operator(OperatorError::BoundsDiffer));
+    }
+    let tiers = tiers(whole.required(SectionKind::Tiers)?)?;
     for (tier, info) in (0_u8..).zip(tiers) {
-        let cost = operator.map_or((0, 0), |operator| {
-            operator.cost_with_pace(tier, channels, pace)
+        let cost = operator.as_ref().map_or((0, 0), |operator| {
+            operator.cost_with_pace(tier, meta.channels, pace)
         });
         if cost != (info.entries, info.multiplications) {
             return Err(ImageError::Operator(OperatorError::CostDiffers { tier }));

@@ -12,10 +12,13 @@ mod bytes;
 mod check;
 mod error;
 pub mod layout;
+#[cfg(test)]
+pub(crate) mod made_up;
 pub mod seal;
 mod sections;
 mod table;
 
+pub use check::Checked;
 pub use error::{ImageError, SectionProblem};
 pub use seal::{Seal, SealError, content, unseal};
 pub(crate) use sections::Whole;

@@ -206,3 +206,109 @@ impl fmt::Display for SealError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::made_up::{flat, image};
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn seal() -> Seal {
+        Seal {
+            version: 0x0102_0304,
+            oldest: 0x0506_0708,
+            device: 0x1112_1314_1516_1718,
+            key: *b"key-name",
+            signature: core::array::from_fn(|index| index as u8),
+        }
+    }
+
+    fn sealed() -> (Vec<u8>, Vec<u8>) {
+        let image = image(&flat(2, 3));
+        let file = [&image[..], &seal().emit()].concat();
+        (image, file)
+    }
+
+    #[test]
+    fn a_seal_is_where_the_layout_says() {
+        let bytes = seal().emit();
+        assert_eq!(bytes[..8], *b"SEAL\x01\0\0\0");
+        assert_eq!(bytes[8..16], [4, 3, 2, 1, 8, 7, 6, 5]);
+        assert_eq!(bytes[16..24], [24, 23, 22, 21, 20, 19, 18, 17]);
+        assert_eq!(bytes[24..32], *b"key-name");
+        assert_eq!(bytes[32..], seal().signature);
+        assert_eq!(Seal::parse(&bytes), Ok(seal()));
+    }
+
+    #[test]
+    fn the_head_that_is_signed_is_the_start_of_the_seal() {
+        let key = *b"key-name and twenty-four more...";
+        let head = Seal::head(seal().version, seal().oldest, seal().device, &key);
+        assert_eq!(head, seal().emit()[..32]);
+    }
+
+    #[test]
+    fn a_file_comes_apart_into_image_and_seal() {
+        let (image, file) = sealed();
+        assert_eq!(unseal(&image), Ok((&image[..], None)));
+        assert_eq!(unseal(&file), Ok((&image[..], Some(seal()))));
+    }
+
+    #[test]
+    fn what_follows_an_image_is_one_whole_seal_or_nothing() {
+        let (image, file) = sealed();
+        let (stated, needed) = (image.len(), file.len());
+        for given in stated + 1..needed {
+            let truncated = ImageError::Truncated { needed, given };
+            assert_eq!(unseal(&file[..given]), Err(truncated));
+        }
+        for more in [[&file[..], &[0]].concat(), [&image[..], &[0; 96]].concat()] {
+            let given = more.len();
+            assert_eq!(unseal(&more), Err(ImageError::Length { stated, given }));
+        }
+    }
+
+    #[test]
+    fn a_seal_of_another_version_or_with_reserved_bytes_is_refused() {
+        let (image, mut file) = sealed();
+        file[image.len() + field::RESERVED.start] = 1;
+        assert_eq!(unseal(&file), Err(ImageError::Seal(SealError::Reserved)));
+        file[image.len() + field::SEAL_VERSION.start] = 2;
+        let version = SealError::Version { found: 2 };
+        assert_eq!(unseal(&file), Err(ImageError::Seal(version)));
+    }
+
+    #[test]
+    fn a_slot_holds_the_file_at_its_start() {
+        let (image, file) = sealed();
+        for filling in [0x00, 0xFF] {
+            let slot = |file: &[u8]| [file, &[filling; 500]].concat();
+            assert_eq!(content(&slot(&image)), image);
+            assert_eq!(content(&slot(&file)), file);
+        }
+        assert_eq!(content(&file[..40]), &file[..40], "cut short");
+        assert_eq!(content(&[0xFF; 64]), [0xFF; 64], "erased");
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_come_apart_or_give_an_error(
+            bytes in prop::collection::vec(any::<u8>(), 0..200),
+            length in 0_u32..250,
+            magic in any::<bool>(),
+        ) {
+            let mut bytes = bytes;
+            if magic && bytes.len() > header::SIZE {
+                bytes[header::MAGIC].copy_from_slice(&layout::MAGIC);
+                bytes[header::VERSION].copy_from_slice(&layout::FORMAT_VERSION.to_le_bytes());
+                bytes[header::LENGTH].copy_from_slice(&length.to_le_bytes());
+            }
+            if let Ok((image, seal)) = unseal(&bytes) {
+                let seal = seal.map_or(Vec::new(), |seal| seal.emit().to_vec());
+                prop_assert_eq!([image, &seal].concat(), &bytes[..]);
+            }
+            prop_assert!(bytes.starts_with(content(&bytes)));
+        }
+    }
+}

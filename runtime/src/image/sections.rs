@@ -2,12 +2,12 @@
 
 use super::bytes::{u16_at, u32_at};
 use super::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, MAX_SECTIONS, SectionKind, entry, header};
-use super::{ImageError, SectionProblem, Table, check, checksum};
+use super::{ImageError, SectionProblem, checksum};
 use crate::pace::Pace;
 
 /// An image whose checksums hold: every byte is as it was written. What they mean
 /// is not looked at yet.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Whole<'a> {
     pub(super) image: &'a [u8],
     entries: &'a [[u8; entry::SIZE]],
@@ -57,11 +57,6 @@ impl<'a> Whole<'a> {
         };
         whole.check(pace)?;
         Ok(whole)
-    }
-
-    /// Its table, if the contents are those of one.
-    pub(crate) fn table(&self, pace: &mut Pace<'_>) -> Result<Table<'a>, ImageError> {
-        check::contents(self, pace)
     }
 
     /// Sections stand in order, one behind the other, each with its checksum.

@@ -1,12 +1,10 @@
 //! A checked table.
 
-use super::ImageError;
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
-use super::sections::Whole;
+use super::{Checked, ImageError};
 use crate::haar::Basis;
 use crate::operator::Operator;
-use crate::pace::Pace;
 use crate::pipeline::{CODES, RESPONSE_KNOTS, Response};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
@@ -15,7 +13,7 @@ use heapless::Vec;
 
 /// A compensation table, checked.
 ///
-/// Made by [`Table::check`] only, so whoever holds one knows that every section
+/// Made from a [`Checked`] image only, so whoever holds one knows that every section
 /// is whole and that no frame can overflow.
 #[derive(Clone, Debug)]
 pub struct Table<'a> {
@@ -89,6 +87,16 @@ fn channel_row(
         .step_by(channels)
 }
 
+/// The response of a channel: its own, or that of all.
+pub(super) fn curve(response: Option<Halfwords<'_>>, channel: usize) -> Response<'_> {
+    let knots = response.map_or(&[][..], Halfwords::words);
+    let curve = |channel: usize| {
+        let start = channel.checked_mul(RESPONSE_KNOTS)?;
+        knots.get(start..)?.get(..RESPONSE_KNOTS)
+    };
+    Response::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
+}
+
 impl<'a> Table<'a> {
     /// Checks an image and proves that no frame can overflow.
     ///
@@ -111,8 +119,7 @@ impl<'a> Table<'a> {
     /// # Errors
     /// As [`check`](Self::check).
     pub fn check_with(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
-        let mut pace = Pace::new(pause);
-        Whole::new(image, &mut pace)?.table(&mut pace)
+        Ok(Checked::new(image, pause)?.table())
     }
 
     /// The grid of cells.
@@ -201,12 +208,7 @@ impl<'a> Table<'a> {
     /// says whether it is more than a straight line.
     #[must_use]
     pub fn response(&self, channel: usize) -> Response<'a> {
-        let knots = self.response.map_or(&[][..], Halfwords::words);
-        let curve = |channel: usize| {
-            let start = channel.checked_mul(RESPONSE_KNOTS)?;
-            knots.get(start..)?.get(..RESPONSE_KNOTS)
-        };
-        Response::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
+        curve(self.response, channel)
     }
 
     /// Whether codes follow a response; otherwise they are proportional to drives.

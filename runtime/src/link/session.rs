@@ -232,6 +232,8 @@ impl Talk {
         }
     }
 
+    /// Not inlined: its buffers would lie on the stack under whatever a request does.
+    #[inline(never)]
     fn send(&mut self, channel: Channel, sequence: u16, message: &impl Serialize) {
         let mut bytes = [0; MAX_PAYLOAD];
         // The longest message has room, which a test makes sure of.

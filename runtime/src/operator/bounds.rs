@@ -6,12 +6,11 @@
 //! level do not overlap between nodes, so a correction is at most the sum over
 //! the levels of the largest node's `sum_i z_i * peak_i`.
 
-use super::{Channels, Group, OperatorError, Rows, Segment};
+use super::{Channels, OperatorError, Rows, Segment};
 use crate::haar::Basis;
 use crate::image::layout::segment::MAX_SHORT;
 use crate::pace::{Pace, cost};
 use crate::units::INPUT_COEFFICIENT_MAX;
-use core::iter::Peekable;
 use heapless::Vec;
 
 /// Largest magnitudes that any frame can lead to, at any tier.
@@ -91,16 +90,19 @@ impl Bounds {
 struct Cursor<'a> {
     segment: usize,
     channels: Channels,
-    groups: Vec<Peekable<Rows<'a>>, { MAX_SHORT + 1 }>,
+    groups: Vec<Rows<'a>, { MAX_SHORT + 1 }>,
 }
 
 impl<'a> Cursor<'a> {
     fn new(index: usize, segment: &Segment<'a>) -> Self {
-        let rows = |group: Group<'a>| group.rows().peekable();
         Self {
             segment: index,
             channels: segment.channels,
-            groups: segment.groups().take(MAX_SHORT + 1).map(rows).collect(),
+            groups: segment
+                .groups()
+                .take(MAX_SHORT + 1)
+                .map(|group| group.rows())
+                .collect(),
         }
     }
 
@@ -113,9 +115,13 @@ impl<'a> Cursor<'a> {
         let mut found = None;
         pace.done(1, cost::FUNCTION);
         for rows in &mut self.groups {
-            let Some(next) = rows.next_if(|next| usize::from(next.index) == row) else {
+            if rows
+                .next_index()
+                .is_none_or(|next| usize::from(next) != row)
+            {
                 continue;
-            };
+            }
+            let Some(next) = rows.next() else { continue };
             if found.is_some() {
                 let segment = self.segment;
                 return Err(OperatorError::Row { segment, row });

@@ -35,6 +35,7 @@ pub use bounds::Bounds;
 pub use error::OperatorError;
 pub use segment::{Channels, Group, Groups, Pair, Row, Rows, Segment};
 
+use crate::Grid;
 use crate::haar::Basis;
 use crate::image::layout::MAX_SEGMENTS;
 use crate::kernel::gather::{self, Sums};
@@ -65,35 +66,43 @@ impl<'a> Operator<'a> {
         segments: Vec<Segment<'a>, MAX_SEGMENTS>,
         channel_scales: [U1F15; 3],
     ) -> Result<Self, OperatorError> {
-        Self::with_pace(basis, segments, channel_scales, &mut Pace::new(&mut || {}))
+        let grid = basis.grid();
+        let mut operator = Self::stated(grid, segments, channel_scales, Bounds::default());
+        operator.bounds = operator.prove(grid, &mut Pace::new(&mut || {}))?;
+        Ok(operator)
     }
 
-    /// [`new`](Self::new) in short pieces.
-    pub(crate) fn with_pace(
-        basis: &Basis,
+    /// An operator whose bounds have been proved before, or will be.
+    pub(crate) const fn stated(
+        grid: Grid,
         segments: Vec<Segment<'a>, MAX_SEGMENTS>,
         channel_scales: [U1F15; 3],
-        pace: &mut Pace<'_>,
-    ) -> Result<Self, OperatorError> {
-        let cells = basis.grid().cells();
-        if channel_scales.iter().any(|scale| *scale > U1F15::ONE) {
-            return Err(OperatorError::ChannelScale);
-        }
-        let mut top = 0;
-        for (index, segment) in segments.iter().enumerate() {
-            segment.check(index, cells, pace)?;
-            top = segment.tier.max(top);
-        }
-        let mut bounds = Bounds::default();
-        for tier in 1..=top {
-            bounds = bounds.max(Bounds::prove(basis, &segments, tier, pace)?);
-        }
-        Ok(Self {
-            cells,
+        bounds: Bounds,
+    ) -> Self {
+        Self {
+            cells: grid.cells(),
             segments,
             channel_scales,
             bounds,
-        })
+        }
+    }
+
+    /// Checks the segments, and computes the bounds from them.
+    pub(crate) fn prove(&self, grid: Grid, pace: &mut Pace<'_>) -> Result<Bounds, OperatorError> {
+        if self.channel_scales.iter().any(|scale| *scale > U1F15::ONE) {
+            return Err(OperatorError::ChannelScale);
+        }
+        let mut top = 0;
+        for (index, segment) in self.segments.iter().enumerate() {
+            segment.check(index, grid.cells(), pace)?;
+            top = segment.tier.max(top);
+        }
+        let basis = Basis::new(grid);
+        let mut bounds = Bounds::default();
+        for tier in 1..=top {
+            bounds = bounds.max(Bounds::prove(&basis, &self.segments, tier, pace)?);
+        }
+        Ok(bounds)
     }
 
     /// The proved bounds.

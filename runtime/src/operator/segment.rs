@@ -292,6 +292,14 @@ pub struct Rows<'a> {
     words: &'a [[u8; WORD]],
 }
 
+impl Rows<'_> {
+    /// The index of the row that comes next.
+    pub(super) fn next_index(&self) -> Option<u16> {
+        let head = self.words.first()?;
+        (self.left > 0).then_some(halves(*head).0)
+    }
+}
+
 impl<'a> Iterator for Rows<'a> {
     type Item = Row<'a>;
 

@@ -21,7 +21,7 @@ const WINDOW: u8 = 3;
 const MAX_TRIAL_MS: u64 = 65_535_000;
 
 /// Both slots, the records, and what a host may do with them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Updater<F> {
     flash: F,
     map: Map,
@@ -59,6 +59,7 @@ pub struct Change {
 impl<F: NorFlash> Updater<F> {
     /// After a start: finds the table that counts, checks it and has it used; with
     /// the other one if that fails, or none.
+    #[inline(never)]
     pub fn start(mut flash: F, map: Map, shelf: &mut impl Shelf<F>) -> Self {
         let identity = identity::find(&mut flash, map.identity());
         let trust = identity.map_or_else(Trust::default, |identity| Trust {
@@ -100,6 +101,7 @@ impl<F: NorFlash> Updater<F> {
     }
 
     /// Checks what is in a slot.
+    #[inline(never)]
     fn look(&mut self, slot: Slot, shelf: &mut impl Shelf<F>) {
         let part = self.map.slot(slot);
         let erased = |piece: &[u8]| piece.iter().all(|byte| *byte == flash::ERASED);
@@ -250,6 +252,11 @@ impl<F: NorFlash> Updater<F> {
         &self.flash
     }
 
+    /// The flash, for what else is done with it than storing tables.
+    pub const fn flash_mut(&mut self) -> &mut F {
+        &mut self.flash
+    }
+
     /// Gives the flash back.
     #[must_use]
     pub fn into_flash(self) -> F {
@@ -282,6 +289,7 @@ impl<F: NorFlash> Updater<F> {
         })
     }
 
+    #[inline(never)]
     fn slots(&self, now_ms: u64) -> Slots {
         let [a, b, record_erases] = self.erases;
         let states = self.states();
@@ -327,6 +335,7 @@ impl<F: NorFlash> Updater<F> {
         used.map_or(floor, |table| table.version.max(floor))
     }
 
+    #[inline(never)]
     fn sectors(
         &mut self,
         length: u32,
@@ -357,6 +366,7 @@ impl<F: NorFlash> Updater<F> {
         Ok(())
     }
 
+    #[inline(never)]
     fn begin(&mut self, length: u32, digest: Digest) -> Result<Response, Refusal> {
         if self.trial.is_some() {
             return Err(Refusal::OnTrial);
@@ -378,6 +388,7 @@ impl<F: NorFlash> Updater<F> {
         }))
     }
 
+    #[inline(never)]
     fn write(
         &mut self,
         transfer: u32,
@@ -401,6 +412,7 @@ impl<F: NorFlash> Updater<F> {
         Ok(Response::Written)
     }
 
+    #[inline(never)]
     fn activate(
         &mut self,
         transfer: u32,
@@ -445,6 +457,7 @@ impl<F: NorFlash> Updater<F> {
         Ok(self.use_now(now_ms))
     }
 
+    #[inline(never)]
     fn confirm(&mut self, table: u32, now_ms: u64) -> Result<Response, Refusal> {
         self.check_in_use(table)?;
         if self.trial.is_some() {
@@ -456,6 +469,7 @@ impl<F: NorFlash> Updater<F> {
         Ok(self.use_now(now_ms))
     }
 
+    #[inline(never)]
     fn roll_back(
         &mut self,
         table: u32,
@@ -480,6 +494,7 @@ impl<F: NorFlash> Updater<F> {
         Ok(self.use_now(now_ms))
     }
 
+    #[inline(never)]
     fn provision(&mut self, identity: Identity) -> Result<Response, Refusal> {
         let wanted = Trust {
             key: Some(identity.key),

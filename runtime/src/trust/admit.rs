@@ -1,14 +1,27 @@
 //! The gate.
 
 use super::{Accepted, Rejected, Terms, ed25519};
-use crate::image::{Seal, Table, Whole, seal, unseal};
+use crate::image::{Checked, Seal, Table, Whole, seal, unseal};
 use crate::pace::Pace;
 
+/// [`examine`]s a file and makes its table.
+///
+/// # Errors
+/// As [`examine`].
+pub fn admit<'a>(
+    file: &'a [u8],
+    terms: &Terms,
+    pause: &mut dyn FnMut(),
+) -> Result<(Table<'a>, Accepted), Rejected> {
+    let (checked, accepted) = examine(file, terms, pause)?;
+    Ok((checked.table(), accepted))
+}
+
 /// Checks the bytes of a whole file against `terms`, and its table as
-/// [`Table::check`] does. Whoever holds the table that this returns may run it.
+/// [`Table::check`] does. What this returns may run.
 ///
 /// `pause` is called every few thousand instructions, and a device works on frames
-/// in it. The longest piece without a pause is a square root or an inverse modulo
+/// in it. The longest pieces without a pause are a square root and an inverse modulo
 /// `2^255 - 19`, of which a signature takes one each.
 ///
 /// # Errors
@@ -16,11 +29,11 @@ use crate::pace::Pace;
 /// damage, which the checksums tell from forgery; then, where the device has a
 /// key, no signature, another key, a false signature, another device, an old version;
 /// last, contents that the runtime cannot use.
-pub fn admit<'a>(
+pub fn examine<'a>(
     file: &'a [u8],
     terms: &Terms,
     pause: &mut dyn FnMut(),
-) -> Result<(Table<'a>, Accepted), Rejected> {
+) -> Result<(Checked<'a>, Accepted), Rejected> {
     let (image, seal) = unseal(file)?;
     let mut pace = Pace::new(pause);
     let whole = Whole::new(image, &mut pace)?;
@@ -28,18 +41,19 @@ pub fn admit<'a>(
         Some(key) => vouched(file, seal.as_ref(), key, terms, &mut pace)?,
         None => 0,
     };
-    let table = whole.table(&mut pace)?;
+    let checked = Checked::of(whole, &mut pace)?;
     let accepted = Accepted {
-        id: table.id(),
+        id: checked.id(),
         version: seal.map_or(0, |seal| seal.version),
         oldest,
         length: file.len() as u32,
     };
-    Ok((table, accepted))
+    Ok((checked, accepted))
 }
 
 /// The floor that the file brings, if it is signed with `key`, for this device,
 /// and recent enough.
+#[inline(never)]
 fn vouched(
     file: &[u8],
     seal: Option<&Seal>,

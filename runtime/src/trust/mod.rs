@@ -1,6 +1,6 @@
 //! Who signed a table, and whether it may run here.
 //!
-//! [`admit`] is the one gate: before a new table becomes active, and again for what
+//! [`examine`] is the one gate: before a new table becomes active, and again for what
 //! lies in flash at every start. What a device demands is its [`Terms`]; a device
 //! that was never given a key demands only that the table is whole.
 
@@ -8,7 +8,12 @@ mod admit;
 mod ed25519;
 mod rejected;
 
-pub use admit::admit;
+#[cfg(test)]
+mod ed25519_tests;
+#[cfg(test)]
+mod tests;
+
+pub use admit::{admit, examine};
 pub use rejected::Rejected;
 
 use crate::image::Seal;

@@ -18,8 +18,8 @@ use iltm_firmware::memory::{MAX_PIXELS, Memory};
 use iltm_runtime::FrameSize;
 use iltm_runtime::exchange::ControlWords;
 use iltm_runtime::image::{Table, content, unseal};
-use iltm_runtime::store::Slot;
 use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
+use iltm_runtime::store::Slot;
 use static_cell::ConstStaticCell;
 
 /// Instructions a tick: a nanosecond each, at 25 MHz.

@@ -201,6 +201,36 @@ fn a_cut_at_any_step_leaves_what_was_done_and_tears_what_was_not() {
 }
 
 #[test]
+fn an_erase_that_is_cut_before_it_begins_changes_nothing() {
+    for stage in 0..ERASE_STAGES {
+        let mut flash = Flash::new(1, 1);
+        flash.cut_after(stage);
+        assert_eq!(flash.erase(0, 64), Err(NorError::PowerCut));
+        flash.power_on();
+        assert_eq!(flash.contents(), [0xFF; 64]);
+        let has_begun = stage > 0;
+        assert_eq!(
+            flash.write(0, &[0; 64]).is_err(),
+            has_begun,
+            "stage {stage}"
+        );
+        assert_eq!(flash.erases(0), Some(u32::from(has_begun)));
+    }
+}
+
+#[test]
+fn an_erase_makes_no_unit_of_its_neighbours_free() {
+    let mut flash = Flash::new(3, 1);
+    flash.write(0, &[0xFF; 192]).expect("erased");
+    flash.erase(64, 128).expect("a sector");
+    for unit in [0, 60, 128, 188] {
+        let result = flash.write(unit, &[0; 4]);
+        assert_eq!(result, Err(NorError::NotErased { unit }));
+    }
+    flash.write(64, &[0; 64]).expect("erased");
+}
+
+#[test]
 fn a_torn_byte_is_any_mixture_of_old_and_new() {
     let mut seen = [false; 256];
     for seed in 0..4_000 {
