@@ -16,4 +16,5 @@ pub mod learn;
 pub mod progress;
 pub mod report;
 pub mod solve;
+pub mod user;
 pub mod video;

@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 fn iltm(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_iltm"));
     command.args(arguments).stdin(Stdio::null());
+    // Not the settings of whoever runs the tests.
+    command.env("ILTM_CONFIG_DIR", "/no/such/folder");
+    command.env("ILTM_STATE_DIR", "/no/such/folder");
     command
 }
 

@@ -1,19 +1,22 @@
 //! A device that is none: the runtime's session over a made-up status, at the end
 //! of a line in memory or of a pseudo-terminal.
 
+use crate::fake_tables::FakeTables;
 use iltm::device::fault::{FarEnd, PacedLine};
+use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
     Clipping, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode, Name,
-    PROTOCOL_VERSION, Refusal, Request, Response, SerialCounts, Session, SlotState, Stack, Status,
-    TableName, Version,
+    PROTOCOL_VERSION, PassThrough, Refusal, Request, Response, SerialCounts, Session, SlotState,
+    Stack, Status, TableName, Version,
 };
+use std::fmt;
 use std::io::{Read, Write};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// What the made-up device says of itself.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct FakeDevice {
     /// Its status; uptime and frames are added to it.
     pub status: Status,
@@ -21,6 +24,12 @@ pub struct FakeDevice {
     pub protocol: u16,
     /// Milliseconds since it started.
     pub uptime_ms: u64,
+    /// Bytes that came in.
+    pub heard: usize,
+    /// Its number.
+    pub number: u64,
+    /// Its tables; without, it refuses what is about tables and makes up a status.
+    pub tables: Option<FakeTables>,
 }
 
 impl Default for FakeDevice {
@@ -72,11 +81,52 @@ impl Default for FakeDevice {
             status,
             protocol: PROTOCOL_VERSION,
             uptime_ms: 0,
+            heard: 0,
+            number: 0x0102_0304_0506_0708,
+            tables: None,
         }
     }
 }
 
 impl FakeDevice {
+    /// A device with a flash for tables.
+    #[must_use]
+    pub fn with_tables(tables: FakeTables) -> Self {
+        Self {
+            number: tables.updater().trust().device,
+            tables: Some(tables),
+            ..Self::default()
+        }
+    }
+
+    /// The tables of a device that has some.
+    ///
+    /// # Panics
+    /// If it has none.
+    pub const fn tables(&mut self) -> &mut FakeTables {
+        self.tables.as_mut().expect("a device with tables")
+    }
+
+    /// Lets time pass; what became of the tables meanwhile.
+    fn poll(&mut self, now_ms: u64) -> Option<Event> {
+        let tables = self.tables.as_mut()?;
+        // A number that it was given counts from now on.
+        self.number = tables.updater().trust().device;
+        let change = tables.poll(now_ms)?;
+        Some(Event::TableChanged {
+            table: change.table,
+            reason: change.reason,
+            frame: 0,
+        })
+    }
+
+    /// As after a loss of power.
+    pub fn restart(&mut self) {
+        if let Some(tables) = &mut self.tables {
+            tables.restart();
+        }
+    }
+
     /// Who it says it is.
     #[must_use]
     pub fn identity(&self) -> Hello {
@@ -84,13 +134,13 @@ impl FakeDevice {
             protocol: self.protocol,
             firmware: self.status.firmware,
             board: self.status.board.clone(),
-            device: 0x0102_0304_0506_0708,
-            table_format: 1,
+            device: self.number,
+            table_format: FORMAT_VERSION,
             max_payload: MAX_PAYLOAD as u16,
             limits: Limits {
                 cells: 16_384,
                 frame_bytes: 230_400,
-                table_bytes: 2_097_152,
+                table_bytes: (self.tables.as_ref()).map_or(2_097_152, FakeTables::slot_bytes),
             },
         }
     }
@@ -101,8 +151,11 @@ impl Device for FakeDevice {
         Self::identity(self)
     }
 
-    fn carry_out(&mut self, _: Request<'_>, _: u64) -> Response {
-        Response::Refused(Refusal::ReadOnly)
+    fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
+        match &mut self.tables {
+            Some(tables) => tables.carry_out(request, now_ms),
+            None => Response::Refused(Refusal::ReadOnly),
+        }
     }
 
     fn status(&self) -> Status {
@@ -110,6 +163,14 @@ impl Device for FakeDevice {
         status.uptime_ms = self.uptime_ms;
         status.frames.received = (self.uptime_ms * 60 / 1_000) as u32;
         status.frames.shown = status.frames.received;
+        if let Some(tables) = &self.tables {
+            status.table = tables.updater().table();
+            status.slots = tables.updater().states();
+            status.mode = match status.table {
+                Some(_) => Mode::Compensating,
+                None => Mode::PassThrough(PassThrough::NoTable),
+            };
+        }
         status
     }
 }
@@ -138,11 +199,27 @@ impl FakeDevice {
     }
 }
 
+impl FakeEnd {
+    /// As after a loss of power.
+    pub fn restart(&mut self) {
+        self.session = Session::new();
+        self.device.restart();
+    }
+}
+
 impl FarEnd for FakeEnd {
     fn turn(&mut self, arrived: &[u8], now: Duration) {
         let now = now.as_millis() as u64;
         self.device.uptime_ms = now;
+        let mute = self.device.tables.as_ref().is_some_and(FakeTables::is_mute);
+        let arrived = if mute { &[] } else { arrived };
         self.session.receive(arrived, now, &mut self.device);
+        if (self.device.tables.as_mut()).is_some_and(FakeTables::restarts) {
+            self.restart();
+        }
+        if let Some(event) = self.device.poll(now) {
+            self.session.event(&event);
+        }
         self.session.poll(now, &self.device);
     }
 
@@ -168,6 +245,17 @@ pub enum Order {
     Noise(Vec<u8>),
     /// It goes, and its port with it.
     Vanish,
+    /// Something looks into it.
+    Look(Look),
+}
+
+/// Looks into a device.
+pub struct Look(Box<dyn FnOnce(&mut FakeDevice) + Send>);
+
+impl fmt::Debug for Look {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Look")
+    }
 }
 
 /// A pseudo-terminal with a device at its end.
@@ -211,6 +299,23 @@ impl FakePort {
         &self.path
     }
 
+    /// What there is to see in the device, or is after this was done to it.
+    ///
+    /// # Panics
+    /// If the device has vanished.
+    pub fn look<T: Send + 'static>(
+        &self,
+        look: impl FnOnce(&mut FakeDevice) -> T + Send + 'static,
+    ) -> T {
+        let (sender, seen) = channel();
+        let look = move |device: &mut FakeDevice| {
+            // Whoever asked waits for it.
+            let _ = sender.send(look(device));
+        };
+        self.order(Order::Look(Look(Box::new(look))));
+        seen.recv().expect("the device is there")
+    }
+
     /// Does something to the device.
     pub fn order(&self, order: Order) {
         // A device that has vanished takes no orders.
@@ -234,25 +339,36 @@ fn run(line: &mut (impl Read + Write), mut device: FakeDevice, orders: &Receiver
     let mut session = Session::new();
     let mut started = Instant::now();
     let mut bytes = [0; 256];
+    let mut restart = false;
     loop {
+        if std::mem::take(&mut restart) || device.tables.as_mut().is_some_and(FakeTables::restarts)
+        {
+            session = Session::new();
+            device.restart();
+            started = Instant::now();
+        }
         device.uptime_ms = started.elapsed().as_millis() as u64;
         let now = device.uptime_ms;
+        if let Some(event) = device.poll(now) {
+            session.event(&event);
+        }
         // Nothing to read is an error here, and nothing to do.
         let count = line.read(&mut bytes).unwrap_or(0);
+        device.heard += count;
+        let mute = device.tables.as_ref().is_some_and(FakeTables::is_mute);
+        let count = if mute { 0 } else { count };
         session.receive(&bytes[..count], now, &mut device);
         session.poll(now, &device);
         for order in orders.try_iter() {
             match order {
                 Order::Event(event) => session.event(&event),
                 Order::Log(bytes) => session.log(&bytes),
-                Order::Restart => {
-                    session = Session::new();
-                    started = Instant::now();
-                }
+                Order::Restart => restart = true,
                 Order::Noise(bytes) => {
                     let _ = line.write_all(&bytes);
                 }
                 Order::Vanish => return,
+                Order::Look(Look(look)) => look(&mut device),
             }
         }
         let written = line.write(session.pending()).unwrap_or(0);

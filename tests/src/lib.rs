@@ -2,6 +2,7 @@
 //! a device that is none.
 
 pub mod fake_device;
+pub mod fake_tables;
 pub mod firmware;
 pub mod fuzz;
 pub mod instructions;

@@ -3,7 +3,6 @@
 use super::failure::Kind;
 #[cfg(unix)]
 use crate::device::emulator::Board;
-use crate::device::port::BAUD;
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 #[cfg(unix)]
@@ -31,10 +30,24 @@ pub(super) enum Command {
     Inspect(Inspect),
     /// Compensate a picture or a video with a table
     Compensate(Compensate),
+    /// Sign a table, so that devices with the key take it
+    Sign(Sign),
+    /// List the serial ports and the devices that answer there
+    Ports(Ports),
+    /// Bring a table to a device, which uses it on trial
+    Flash(Flash),
+    /// Keep the table that is on trial
+    Confirm(SerialLine),
+    /// Go back to the table before
+    Rollback(SerialLine),
     /// Say how a device is
     Status(Status),
     /// Watch a device: frame rate, tier, time budget, events, log
     Monitor(Monitor),
+    /// Make, show and install keys that tables are signed with
+    Key(Key),
+    /// Write a zip file for support: versions, status, logs, transcripts; never keys
+    Report(Report),
     /// Run the firmware on an emulated board, with its serial line as a port
     #[cfg(unix)]
     Emulate(Emulate),
@@ -69,13 +82,125 @@ pub(super) struct Solve {
     /// grey that every live cell reaches
     #[arg(long, value_name = "LIGHT")]
     pub(super) white: Option<f64>,
+    /// Sign the table with this key
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) seal: SealTerms,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SealTerms {
+    /// Version of the table; a device does not go back to a lower one by itself
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(super) table_version: u32,
+    /// Number of the only device that the table is for; any if left out
+    #[arg(long, value_name = "NUMBER", value_parser = device_number)]
+    pub(super) for_device: Option<u64>,
+    /// Once the table is confirmed, versions below this never run again on the device
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) revoke_below: u32,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Sign {
+    /// Table to sign
+    pub(super) table: PathBuf,
+    /// Private key
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: PathBuf,
+    #[command(flatten)]
+    pub(super) seal: SealTerms,
+    /// Where to write; by default the table itself
+    #[arg(short, long, value_name = "TABLE.iltm")]
+    pub(super) output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Ports {
+    /// Speed to try first; lower ones follow
+    #[arg(long, value_name = "BAUD")]
+    pub(super) baud: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Flash {
+    /// Table to bring
+    pub(super) table: PathBuf,
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+    /// Seconds until the device goes back by itself, unless somebody confirms
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) trial: u16,
+    /// Confirm at once, without looking at the wall first
+    #[arg(long)]
+    pub(super) confirm: bool,
+    /// Say what would be sent and change nothing
+    #[arg(long)]
+    pub(super) dry_run: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Key {
+    #[command(subcommand)]
+    pub(super) command: KeyCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum KeyCommand {
+    /// Make a new private key
+    New {
+        /// File to write; never one that is there already
+        #[arg(short, long, value_name = "FILE", default_value = "iltm.key")]
+        output: PathBuf,
+    },
+    /// Say a key's public key and id
+    Show {
+        /// Private or public key
+        file: PathBuf,
+    },
+    /// Give a device that has none its public key, for good
+    Install(Install),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Install {
+    /// Private or public key; only the public one is sent
+    pub(super) file: PathBuf,
+    /// Number that the device gets, so that tables can be made for it alone
+    #[arg(long, value_name = "NUMBER", value_parser = device_number, default_value = "0", hide_default_value = true)]
+    pub(super) device: u64,
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+    /// Do not ask whether this is meant
+    #[arg(long)]
+    pub(super) yes: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Report {
+    /// Zip file to write
+    #[arg(short, long, value_name = "FILE.zip")]
+    pub(super) output: PathBuf,
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+    /// ELF file of the device's firmware, which has the words of its log messages
+    #[arg(long, value_name = "ELF")]
+    pub(super) firmware: Option<PathBuf>,
+    /// Seconds for which logs are gathered
+    #[arg(long, value_name = "SECONDS", default_value_t = 3)]
+    pub(super) seconds: u16,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Inspect {
     /// Table to read
     pub(super) table: PathBuf,
+    /// Key to verify its signature with
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
 }
+
 #[derive(Debug, Args)]
 pub(super) struct Compensate {
     /// Table to compensate with
@@ -94,14 +219,14 @@ pub(super) struct Compensate {
     pub(super) tier: Option<u8>,
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct SerialLine {
-    /// Serial port of the device
+    /// Serial port of the device; by default the one that answers
     #[arg(long, value_name = "PORT")]
-    pub(super) port: String,
-    /// Speed of the line, bits a second
-    #[arg(long, value_name = "BAUD", default_value_t = BAUD)]
-    pub(super) baud: u32,
+    pub(super) port: Option<String>,
+    /// Speed of the line to try first, bits a second; lower ones follow
+    #[arg(long, value_name = "BAUD")]
+    pub(super) baud: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -145,6 +270,18 @@ pub(super) struct Emulate {
     /// File that holds the board's memory and keeps it for the next time
     #[arg(long, value_name = "FILE")]
     pub(super) memory: Option<PathBuf>,
+}
+
+/// A number, or the 16 hexadecimal digits that `iltm status` shows.
+fn device_number(text: &str) -> Result<u64, String> {
+    let digits = text
+        .strip_prefix("0x")
+        .or((text.len() == 16).then_some(text));
+    let number = match digits {
+        Some(digits) => u64::from_str_radix(digits, 16),
+        None => text.parse(),
+    };
+    number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
 }
 
 #[cfg(unix)]

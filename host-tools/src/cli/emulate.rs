@@ -10,6 +10,8 @@ use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frames::Frames;
 use crate::device::memory::Memory;
 use crate::device::playback::{Playback, PlaybackError};
+use crate::user::Folders;
+use crate::user::emulated::register;
 use crate::video::VideoError;
 use iltm_runtime::FrameSize;
 use iltm_runtime::exchange::{Format, psram};
@@ -48,6 +50,12 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     interrupt::catch();
     let started = Emulator::start(arguments.board, &firmware, &memory);
     let mut emulator = started.map_err(|error| emulator_failure(&error))?;
+    // Others find its port until this goes.
+    let folders = Folders::of_user();
+    let registered = folders.map(|it| register(&it, emulator.port(), arguments.board.name()));
+    if let Some(Err(error)) = &registered {
+        output.remark(&format!("`iltm ports` will not find this board: {error}"));
+    }
     report(arguments, &emulator, &firmware, output);
     let played = play(&mut emulator, &mut playback, &mut frames);
     // Ctrl-C goes to the emulator as well, which may be the first to notice.
@@ -202,9 +210,8 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
     if output.terminal && !output.is_json() {
         let _ = writeln!(
             io::stderr(),
-            "{} runs; try `iltm monitor --port {} --firmware {}` in another terminal. Ctrl-C ends it.",
+            "{} runs; try `iltm monitor --firmware {}` in another terminal. Ctrl-C ends it.",
             arguments.board,
-            emulator.port(),
             firmware.display()
         );
     }

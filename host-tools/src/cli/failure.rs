@@ -1,9 +1,15 @@
 //! What a command failed for: words for people, a code for scripts.
 
+use super::active::Active;
 use crate::capture::CaptureError;
 use crate::compile::CompileError;
+use crate::compile::sign::KeyError;
 use crate::device::DeviceError;
+use crate::device::upload::UploadError;
 use crate::learn::LearnError;
+use crate::user::ConfigError;
+use iltm_runtime::link::Refusal;
+use iltm_runtime::trust::Rejected;
 use miette::Diagnostic;
 use std::fmt::{self, Write};
 
@@ -35,10 +41,94 @@ pub(super) enum Kind {
     Device = 12,
     /// The emulated board cannot be started.
     Emulator = 13,
+    /// No device answers at any port.
+    NoDevice = 14,
+    /// Several devices answer, and none was chosen.
+    SeveralDevices = 15,
+    /// The user's settings cannot be read or kept.
+    Settings = 16,
+    /// A key cannot be read or made.
+    Key = 17,
+    /// A table did not arrive whole.
+    Transfer = 18,
+    /// A device's flash does not hold what is written to it.
+    Flash = 19,
+    /// A table is larger than the device has room for.
+    TooLarge = 20,
+    /// A table is not signed, and the device wants that.
+    Unsigned = 21,
+    /// A table is signed with another key than the device's.
+    WrongKey = 22,
+    /// A table's signature is false.
+    Signature = 23,
+    /// A table is older than the device takes.
+    Older = 24,
+    /// A table is for another device.
+    OtherDevice = 25,
+    /// Another table is on trial.
+    OnTrial = 26,
+    /// There is no table to confirm or to go back to.
+    NoTable = 27,
+    /// A device has another key or number already.
+    HasKey = 28,
+    /// Stopped by the user before the end.
+    Interrupted = 29,
+}
+
+impl From<&Rejected> for Kind {
+    fn from(rejected: &Rejected) -> Self {
+        match rejected {
+            Rejected::Unsigned => Self::Unsigned,
+            Rejected::WrongKey => Self::WrongKey,
+            Rejected::Signature => Self::Signature,
+            Rejected::Older { .. } => Self::Older,
+            Rejected::OtherDevice { .. } => Self::OtherDevice,
+            Rejected::NotATable
+            | Rejected::Truncated
+            | Rejected::Format
+            | Rejected::Damaged
+            | Rejected::Contents => Self::Table,
+        }
+    }
+}
+
+impl From<&DeviceError> for Kind {
+    fn from(error: &DeviceError) -> Self {
+        match error {
+            DeviceError::Open { .. } => Self::Port,
+            DeviceError::Gone { .. } | DeviceError::NoAnswer { .. } => Self::NoAnswer,
+            DeviceError::Refused { refusal, .. } => match refusal {
+                Refusal::Table(rejected) => rejected.into(),
+                Refusal::TooLong { .. } => Self::TooLarge,
+                Refusal::OnTrial => Self::OnTrial,
+                Refusal::Flash { .. } => Self::Flash,
+                Refusal::NoTransfer | Refusal::Incomplete | Refusal::Chunk => Self::Transfer,
+                Refusal::NotInUse { .. } | Refusal::NoOther => Self::NoTable,
+                Refusal::HasKey => Self::HasKey,
+                Refusal::HelloFirst | Refusal::Unknown | Refusal::Malformed | Refusal::ReadOnly => {
+                    Self::Device
+                }
+            },
+            DeviceError::Protocol { .. } | DeviceError::Exchanged | DeviceError::Answer { .. } => {
+                Self::Device
+            }
+        }
+    }
+}
+
+impl From<&UploadError> for Kind {
+    fn from(error: &UploadError) -> Self {
+        match error {
+            UploadError::Device(error) => error.into(),
+            UploadError::Worn { .. } => Self::Flash,
+            UploadError::Stalled { .. } | UploadError::NeverWhole { .. } => Self::Transfer,
+            UploadError::Stopped => Self::Interrupted,
+        }
+    }
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 12] = [
+    const ALL: [(Self, &'static str, &'static str); 28] = [
         (
             Self::Usage,
             "usage",
@@ -71,6 +161,66 @@ impl Kind {
             "emulator",
             "the emulated board cannot be started",
         ),
+        (Self::NoDevice, "no-device", "no device answers at any port"),
+        (
+            Self::SeveralDevices,
+            "several-devices",
+            "several devices answer, and none was chosen",
+        ),
+        (
+            Self::Settings,
+            "settings",
+            "the user's settings cannot be read or kept",
+        ),
+        (Self::Key, "key", "a key cannot be read or made"),
+        (Self::Transfer, "transfer", "a table did not arrive whole"),
+        (
+            Self::Flash,
+            "flash",
+            "a device's flash does not hold what is written to it",
+        ),
+        (
+            Self::TooLarge,
+            "too-large",
+            "a table is larger than the device has room for",
+        ),
+        (
+            Self::Unsigned,
+            "unsigned",
+            "a table is not signed, and the device wants that",
+        ),
+        (
+            Self::WrongKey,
+            "wrong-key",
+            "a table is signed with another key than the device's",
+        ),
+        (Self::Signature, "signature", "a table's signature is false"),
+        (
+            Self::Older,
+            "older-version",
+            "a table is older than the device takes",
+        ),
+        (
+            Self::OtherDevice,
+            "other-device",
+            "a table is for another device",
+        ),
+        (Self::OnTrial, "on-trial", "another table is on trial"),
+        (
+            Self::NoTable,
+            "no-table",
+            "there is no table to confirm or to go back to",
+        ),
+        (
+            Self::HasKey,
+            "has-key",
+            "a device has another key or number already",
+        ),
+        (
+            Self::Interrupted,
+            "interrupted",
+            "stopped by the user before the end",
+        ),
     ];
 
     pub(super) const fn code(self) -> u8 {
@@ -98,6 +248,8 @@ pub(super) struct Failure {
     pub(super) kind: Kind,
     pub(super) message: String,
     pub(super) next_step: String,
+    /// Where a device's tables were about to change: which one is in use now.
+    pub(super) active: Option<Active>,
 }
 
 impl Failure {
@@ -110,6 +262,21 @@ impl Failure {
             kind,
             message: message.to_string(),
             next_step: next_step.into(),
+            active: None,
+        }
+    }
+
+    /// The same, with the table that is in use now.
+    pub(super) fn with(mut self, active: Active) -> Self {
+        self.active = Some(active);
+        self
+    }
+
+    /// Which table is in use now, and what to do.
+    pub(super) fn advice(&self) -> String {
+        match &self.active {
+            Some(active) => format!("{active} {}", self.next_step),
+            None => self.next_step.clone(),
         }
     }
 }
@@ -117,13 +284,7 @@ impl Failure {
 impl Failure {
     /// Of the device at a port.
     pub(super) fn of_device(port: &str, error: &DeviceError) -> Self {
-        let kind = match error {
-            DeviceError::Open { .. } => Kind::Port,
-            DeviceError::Gone { .. } | DeviceError::NoAnswer { .. } => Kind::NoAnswer,
-            DeviceError::Protocol { .. }
-            | DeviceError::Refused { .. }
-            | DeviceError::Answer { .. } => Kind::Device,
-        };
+        let kind = error.into();
         Self::new(kind, format!("{port}: {error}"), error.next_step())
     }
 }
@@ -142,7 +303,7 @@ impl Diagnostic for Failure {
     }
 
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        Some(Box::new(&self.next_step))
+        Some(Box::new(self.advice()))
     }
 }
 
@@ -163,6 +324,19 @@ impl From<LearnError> for Failure {
                 "Take more Bernoulli photographs, or average several of each pattern.",
             ),
         }
+    }
+}
+
+impl From<KeyError> for Failure {
+    fn from(error: KeyError) -> Self {
+        Self::new(Kind::Key, &error, error.next_step())
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        let next_step = "Correct the file, or move it away; --port needs none.";
+        Self::new(Kind::Settings, error, next_step)
     }
 }
 

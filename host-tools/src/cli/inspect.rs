@@ -3,22 +3,111 @@
 use super::args::Inspect;
 use super::failure::{Failure, Kind};
 use super::output::{Output, read_file};
-use iltm_runtime::image::Table;
+use super::slots::key_id;
+use crate::compile::sign::{is_signed_by, read_public_key};
+use crate::device::cure;
+use ed25519_dalek::VerifyingKey;
+use iltm_runtime::image::{Seal, Table, unseal};
 use iltm_runtime::operator::{Bounds, Operator};
+use iltm_runtime::trust::Rejected;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
 pub(super) fn run(arguments: &Inspect, output: &Output) -> Result<(), Failure> {
-    let image = read_file(&arguments.table)?;
-    let table = check(&arguments.table, &image)?;
-    output.result(&data(&table), &text(&arguments.table, &table));
+    let file = read_file(&arguments.table)?;
+    let (table, seal) = check_sealed(&arguments.table, &file)?;
+    if let Some(path) = &arguments.key {
+        verify(
+            &arguments.table,
+            &file,
+            seal.as_ref(),
+            &read_public_key(path)?,
+        )?;
+    }
+    let mut data = data(&table);
+    let mut text = text(&arguments.table, &table);
+    data["file_bytes"] = json!(file.len());
+    data["seal"] = json!(
+        seal.as_ref()
+            .map(|seal| seal_data(seal, arguments.key.is_some()))
+    );
+    text.insert_str(
+        text.find('\n').map_or(0, |end| end + 1),
+        &seal_text(seal.as_ref(), arguments.key.is_some()),
+    );
+    output.result(&data, &text);
     Ok(())
 }
 
-/// Checks the bytes of a table file.
-pub(super) fn check<'a>(path: &Path, image: &'a [u8]) -> Result<Table<'a>, Failure> {
-    Table::check(image).map_err(|error| {
+/// Checks the bytes of a table file, and whether they are signed with this key.
+fn verify(
+    path: &Path,
+    file: &[u8],
+    seal: Option<&Seal>,
+    key: &VerifyingKey,
+) -> Result<(), Failure> {
+    let rejected = match seal {
+        None => Rejected::Unsigned,
+        Some(seal) if seal.key != Seal::key_id(key.as_bytes()) => Rejected::WrongKey,
+        Some(seal) if !is_signed_by(file, seal, key) => Rejected::Signature,
+        Some(_) => return Ok(()),
+    };
+    let why = match rejected {
+        Rejected::Unsigned => "the table is not signed",
+        Rejected::WrongKey => "the table is signed with another key",
+        _ => "the table's signature is false",
+    };
+    let message = format!("{}: {why}", path.display());
+    Err(Failure::new((&rejected).into(), message, cure(&rejected)))
+}
+
+fn seal_data(seal: &Seal, verified: bool) -> Value {
+    json!({
+        "version": seal.version,
+        "revokes_below": seal.oldest,
+        "device": (seal.device != 0).then(|| format!("{:016x}", seal.device)),
+        "key": key_id(&seal.key),
+        "verified": verified,
+    })
+}
+
+fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
+    let Some(seal) = seal else {
+        return "signed           no: only devices without a key take it\n".to_owned();
+    };
+    let verified = if verified {
+        "verified"
+    } else {
+        "not verified: give --key"
+    };
+    let device = match seal.device {
+        0 => "any device".to_owned(),
+        device => format!("device {device:016x} only"),
+    };
+    let revokes = match seal.oldest {
+        0 => String::new(),
+        oldest => format!(", revokes versions below {oldest}"),
+    };
+    format!(
+        "version          {}, for {device}{revokes}\nsigned           with key {} ({verified})\n",
+        seal.version,
+        key_id(&seal.key)
+    )
+}
+
+/// Checks the bytes of a table file. The signature is not looked at.
+pub(super) fn check<'a>(path: &Path, file: &'a [u8]) -> Result<Table<'a>, Failure> {
+    Ok(check_sealed(path, file)?.0)
+}
+
+/// The same, with the seal if there is one.
+pub(super) fn check_sealed<'a>(
+    path: &Path,
+    file: &'a [u8],
+) -> Result<(Table<'a>, Option<Seal>), Failure> {
+    let checked = unseal(file).and_then(|(image, seal)| Ok((Table::check(image)?, seal)));
+    checked.map_err(|error| {
         let message = format!("{}: {error}", path.display());
         Failure::new(
             Kind::Table,

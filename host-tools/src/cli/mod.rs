@@ -4,19 +4,27 @@
 //! with `--json` one JSON object and nothing else. What goes on until it is
 //! stopped prints a JSON object a line.
 
+mod active;
 mod args;
 mod compensate;
+mod connect;
 mod demo;
 #[cfg(unix)]
 mod emulate;
 mod failure;
+mod flash;
 mod inspect;
 mod interrupt;
+mod key;
 mod monitor;
 mod output;
+mod ports;
 mod progress;
+mod report;
+mod slots;
 mod solve;
 mod status;
+mod trial;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -33,6 +41,13 @@ pub fn run() -> ExitCode {
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Sign(sign) => key::sign(sign, &output),
+        Command::Ports(ports) => ports::run(ports, &output),
+        Command::Flash(flash) => flash::run(flash, &output),
+        Command::Confirm(line) => trial::confirm(line, &output),
+        Command::Rollback(line) => trial::rollback(line, &output),
+        Command::Key(key) => key::run(key, &output),
+        Command::Report(report) => report::run(report, &output),
         Command::Status(status) => status::run(status, &output),
         Command::Monitor(monitor) => monitor::run(monitor, &output),
         #[cfg(unix)]

@@ -1,5 +1,6 @@
 //! Where words and data go.
 
+use super::active::Active;
 use super::failure::{Failure, Kind};
 use crate::video::{VideoError, WholeFile};
 use serde_json::{Value, json};
@@ -36,6 +37,22 @@ impl Output {
         }
     }
 
+    /// A remark for people, where there are some.
+    pub(super) fn remark(&self, text: &str) {
+        if self.terminal && !self.json {
+            let _ = writeln!(io::stderr(), "{text}");
+        }
+    }
+
+    /// An event of long work, for programs: an object a line.
+    pub(super) fn event(&self, data: &Value) {
+        if self.json {
+            let mut out = io::stdout();
+            let _ = writeln!(out, "{data}");
+            let _ = out.flush();
+        }
+    }
+
     pub(super) fn failure(&self, failure: &Failure) -> ExitCode {
         if self.json {
             let data = json!({ "error": {
@@ -43,13 +60,14 @@ impl Output {
                 "exit": failure.kind.code(),
                 "message": failure.message,
                 "next_step": failure.next_step,
+                "active": failure.active.as_ref().map(Active::data),
             }});
             let _ = writeln!(io::stdout(), "{data}");
         }
         let mut text = String::new();
         let graphical = miette::GraphicalReportHandler::new();
         if !self.terminal || graphical.render_report(&mut text, failure).is_err() {
-            text = format!("error: {}\nnext: {}\n", failure.message, failure.next_step);
+            text = format!("error: {}\nnext: {}\n", failure.message, failure.advice());
         }
         let _ = write!(io::stderr(), "{text}");
         ExitCode::from(failure.kind.code())

@@ -2,9 +2,11 @@
 
 use super::args::Solve;
 use super::failure::Failure;
+use super::key::seal;
 use super::output::{Output, write_file};
 use super::progress::progress;
 use crate::capture::{CaptureOptions, Why};
+use crate::compile::sign::read_key;
 use crate::learn::{Learned, learn};
 use crate::solve::SolveOptions;
 use serde_json::{Value, json};
@@ -16,6 +18,8 @@ const MOST_LINES: usize = 8;
 
 pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
+    // A key that cannot be read is known before the work, not after it.
+    let key = arguments.key.as_deref().map(read_key).transpose()?;
     let photographs = CaptureOptions {
         bernoulli: arguments.photos,
         ..CaptureOptions::default()
@@ -35,17 +39,24 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     );
     bars.end();
     let learned = learned?;
-    write_file(&arguments.output, &learned.compiled.image)?;
+    let image = &learned.compiled.image;
+    let file = match &key {
+        Some(key) => seal(image, key, &arguments.seal)?,
+        None => image.clone(),
+    };
+    write_file(&arguments.output, &file)?;
     let seconds = start.elapsed().as_secs_f64();
     let mut data = summary(&learned);
     data["table"] = json!(arguments.output.display().to_string());
     data["seconds"] = json!(seconds);
+    data["signed"] = json!(key.is_some());
     let mut text = text(&learned);
     let _ = writeln!(
         text,
-        "table       {}: {} bytes, in {seconds:.2} s",
+        "table       {}: {} bytes, {}in {seconds:.2} s",
         arguments.output.display(),
-        learned.compiled.image.len(),
+        file.len(),
+        if key.is_some() { "signed, " } else { "" },
     );
     output.result(&data, &text);
     Ok(())

@@ -1,27 +1,46 @@
 //! `iltm status`
 
 use super::args;
+use super::connect::connect;
 use super::failure::Failure;
 use super::output::Output;
-use crate::device::{Client, DeviceError, Patience, Port};
-use iltm_runtime::link::{Hello, Mode, PassThrough, Status, TableName};
+use super::slots;
+use crate::device::DeviceError;
+use iltm_runtime::link::{Hello, Mode, PassThrough, Slots, Status, TableName};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
 pub(super) fn run(arguments: &args::Status, output: &Output) -> Result<(), Failure> {
-    let line = &arguments.line;
-    let ask = || -> Result<(Hello, Status), DeviceError> {
-        let port = Port::open(&line.port, line.baud)?;
-        let mut client = Client::greet(port, Patience::default())?;
-        let status = client.status()?;
-        Ok((client.device().clone(), status))
+    let mut connection = connect(&arguments.line, output)?;
+    let status = connection.client.status();
+    let status = status.map_err(|error| connection.failed(&error))?;
+    let slots = match connection.client.slots() {
+        Ok(slots) => Some(slots),
+        // It takes no tables.
+        Err(DeviceError::Refused { .. }) => None,
+        Err(error) => return Err(connection.failed(&error)),
     };
-    let (device, status) = ask().map_err(|error| Failure::of_device(&line.port, &error))?;
+    connection.remember(output);
+    let device = connection.client.device();
     let mut data = data(&status);
-    data["port"] = json!(line.port);
-    data["device"] = identity(&device);
-    output.result(&data, &text(&line.port, &status));
+    data["port"] = json!(connection.port);
+    data["baud"] = json!(connection.baud);
+    data["device"] = identity(device);
+    data["update"] = json!(slots.as_ref().map(slots::data));
+    output.result(
+        &data,
+        &text(&connection.port, &status, device, slots.as_ref()),
+    );
     Ok(())
+}
+
+/// A device's number, in words.
+pub(super) fn number(number: u64) -> String {
+    if number == 0 {
+        "no number".to_owned()
+    } else {
+        format!("number {number:016x}")
+    }
 }
 
 /// Who a device is, for programs.
@@ -98,7 +117,7 @@ pub(super) fn data(status: &Status) -> Value {
     })
 }
 
-fn text(port: &str, status: &Status) -> String {
+fn text(port: &str, status: &Status, device: &Hello, slots: Option<&Slots>) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<12} {value}");
@@ -106,15 +125,24 @@ fn text(port: &str, status: &Status) -> String {
     line(
         "device",
         format!(
-            "{} at {port}, firmware {}, up {}",
+            "{} at {port}, {}, firmware {}, up {}",
             status.board,
+            number(device.device),
             status.firmware,
             duration(status.uptime_ms)
         ),
     );
     line("mode", status.mode.to_string());
     line("table", table(status));
-    line("slots", slots(status));
+    match slots {
+        Some(slots) => {
+            for (index, slot) in slots::lines(slots).into_iter().enumerate() {
+                line(if index == 0 { "slots" } else { "" }, slot);
+            }
+            line("key", slots::trust(slots));
+        }
+        None => line("slots", self::slots(status)),
+    }
     line("tier", format!("{} of {}", status.tier, status.top_tier));
     line("frames", frames(status));
     line("frame time", frame_time(status));

@@ -9,6 +9,7 @@
 //! | gains, also finer than the cells | [`gain`] |
 //! | projector codes by drive | [`response`] |
 //! | bytes | [`image`] |
+//! | the seal behind them | [`sign`] |
 //!
 //! The image is checked by the runtime's own reader before it is returned, so
 //! what leaves here is known to load.
@@ -19,6 +20,7 @@ pub mod image;
 pub mod ladder;
 pub mod quantise;
 pub mod response;
+pub mod sign;
 mod table;
 pub mod white;
 

@@ -55,7 +55,7 @@ pub struct Subscription {
 /// no harm: the device answers each copy alike, and any of the answers will do.
 #[derive(Debug)]
 pub struct Client<L> {
-    talk: Talk<L>,
+    pub(super) talk: Talk<L>,
     device: Hello,
 }
 
@@ -79,6 +79,43 @@ impl<L: Line> Client<L> {
             }),
             other => Err(unexpected(hello, &other)),
         }
+    }
+
+    /// Says hello again, to a device that has restarted.
+    ///
+    /// # Errors
+    /// As [`greet`](Self::greet), and [`DeviceError::Exchanged`] if it is not the device
+    /// that it was.
+    pub fn greet_again(&mut self) -> Result<(), DeviceError> {
+        let hello = Request::Hello {
+            protocol: PROTOCOL_VERSION,
+        };
+        let device = match self.talk.ask(hello)? {
+            Response::Hello(device) => device,
+            other => return Err(unexpected(hello, &other)),
+        };
+        self.talk.forget();
+        if device.protocol != PROTOCOL_VERSION {
+            return Err(DeviceError::Protocol {
+                device: device.protocol,
+            });
+        }
+        if device.board != self.device.board || device.device != self.device.device {
+            return Err(DeviceError::Exchanged);
+        }
+        self.device = device;
+        Ok(())
+    }
+
+    /// The line.
+    pub const fn line(&mut self) -> &mut L {
+        self.talk.line()
+    }
+
+    /// Ends the conversation.
+    #[must_use]
+    pub fn into_line(self) -> L {
+        self.talk.into_line()
     }
 
     /// Who the device is.
@@ -128,7 +165,7 @@ impl<L: Line> Client<L> {
     }
 }
 
-const fn unexpected(request: Request<'_>, response: &Response) -> DeviceError {
+pub(super) const fn unexpected(request: Request<'_>, response: &Response) -> DeviceError {
     let request = name(request);
     match response {
         Response::Refused(refusal) => DeviceError::Refused {

@@ -1,6 +1,7 @@
 //! Why a device could not be spoken to.
 
 use iltm_runtime::link::{PROTOCOL_VERSION, Refusal};
+use iltm_runtime::trust::Rejected;
 use std::io;
 
 /// Why a device could not be spoken to. [`DeviceError::next_step`] says what to
@@ -46,6 +47,9 @@ pub enum DeviceError {
         /// Why not.
         refusal: Refusal,
     },
+    /// Another device answers now.
+    #[error("another device answers than before")]
+    Exchanged,
     /// The answer belongs to another request, or cannot be read.
     #[error("the device answers the request \"{request}\" with something else")]
     Answer {
@@ -98,13 +102,58 @@ impl DeviceError {
                 "Use the host tools of the firmware's version, or later ones."
             }
             Self::Protocol { .. } => "Bring the device's firmware up to date.",
-            Self::Refused {
-                refusal: Refusal::HelloFirst,
-                ..
-            } => "The device has just restarted: try again.",
-            Self::Refused { .. } | Self::Answer { .. } => {
-                "Use host tools and firmware of the same version."
-            }
+            Self::Refused { refusal, .. } => after(refusal),
+            Self::Exchanged => "Plug the device back in and start again.",
+            Self::Answer { .. } => "Use host tools and firmware of the same version.",
+        }
+    }
+}
+
+/// What to do about a refusal.
+const fn after(refusal: &Refusal) -> &'static str {
+    match refusal {
+        Refusal::HelloFirst => "The device has just restarted: try again.",
+        Refusal::Unknown | Refusal::Malformed | Refusal::Chunk => {
+            "Use host tools and firmware of the same version."
+        }
+        Refusal::NoTransfer | Refusal::Incomplete => {
+            "Run `iltm flash` again: it goes on where it stopped."
+        }
+        Refusal::TooLong { .. } => "Solve for a coarser grid.",
+        Refusal::OnTrial => "Run `iltm confirm` to keep that table, or `iltm rollback`, first.",
+        Refusal::Flash { .. } => {
+            "Try once more; if it happens again the device's flash is worn out."
+        }
+        Refusal::Table(rejected) => cure(rejected),
+        Refusal::NotInUse { .. } => "Run `iltm status` to see which table is in use.",
+        Refusal::NoOther => "Flash the table that you want instead.",
+        Refusal::HasKey => {
+            "A device keeps its key for good: sign tables with that key (`iltm status` shows its id)."
+        }
+        Refusal::ReadOnly => {
+            "The device has no flash for tables, or no room for records: ask who built its firmware."
+        }
+    }
+}
+
+/// What to do about a table that a device does not take.
+#[must_use]
+pub const fn cure(rejected: &Rejected) -> &'static str {
+    match rejected {
+        Rejected::NotATable | Rejected::Truncated | Rejected::Damaged | Rejected::Contents => {
+            "Copy the table again, or make it anew with `iltm solve`."
+        }
+        Rejected::Format => "Use host tools and firmware of the same version.",
+        Rejected::Unsigned => "Sign it: `iltm sign TABLE --key FILE` with the device's key.",
+        Rejected::WrongKey => {
+            "Sign it with the device's own key: `iltm key show FILE` says a key's id, `iltm status` the device's."
+        }
+        Rejected::Signature => "Sign it again: `iltm sign TABLE --key FILE`.",
+        Rejected::Older { .. } => {
+            "Flash a newer table, or sign this one with a higher --table-version."
+        }
+        Rejected::OtherDevice { .. } => {
+            "Take this device's table, or sign this one with --for-device."
         }
     }
 }

@@ -4,6 +4,10 @@
 //! |---|---|
 //! | the line: a serial port, or anything else that carries bytes both ways | [`port`] |
 //! | requests, answers, events | [`client`] |
+//! | requests about tables | [`tables`] |
+//! | a table's file on its way, whatever breaks | [`upload`] |
+//! | ports that a device answers at | [`ports`] |
+//! | what was said, in words | [`transcript`] |
 //! | log messages, with the firmware's ELF file | [`logs`] |
 //! | the emulated board, its serial line as a port | [`emulator`] |
 //! | the emulated board's memory, which is a file here | [`memory`] |
@@ -27,8 +31,12 @@ pub mod memory;
 #[cfg(unix)]
 pub mod playback;
 pub mod port;
+pub mod ports;
+pub mod tables;
 mod talk;
+pub mod transcript;
+pub mod upload;
 
 pub use client::{Client, Incoming, Patience};
-pub use error::DeviceError;
+pub use error::{DeviceError, cure};
 pub use port::{Line, Port};

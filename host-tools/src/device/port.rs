@@ -68,6 +68,17 @@ impl Port {
     }
 }
 
+impl Port {
+    /// Goes on at another speed.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] if the port cannot do it.
+    pub fn set_speed(&mut self, baud: u32) -> Result<(), DeviceError> {
+        let set = self.port.set_baud_rate(baud);
+        set.map_err(|source| DeviceError::Open { source })
+    }
+}
+
 /// Longest that one write may wait for a line that does not take bytes.
 const WRITE_WAIT: Duration = Duration::from_secs(1);
 

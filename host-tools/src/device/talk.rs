@@ -8,7 +8,14 @@ use iltm_runtime::link::{
 };
 use std::collections::VecDeque;
 use std::io;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// A request as it goes on the line.
+#[derive(Debug)]
+pub(super) struct Posted {
+    pub(super) sequence: u16,
+    bytes: Vec<u8>,
+}
 
 /// A line with frames on it.
 #[derive(Debug)]
@@ -62,21 +69,28 @@ impl<L: Line> Talk<L> {
 
     /// Sends a request until it is answered.
     pub(super) fn ask(&mut self, request: Request<'_>) -> Result<Response, DeviceError> {
-        self.sequence = self.sequence.wrapping_add(1);
-        let sequence = self.sequence;
-        let bytes = encoded(sequence, request);
+        self.ask_patiently(request, self.patience)
+    }
+
+    /// The same with other patience than usual.
+    pub(super) fn ask_patiently(
+        &mut self,
+        request: Request<'_>,
+        patience: Patience,
+    ) -> Result<Response, DeviceError> {
         let start = self.line.now();
         self.heard = Heard::default();
-        for _ in 0..self.patience.tries {
-            self.line.write(&bytes).map_err(gone)?;
-            if let Some(response) = self.answer(sequence)? {
+        let posted = self.post(request);
+        for _ in 0..patience.tries {
+            self.send(&posted)?;
+            if let Some(response) = self.answer(posted.sequence, patience.answer)? {
                 return response.map_err(|_| DeviceError::Answer {
                     request: name(request),
                 });
             }
         }
         Err(DeviceError::NoAnswer {
-            tries: self.patience.tries,
+            tries: patience.tries,
             seconds: self
                 .line
                 .now()
@@ -86,12 +100,53 @@ impl<L: Line> Talk<L> {
         })
     }
 
+    /// A request with a number of its own, to be sent as often as it takes.
+    pub(super) fn post(&mut self, request: Request<'_>) -> Posted {
+        self.sequence = self.sequence.wrapping_add(1);
+        Posted {
+            sequence: self.sequence,
+            bytes: encoded(self.sequence, request),
+        }
+    }
+
+    /// Sends a request, for the first time or again.
+    pub(super) fn send(&mut self, posted: &Posted) -> Result<(), DeviceError> {
+        self.line.write(&posted.bytes).map_err(gone)
+    }
+
+    /// The responses that come within `wait`, as soon as there are any; `None` for one
+    /// that cannot be read.
+    pub(super) fn responses(
+        &mut self,
+        wait: Duration,
+    ) -> Result<Vec<(u16, Option<Response>)>, DeviceError> {
+        let mut responses = Vec::new();
+        self.listen(wait, |sequence, payload| {
+            responses.push((sequence, postcard::from_bytes(payload).ok()));
+        })?;
+        Ok(responses)
+    }
+
+    /// The line's time.
+    pub(super) fn now(&self) -> Instant {
+        self.line.now()
+    }
+
+    pub(super) const fn line(&mut self) -> &mut L {
+        &mut self.line
+    }
+
+    pub(super) fn into_line(self) -> L {
+        self.line
+    }
+
     /// Waits for the response with this number.
     fn answer(
         &mut self,
         sequence: u16,
+        patience: Duration,
     ) -> Result<Option<Result<Response, postcard::Error>>, DeviceError> {
-        let end = self.line.now() + self.patience.answer;
+        let end = self.line.now() + patience;
         loop {
             let left = end.saturating_duration_since(self.line.now());
             if left.is_zero() {

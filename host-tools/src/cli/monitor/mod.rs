@@ -13,7 +13,8 @@ mod lines;
 mod live;
 mod view;
 
-use super::args::{Monitor, SerialLine};
+use super::args::Monitor;
+use super::connect::{Wire, connect};
 use super::failure::{Failure, Kind};
 use super::interrupt;
 use super::output::Output;
@@ -22,6 +23,7 @@ use crate::device::{Client, DeviceError, Incoming, Patience, Port};
 use happening::Happening;
 use iltm_runtime::link::{Channel, Refusal};
 use std::io;
+use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -43,16 +45,18 @@ trait Show {
 }
 
 pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
-    let logs = arguments.firmware.as_deref().map(Logs::read).transpose();
-    let logs = logs.map_err(|error| {
-        let next_step = "Give the ELF file that the device's firmware was flashed from.";
-        Failure::new(Kind::Read, error, next_step)
-    })?;
-    let line = &arguments.line;
+    let logs = arguments.firmware.as_deref().map(words).transpose()?;
     let period = Duration::from_millis(arguments.period.into());
-    let failed = |error| Failure::of_device(&line.port, &error);
     // A first failure ends the command; later ones are the device's business.
-    let first = Watch::begin(line, period, logs.as_ref()).map_err(failed)?;
+    let mut connection = connect(&arguments.line, output)?;
+    connection.remember(output);
+    let place = Place {
+        port: connection.port,
+        baud: connection.baud,
+    };
+    let line = &place;
+    let first = Watch::of(connection.client, period, logs.as_ref());
+    let first = first.map_err(|error| Failure::of_device(&line.port, &error))?;
     interrupt::catch();
     let mut show: Box<dyn Show> = if output.is_json() {
         Box::new(lines::Json)
@@ -73,10 +77,24 @@ pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
     }
 }
 
+/// Reads the words of a firmware's log messages.
+pub(super) fn words(firmware: &Path) -> Result<Logs, Failure> {
+    Logs::read(firmware).map_err(|error| {
+        let next_step = "Give the ELF file that the device's firmware was flashed from.";
+        Failure::new(Kind::Read, error, next_step)
+    })
+}
+
+/// Where the device was found.
+struct Place {
+    port: String,
+    baud: u32,
+}
+
 /// Shows what happens until somebody stops it.
 fn watch(
     first: Watch<'_>,
-    line: &SerialLine,
+    line: &Place,
     period: Duration,
     logs: Option<&Logs>,
     show: &mut dyn Show,
@@ -121,7 +139,7 @@ fn watch(
 
 /// A conversation with a device that has granted a subscription.
 struct Watch<'l> {
-    client: Client<Port>,
+    client: Client<Wire>,
     logs: Option<&'l Logs>,
     period: Duration,
     /// Between two renewals of the subscription.
@@ -129,13 +147,17 @@ struct Watch<'l> {
 }
 
 impl<'l> Watch<'l> {
-    fn begin(
-        line: &SerialLine,
+    fn begin(line: &Place, period: Duration, logs: Option<&'l Logs>) -> Result<Self, DeviceError> {
+        let port = Port::open(&line.port, line.baud)?;
+        let client = Client::greet(Wire::new(port), Patience::default())?;
+        Self::of(client, period, logs)
+    }
+
+    fn of(
+        mut client: Client<Wire>,
         period: Duration,
         logs: Option<&'l Logs>,
     ) -> Result<Self, DeviceError> {
-        let port = Port::open(&line.port, line.baud)?;
-        let mut client = Client::greet(port, Patience::default())?;
         let subscription = client.subscribe(period)?;
         Ok(Self {
             client,

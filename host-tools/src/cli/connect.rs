@@ -1,0 +1,184 @@
+//! Finding the device that is meant, and beginning to talk.
+
+use super::args::SerialLine;
+use super::failure::{Failure, Kind};
+use super::output::Output;
+use crate::device::ports::{self, Candidate, Found};
+use crate::device::transcript::Transcribed;
+use crate::device::{Client, DeviceError, Patience, Port};
+use crate::user::{Config, Folders};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, BufWriter, IsTerminal, Write};
+
+/// What commands talk over.
+pub(super) type Wire = Transcribed<Port>;
+
+/// A conversation with the device that is meant.
+#[derive(Debug)]
+pub(super) struct Connection {
+    pub(super) client: Client<Wire>,
+    pub(super) port: String,
+    pub(super) baud: u32,
+    /// Where the port is to be remembered once the command has succeeded.
+    remember: Option<Config>,
+}
+
+/// Talks to the device at the port that was given; else to that at the remembered one;
+/// else to the only one that answers; else asks.
+pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, Failure> {
+    if let Some(port) = &line.port {
+        let greeted = ports::greet(port, line.baud, Patience::default(), Transcribed::new);
+        let (client, baud) = greeted.map_err(|error| Failure::of_device(port, &error))?;
+        return Ok(Connection::new(client, port, baud, None));
+    }
+    let folders = Folders::of_user();
+    let config = folders.as_ref().map(Config::read).transpose()?;
+    let config = config.unwrap_or_default();
+    if let Some(port) = config.port.clone().filter(|port| !config.excludes(port)) {
+        let greeted = ports::greet(&port, line.baud, ports::SHORT, Transcribed::new);
+        match greeted {
+            Ok((client, baud)) => return Ok(Connection::new(client, &port, baud, None)),
+            Err(error @ DeviceError::Protocol { .. }) => {
+                return Err(Failure::of_device(&port, &error));
+            }
+            Err(_) => output.remark(&format!("no device at {port}; asking the other ports")),
+        }
+    }
+    let candidates = folders.map_or_else(Vec::new, |it| ports::candidates(&it, &config));
+    let (mut found, silent) = ports::ask(&candidates, line.baud);
+    let found = match found.len() {
+        0 => return Err(nobody(&silent)),
+        1 => found.remove(0),
+        _ => choose(found, output)?,
+    };
+    let port = &found.candidate.path;
+    output.remark(&format!("{} at {port}", found.device.board));
+    let greeted = ports::greet(
+        port,
+        Some(found.baud),
+        Patience::default(),
+        Transcribed::new,
+    );
+    let (client, baud) = greeted.map_err(|error| Failure::of_device(port, &error))?;
+    Ok(Connection::new(client, port, baud, Some(config)))
+}
+
+impl Connection {
+    fn new(client: Client<Wire>, port: &str, baud: u32, remember: Option<Config>) -> Self {
+        Self {
+            client,
+            port: port.to_owned(),
+            baud,
+            remember,
+        }
+    }
+
+    /// Keeps the port for the next time, if it was not known; that this fails is no
+    /// failure of the command.
+    pub(super) fn remember(&mut self, output: &Output) {
+        if let Some(mut config) = self.remember.take()
+            && let Err(error) = config.remember(&self.port)
+        {
+            output.remark(&format!("the port is not remembered: {error}"));
+        }
+    }
+
+    /// Writes down what is said from now on.
+    pub(super) fn transcribe(&mut self, file: File) {
+        let device = self.client.device();
+        let words = format!(
+            "iltm {} talks to {}, firmware {}, at {}, {} baud",
+            env!("CARGO_PKG_VERSION"),
+            device.board,
+            device.firmware,
+            self.port,
+            self.baud
+        );
+        let wire = self.client.line();
+        wire.write_to(Box::new(BufWriter::new(file)));
+        wire.remark(&words);
+    }
+
+    /// Goes on at the next lower speed that the device answers at; returns whether there
+    /// is one.
+    pub(super) fn slow_down(&mut self) -> bool {
+        for baud in ports::speeds(Some(self.baud)).into_iter().skip(1) {
+            let wire = self.client.line();
+            if wire.line().set_speed(baud).is_err() {
+                continue;
+            }
+            wire.remark(&format!("{baud} baud"));
+            if self.client.greet_again().is_ok() {
+                self.baud = baud;
+                return true;
+            }
+        }
+        false
+    }
+
+    pub(super) fn failed(&self, error: &DeviceError) -> Failure {
+        Failure::of_device(&self.port, error)
+    }
+}
+
+fn nobody(silent: &[(Candidate, DeviceError)]) -> Failure {
+    if silent.is_empty() {
+        return Failure::new(
+            Kind::NoDevice,
+            "there is no serial port to ask",
+            "Plug the device in, or name its port with --port; `iltm emulate` runs one without hardware.",
+        );
+    }
+    let mut message = "no device answers".to_owned();
+    for (candidate, error) in silent {
+        let _ = write!(message, "; {}: {error}", candidate.path);
+    }
+    // What keeps a port from being asked matters more than silence.
+    let unopened = silent.iter().map(|(_, error)| error);
+    let mut unopened = unopened.filter(|error| matches!(error, DeviceError::Open { .. }));
+    let next_step = match unopened.next() {
+        Some(error) => error.next_step().to_owned(),
+        None => "Check power and cable, or name the port with --port and its speed with --baud."
+            .to_owned(),
+    };
+    Failure::new(Kind::NoDevice, message, next_step)
+}
+
+/// One of several devices: a question on a terminal, an error elsewhere.
+fn choose(mut found: Vec<Found>, output: &Output) -> Result<Found, Failure> {
+    let several = |found: &[Found]| {
+        let mut message = "several devices answer".to_owned();
+        for device in found {
+            let _ = write!(
+                message,
+                "; {}: {}",
+                device.candidate.path, device.device.board
+            );
+        }
+        Failure::new(Kind::SeveralDevices, message, "Name one with --port.")
+    };
+    if output.is_json() || !output.terminal || !io::stdin().is_terminal() {
+        return Err(several(&found));
+    }
+    let mut err = io::stderr();
+    let _ = writeln!(err, "Several devices answer:");
+    for (number, device) in (1..).zip(&found) {
+        let _ = writeln!(
+            err,
+            "  {number}  {}  {} {}, firmware {}",
+            device.candidate.path,
+            device.device.board,
+            super::status::number(device.device.device),
+            device.device.firmware
+        );
+    }
+    let _ = write!(err, "Which one? ");
+    let _ = err.flush();
+    let mut answer = String::new();
+    let _ = io::stdin().read_line(&mut answer);
+    match answer.trim().parse::<usize>() {
+        Ok(number @ 1..) if number <= found.len() => Ok(found.remove(number - 1)),
+        _ => Err(several(&found)),
+    }
+}

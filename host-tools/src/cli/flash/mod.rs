@@ -1,0 +1,266 @@
+//! `iltm flash`
+//!
+//! | what | file |
+//! |---|---|
+//! | the order of things, and what to say when they fail | here |
+//! | what the host can tell before anything is sent | [`preflight`] |
+//! | progress: a bar, or an event a line | [`show`] |
+
+mod preflight;
+mod show;
+
+use super::active::Active;
+use super::args::Flash;
+use super::connect::{Connection, connect};
+use super::failure::{Failure, Kind};
+use super::output::{Output, read_file};
+use super::slots::letter;
+use super::{interrupt, trial};
+use crate::device::upload::{Parcel, Plan, Summary, Upload, UploadError};
+use crate::user::{Folders, transcripts};
+use iltm_runtime::link::InUse;
+use preflight::{Named, Now};
+use serde_json::json;
+use show::Show;
+use std::time::{Duration, Instant};
+
+pub(super) fn run(arguments: &Flash, output: &Output) -> Result<(), Failure> {
+    let bytes = read_file(&arguments.table)?;
+    let table = Named::read(&arguments.table, &bytes)?;
+    let mut connection = connect(&arguments.line, output)?;
+    if let Some(Ok(file)) = Folders::of_user().map(|folders| transcripts::begin(&folders)) {
+        connection.transcribe(file);
+    }
+    let result = flash(arguments, &bytes, &table, &mut connection, output);
+    let result = result.map_err(|failure| match failure.active {
+        Some(_) => failure,
+        None => failure.with(Active::ask(&mut connection.client)),
+    });
+    let words = match &result {
+        Ok(()) => "done".to_owned(),
+        Err(failure) => format!("failed: {failure}"),
+    };
+    connection.client.line().remark(&words);
+    result?;
+    connection.remember(output);
+    Ok(())
+}
+
+fn flash(
+    arguments: &Flash,
+    bytes: &[u8],
+    table: &Named,
+    connection: &mut Connection,
+    output: &Output,
+) -> Result<(), Failure> {
+    let slots = connection.client.slots();
+    let slots = slots.map_err(|error| connection.failed(&error))?;
+    let in_use = match table.check(connection.client.device(), &slots)? {
+        Now::Send => None,
+        Now::InUse { trial_ms } => Some(InUse {
+            table: Some(table.name),
+            trial_ms,
+        }),
+    };
+    let parcel = Parcel::new(bytes);
+    let mut ending = Ending {
+        arguments,
+        table,
+        output,
+        summary: Summary::default(),
+        start: Instant::now(),
+        dry_run: arguments.dry_run,
+    };
+    if let Some(in_use) = in_use {
+        return ending.end(connection, in_use, "is in use already");
+    }
+    interrupt::catch();
+    let plan = Plan::make(&mut connection.client, &parcel, interrupt::stopped);
+    let plan = plan.map_err(|error| failed(connection, &error))?;
+    announce(table, &plan, connection, output);
+    if arguments.dry_run {
+        output.result(
+            &json!({
+                "event": "done",
+                "dry_run": true,
+                "active": active(&plan.slots).data(),
+            }),
+            "Nothing was changed: this was a dry run.\n",
+        );
+        return Ok(());
+    }
+    let mut show = Show::new(output);
+    let in_use = loop {
+        let mut upload = Upload::new(&mut connection.client, &parcel);
+        let result = upload.run(&mut show).and_then(|summary| {
+            ending.summary = summary;
+            let text = format!("slot {} holds the table", letter(plan.slots.target));
+            show.say(
+                &text,
+                &json!({
+                    "event": "verified",
+                    "sent": summary.sent,
+                    "skipped": summary.skipped,
+                    "restarts": summary.restarts,
+                }),
+            );
+            upload.activate(Duration::from_secs(arguments.trial.into()), &mut show)
+        });
+        match result {
+            Ok(in_use) => break in_use,
+            Err(error) if is_silence(&error) && connection.slow_down() => {
+                let baud = connection.baud;
+                let data = json!({ "event": "slower", "baud": baud });
+                show.say(
+                    &format!("no answer any more; going on at {baud} baud"),
+                    &data,
+                );
+            }
+            Err(error) => {
+                show.end();
+                return Err(failed(connection, &error));
+            }
+        }
+    };
+    show.end();
+    ending.end(connection, in_use, "is in use")
+}
+
+/// Whether a lower speed may help.
+const fn is_silence(error: &UploadError) -> bool {
+    use crate::device::DeviceError::NoAnswer;
+    matches!(
+        error,
+        UploadError::Stalled { .. } | UploadError::Device(NoAnswer { .. })
+    )
+}
+
+fn failed(connection: &mut Connection, error: &UploadError) -> Failure {
+    let message = format!("{}: {error}", connection.port);
+    let active = Active::ask(&mut connection.client);
+    Failure::new(error.into(), message, error.next_step()).with(active)
+}
+
+fn active(slots: &iltm_runtime::link::Slots) -> Active {
+    Active::Known {
+        table: super::slots::in_use(slots),
+        trial_ms: slots.trial_ms,
+    }
+}
+
+/// Says what is about to be done.
+fn announce(table: &Named, plan: &Plan, connection: &Connection, output: &Output) {
+    let (differing, sectors) = (plan.differing.len(), plan.sectors);
+    let seconds = seconds(plan.bytes(), connection.baud);
+    let slot = letter(plan.slots.target);
+    output.event(&json!({
+        "event": "started",
+        "port": connection.port,
+        "baud": connection.baud,
+        "board": connection.client.device().board.as_str(),
+        "table": super::status::table_name(Some(table.name)),
+        "bytes": table.bytes,
+        "slot": slot.to_string(),
+        "sectors": sectors,
+        "differing": differing,
+        "to_send": plan.bytes(),
+        "seconds": seconds,
+        "active": active(&plan.slots).data(),
+    }));
+    if output.is_json() {
+        return;
+    }
+    let what = if differing == 0 {
+        "holds it already: nothing to send".to_owned()
+    } else {
+        format!(
+            "{differing} of {sectors} sectors differ, {} bytes to send, about {} at {} baud",
+            plan.bytes(),
+            duration(seconds),
+            connection.baud
+        )
+    };
+    eprintln!(
+        "table    {}, {} bytes, {}\ndevice   {} at {}\nin use   {}\nslot {slot}   {what}",
+        table.name,
+        table.bytes,
+        table.signer(),
+        connection.client.device().board,
+        connection.port,
+        match super::slots::in_use(&plan.slots) {
+            Some(used) => format!("table {used}"),
+            None => "no table: frames pass unchanged".to_owned(),
+        },
+    );
+}
+
+/// Seconds that so many bytes take: 10 bits each, and the frames around chunks.
+fn seconds(bytes: u32, baud: u32) -> f64 {
+    1.05 * 10.0 * f64::from(bytes) / f64::from(baud.max(1))
+}
+
+fn duration(seconds: f64) -> String {
+    let seconds = seconds.ceil() as u64;
+    match seconds / 60 {
+        0 => format!("{seconds} s"),
+        minutes => format!("{minutes} min {} s", seconds % 60),
+    }
+}
+
+/// What is left to do once the device uses the table.
+struct Ending<'a> {
+    arguments: &'a Flash,
+    table: &'a Named,
+    output: &'a Output,
+    summary: Summary,
+    start: Instant,
+    dry_run: bool,
+}
+
+impl Ending<'_> {
+    fn end(
+        &mut self,
+        connection: &mut Connection,
+        in_use: InUse,
+        how: &str,
+    ) -> Result<(), Failure> {
+        let name = self.table.name;
+        let mut trial_ms = in_use.trial_ms;
+        if in_use.table.is_none_or(|used| used.id != name.id) {
+            let message = format!("{}: the device uses another table by now", connection.port);
+            return Err(Failure::new(Kind::Device, message, "Run `iltm status`."));
+        }
+        if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
+            trial::keep(connection, name)?;
+            trial_ms = 0;
+        }
+        if trial_ms > 0 {
+            self.output
+                .event(&json!({ "event": "trial", "seconds": trial_ms.div_ceil(1_000) }));
+        }
+        let mut text = match (trial_ms, self.arguments.confirm && in_use.trial_ms > 0) {
+            (0, true) => format!("Table {name} {how}, confirmed.\n"),
+            (0, false) => format!("Table {name} {how}.\n"),
+            (trial_ms, _) => format!(
+                "Table {name} {how}, on trial for {} s. Look at the wall, then run `iltm confirm`;\n\
+                 without it the device goes back to what it showed before. `iltm rollback` does so now.\n",
+                trial_ms.div_ceil(1_000)
+            ),
+        };
+        if self.dry_run {
+            text.push_str("Nothing was changed: this was a dry run.\n");
+        }
+        let data = json!({
+            "event": "done",
+            "dry_run": self.dry_run,
+            "active": Active::Known { table: Some(name), trial_ms }.data(),
+            "confirmed": trial_ms == 0,
+            "sent": self.summary.sent,
+            "skipped": self.summary.skipped,
+            "restarts": self.summary.restarts,
+            "seconds": self.start.elapsed().as_secs_f64(),
+        });
+        self.output.result(&data, &text);
+        Ok(())
+    }
+}

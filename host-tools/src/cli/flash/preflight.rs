@@ -1,0 +1,123 @@
+//! What the host can tell before anything is sent.
+
+use super::super::failure::{Failure, Kind};
+use super::super::inspect::check_sealed;
+use super::super::slots::{key_id, uses};
+use crate::device::cure;
+use iltm_runtime::image::Seal;
+use iltm_runtime::image::layout::FORMAT_VERSION;
+use iltm_runtime::link::{Hello, Slots, TableName};
+use iltm_runtime::trust::Rejected;
+use std::path::{Path, PathBuf};
+
+/// A table's file, checked.
+#[derive(Debug)]
+pub(super) struct Named {
+    path: PathBuf,
+    pub(super) name: TableName,
+    pub(super) bytes: usize,
+    cells: usize,
+    seal: Option<Seal>,
+}
+
+/// What is to be done with it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Now {
+    /// Bring it.
+    Send,
+    /// Nothing: the device uses it.
+    InUse { trial_ms: u32 },
+}
+
+impl Named {
+    pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Self, Failure> {
+        let (table, seal) = check_sealed(path, bytes)?;
+        Ok(Self {
+            path: path.to_owned(),
+            name: TableName {
+                id: table.id(),
+                version: seal.map_or(0, |seal| seal.version),
+            },
+            bytes: bytes.len(),
+            cells: table.grid().cells(),
+            seal,
+        })
+    }
+
+    /// Who signed it.
+    pub(super) fn signer(&self) -> String {
+        self.seal.map_or_else(
+            || "not signed".to_owned(),
+            |seal| format!("signed with key {}", key_id(&seal.key)),
+        )
+    }
+
+    /// Whether the device will take it, as far as that can be told from here: the
+    /// signature itself is the device's to verify.
+    pub(super) fn check(&self, device: &Hello, slots: &Slots) -> Result<Now, Failure> {
+        if uses(slots, self.name, self.bytes) {
+            let trial_ms = slots.trial_ms;
+            return Ok(Now::InUse { trial_ms });
+        }
+        let refused = |kind, why: String, next_step: &str| {
+            let message = format!("{}: {why}", self.path.display());
+            Err(Failure::new(kind, message, next_step))
+        };
+        if slots.trial_ms > 0 {
+            let why = "another table is on trial on the device".to_owned();
+            let next_step = "Run `iltm confirm` to keep that one, or `iltm rollback`, first.";
+            return refused(Kind::OnTrial, why, next_step);
+        }
+        let limits = &device.limits;
+        if self.bytes as u64 > u64::from(limits.table_bytes) {
+            let why = format!(
+                "the table has {} bytes; the device has room for {}",
+                self.bytes, limits.table_bytes
+            );
+            return refused(Kind::TooLarge, why, "Solve for a coarser grid.");
+        }
+        if self.cells as u64 > u64::from(limits.cells) {
+            let why = format!(
+                "the table has {} cells; the device can take {}",
+                self.cells, limits.cells
+            );
+            return refused(Kind::TooLarge, why, "Solve for a coarser grid.");
+        }
+        if device.table_format != FORMAT_VERSION {
+            let why = format!(
+                "the table is of format {FORMAT_VERSION}; the device reads format {}",
+                device.table_format
+            );
+            return refused(Kind::Table, why, cure(&Rejected::Format));
+        }
+        match self.rejected(slots) {
+            Some(Rejected::Older { version, floor }) => {
+                let why = format!(
+                    "the table has version {version}; the device takes {floor} and later ones"
+                );
+                let rejected = Rejected::Older { version, floor };
+                refused((&rejected).into(), why, cure(&rejected))
+            }
+            Some(rejected) => refused((&rejected).into(), rejected.to_string(), cure(&rejected)),
+            None => Ok(Now::Send),
+        }
+    }
+
+    /// Why the device's terms do not admit it.
+    fn rejected(&self, slots: &Slots) -> Option<Rejected> {
+        // A device without a key takes every whole table.
+        let key = slots.key?;
+        let Some(seal) = self.seal else {
+            return Some(Rejected::Unsigned);
+        };
+        if seal.key != key {
+            return Some(Rejected::WrongKey);
+        }
+        let device = seal.device;
+        if device != 0 && device != slots.device {
+            return Some(Rejected::OtherDevice { device });
+        }
+        let (version, floor) = (seal.version, slots.oldest);
+        (version < floor).then_some(Rejected::Older { version, floor })
+    }
+}

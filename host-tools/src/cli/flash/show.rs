@@ -1,0 +1,103 @@
+//! Progress of a transfer: a bar on a terminal, an event a line for programs.
+
+use super::super::interrupt;
+use super::super::output::Output;
+use crate::device::upload::{Step, Watch};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+/// Between two progress events.
+const PERIOD: Duration = Duration::from_millis(200);
+
+pub(super) struct Show<'a> {
+    output: &'a Output,
+    bar: Option<ProgressBar>,
+    last: Option<Instant>,
+}
+
+impl<'a> Show<'a> {
+    pub(super) const fn new(output: &'a Output) -> Self {
+        Self {
+            output,
+            bar: None,
+            last: None,
+        }
+    }
+
+    /// Says something between, without harm to the bar.
+    pub(super) fn say(&self, text: &str, data: &Value) {
+        self.output.event(data);
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => self.output.remark(text),
+        }
+    }
+
+    pub(super) fn end(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn progress(&mut self, done: u32, skipped: u32, total: u32) {
+        let due = self.last.is_none_or(|last| last.elapsed() >= PERIOD);
+        if self.output.is_json() && (due || done == total) {
+            self.last = Some(Instant::now());
+            self.output.event(&json!({
+                "event": "progress",
+                "done": done,
+                "skipped": skipped,
+                "total": total,
+            }));
+        }
+        if self.output.terminal && !self.output.is_json() {
+            let bar = self.bar.get_or_insert_with(|| bar(skipped, total));
+            bar.set_position(done.into());
+        }
+    }
+}
+
+/// What was there before does not count towards the rate.
+fn bar(skipped: u32, total: u32) -> ProgressBar {
+    let bar = ProgressBar::new(total.into()).with_position(skipped.into());
+    let template = "sending  [{bar:30}] {bytes} of {total_bytes}, {bytes_per_sec}, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar.reset_eta();
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+impl Watch for Show<'_> {
+    fn step(&mut self, step: Step) {
+        match step {
+            Step::Progress {
+                done,
+                skipped,
+                total,
+            } => self.progress(done, skipped, total),
+            Step::Quiet { silence } => {
+                let seconds = silence.as_secs();
+                self.say(
+                    &format!("nothing new has arrived for {seconds} s; trying on"),
+                    &json!({ "event": "quiet", "seconds": seconds }),
+                );
+            }
+            Step::Restarted => self.say(
+                "the device has restarted; going on with what is missing",
+                &json!({ "event": "restarted" }),
+            ),
+            Step::Repeated { sector } => self.say(
+                &format!("sector {sector} did not get into the flash; sending it again"),
+                &json!({ "event": "repeated", "sector": sector }),
+            ),
+            Step::Verified => {}
+        }
+    }
+
+    fn stopped(&self) -> bool {
+        interrupt::stopped()
+    }
+}

@@ -1,0 +1,165 @@
+//! `iltm key` and `iltm sign`
+
+use super::args::{Install, Key, KeyCommand, SealTerms as Given, Sign};
+use super::connect::connect;
+use super::failure::{Failure, Kind};
+use super::output::{Output, read_file, write_file};
+use super::slots::key_id;
+use super::status::number;
+use crate::compile::sign::{self, SealTerms, new_key, read_key, read_public_key};
+use ed25519_dalek::{SigningKey, VerifyingKey};
+use iltm_runtime::image::Seal;
+use serde_json::{Value, json};
+use std::io::{self, IsTerminal, Write};
+use std::path::Path;
+
+pub(super) fn run(arguments: &Key, output: &Output) -> Result<(), Failure> {
+    match &arguments.command {
+        KeyCommand::New { output: path } => {
+            let key = new_key(path)?;
+            let text = format!(
+                "{}Keep the file safe and secret: who has it can make tables for your devices,\n\
+                 and without it nobody can.\n",
+                words(path, &key.verifying_key())
+            );
+            output.result(&data(path, &key.verifying_key()), &text);
+        }
+        KeyCommand::Show { file } => {
+            let key = read_public_key(file)?;
+            output.result(&data(file, &key), &words(file, &key));
+        }
+        KeyCommand::Install(arguments) => return install(arguments, output),
+    }
+    Ok(())
+}
+
+fn id(key: &VerifyingKey) -> String {
+    key_id(&Seal::key_id(key.as_bytes()))
+}
+
+fn data(path: &Path, key: &VerifyingKey) -> Value {
+    json!({
+        "file": path.display().to_string(),
+        "id": id(key),
+        "public_key": key_id(key.as_bytes()),
+    })
+}
+
+fn words(path: &Path, key: &VerifyingKey) -> String {
+    format!(
+        "file        {}\nkey id      {}\npublic key  {}\n",
+        path.display(),
+        id(key),
+        key_id(key.as_bytes())
+    )
+}
+
+fn install(arguments: &Install, output: &Output) -> Result<(), Failure> {
+    let key = read_public_key(&arguments.file)?;
+    let mut connection = connect(&arguments.line, output)?;
+    let slots = connection.client.slots();
+    let slots = slots.map_err(|error| connection.failed(&error))?;
+    // The device answers a repetition of what it has with yes: nothing to ask then.
+    let same = slots.key == Some(Seal::key_id(key.as_bytes())) && slots.device == arguments.device;
+    if slots.key.is_none() {
+        agree(arguments, &connection.port, &key, output)?;
+    }
+    let installed = connection
+        .client
+        .provision(key.to_bytes(), arguments.device);
+    installed.map_err(|error| connection.failed(&error))?;
+    connection.remember(output);
+    let mut data = data(&arguments.file, &key);
+    data["port"] = json!(connection.port);
+    data["number"] = json!(format!("{:016x}", arguments.device));
+    let text = format!(
+        "The device at {} {} key {} and {}.\n",
+        connection.port,
+        if same { "has" } else { "now has" },
+        id(&key),
+        number(arguments.device)
+    );
+    output.result(&data, &text);
+    Ok(())
+}
+
+/// Asks whether it is meant: it cannot be taken back.
+fn agree(
+    arguments: &Install,
+    port: &str,
+    key: &VerifyingKey,
+    output: &Output,
+) -> Result<(), Failure> {
+    if arguments.yes {
+        return Ok(());
+    }
+    let refused = |message: &str| {
+        Err(Failure::new(
+            Kind::Usage,
+            message,
+            "Give --yes if you mean it: a device keeps its key for good.",
+        ))
+    };
+    if output.is_json() || !output.terminal || !io::stdin().is_terminal() {
+        return refused("installing a key cannot be taken back, and nobody is here to be asked");
+    }
+    let _ = write!(
+        io::stderr(),
+        "The device at {port} will take only tables signed with key {} from now on,\n\
+         and be {} for good. Is that meant? [y/N] ",
+        id(key),
+        number(arguments.device)
+    );
+    let mut answer = String::new();
+    let _ = io::stdin().read_line(&mut answer);
+    match answer.trim() {
+        "y" | "Y" | "yes" => Ok(()),
+        _ => refused("nothing was installed"),
+    }
+}
+
+/// `iltm sign`
+pub(super) fn sign(arguments: &Sign, output: &Output) -> Result<(), Failure> {
+    let key = read_key(&arguments.key)?;
+    let file = read_file(&arguments.table)?;
+    super::inspect::check(&arguments.table, &file)?;
+    let signed = seal(&file, &key, &arguments.seal)?;
+    let path = arguments.output.as_ref().unwrap_or(&arguments.table);
+    write_file(path, &signed)?;
+    let mut data = data(&arguments.key, &key.verifying_key());
+    data["table"] = json!(path.display().to_string());
+    data["version"] = json!(arguments.seal.table_version);
+    data["bytes"] = json!(signed.len());
+    let text = format!(
+        "{}: version {}, signed with key {}, {} bytes\n",
+        path.display(),
+        arguments.seal.table_version,
+        id(&key.verifying_key()),
+        signed.len()
+    );
+    output.result(&data, &text);
+    Ok(())
+}
+
+/// Signs a file on the terms of the command line.
+pub(super) fn seal(file: &[u8], key: &SigningKey, given: &Given) -> Result<Vec<u8>, Failure> {
+    if given.revoke_below > given.table_version {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!(
+                "version {} would revoke itself: versions below {} are to be revoked",
+                given.table_version, given.revoke_below
+            ),
+            "Give --revoke-below at most the --table-version.",
+        ));
+    }
+    let terms = SealTerms {
+        version: given.table_version,
+        oldest: given.revoke_below,
+        device: given.for_device.unwrap_or(0),
+    };
+    sign::sign(file, key, terms).map_err(|error| {
+        let next_step = "Make the table anew with `iltm solve`.";
+        Failure::new(Kind::Table, error, next_step)
+    })
+}

@@ -1,0 +1,88 @@
+//! `iltm ports`
+
+use super::args::Ports;
+use super::failure::Failure;
+use super::output::Output;
+use super::status::{identity, number, table_name};
+use crate::device::DeviceError;
+use crate::device::ports::{Candidate, Found, ask, candidates};
+use crate::user::{Config, Folders};
+use serde_json::json;
+use std::fmt::Write;
+
+pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
+    let folders = Folders::of_user();
+    let config = folders.as_ref().map(Config::read).transpose()?;
+    let config = config.unwrap_or_default();
+    let candidates = folders.map_or_else(Vec::new, |it| super::ports::candidates(&it, &config));
+    let (found, silent) = ask(&candidates, arguments.baud);
+    let devices = found.iter().map(|found| {
+        let mut data = identity(&found.device);
+        data["port"] = json!(found.candidate.path);
+        data["about"] = json!(found.candidate.about);
+        data["baud"] = json!(found.baud);
+        data["table"] = json!(found.status.as_ref().map(|status| table_name(status.table)));
+        data
+    });
+    let others = silent.iter().map(|(candidate, error)| {
+        json!({
+            "port": candidate.path,
+            "about": candidate.about,
+            "reason": error.to_string(),
+        })
+    });
+    let data = json!({
+        "devices": devices.collect::<Vec<_>>(),
+        "others": others.collect::<Vec<_>>(),
+        "remembered": config.port,
+    });
+    output.result(&data, &text(&found, &silent, config.port.as_deref()));
+    Ok(())
+}
+
+fn text(found: &[Found], silent: &[(Candidate, DeviceError)], remembered: Option<&str>) -> String {
+    let mut rows = vec![["port", "board", "firmware", "number", "table"].map(str::to_owned)];
+    for device in found {
+        let table = device.status.as_ref().map(super::status::table);
+        rows.push([
+            device.candidate.path.clone(),
+            device.device.board.to_string(),
+            device.device.firmware.to_string(),
+            number(device.device.device),
+            table.unwrap_or_else(|| "?".to_owned()),
+        ]);
+    }
+    let mut text = String::new();
+    if found.is_empty() {
+        let _ = writeln!(text, "No device answers.");
+    } else {
+        let width = |column: usize| rows.iter().map(|row| row[column].len()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..4).map(width).collect();
+        for [port, board, firmware, number, table] in &rows {
+            let star = if Some(port.as_str()) == remembered {
+                "*"
+            } else {
+                " "
+            };
+            let _ = writeln!(
+                text,
+                "{star} {port:0$}  {board:1$}  {firmware:2$}  {number:3$}  {table}",
+                widths[0], widths[1], widths[2], widths[3]
+            );
+        }
+        if found
+            .iter()
+            .any(|found| Some(found.candidate.path.as_str()) == remembered)
+        {
+            let _ = writeln!(text, "* is the one that is asked first.");
+        }
+    }
+    for (candidate, error) in silent {
+        let why = match error {
+            DeviceError::NoAnswer { heard, .. } => format!("no answer: {heard}"),
+            other => other.to_string(),
+        };
+        let _ = writeln!(text, "  {}  {why}", candidate.path);
+    }
+    text
+}

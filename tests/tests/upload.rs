@@ -1,0 +1,263 @@
+//! A table's file on its way to a device, whatever happens meanwhile: the host's
+//! transfer against the runtime's own updater over a simulated flash.
+
+use iltm::device::fault::{Faults, Harm, LossyLine};
+use iltm::device::upload::{Parcel, Plan, Step, Unwatched, Upload, UploadError, Watch};
+use iltm::device::{Client, DeviceError, Patience};
+use iltm_runtime::fault::Wear;
+use iltm_runtime::link::SlotState;
+use iltm_tests::fake_device::{FakeDevice, FakeLine};
+use iltm_tests::fake_tables::{FakeTables, Flash, SECTOR, slot};
+use iltm_tests::wedge_table;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+const TRIAL: Duration = Duration::from_mins(5);
+
+/// Bits a second of the line.
+const BAUD: u32 = 921_600;
+
+/// A table of several sectors.
+fn table() -> &'static [u8] {
+    static TABLE: OnceLock<Vec<u8>> = OnceLock::new();
+    TABLE.get_or_init(|| wedge_table(12, 16, 1))
+}
+
+type Lossy = LossyLine<FakeLine>;
+
+fn client(tables: FakeTables, harm: Harm, seed: u64) -> Client<Lossy> {
+    let line = FakeDevice::with_tables(tables).line(BAUD);
+    let line = LossyLine::new(line, Faults::both_ways(harm, seed));
+    let patience = Patience {
+        tries: 20,
+        ..Patience::default()
+    };
+    Client::greet(line, patience).expect("a device")
+}
+
+/// The tables of the device at the other end.
+fn of_device(client: &mut Client<Lossy>) -> &mut FakeTables {
+    client.line().line_mut().far_end_mut().device.tables()
+}
+
+/// Everything that happens, and an end after some bytes.
+#[derive(Default)]
+struct Seen {
+    steps: Vec<Step>,
+    stop_at: Option<u32>,
+}
+
+impl Watch for Seen {
+    fn step(&mut self, step: Step) {
+        self.steps.push(step);
+    }
+
+    fn stopped(&self) -> bool {
+        let done = self.steps.iter().rev().find_map(|step| match step {
+            Step::Progress { done, .. } => Some(*done),
+            _ => None,
+        });
+        self.stop_at
+            .is_some_and(|stop| done.is_some_and(|done| done >= stop))
+    }
+}
+
+#[test]
+fn a_first_table_arrives_and_is_used_on_trial() {
+    let file = table();
+    assert!(file.len() > 6 * SECTOR, "{} bytes", file.len());
+    let parcel = Parcel::new(file);
+    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut seen = Seen::default();
+    let mut upload = Upload::new(&mut client, &parcel);
+    let summary = upload.run(&mut seen).expect("a good line");
+    assert_eq!(summary.sent, file.len() as u64);
+    assert_eq!((summary.skipped, summary.restarts), (0, 0));
+    let in_use = upload.activate(TRIAL, &mut seen).expect("a good table");
+    assert!(in_use.table.is_some() && in_use.trial_ms > 290_000);
+    assert_eq!(seen.steps.last(), Some(&Step::Verified));
+    let tables = of_device(&mut client);
+    assert_eq!(tables.updater().states()[0], SlotState::Trial);
+    assert_eq!(tables.contents()[slot(0)][..file.len()], *file);
+    assert_eq!(
+        tables.writes.len(),
+        file.len().div_ceil(512),
+        "each chunk once"
+    );
+}
+
+#[test]
+fn what_is_there_already_is_not_sent_again() {
+    let parcel = Parcel::new(table());
+    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let half = table().len() as u32 / 2;
+    let mut seen = Seen {
+        stop_at: Some(half),
+        ..Seen::default()
+    };
+    let stopped = Upload::new(&mut client, &parcel).run(&mut seen);
+    assert!(matches!(stopped, Err(UploadError::Stopped)), "{stopped:?}");
+    let plan = Plan::make(&mut client, &parcel, || false).expect("a good line");
+    // What was on its way has arrived by then.
+    let before = of_device(&mut client).writes.len();
+    assert!(plan.bytes() <= half + SECTOR as u32 && plan.bytes() > 0);
+
+    let mut upload = Upload::new(&mut client, &parcel);
+    let summary = upload.run(&mut Unwatched).expect("a good line");
+    assert_eq!(
+        summary.sent,
+        u64::from(plan.bytes()),
+        "only whole missing sectors"
+    );
+    assert_eq!(summary.skipped, table().len() as u32 - plan.bytes());
+    let after = of_device(&mut client).writes.len();
+    assert_eq!(after - before, plan.bytes().div_ceil(512) as usize);
+
+    let again = Upload::new(&mut client, &parcel).run(&mut Unwatched);
+    assert_eq!(again.expect("a good line").sent, 0);
+    assert_eq!(of_device(&mut client).writes.len(), after);
+}
+
+#[test]
+fn a_device_that_restarts_in_the_middle_gets_the_rest() {
+    let parcel = Parcel::new(table());
+    for after in [1, 9, 20, 41] {
+        let mut tables = FakeTables::default();
+        tables.restart_after = Some(after);
+        let mut client = client(tables, Harm::default(), 1);
+        let mut seen = Seen::default();
+        let mut upload = Upload::new(&mut client, &parcel);
+        let summary = upload.run(&mut seen).expect("it goes on");
+        assert_eq!(summary.restarts, 1);
+        assert!(seen.steps.contains(&Step::Restarted));
+        upload.activate(TRIAL, &mut seen).expect("all of it");
+        let writes = of_device(&mut client).writes.len();
+        let (chunks, sector) = (table().len().div_ceil(512), SECTOR / 512);
+        assert!(writes <= chunks + sector + 3, "{writes} of {chunks}");
+    }
+}
+
+#[test]
+fn a_device_that_restarts_before_the_activation_gets_it_again() {
+    let parcel = Parcel::new(table());
+    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut upload = Upload::new(&mut client, &parcel);
+    upload.run(&mut Unwatched).expect("a good line");
+    client.line().line_mut().far_end_mut().restart();
+    let mut upload = Upload::new(&mut client, &parcel);
+    let in_use = upload.activate(TRIAL, &mut Unwatched).expect("again");
+    assert!(in_use.trial_ms > 0);
+    let chunks = table().len().div_ceil(512);
+    assert_eq!(of_device(&mut client).writes.len(), chunks);
+}
+
+/// Transfers over lines of which up to a fifth of the frames come to harm, both ways.
+/// `ILTM_TRANSFERS` says how many.
+#[test]
+fn on_a_bad_line_every_transfer_ends_whole_or_with_an_error_and_the_old_table() {
+    let count = std::env::var("ILTM_TRANSFERS").map_or(Ok(1_000), |count| count.parse());
+    let count: u64 = count.expect("a number");
+    let file = &table()[..3 * SECTOR + 700];
+    let parcel = Parcel::new(file);
+    let (mut whole, mut longest) = (0, Duration::ZERO);
+    for seed in 0..count {
+        let harm = Harm::evenly((seed % 5 * 50) as u16);
+        let mut client = client(FakeTables::default(), harm, seed);
+        match Upload::new(&mut client, &parcel).run(&mut Unwatched) {
+            Ok(_) => {
+                let contents = of_device(&mut client).contents();
+                assert!(contents[slot(0)].starts_with(file), "seed {seed}");
+                whole += 1;
+            }
+            Err(error) => {
+                println!("seed {seed}: {error}");
+                assert_eq!(of_device(&mut client).updater().table(), None);
+            }
+        }
+        longest = longest.max(client.line().line().elapsed());
+    }
+    println!("{whole} of {count} transfers whole; the longest took {longest:.1?} of line time");
+    assert!(whole * 100 >= count * 99, "{whole} of {count}");
+    assert!(longest < Duration::from_mins(2), "{longest:?}");
+}
+
+#[test]
+fn a_device_that_falls_silent_ends_the_transfer_after_half_a_minute() {
+    let parcel = Parcel::new(table());
+    let mut tables = FakeTables::default();
+    tables.mute_after = Some(7);
+    let mut client = client(tables, Harm::default(), 1);
+    let mut seen = Seen::default();
+    let error = Upload::new(&mut client, &parcel).run(&mut seen);
+    let error = error.expect_err("nothing comes any more");
+    assert!(matches!(error, UploadError::Stalled { .. }), "{error}");
+    let quiet = seen
+        .steps
+        .iter()
+        .filter(|step| matches!(step, Step::Quiet { .. }));
+    assert!(quiet.count() > 3, "it is said meanwhile");
+    let took = client.line().line().elapsed();
+    assert!(
+        took > Duration::from_secs(30) && took < Duration::from_secs(35),
+        "{took:?}"
+    );
+}
+
+#[test]
+fn a_line_that_is_cut_ends_the_transfer_at_once() {
+    let parcel = Parcel::new(table());
+    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    client.line().unplug_after(20);
+    let error = Upload::new(&mut client, &parcel).run(&mut Unwatched);
+    let error = error.expect_err("there is no line any more");
+    let gone = matches!(
+        error,
+        UploadError::Device(DeviceError::Gone { .. } | DeviceError::NoAnswer { .. })
+            | UploadError::Stalled { .. }
+    );
+    assert!(gone, "{error}");
+}
+
+#[test]
+fn a_clean_line_is_used_to_85_percent() {
+    let parcel = Parcel::new(table());
+    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let before = client.line().line().elapsed();
+    let plan = Plan::make(&mut client, &parcel, || false).expect("a good line");
+    assert_eq!(plan.bytes() as usize, table().len());
+    Upload::new(&mut client, &parcel)
+        .run(&mut Unwatched)
+        .expect("a good line");
+    let took = client.line().line().elapsed() - before;
+    let share = 10.0 * table().len() as f64 / f64::from(BAUD) / took.as_secs_f64();
+    println!(
+        "{} bytes in {took:.3?}: {:.1} % of the line",
+        table().len(),
+        100.0 * share
+    );
+    assert!(share >= 0.85, "{share}");
+}
+
+#[test]
+fn a_sector_that_does_not_hold_anything_is_named_after_three_attempts() {
+    let parcel = Parcel::new(table());
+    let mut flash = Flash::new(67, 1);
+    flash.wear_out(2, 0, Wear::StuckBits).expect("a sector");
+    let mut client = client(FakeTables::new(flash), Harm::default(), 1);
+    let mut seen = Seen::default();
+    let error = Upload::new(&mut client, &parcel).run(&mut seen);
+    match error {
+        Err(UploadError::Worn {
+            sector: 2,
+            offset: 8_192,
+            attempts: 3,
+        }) => {}
+        other => panic!("{other:?}"),
+    }
+    let repeated = seen
+        .steps
+        .iter()
+        .filter(|step| **step == Step::Repeated { sector: 2 });
+    assert_eq!(repeated.count(), 2);
+    assert_eq!(of_device(&mut client).updater().table(), None);
+}
