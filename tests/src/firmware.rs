@@ -90,6 +90,8 @@ pub mod word {
     /// See the self-test.
     pub const PANIC: usize = 12;
     /// See the self-test.
+    pub const NEW_OUTPUT: usize = 13;
+    /// See the self-test.
     pub const SHOWN: usize = 32;
     /// See the self-test.
     pub const WRONG: usize = 33;
@@ -107,6 +109,14 @@ pub mod word {
     pub const WORST: usize = 39;
     /// See the self-test.
     pub const CHANGES: usize = 40;
+    /// See the self-test.
+    pub const NEW: usize = 41;
+    /// See the self-test.
+    pub const TURNS: usize = 42;
+    /// See the self-test.
+    pub const TURN: usize = 43;
+    /// See the self-test.
+    pub const SKIPPED: usize = 44;
     /// See the self-test.
     pub const CHANGE: usize = 64;
 }

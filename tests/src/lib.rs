@@ -7,6 +7,8 @@ pub mod firmware;
 pub mod fuzz;
 pub mod instructions;
 pub mod slots;
+#[cfg(unix)]
+pub mod socket;
 
 use iltm::capture::Response;
 use iltm::compile::{CompileOptions, compile};

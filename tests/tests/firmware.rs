@@ -17,6 +17,7 @@ use iltm_tests::firmware::{
     Effects, PATIENCE, counted, elf, finding, on_host, order, random_frame, random_table, through,
     word,
 };
+use iltm_tests::socket::Socket;
 use std::time::{Duration, Instant};
 
 fn size(width: u16, height: u16) -> FrameSize {
@@ -572,7 +573,7 @@ fn a_million_bytes_of_garbage_on_the_line_disturb_no_frame() {
         .spawn()
         .expect("qemu-system-arm is installed: tests/run.sh does it");
     let result = std::panic::catch_unwind(|| {
-        let mut line = Socket::connect(&path);
+        let mut line = Socket::connect(&path, PATIENCE);
         let start = Instant::now();
         let mut random = fastrand::Rng::with_seed(1);
         let mut sent = 0;
@@ -609,39 +610,5 @@ fn a_million_bytes_of_garbage_on_the_line_disturb_no_frame() {
     qemu.wait().expect("it has been killed");
     if let Err(panic) = result {
         std::panic::resume_unwind(panic);
-    }
-}
-
-/// The line as a socket, which takes garbage faster than a terminal.
-struct Socket(std::os::unix::net::UnixStream);
-
-impl Socket {
-    fn connect(path: &std::path::Path) -> Self {
-        let end = Instant::now() + PATIENCE;
-        loop {
-            match std::os::unix::net::UnixStream::connect(path) {
-                Ok(stream) => return Self(stream),
-                Err(error) => assert!(Instant::now() < end, "no line: {error}"),
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-}
-
-impl Line for Socket {
-    fn read(&mut self, bytes: &mut [u8], wait: Duration) -> std::io::Result<usize> {
-        use std::io::{ErrorKind, Read};
-        self.0
-            .set_read_timeout(Some(wait.max(Duration::from_millis(1))))?;
-        match self.0.read(bytes) {
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                Ok(0)
-            }
-            other => other,
-        }
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        std::io::Write::write_all(&mut self.0, bytes)
     }
 }

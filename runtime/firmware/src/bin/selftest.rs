@@ -56,13 +56,15 @@ mod order {
     /// Number of the frame during which the firmware panics; 0 for none. Cleared
     /// when it does.
     pub(super) const PANIC: usize = 12;
+    /// CRC-32 of every output that is to be shown from some frame on.
+    pub(super) const NEW_OUTPUT: usize = 13;
 }
 
 /// Indices of the findings.
 mod finding {
     /// Outputs shown.
     pub(super) const SHOWN: usize = 32;
-    /// Outputs shown that had another CRC than was ordered.
+    /// Outputs shown that had neither of the CRCs that were ordered.
     pub(super) const WRONG: usize = 33;
     /// Frames over the budget.
     pub(super) const OVER: usize = 34;
@@ -76,6 +78,14 @@ mod finding {
     pub(super) const WORST: usize = 39;
     /// Changes of tier.
     pub(super) const CHANGES: usize = 40;
+    /// Outputs shown that had the CRC of the new outputs.
+    pub(super) const NEW: usize = 41;
+    /// Times that a new output was followed by an old one, or an old one by a new one.
+    pub(super) const TURNS: usize = 42;
+    /// Number of the frame at the last turn.
+    pub(super) const TURN: usize = 43;
+    /// Frames shown whose number was not the next.
+    pub(super) const SKIPPED: usize = 44;
     /// From here on, one word a change: frame in the low half, then tiers before
     /// and after.
     pub(super) const CHANGE: usize = 64;
@@ -90,6 +100,8 @@ struct Play {
     /// When the next frame is due.
     due: Option<u64>,
     left: u32,
+    /// Number of the last output, and whether it was a new one.
+    last: Option<(u32, bool)>,
 }
 
 struct Orders {
@@ -123,6 +135,7 @@ impl Orders {
                 / 1_000_000,
             due: None,
             left,
+            last: None,
         })
     }
 
@@ -153,16 +166,30 @@ impl Orders {
         }
         let mut shown = 0;
         let mut wrong = 0;
+        let [mut new, mut turns, mut skipped] = [0; 3];
         while let Some(output) = display.advance() {
             shown += 1;
-            let pixels = psram::outside_pixels(display.pixels(&output));
-            let right = crc32(&[pixels]) == self.words.load(order::OUTPUT);
+            let crc = crc32(&[psram::outside_pixels(display.pixels(&output))]);
+            let is_new = crc == self.words.load(order::NEW_OUTPUT);
+            let right = is_new || crc == self.words.load(order::OUTPUT);
             wrong += u32::from(!right || !display.is_whole(&output));
+            new += u32::from(is_new);
+            let sequence = output.sequence();
+            if let Some((last, was_new)) = play.last.replace((sequence, is_new)) {
+                skipped += u32::from(sequence != last.wrapping_add(1));
+                if is_new != was_new {
+                    turns += 1;
+                    self.words.store(finding::TURN, sequence);
+                }
+            }
         }
         // A period after the last frame, nothing is on its way any more.
         let over = play.left == 0 && *due <= now;
         self.add(finding::SHOWN, shown);
         self.add(finding::WRONG, wrong);
+        self.add(finding::NEW, new);
+        self.add(finding::TURNS, turns);
+        self.add(finding::SKIPPED, skipped);
         if over {
             self.words.store(finding::STACK, stack::depth().used);
             debug::exit(debug::EXIT_SUCCESS);
