@@ -11,17 +11,19 @@ pub(crate) mod cost {
     /// A byte through CRC-32.
     pub(crate) const CRC_BYTE: usize = 10;
     /// A byte through SHA-512.
-    pub(crate) const HASH_BYTE: usize = 60;
+    pub(crate) const HASH_BYTE: usize = 95;
     /// A sum of two points of the curve.
     pub(crate) const POINT: usize = 8_000;
+    /// A square root or an inverse modulo `2^255 - 19`; cannot be interrupted.
+    pub(crate) const ROOT: usize = 135_000;
     /// One value looked at.
-    pub(crate) const VALUE: usize = 10;
+    pub(crate) const VALUE: usize = 25;
     /// A code made from a response.
     pub(crate) const CODE: usize = 50;
     /// A pair of operator entries.
-    pub(crate) const PAIR: usize = 20;
+    pub(crate) const PAIR: usize = 30;
     /// A row of an operator, beside its pairs.
-    pub(crate) const ROW: usize = 60;
+    pub(crate) const ROW: usize = 120;
     /// A function of the basis.
     pub(crate) const FUNCTION: usize = 200;
 }

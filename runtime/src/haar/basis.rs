@@ -259,7 +259,7 @@ impl Functions<'_> {
         }
         self.ended = true;
         let whole = |cells: usize| Pair {
-            first: cells as u32,
+            first: cells as u16,
             second: 0,
             first_weight: 0,
             second_weight: 0,

@@ -3,20 +3,23 @@
 use super::basis::NodeShifts;
 
 /// How two adjacent nodes of one axis merge, or that a last one stays alone.
+///
+/// `u16`, because every table keeps four of them a level, and a side has at most
+/// [`Grid::MAX_CELLS`](crate::Grid::MAX_CELLS).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Pair {
     /// Cells in the first node.
-    pub(crate) first: u32,
+    pub(crate) first: u16,
     /// Cells in the second node, 0 if the first stays alone.
-    pub(crate) second: u32,
+    pub(crate) second: u16,
     /// Weight of the first node in the detail: `second / gcd`, 0 if alone.
-    pub(crate) first_weight: u32,
+    pub(crate) first_weight: u16,
     /// Weight of the second node, subtracted: `first / gcd`, 0 if alone.
-    pub(crate) second_weight: u32,
+    pub(crate) second_weight: u16,
 }
 
 impl Pair {
-    fn new(first: u32, second: u32) -> Self {
+    fn new(first: u16, second: u16) -> Self {
         if second == 0 {
             return Self {
                 first,
@@ -46,7 +49,7 @@ impl Pair {
 
     /// Cells in both nodes.
     pub(crate) const fn cells(self) -> u32 {
-        self.first + self.second
+        self.first as u32 + self.second as u32
     }
 
     /// Sum of the positive values of the detail function along this axis, which
@@ -57,7 +60,7 @@ impl Pair {
     }
 }
 
-const fn greatest_common_divisor(mut a: u32, mut b: u32) -> u32 {
+const fn greatest_common_divisor(mut a: u16, mut b: u16) -> u16 {
     while b != 0 {
         (a, b) = (b, a % b);
     }
@@ -68,8 +71,8 @@ const fn greatest_common_divisor(mut a: u32, mut b: u32) -> u32 {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Axis {
     pub(crate) nodes: usize,
-    full: u32,
-    last: u32,
+    full: u16,
+    last: u16,
 }
 
 impl Axis {
@@ -83,7 +86,7 @@ impl Axis {
 
     pub(crate) const fn merged(self) -> Self {
         let last = if self.nodes.is_multiple_of(2) {
-            self.full + self.last
+            self.full.saturating_add(self.last)
         } else {
             self.last
         };

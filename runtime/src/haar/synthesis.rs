@@ -190,8 +190,8 @@ impl Rule<i32> for Weigh {
     #[inline]
     fn halves(value: i32, detail: i32, pair: Pair) -> [i32; 2] {
         [
-            value.wrapping_add((pair.first_weight as i32).wrapping_mul(detail)),
-            value.wrapping_sub((pair.second_weight as i32).wrapping_mul(detail)),
+            value.wrapping_add(i32::from(pair.first_weight).wrapping_mul(detail)),
+            value.wrapping_sub(i32::from(pair.second_weight).wrapping_mul(detail)),
         ]
     }
 

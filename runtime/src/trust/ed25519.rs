@@ -36,13 +36,19 @@ pub(super) fn verify(
     let Some(a) = CompressedEdwardsY(*key).decompress() else {
         return false;
     };
+    pace.done(1, cost::ROOT);
     if a.is_small_order() {
         return false;
     }
+    pace.done(2, cost::POINT);
     let k = challenge(r, key, message, pace);
     let expected = combination(&k, -a, &s, pace);
     // Equal encodings are equal points, so `R` need not be decoded to learn its order.
-    !expected.is_small_order() && expected.compress().as_bytes() == r
+    let small = expected.is_small_order();
+    pace.done(2, cost::POINT);
+    let equal = expected.compress().as_bytes() == r;
+    pace.done(1, cost::ROOT);
+    equal && !small
 }
 
 /// `k`: the hash of `R`, the key and the message, modulo the order of the group.
@@ -54,7 +60,11 @@ fn challenge(r: &[u8; 32], key: &[u8; 32], message: &[u8], pace: &mut Pace<'_>) 
         hash.update(piece);
         pace.done(piece.len(), cost::HASH_BYTE);
     }
-    Scalar::from_bytes_mod_order_wide(&hash.finalize().into())
+    let hash = hash.finalize().into();
+    pace.done(1, cost::POINT);
+    let k = Scalar::from_bytes_mod_order_wide(&hash);
+    pace.done(1, cost::POINT);
+    k
 }
 
 /// `[k] point + [s] B`, a bit of both a step, the highest first.
