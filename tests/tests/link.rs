@@ -1,18 +1,11 @@
-//! Host and device at the two ends of one line, good and bad; and that the
-//! specification says what they do.
+//! Host and device at the two ends of one line, good and bad.
 
 use iltm::device::fault::{Faults, Harm, LossyLine, LossyProxy};
 use iltm::device::port::BAUD;
 use iltm::device::{Client, DeviceError, Incoming, Patience, Port};
-use iltm_runtime::link::{
-    Channel, Decoder, Event, Fault, FaultyFrame, Frame, MAX_ENCODED, MAX_PAYLOAD, Refusal, Request,
-    Response, SlotState, TierReason, encode,
-};
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::link::{Channel, Decoder, Event, Request, SlotState};
 use iltm_tests::fake_device::{FakeDevice, FakeLine, FakePort};
 use iltm_tests::fuzz;
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::time::Duration;
 
 /// Time on a line in memory costs nothing.
@@ -176,149 +169,6 @@ fn a_device_of_another_version_is_recognised() {
     };
     let error = Client::greet(device.line(BAUD), PATIENT).expect_err("another version");
     assert!(matches!(error, DeviceError::Protocol { device: 99 }));
-}
-
-/// The frames that the specification shows, by the name that it gives them: the
-/// bytes before COBS, and on the line.
-fn examples() -> BTreeMap<&'static str, (Vec<u8>, Vec<u8>)> {
-    let mut device = FakeDevice::default();
-    let identity = device.identity();
-    device.uptime_ms = 10_000;
-    let status = iltm_runtime::link::Device::status(&device);
-    let mut faulty = status.clone();
-    faulty.last_fault = Some(Fault::Table {
-        slot: 1,
-        cause: Rejected::Damaged,
-    });
-    let mut examples = BTreeMap::new();
-    let mut add = |name, channel, sequence, payload: &[u8]| {
-        let mut line = [0; MAX_ENCODED];
-        let frame = Frame {
-            channel,
-            sequence,
-            payload,
-        };
-        let length = encode(frame, &mut line).expect("short enough");
-        let [low, high] = u16::to_le_bytes(sequence);
-        let mut content = [&[channel as u8, low, high], payload].concat();
-        let crc = iltm_runtime::image::crc32(&[&content]);
-        content.extend(crc.to_le_bytes());
-        examples.insert(name, (content, line[..length].to_vec()));
-    };
-    let mut bytes = [0; MAX_PAYLOAD];
-    let mut message = |message: &dyn Fn(&mut [u8]) -> usize| {
-        let length = message(&mut bytes);
-        bytes[..length].to_vec()
-    };
-    let request = |request: Request<'static>| {
-        move |bytes: &mut [u8]| postcard::to_slice(&request, bytes).expect("short").len()
-    };
-    let response = |response: Response| {
-        move |bytes: &mut [u8]| postcard::to_slice(&response, bytes).expect("short").len()
-    };
-    let event = |event: Event| {
-        move |bytes: &mut [u8]| postcard::to_slice(&event, bytes).expect("short").len()
-    };
-    let hello = message(&request(Request::Hello { protocol: 1 }));
-    add("hello-request", Channel::Request, 1, &hello);
-    let hello = message(&response(Response::Hello(identity)));
-    add("hello-response", Channel::Response, 1, &hello);
-    let ask = message(&request(Request::Status));
-    add("status-request", Channel::Request, 2, &ask);
-    let answer = message(&response(Response::Status(status)));
-    add("status-response", Channel::Response, 2, &answer);
-    let subscribe = message(&request(Request::Subscribe { period_ms: 500 }));
-    add("subscribe-request", Channel::Request, 3, &subscribe);
-    let subscribed = message(&response(Response::Subscribed {
-        period_ms: 500,
-        lapse_ms: 5_000,
-    }));
-    add("subscribe-response", Channel::Response, 3, &subscribed);
-    let changed = message(&event(Event::TierChanged {
-        from: 3,
-        to: 2,
-        reason: TierReason::OverBudget,
-        frame: 1_234,
-    }));
-    add("tier-event", Channel::Event, 0, &changed);
-    let fault = message(&event(Event::Fault(Fault::Frame {
-        sequence: 1_300,
-        cause: FaultyFrame::Torn,
-    })));
-    add("fault-event", Channel::Event, 1, &fault);
-    add("unknown-request", Channel::Request, 4, &[200]);
-    let refused = message(&response(Response::Refused(Refusal::Unknown)));
-    add("unknown-response", Channel::Response, 4, &refused);
-    add("log", Channel::Log, 0, &[0x07, 0x00, 0x8F, 0x4E]);
-    examples
-}
-
-/// The bytes in the specification's blocks, by name; what follows a `|` explains.
-fn written(kind: &str) -> BTreeMap<String, Vec<u8>> {
-    const PROTOCOL: &str = include_str!("../../docs/protocol.md");
-    let mut blocks = BTreeMap::new();
-    for block in PROTOCOL.split("```").skip(1).step_by(2) {
-        let (name, lines) = block.split_once('\n').expect("a block has lines");
-        let Some(name) = name.strip_prefix(kind) else {
-            continue;
-        };
-        let bytes = lines.lines().flat_map(|line| {
-            let bytes = line.split('|').next().unwrap_or_default();
-            bytes.split_whitespace().map(|byte| {
-                u8::from_str_radix(byte, 16).unwrap_or_else(|_| panic!("{name}: {byte}"))
-            })
-        });
-        blocks.insert(name.trim().to_owned(), bytes.collect());
-    }
-    blocks
-}
-
-#[test]
-fn the_specification_shows_the_bytes_that_are_sent() {
-    let hex = |bytes: &[u8]| {
-        let mut text = String::new();
-        for byte in bytes {
-            let _ = write!(text, "{byte:02x} ");
-        }
-        text
-    };
-    let (contents, lines) = (written("content "), written("line "));
-    let mut differences = String::new();
-    for (name, (content, line)) in examples() {
-        if contents.get(name) != Some(&content) {
-            let _ = writeln!(differences, "content {name}: {}", hex(&content));
-        }
-        if lines.get(name) != Some(&line) {
-            let _ = writeln!(differences, "line {name}: {}", hex(&line));
-        }
-    }
-    assert!(differences.is_empty(), "should be\n{differences}");
-    assert_eq!(contents.len(), examples().len(), "none that nobody checks");
-    assert_eq!(lines.len(), examples().len(), "none that nobody checks");
-}
-
-#[test]
-fn the_specification_states_the_limits() {
-    const PROTOCOL: &str = include_str!("../../docs/protocol.md");
-    for (name, value) in [
-        ("Most bytes of a payload", MAX_PAYLOAD),
-        ("Most bytes of a frame on the line", MAX_ENCODED),
-        (
-            "Shortest period of statuses, ms",
-            iltm_runtime::link::MIN_PERIOD_MS.into(),
-        ),
-        (
-            "Silence that ends a subscription, ms",
-            iltm_runtime::link::LAPSE_MS.into(),
-        ),
-        (
-            "Version of the protocol",
-            iltm_runtime::link::PROTOCOL_VERSION.into(),
-        ),
-    ] {
-        let row = format!("| {name} | {value} |");
-        assert!(PROTOCOL.contains(&row), "{row}");
-    }
 }
 
 #[test]
