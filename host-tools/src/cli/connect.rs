@@ -61,9 +61,7 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
     };
     let port = &found.candidate.path;
     let board = &found.device.board;
-    output.remark(&format!(
-        "found {board} at {port}, which is asked first from now on"
-    ));
+    output.remark(&format!("found {board} at {port}"));
     let greeted = ports::greet(
         port,
         Some(found.baud),
