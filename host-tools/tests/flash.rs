@@ -489,10 +489,8 @@ fn a_key_is_made_installed_and_tables_signed_with_it_are_taken() {
     assert!(said.contains("--yes"), "{said}");
     user.says(&[&install[..], &["--yes"]].concat());
     let public = port.look(|device| device.tables().updater().trust().key);
-    let id: String = public.expect("a key")[..8]
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
+    let id = public.and_then(|key| key.first_chunk().copied());
+    let id = format!("{:016x}", u64::from_be_bytes(id.expect("a key")));
     assert_eq!(shown["id"], id);
     let said = user.says(&["status", "--port", port.path()]);
     assert!(
