@@ -170,7 +170,7 @@ fn a_table_is_flashed_looked_at_and_confirmed() {
     assert!(said.contains("iltm confirm"), "{said}");
     assert_eq!(states(&port), [SlotState::Trial, SlotState::Empty]);
     let said = user.says(&["status", "--port", port.path()]);
-    assert!(said.contains("A trial for "), "{said}");
+    assert!(said.contains("A trial, "), "{said}");
     assert!(said.contains("takes tables from anybody"), "{said}");
     let said = user.says(&["confirm", "--port", port.path()]);
     assert_eq!(
@@ -304,12 +304,11 @@ fn every_cause_of_refusal_has_its_code_and_says_which_table_is_in_use() {
     ] {
         user.write("t.iltm", &file);
         let said = user.fails(code, &["flash", "t.iltm", "--port", port.path()]);
-        if name != "damaged" {
-            assert!(
-                said.contains(&format!("Table {used} is in use.")),
-                "{name}: {said}"
-            );
-        }
+        let active = match name {
+            "damaged" => "goes on with the table that it has.".to_owned(),
+            _ => format!("Table {used} is in use."),
+        };
+        assert!(said.contains(&active), "{name}: {said}");
         assert_eq!(
             writes(&port),
             sent,
@@ -490,10 +489,8 @@ fn a_key_is_made_installed_and_tables_signed_with_it_are_taken() {
     assert!(said.contains("--yes"), "{said}");
     user.says(&[&install[..], &["--yes"]].concat());
     let public = port.look(|device| device.tables().updater().trust().key);
-    let id: String = public.expect("a key")[..8]
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
+    let id = public.and_then(|key| key.first_chunk().copied());
+    let id = format!("{:016x}", u64::from_be_bytes(id.expect("a key")));
     assert_eq!(shown["id"], id);
     let said = user.says(&["status", "--port", port.path()]);
     assert!(

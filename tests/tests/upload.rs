@@ -228,7 +228,7 @@ fn a_clean_line_is_used_to_85_percent() {
     Upload::new(&mut client, &parcel)
         .run(&mut Unwatched)
         .expect("a good line");
-    let took = client.line().line().elapsed() - before;
+    let took = client.line().line().elapsed().saturating_sub(before);
     let share = 10.0 * table().len() as f64 / f64::from(BAUD) / took.as_secs_f64();
     println!(
         "{} bytes in {took:.3?}: {:.1} % of the line",

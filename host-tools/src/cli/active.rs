@@ -14,8 +14,10 @@ pub(super) enum Active {
         table: Option<TableName>,
         trial_ms: u32,
     },
-    /// It does not answer any more.
+    /// It does not answer.
     Unknown,
+    /// It was not asked, nor sent anything.
+    Untouched,
 }
 
 impl Active {
@@ -45,7 +47,7 @@ impl Active {
                 "table": table_name(*table),
                 "trial_ms": trial_ms,
             }),
-            Self::Unknown => json!({ "known": false }),
+            Self::Unknown | Self::Untouched => json!({ "known": false }),
         }
     }
 }
@@ -67,6 +69,9 @@ impl fmt::Display for Active {
             ),
             Self::Known { table: None, .. } => {
                 f.write_str("No table is in use: frames pass unchanged.")
+            }
+            Self::Untouched => {
+                f.write_str("Nothing was sent: the device goes on with the table that it has.")
             }
             Self::Unknown => f.write_str(
                 "Which table is in use cannot be asked now: the device keeps the one that was \

@@ -10,6 +10,13 @@ use crate::user::{Config, Folders};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
+use std::time::Duration;
+
+/// A device may be busy with frames; an empty port should not take long.
+const REMEMBERED: Patience = Patience {
+    answer: Duration::from_millis(400),
+    tries: 3,
+};
 
 /// What commands talk over.
 pub(super) type Wire = Transcribed<Port>;
@@ -36,7 +43,7 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
     if let Some(port) = config.port.clone().filter(|port| !config.excludes(port)) {
-        let greeted = ports::greet(&port, line.baud, ports::SHORT, Transcribed::new);
+        let greeted = ports::greet(&port, line.baud, REMEMBERED, Transcribed::new);
         match greeted {
             Ok((client, baud)) => return Ok(Connection::new(client, &port, baud, None)),
             Err(error @ DeviceError::Protocol { .. }) => {
@@ -53,7 +60,8 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
         _ => choose(found, output)?,
     };
     let port = &found.candidate.path;
-    output.remark(&format!("{} at {port}", found.device.board));
+    let board = &found.device.board;
+    output.remark(&format!("found {board} at {port}"));
     let greeted = ports::greet(
         port,
         Some(found.baud),

@@ -275,7 +275,7 @@ impl Failure {
     /// Which table is in use now, and what to do.
     pub(super) fn advice(&self) -> String {
         match &self.active {
-            Some(active) => format!("{active} {}", self.next_step),
+            Some(active) => format!("{active}\n{}", self.next_step),
             None => self.next_step.clone(),
         }
     }

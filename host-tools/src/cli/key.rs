@@ -4,7 +4,7 @@ use super::args::{Install, Key, KeyCommand, SealTerms as Given, Sign};
 use super::connect::connect;
 use super::failure::{Failure, Kind};
 use super::output::{Output, read_file, write_file};
-use super::slots::key_id;
+use super::slots::{in_use, key_id};
 use super::status::number;
 use crate::compile::sign::{self, SealTerms, new_key, read_key, read_public_key};
 use ed25519_dalek::{SigningKey, VerifyingKey};
@@ -12,6 +12,10 @@ use iltm_runtime::image::Seal;
 use serde_json::{Value, json};
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
+
+/// What happens to the table that is in use when a device gets a key.
+const UNSIGNED: &str = "If the table in use is not signed with it, the device refuses that too \
+     from its next start on:\nflash a signed one before.\n";
 
 pub(super) fn run(arguments: &Key, output: &Output) -> Result<(), Failure> {
     match &arguments.command {
@@ -62,7 +66,8 @@ fn install(arguments: &Install, output: &Output) -> Result<(), Failure> {
     // The device answers a repetition of what it has with yes: nothing to ask then.
     let same = slots.key == Some(Seal::key_id(key.as_bytes())) && slots.device == arguments.device;
     if slots.key.is_none() {
-        agree(arguments, &connection.port, &key, output)?;
+        let used = in_use(&slots).is_some();
+        agree(arguments, &connection.port, &key, used, output)?;
     }
     let installed = connection
         .client
@@ -73,11 +78,16 @@ fn install(arguments: &Install, output: &Output) -> Result<(), Failure> {
     data["port"] = json!(connection.port);
     data["number"] = json!(format!("{:016x}", arguments.device));
     let text = format!(
-        "The device at {} {} key {} and {}.\n",
+        "The device at {} {} key {} and {}.\n{}",
         connection.port,
         if same { "has" } else { "now has" },
         id(&key),
-        number(arguments.device)
+        number(arguments.device),
+        if !same && in_use(&slots).is_some() {
+            UNSIGNED
+        } else {
+            ""
+        }
     );
     output.result(&data, &text);
     Ok(())
@@ -88,6 +98,7 @@ fn agree(
     arguments: &Install,
     port: &str,
     key: &VerifyingKey,
+    used: bool,
     output: &Output,
 ) -> Result<(), Failure> {
     if arguments.yes {
@@ -106,9 +117,10 @@ fn agree(
     let _ = write!(
         io::stderr(),
         "The device at {port} will take only tables signed with key {} from now on,\n\
-         and be {} for good. Is that meant? [y/N] ",
+         and have {} for good.\n{}Is that meant? [y/N] ",
         id(key),
-        number(arguments.device)
+        number(arguments.device),
+        if used { UNSIGNED } else { "" }
     );
     let mut answer = String::new();
     let _ = io::stdin().read_line(&mut answer);

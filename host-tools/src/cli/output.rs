@@ -65,9 +65,17 @@ impl Output {
             let _ = writeln!(io::stdout(), "{data}");
         }
         let mut text = String::new();
-        let graphical = miette::GraphicalReportHandler::new();
+        let width = console::Term::stderr().size().1.into();
+        let graphical = miette::GraphicalReportHandler::new().with_width(width);
         if !self.terminal || graphical.render_report(&mut text, failure).is_err() {
-            text = format!("error: {}\nnext: {}\n", failure.message, failure.advice());
+            let active = failure.active.as_ref();
+            let active = active.map(|active| format!("now: {active}\n"));
+            text = format!(
+                "error: {}\n{}next: {}\n",
+                failure.message,
+                active.unwrap_or_default(),
+                failure.next_step
+            );
         }
         let _ = write!(io::stderr(), "{text}");
         ExitCode::from(failure.kind.code())

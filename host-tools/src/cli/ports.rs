@@ -3,7 +3,7 @@
 use super::args::Ports;
 use super::failure::Failure;
 use super::output::Output;
-use super::status::{identity, number, table_name};
+use super::status::{identity, table_name};
 use crate::device::DeviceError;
 use crate::device::ports::{Candidate, Found, ask, candidates};
 use crate::user::{Config, Folders};
@@ -48,7 +48,10 @@ fn text(found: &[Found], silent: &[(Candidate, DeviceError)], remembered: Option
             device.candidate.path.clone(),
             device.device.board.to_string(),
             device.device.firmware.to_string(),
-            number(device.device.device),
+            match device.device.device {
+                0 => "none".to_owned(),
+                number => format!("{number:016x}"),
+            },
             table.unwrap_or_else(|| "?".to_owned()),
         ]);
     }

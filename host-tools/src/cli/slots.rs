@@ -71,13 +71,11 @@ pub(super) fn lines(slots: &Slots) -> Vec<String> {
             None => String::new(),
         };
         let trial = match slot.state {
-            SlotState::Trial => format!(
-                " for {} s more, then back by itself",
-                slots.trial_ms.div_ceil(1_000)
-            ),
+            SlotState::Trial => format!(", {} s left", slots.trial_ms.div_ceil(1_000)),
             _ => String::new(),
         };
         let erases = match slot.erases {
+            0 => "never erased".to_owned(),
             1 => "erased once".to_owned(),
             times => format!("erased {times} times"),
         };

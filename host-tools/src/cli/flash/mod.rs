@@ -25,9 +25,14 @@ use show::Show;
 use std::time::{Duration, Instant};
 
 pub(super) fn run(arguments: &Flash, output: &Output) -> Result<(), Failure> {
-    let bytes = read_file(&arguments.table)?;
-    let table = Named::read(&arguments.table, &bytes)?;
-    let mut connection = connect(&arguments.line, output)?;
+    let untouched = |failure: Failure| failure.with(Active::Untouched);
+    let bytes = read_file(&arguments.table).map_err(untouched)?;
+    let table = Named::read(&arguments.table, &bytes).map_err(untouched)?;
+    let connected = connect(&arguments.line, output);
+    let mut connection = connected.map_err(|failure| match failure.kind {
+        Kind::NoAnswer | Kind::NoDevice | Kind::Port => failure.with(Active::Unknown),
+        _ => failure.with(Active::Untouched),
+    })?;
     if let Some(Ok(file)) = Folders::of_user().map(|folders| transcripts::begin(&folders)) {
         connection.transcribe(file);
     }

@@ -53,6 +53,9 @@ impl UploadError {
     #[must_use]
     pub fn next_step(&self) -> &'static str {
         match self {
+            Self::Device(DeviceError::Gone { .. } | DeviceError::NoAnswer { .. }) => {
+                "Check the cable and the device's power, then flash again: it goes on where it stopped."
+            }
             Self::Device(error) => error.next_step(),
             Self::Stalled { .. } => {
                 "Check cable and power, or give a lower --baud, and flash again: it goes on where it stopped."
