@@ -195,7 +195,7 @@ impl<F: NorFlash> Updater<F> {
             }
             Request::Confirm { table } => self.confirm(table, now_ms),
             Request::Rollback { table } => self.roll_back(table, now_ms, shelf),
-            Request::Provision { key, device } => self.provision(Identity { key, device }),
+            Request::Provision { key, device } => self.provision(Identity { key, device }, shelf),
             // The session answers these.
             Request::Hello { .. } | Request::Status | Request::Subscribe { .. } => {
                 Err(Refusal::Unknown)
@@ -495,16 +495,28 @@ impl<F: NorFlash> Updater<F> {
     }
 
     #[inline(never)]
-    fn provision(&mut self, identity: Identity) -> Result<Response, Refusal> {
+    fn provision(
+        &mut self,
+        identity: Identity,
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<Response, Refusal> {
         let wanted = Trust {
             key: Some(identity.key),
             device: identity.device,
         };
         if self.trust.key.is_none() {
+            if self.trial.is_some() {
+                return Err(Refusal::OnTrial);
+            }
             let part = self.map.identity();
             let written = identity::write(&mut self.flash, part, &identity);
             written.map_err(|_| Refusal::ReadOnly)?;
             self.trust = wanted;
+            // From now on nobody goes back to a table that the next start would refuse.
+            // The one in use stays until then.
+            if let Some(used) = self.in_use {
+                self.look(used.other(), shelf);
+            }
         }
         if self.trust != wanted {
             return Err(Refusal::HasKey);
