@@ -8,10 +8,10 @@
 //! The short form of the two-cut test runs always; the full form with
 //! `cargo test --release -p iltm-tests --test power_cuts -- --include-ignored --nocapture`.
 
-use ed25519_dalek::{Signer, SigningKey};
+use ed25519_dalek::SigningKey;
 use iltm::capture::Response;
+use iltm::compile::sign::{SealTerms, sign};
 use iltm_runtime::fault::Violations;
-use iltm_runtime::image::Seal;
 use iltm_runtime::link::{Refusal, Request};
 use iltm_tests::slots::{SimDevice, Step};
 use iltm_tests::wedge_table_for;
@@ -27,12 +27,13 @@ fn key() -> SigningKey {
 
 /// A signed table.
 fn signed(rows: u16, cols: u16, version: u32) -> Vec<u8> {
-    let public = key().verifying_key().to_bytes();
-    let mut file = wedge_table_for(Response::Linear, rows, cols, 1);
-    file.extend(Seal::head(version, 0, DEVICE, &public));
-    let signature = key().sign(&file);
-    file.extend(signature.to_bytes());
-    file
+    let terms = SealTerms {
+        version,
+        oldest: 0,
+        device: DEVICE,
+    };
+    let image = wedge_table_for(Response::Linear, rows, cols, 1);
+    sign(&image, &key(), terms).expect("an image")
 }
 
 /// Two files that differ from the first sector on.

@@ -1,0 +1,164 @@
+//! What becomes of tables: transfer, trial, confirmation, and the way back.
+//!
+//! | what | file |
+//! |---|---|
+//! | what a start finds | `start` |
+//! | what each request does | `requests` |
+//! | the slot in use, the trial, the record that counts | `state` |
+
+mod requests;
+mod start;
+mod state;
+
+use super::journal::Journal;
+use super::record::Identity;
+use super::transfer::Transfer;
+use super::{Map, Shelf, Slot};
+use crate::link::{Fault, Refusal, Request, Response, SlotState, TableName, TableReason};
+use crate::trust::{Accepted, Trust};
+use embedded_storage::nor_flash::NorFlash;
+
+/// Both slots, the records, and what a host may do with them.
+#[derive(Clone, Debug)]
+pub struct Updater<F> {
+    flash: F,
+    map: Map,
+    trust: Trust,
+    journal: Journal,
+    /// Sectors erased so far: slot A, slot B, records.
+    erases: [u32; 3],
+    tables: [Option<Accepted>; 2],
+    broken: [bool; 2],
+    in_use: Option<Slot>,
+    transfer: Option<Transfer>,
+    trial: Option<Trial>,
+    fault: Option<Fault>,
+    change: Option<Change>,
+}
+
+/// A table in use that nobody has confirmed.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    ends_ms: u64,
+    transfer: u32,
+    /// What frames go through when it ends.
+    before: Option<Slot>,
+}
+
+/// Another table in use.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Change {
+    /// It; none passes frames through.
+    pub table: Option<TableName>,
+    /// Why.
+    pub reason: TableReason,
+}
+
+impl<F: NorFlash> Updater<F> {
+    /// Answers a request about tables. Repeating one does no harm.
+    pub fn answer(
+        &mut self,
+        request: Request<'_>,
+        now_ms: u64,
+        shelf: &mut impl Shelf<F>,
+    ) -> Response {
+        let answer = match request {
+            Request::Slots => Ok(Response::Slots(self.slots(now_ms))),
+            Request::Sectors { length, first } => self.sectors(length, first, shelf),
+            Request::Begin { length, digest } => self.begin(length, digest),
+            Request::Write {
+                transfer,
+                offset,
+                bytes,
+            } => self.write(transfer, offset, bytes, shelf),
+            Request::Activate { transfer, trial_s } => {
+                self.activate(transfer, trial_s, now_ms, shelf)
+            }
+            Request::Confirm { table } => self.confirm(table, now_ms),
+            Request::Rollback { table } => self.roll_back(table, now_ms, shelf),
+            Request::Provision { key, device } => self.provision(Identity { key, device }, shelf),
+            // The session answers these.
+            Request::Hello { .. } | Request::Status | Request::Subscribe { .. } => {
+                Err(Refusal::Unknown)
+            }
+        };
+        answer.unwrap_or_else(Response::Refused)
+    }
+
+    /// Ends a trial whose time is over.
+    pub fn poll(&mut self, now_ms: u64, shelf: &mut impl Shelf<F>) {
+        if let Some(trial) = self.trial.filter(|trial| now_ms >= trial.ends_ms) {
+            self.end_trial(trial, TableReason::TrialOver, shelf);
+        }
+    }
+
+    /// The last change that nobody has asked for yet.
+    pub const fn take_change(&mut self) -> Option<Change> {
+        self.change.take()
+    }
+
+    /// The slot that frames go through.
+    #[must_use]
+    pub const fn in_use(&self) -> Option<Slot> {
+        self.in_use
+    }
+
+    /// The table that frames go through.
+    #[must_use]
+    pub fn table(&self) -> Option<TableName> {
+        self.name(self.in_use?)
+    }
+
+    /// What was wrong with a table at the start.
+    #[must_use]
+    pub const fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// What the device is provisioned with.
+    #[must_use]
+    pub const fn trust(&self) -> &Trust {
+        &self.trust
+    }
+
+    /// What lies where in it.
+    #[must_use]
+    pub const fn map(&self) -> &Map {
+        &self.map
+    }
+
+    /// The flash.
+    #[must_use]
+    pub const fn flash(&self) -> &F {
+        &self.flash
+    }
+
+    /// The flash, for what else is done with it than storing tables.
+    pub const fn flash_mut(&mut self) -> &mut F {
+        &mut self.flash
+    }
+
+    /// Gives the flash back.
+    #[must_use]
+    pub fn into_flash(self) -> F {
+        self.flash
+    }
+
+    /// States of both slots.
+    #[must_use]
+    pub fn states(&self) -> [SlotState; 2] {
+        Slot::ALL.map(|slot| {
+            if *slot.of(&self.broken) {
+                SlotState::Broken
+            } else if slot.of(&self.tables).is_none() {
+                SlotState::Empty
+            } else if self.in_use != Some(slot) {
+                SlotState::Valid
+            } else if self.trial.is_some() {
+                SlotState::Trial
+            } else {
+                SlotState::Active
+            }
+        })
+    }
+}

@@ -1,0 +1,229 @@
+//! What each request does.
+
+use super::{Trial, Updater};
+use crate::link::{Digest, Receiving, Refusal, Response, Sectors, SlotInfo, Slots, TableReason};
+use crate::store::record::Identity;
+use crate::store::transfer::Transfer;
+use crate::store::{Shelf, Slot, flash, identity};
+use crate::trust::{Rejected, Terms, Trust};
+use embedded_storage::nor_flash::NorFlash;
+use heapless::Vec;
+
+/// Chunks that may be on their way to a device at once. What it cannot look at yet
+/// waits in the serial line's buffer, which must hold as many.
+const WINDOW: u8 = 3;
+
+/// Longest trial, milliseconds.
+const MAX_TRIAL_MS: u64 = 65_535_000;
+
+impl<F: NorFlash> Updater<F> {
+    #[inline(never)]
+    pub(super) fn slots(&self, now_ms: u64) -> Slots {
+        let [a, b, record_erases] = self.erases;
+        let states = self.states();
+        Slots {
+            slots: Slot::ALL.map(|slot| SlotInfo {
+                state: *slot.of(&states),
+                table: self.name(slot),
+                length: slot.of(&self.tables).map_or(0, |table| table.length),
+                erases: *slot.of(&[a, b]),
+            }),
+            target: self.target() as u8,
+            trial_ms: self.trial_ms(now_ms),
+            oldest: self.oldest(),
+            key: self.trust.key_id(),
+            device: self.trust.device,
+            sector: self.map.sector(),
+            record_erases,
+        }
+    }
+
+    #[inline(never)]
+    pub(super) fn sectors(
+        &mut self,
+        length: u32,
+        first: u32,
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<Response, Refusal> {
+        self.check_length(length)?;
+        let part = self.map.slot(self.target());
+        let mut crcs = Vec::new();
+        let mut start = first.saturating_mul(self.map.sector());
+        while start < length && !crcs.is_full() {
+            let sector = self.map.sector().min(length - start);
+            let crc = flash::crc(&mut self.flash, part, start, sector);
+            let crc = crc.map_err(|_| Refusal::Flash { offset: start })?;
+            // Not full.
+            let _ = crcs.push(crc);
+            start = start.saturating_add(sector);
+            shelf.pause();
+        }
+        Ok(Response::Sectors(Sectors { first, crcs }))
+    }
+
+    fn check_length(&self, length: u32) -> Result<(), Refusal> {
+        let limit = self.map.slot_bytes();
+        if length > limit {
+            return Err(Refusal::TooLong { limit });
+        }
+        Ok(())
+    }
+
+    #[inline(never)]
+    pub(super) fn begin(&mut self, length: u32, digest: Digest) -> Result<Response, Refusal> {
+        if self.trial.is_some() {
+            return Err(Refusal::OnTrial);
+        }
+        self.check_length(length)?;
+        if self.journal.last().is_none() {
+            // Without a record, a whole table that nobody confirmed would count at
+            // the next start.
+            self.commit(self.in_use, 0)?;
+        }
+        let same = |transfer: &Transfer| transfer.digest == digest && transfer.length == length;
+        if !self.transfer.as_ref().is_some_and(same) {
+            self.transfer = Some(Transfer::new(digest, length));
+        }
+        Ok(Response::Receiving(Receiving {
+            slot: self.target() as u8,
+            chunk: self.map.chunk(),
+            window: WINDOW,
+        }))
+    }
+
+    #[inline(never)]
+    pub(super) fn write(
+        &mut self,
+        transfer: u32,
+        offset: u32,
+        bytes: &[u8],
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<Response, Refusal> {
+        let slot = self.target();
+        let running = self.transfer.as_mut();
+        let running = running.filter(|running| running.digest.transfer() == transfer);
+        let running = running.ok_or(Refusal::NoTransfer)?;
+        // Its bytes are about to change.
+        shelf.unload(slot);
+        *slot.of_mut(&mut self.tables) = None;
+        *slot.of_mut(&mut self.broken) = true;
+        let part = self.map.slot(slot);
+        let erases = running.write(&mut self.flash, &self.map, part, offset, bytes)?;
+        if let Some(count) = self.erases.get_mut(slot.index()) {
+            *count = count.saturating_add(erases);
+        }
+        Ok(Response::Written)
+    }
+
+    #[inline(never)]
+    pub(super) fn activate(
+        &mut self,
+        transfer: u32,
+        trial_s: u16,
+        now_ms: u64,
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<Response, Refusal> {
+        // The answer to the first such request may have been lost.
+        if self.trial.is_some_and(|trial| trial.transfer == transfer) {
+            return Ok(self.use_now(now_ms));
+        }
+        if self.trial.is_some() {
+            return Err(Refusal::OnTrial);
+        }
+        let running = self.transfer.as_ref();
+        let running = running.filter(|running| running.digest.transfer() == transfer);
+        let running = *running.ok_or(Refusal::NoTransfer)?;
+        let slot = self.target();
+        let part = self.map.slot(slot);
+        let whole = running.is_whole(&mut self.flash, part, || shelf.pause());
+        if !whole.map_err(|_| Refusal::Incomplete)? {
+            return Err(Refusal::Incomplete);
+        }
+        let terms = Terms {
+            trust: self.trust,
+            floor: self.oldest(),
+        };
+        *slot.of_mut(&mut self.tables) = None;
+        *slot.of_mut(&mut self.broken) = true;
+        let accepted = shelf.load(&self.flash, slot, Some(running.length), &terms);
+        let accepted = accepted.map_err(Refusal::Table)?;
+        *slot.of_mut(&mut self.tables) = Some(accepted);
+        *slot.of_mut(&mut self.broken) = false;
+        let trial_ms = (u64::from(trial_s.max(1)) * 1_000).min(MAX_TRIAL_MS);
+        self.trial = Some(Trial {
+            ends_ms: now_ms.saturating_add(trial_ms),
+            transfer,
+            before: self.in_use,
+        });
+        self.transfer = None;
+        self.use_slot(Some(slot), TableReason::Trial, shelf);
+        Ok(self.use_now(now_ms))
+    }
+
+    #[inline(never)]
+    pub(super) fn confirm(&mut self, table: u32, now_ms: u64) -> Result<Response, Refusal> {
+        self.check_in_use(table)?;
+        if self.trial.is_some() {
+            let oldest = self.in_use.and_then(|slot| *slot.of(&self.tables));
+            self.commit(self.in_use, oldest.map_or(0, |table| table.oldest))?;
+            self.trial = None;
+            self.changed(TableReason::Confirmed);
+        }
+        Ok(self.use_now(now_ms))
+    }
+
+    #[inline(never)]
+    pub(super) fn roll_back(
+        &mut self,
+        table: u32,
+        now_ms: u64,
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<Response, Refusal> {
+        self.check_in_use(table)?;
+        if let Some(trial) = self.trial {
+            self.end_trial(trial, TableReason::RolledBack, shelf);
+            return Ok(self.use_now(now_ms));
+        }
+        let other = self.target();
+        let there = other.of(&self.tables).ok_or(Refusal::NoOther)?;
+        let floor = self.terms().floor;
+        if self.trust.key.is_some() && there.version < floor {
+            let version = there.version;
+            return Err(Refusal::Table(Rejected::Older { version, floor }));
+        }
+        self.commit(Some(other), 0)?;
+        self.transfer = None;
+        self.use_slot(Some(other), TableReason::RolledBack, shelf);
+        Ok(self.use_now(now_ms))
+    }
+
+    #[inline(never)]
+    pub(super) fn provision(
+        &mut self,
+        identity: Identity,
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<Response, Refusal> {
+        let wanted = Trust {
+            key: Some(identity.key),
+            device: identity.device,
+        };
+        if self.trust.key.is_none() {
+            if self.trial.is_some() {
+                return Err(Refusal::OnTrial);
+            }
+            let part = self.map.identity();
+            let written = identity::write(&mut self.flash, part, &identity);
+            written.map_err(|_| Refusal::ReadOnly)?;
+            self.trust = wanted;
+            // From now on nobody goes back to a table that the next start would refuse.
+            // The one in use stays until then.
+            if let Some(used) = self.in_use {
+                self.look(used.other(), shelf);
+            }
+        }
+        if self.trust != wanted {
+            return Err(Refusal::HasKey);
+        }
+        Ok(Response::Provisioned)
+    }
+}

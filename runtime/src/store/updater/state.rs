@@ -1,0 +1,102 @@
+//! What requests have in common: the slot in use, the trial, the record that counts.
+
+use super::{Change, Trial, Updater};
+use crate::link::{InUse, Refusal, Response, TableName, TableReason};
+use crate::store::record::Commit;
+use crate::store::{Shelf, Slot, StoreError};
+use embedded_storage::nor_flash::NorFlash;
+
+impl<F: NorFlash> Updater<F> {
+    pub(super) fn trial_ms(&self, now_ms: u64) -> u32 {
+        let left = |trial: Trial| trial.ends_ms.saturating_sub(now_ms).max(1);
+        u32::try_from(self.trial.map_or(0, left)).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn use_now(&self, now_ms: u64) -> Response {
+        Response::InUse(InUse {
+            table: self.table(),
+            trial_ms: self.trial_ms(now_ms),
+        })
+    }
+
+    /// The slot that the next table goes to: not the one in use.
+    pub(super) fn target(&self) -> Slot {
+        self.in_use.map_or(Slot::A, Slot::other)
+    }
+
+    /// The lowest version of a table that may come: not below the one that counts,
+    /// and not a revoked one.
+    pub(super) fn oldest(&self) -> u32 {
+        let used = self.in_use.and_then(|slot| *slot.of(&self.tables));
+        let floor = self.terms().floor;
+        used.map_or(floor, |table| table.version.max(floor))
+    }
+
+    pub(super) fn check_in_use(&self, table: u32) -> Result<(), Refusal> {
+        let used = self.table();
+        if used.is_some_and(|used| used.id == table) {
+            return Ok(());
+        }
+        Err(Refusal::NotInUse { table: used })
+    }
+
+    pub(super) fn end_trial(
+        &mut self,
+        trial: Trial,
+        reason: TableReason,
+        shelf: &mut impl Shelf<F>,
+    ) {
+        self.trial = None;
+        self.use_slot(trial.before, reason, shelf);
+    }
+
+    pub(super) fn use_slot(
+        &mut self,
+        slot: Option<Slot>,
+        reason: TableReason,
+        shelf: &mut impl Shelf<F>,
+    ) {
+        self.in_use = slot;
+        shelf.select(slot.ok_or(self.absence()));
+        self.changed(reason);
+    }
+
+    pub(super) fn changed(&mut self, reason: TableReason) {
+        let table = self.table();
+        self.change = Some(Change { table, reason });
+    }
+
+    /// Makes the table of a slot the one that counts; `oldest` is the lowest version
+    /// that may run from then on.
+    pub(super) fn commit(&mut self, slot: Option<Slot>, oldest: u32) -> Result<(), Refusal> {
+        let id = |slot: Slot| Some((slot, slot.of(&self.tables).as_ref()?.id));
+        let table = slot.and_then(id);
+        let floor = self.terms().floor.max(oldest);
+        let commit = Commit {
+            sequence: 0,
+            table,
+            floor,
+            lengths: Slot::ALL.map(|slot| slot.of(&self.tables).map_or(0, |table| table.length)),
+            erases: self.erases,
+        };
+        self.append(commit).map_err(|error| match error {
+            StoreError::Flash { offset } => Refusal::Flash { offset },
+            StoreError::Full => Refusal::ReadOnly,
+        })
+    }
+
+    pub(super) fn append(&mut self, commit: Commit) -> Result<(), StoreError> {
+        let erases = self.journal.append(&mut self.flash, commit)?;
+        let [.., records] = &mut self.erases;
+        *records = records.saturating_add(erases);
+        Ok(())
+    }
+
+    pub(super) fn name(&self, slot: Slot) -> Option<TableName> {
+        let table = slot.of(&self.tables).as_ref()?;
+        Some(TableName {
+            id: table.id,
+            version: table.version,
+        })
+    }
+}
