@@ -23,8 +23,8 @@ use crate::vitals::Vitals;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
-    Device as Answering, Hello, Limits, MAX_PAYLOAD, Name, PROTOCOL_VERSION, Request, Response,
-    Session, Status, Version,
+    Device as Answering, Fault, Hello, Limits, MAX_PAYLOAD, Name, PROTOCOL_VERSION, Request,
+    Response, Session, Status, Version,
 };
 use iltm_runtime::store::{Map, Updater};
 
@@ -87,7 +87,9 @@ fn run<B: Board>(
     let mut frames = Frames::<B, _>::new(side, memory, tables, rehearsal, vitals);
     let updater = Updater::start(flash, map, &mut frames);
     if let Some(fault) = updater.fault() {
-        defmt::error!("a table is refused");
+        if let Fault::Table { slot, .. } = fault {
+            defmt::error!("the table in slot {=u8} is refused", slot);
+        }
         frames.vitals.set_fault(fault);
     }
     frames.begin(WATCHDOG_MS);

@@ -98,9 +98,6 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
     pub(crate) fn begin(&mut self, watchdog_ms: u32) {
         self.watchdog.start(watchdog_ms);
         self.live = true;
-        if let Err(why) = self.in_use {
-            self.vitals.set_mode(Mode::PassThrough(why), 0, 0, 0);
-        }
     }
 
     /// Looks after the next frame, if there is one; says whether there was.
@@ -188,9 +185,10 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
         match self.stream.take() {
             Some(stream) => self.stage(stream.format, stream.lateness),
             None => {
-                if let Err(why) = self.in_use {
-                    self.vitals.set_mode(Mode::PassThrough(why), 0, 0, 0);
-                }
+                let mode = self
+                    .in_use
+                    .map_or_else(Mode::PassThrough, |_| Mode::Compensating);
+                self.vitals.set_mode(mode, 0, 0, 0);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The workspace of a frame: the one large piece of memory, taken once.
 
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FullMemory, Halfword, Row, Workspace};
+use iltm_runtime::pipeline::{FlatMemory, Halfword, Row, Workspace};
 use iltm_runtime::units::InputCoefficient;
 use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
@@ -81,17 +81,18 @@ impl Memory {
     }
 
     /// What a frame larger than the grid needs.
-    pub fn full<const C: usize>(
+    pub fn full(
         &mut self,
+        channels: usize,
         cells: usize,
         width: usize,
-    ) -> (FullMemory<'_, C>, Workspace<'_>) {
+    ) -> (FlatMemory<'_>, Workspace<'_>) {
         let [first, second] = &mut self.buffers;
-        let frame = FullMemory {
-            gains: self.gains.as_chunks_mut().0,
-            ambient: self.ambient.as_chunks_mut().0,
-            sums: leading(&mut self.sums, C * cells),
-            corrections: leading(&mut self.corrections, C * cells),
+        let frame = FlatMemory {
+            gains: &mut self.gains,
+            ambient: &mut self.ambient,
+            sums: leading(&mut self.sums, channels * cells),
+            corrections: leading(&mut self.corrections, channels * cells),
             columns: &mut self.columns,
             row: Row {
                 line: &mut self.line,

@@ -5,7 +5,7 @@ use iltm_runtime::FrameSize;
 use iltm_runtime::exchange::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
+use iltm_runtime::pipeline::{Encoding, FrameError, compensate_cells, compensate_pixels};
 
 /// What is done to the frames of a format.
 #[derive(Clone, Copy)]
@@ -62,54 +62,17 @@ impl Stage {
                 }
                 Ok(0)
             }
-            (Self::Grid(encoding), Some(table)) => match table.channels() {
-                1 => grid::<1>(table, tier, encoding, wanted, input, memory),
-                _ => grid::<3>(table, tier, encoding, wanted, input, memory),
-            },
-            (Self::Full(encoding, size), Some(table)) => match table.channels() {
-                1 => full::<1>(table, size, (tier, encoding), wanted, input, memory),
-                _ => full::<3>(table, size, (tier, encoding), wanted, input, memory),
-            },
+            (Self::Grid(encoding), Some(table)) => {
+                let how = (tier, encoding);
+                compensate_cells(table, how, wanted, input, &mut memory.workspace())
+            }
+            (Self::Full(encoding, size), Some(table)) => {
+                let how = (tier, encoding);
+                let what = (table, size, memory.is_prepared(table, size));
+                let (channels, cells) = (table.channels().into(), table.grid().cells());
+                let (flat, mut workspace) = memory.full(channels, cells, size.width());
+                compensate_pixels(what, how, wanted, input, flat, &mut workspace)
+            }
         }
     }
-}
-
-fn grid<const C: usize>(
-    table: &Table<'static>,
-    tier: u8,
-    encoding: Encoding,
-    wanted: &[u8],
-    input: &mut [u8],
-    memory: &mut Memory,
-) -> Result<u32, FrameError> {
-    GridPipeline::<C>::new(table)?.compensate(
-        tier,
-        encoding,
-        wanted.as_chunks().0,
-        input.as_chunks_mut().0,
-        &mut memory.workspace(),
-    )
-}
-
-fn full<const C: usize>(
-    table: &Table<'static>,
-    size: FrameSize,
-    (tier, encoding): (u8, Encoding),
-    wanted: &[u8],
-    input: &mut [u8],
-    memory: &mut Memory,
-) -> Result<u32, FrameError> {
-    let pipeline = FullPipeline::<C>::new(table, size)?;
-    let prepared = memory.is_prepared(table, size);
-    let (mut frame, mut workspace) = memory.full::<C>(table.grid().cells(), size.width());
-    if !prepared {
-        pipeline.prepare(&mut frame)?;
-    }
-    pipeline.compensate(
-        (tier, encoding),
-        wanted.as_chunks().0,
-        input.as_chunks_mut().0,
-        &mut frame,
-        &mut workspace,
-    )
 }

@@ -23,6 +23,7 @@ mod grid;
 mod pixels;
 mod response;
 mod sample;
+mod samples;
 pub mod srgb;
 pub mod stages;
 mod whole;
@@ -33,6 +34,7 @@ pub use grid::GridPipeline;
 pub use pixels::{Halfword, Pixels};
 pub use response::{RESPONSE_KNOTS, Response, knot_drive, linear_code};
 pub use sample::{Encoding, Sample};
+pub use samples::{FlatMemory, compensate_cells, compensate_pixels};
 pub use stages::Workspace;
 pub use whole::FullMemory;
 

@@ -94,7 +94,8 @@ fn full<const C: usize>(
     let pipeline = FullPipeline::<C>::new(table, size)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     let prepared = memory.is_prepared(table, size);
-    let (mut frame, mut workspace) = memory.full::<C>(table.grid().cells(), size.width());
+    let (flat, mut workspace) = memory.full(C, table.grid().cells(), size.width());
+    let mut frame = flat.channels::<C>();
     if !prepared {
         pipeline.prepare(&mut frame)?;
     }
