@@ -12,6 +12,7 @@ use super::sample::{Encoding, Sample};
 use super::stages::Workspace;
 use crate::haar::ShortSlice;
 use crate::units::Light;
+use core::array::from_fn;
 
 /// Memory for frames of `W x H` pixels of `C` channels over `N` cells.
 #[derive(Debug)]
@@ -127,8 +128,9 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let sums = memory.sums.chunks_exact_mut(cells);
         let columns = memory.columns.chunks_exact_mut(2 * width);
         for (channel, (sums, columns)) in sums.zip(columns).enumerate().take(C) {
+            let curves = S::curves(self.table(), encoding, channel);
             self.average(columns, sums, |y, weight, columns| {
-                let pixels = self.pixels(encoding, wanted, ambient, (y, channel));
+                let pixels = self.pixels(wanted, ambient, (y, channel), curves);
                 S::add_light(&pixels, weight, columns);
             });
         }
@@ -152,15 +154,16 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         self.check_pixels("input", input.len())?;
         let (cells, width) = (self.table().grid().cells(), self.frame().width());
         let fraction = u32::from(self.table().gain_fraction());
+        let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
         let lines = input.chunks_exact_mut(width).take(self.frame().height());
         let gains = memory.gains.chunks_exact(width);
         for (y, (line, gains)) in lines.zip(gains).enumerate() {
             let corrections = memory.corrections.chunks_exact(cells);
-            for (channel, corrections) in corrections.enumerate().take(C) {
+            for (channel, (corrections, curves)) in corrections.zip(curves).enumerate() {
                 self.correct_row(y, corrections, &mut memory.row);
                 let spread = memory.row.spread.get(..width).unwrap_or_default();
-                let pixels = self.pixels(encoding, wanted, memory.ambient, (y, channel));
+                let pixels = self.pixels(wanted, memory.ambient, (y, channel), curves);
                 clipped += S::finish(&pixels, fraction, gains, spread, line);
             }
         }
@@ -175,10 +178,10 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     /// One channel of the pixels from row `y` on.
     fn pixels<'f, S: Sample>(
         &'f self,
-        encoding: Encoding,
         wanted: &'f [[S; C]],
         ambient: &'f [[Halfword; C]],
         (y, channel): (usize, usize),
+        curves: S::Curves<'f>,
     ) -> Pixels<'f, S, C> {
         let (table, start) = (self.table(), y * self.frame().width());
         let ambient = table
@@ -189,7 +192,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
             ambient,
             cols: self.frame().width(),
             channel,
-            curves: S::curves(table, encoding, channel),
+            curves,
         }
     }
 }

@@ -86,8 +86,8 @@ impl Transfer {
         flash::read(flash, slot, 0, self.length, |piece| {
             hash.update(piece);
             pieces += piece.len();
-            // About a block of the hash takes 5,000 instructions.
-            if pieces.is_multiple_of(8 * PIECE) {
+            // A block of the hash takes some 12,000 instructions.
+            if pieces.is_multiple_of(2 * PIECE) {
                 pause();
             }
             true

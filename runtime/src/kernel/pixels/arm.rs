@@ -258,15 +258,16 @@ global_asm!(
     \name:
         push {{r4-r10, lr}}
         ldmia r0, {{r0-r5}}
-        subs r4, #4
+        subs r4, #8
         blt 2f
     1:
+    .rept 4
         iltm_add_two \channels, \lit
-        iltm_add_two \channels, \lit
-        subs r4, #4
+    .endr
+        subs r4, #8
         bge 1b
     2:
-        adds r4, #4
+        adds r4, #8
         beq 4f
     3:
         ldrb r6, [r0], #\channels
