@@ -459,6 +459,39 @@ fn an_excluded_port_is_never_opened() {
 }
 
 #[test]
+fn a_terminal_that_has_the_remembered_name_by_now_is_not_asked() {
+    let (user, port) = (User::new(), device());
+    let folders = user.folders();
+    let board = emulated::register(&folders, port.path(), "one").expect("writable");
+    user.says(&["status"]);
+    let config = fs::read_to_string(user.path("config/config.toml")).expect("there");
+    assert!(config.contains(port.path()), "remembered: {config}");
+    drop(board);
+    let heard = port.look(|device| device.heard);
+    let said = user.fails(14, &["status"]);
+    assert!(said.contains("there is no serial port to ask"), "{said}");
+    assert_eq!(port.look(|device| device.heard), heard);
+    // Whoever names it means it.
+    user.says(&["status", "--port", port.path()]);
+}
+
+#[test]
+fn an_included_port_is_asked_and_one_that_is_excluded_too_is_not() {
+    let (user, port) = (User::new(), device());
+    let settings = |exclude: &str| {
+        let (path, own) = (port.path(), "\"/dev/tty*\", \"/dev/cu*\"");
+        let text = format!("include = [\"{path}\"]\nexclude = [{own}{exclude}]\n");
+        user.write("config/config.toml", text.as_bytes());
+    };
+    settings(", \"/dev/pts/*\"");
+    user.fails(14, &["status"]);
+    assert_eq!(port.look(|device| device.heard), 0);
+    settings("");
+    let data = &user.events(&["status"])[0];
+    assert_eq!(data["port"], port.path());
+}
+
+#[test]
 fn broken_settings_are_an_error_and_no_port_is_opened() {
     let (user, port) = (User::new(), device());
     let folders = user.folders();
