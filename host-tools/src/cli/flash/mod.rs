@@ -16,9 +16,10 @@ use super::failure::{Failure, Kind};
 use super::output::{Output, read_file};
 use super::slots::letter;
 use super::{interrupt, trial};
+use crate::device::DeviceError;
 use crate::device::upload::{Parcel, Plan, Summary, Upload, UploadError};
 use crate::user::{Folders, transcripts};
-use iltm_runtime::link::InUse;
+use iltm_runtime::link::{InUse, Refusal};
 use preflight::{Named, Now};
 use serde_json::json;
 use show::Show;
@@ -60,14 +61,15 @@ fn flash(
 ) -> Result<(), Failure> {
     let slots = connection.client.slots();
     let slots = slots.map_err(|error| connection.failed(&error))?;
+    let parcel = Parcel::new(bytes);
     let in_use = match table.check(connection.client.device(), &slots)? {
         Now::Send => None,
-        Now::InUse { trial_ms } => Some(InUse {
+        Now::InUse => Some(InUse {
             table: Some(table.name),
-            trial_ms,
+            trial_ms: 0,
         }),
+        Now::OnTrial => Some(on_trial(arguments, table, &parcel, connection)?),
     };
-    let parcel = Parcel::new(bytes);
     let mut ending = Ending {
         arguments,
         table,
@@ -131,12 +133,30 @@ fn flash(
     ending.end(connection, in_use, "is in use")
 }
 
+/// Asks a device with a table on trial for the trial of this file, which changes
+/// nothing: it is that one, by its digest, or the device refuses.
+fn on_trial(
+    arguments: &Flash,
+    table: &Named,
+    parcel: &Parcel<'_>,
+    connection: &mut Connection,
+) -> Result<InUse, Failure> {
+    let trial = Duration::from_secs(arguments.trial.into());
+    let asked = connection.client.activate(parcel.transfer(), trial);
+    asked.map_err(|error| match error {
+        DeviceError::Refused {
+            refusal: Refusal::OnTrial,
+            ..
+        } => table.other_on_trial(),
+        error => connection.failed(&error),
+    })
+}
+
 /// Whether a lower speed may help.
 const fn is_silence(error: &UploadError) -> bool {
-    use crate::device::DeviceError::NoAnswer;
     matches!(
         error,
-        UploadError::Stalled { .. } | UploadError::Device(NoAnswer { .. })
+        UploadError::Stalled { .. } | UploadError::Device(DeviceError::NoAnswer { .. })
     )
 }
 
@@ -235,13 +255,13 @@ impl Ending<'_> {
             let message = format!("{}: the device uses another table by now", connection.port);
             return Err(Failure::new(Kind::Device, message, "Run `iltm status`."));
         }
-        if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
-            trial::keep(connection, name)?;
-            trial_ms = 0;
-        }
         if trial_ms > 0 {
             self.output
                 .event(&json!({ "event": "trial", "seconds": trial_ms.div_ceil(1_000) }));
+        }
+        if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
+            trial::keep(connection, name)?;
+            trial_ms = 0;
         }
         let mut text = match (trial_ms, self.arguments.confirm && in_use.trial_ms > 0) {
             (0, true) => format!("Table {name} {how}, confirmed.\n"),
