@@ -9,7 +9,7 @@
 mod preflight;
 mod show;
 
-use super::active::Active;
+use super::active::{Active, Asked, Lost};
 use super::args::Flash;
 use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
@@ -83,7 +83,11 @@ fn flash(
     }
     interrupt::catch();
     let plan = Plan::make(&mut connection.client, &parcel, interrupt::stopped);
-    let plan = plan.map_err(|error| failed(connection, &error))?;
+    let mut lost = Lost {
+        before: super::slots::in_use(&slots),
+        asked: Asked::Transfer,
+    };
+    let plan = plan.map_err(|error| failed(connection, &error, lost))?;
     announce(table, &plan, connection, output);
     if arguments.dry_run {
         output.result(
@@ -111,6 +115,7 @@ fn flash(
                     "restarts": summary.restarts,
                 }),
             );
+            lost.asked = Asked::Trial;
             upload.activate(Duration::from_secs(arguments.trial.into()), &mut show)
         });
         match result {
@@ -124,13 +129,18 @@ fn flash(
                 );
             }
             Err(error) => {
-                show.end();
-                return Err(failed(connection, &error));
+                show.stop();
+                return Err(failed(connection, &error, lost));
             }
         }
     };
     show.end();
-    ending.end(connection, in_use, "is in use")
+    lost.asked = Asked::Confirmation;
+    let ended = ending.end(connection, in_use, "is in use");
+    ended.map_err(|failure| match failure.active {
+        Some(Active::Unknown) => failure.with(Active::Lost(lost)),
+        _ => failure,
+    })
 }
 
 /// Asks a device with a table on trial for the trial of this file, which changes
@@ -160,9 +170,12 @@ const fn is_silence(error: &UploadError) -> bool {
     )
 }
 
-fn failed(connection: &mut Connection, error: &UploadError) -> Failure {
+fn failed(connection: &mut Connection, error: &UploadError, lost: Lost) -> Failure {
     let message = format!("{}: {error}", connection.port);
-    let active = Active::ask(&mut connection.client);
+    let active = match Active::ask(&mut connection.client) {
+        Active::Unknown => Active::Lost(lost),
+        known => known,
+    };
     Failure::new(error.into(), message, error.next_step()).with(active)
 }
 
