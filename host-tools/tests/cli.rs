@@ -2,6 +2,7 @@
 //! has a message with its place and the next step, an exit code of its kind, and
 //! leaves no half-written output.
 
+use ed25519_dalek::{Signature, VerifyingKey};
 use image::{ImageReader, Luma};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -336,6 +337,90 @@ fn solve_in_json_is_one_object_with_the_figures() {
     let error = |name: &str| data["predicted_error"][name].as_f64().expect("a number");
     assert!(error("compensated") < error("gain_only"));
     assert!(error("gain_only") < error("uncompensated"));
+}
+
+/// A folder with a key, and the sample's table signed with it in one go as
+/// `signed.iltm`, and afterwards as `later.iltm`.
+fn signed() -> &'static TempDir {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("plain.iltm"), table()).expect("writable");
+        let terms = ["--key", "iltm.key", "--table-version", "3"];
+        let solve = ["solve", SAMPLE, "-o", "signed.iltm"];
+        let sign = ["sign", "plain.iltm", "-o", "later.iltm"];
+        for command in [
+            vec!["key", "new"],
+            [&solve[..], &terms].concat(),
+            [&sign[..], &terms].concat(),
+        ] {
+            let output = run(folder.path(), &command);
+            assert!(output.status.success(), "{}", said(&output));
+        }
+        folder
+    })
+}
+
+#[test]
+fn a_table_signed_by_solve_and_one_signed_afterwards_have_the_key_s_signature() {
+    let folder = signed();
+    let output = run(folder.path(), &["--json", "key", "show", "iltm.key"]);
+    let shown: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let digits = shown["public_key"].as_str().expect("hexadecimal");
+    let byte = |at| u8::from_str_radix(&digits[2 * at..2 * at + 2], 16).expect("hexadecimal");
+    let public: [u8; 32] = std::array::from_fn(byte);
+    let public = VerifyingKey::from_bytes(&public).expect("a point");
+    let [once, later] = ["signed.iltm", "later.iltm"].map(|name| {
+        let file = fs::read(folder.path().join(name)).expect("written");
+        // Image and the first 32 bytes of the seal, then the signature.
+        let (message, signature) = file.split_at(file.len() - 64);
+        let signature = Signature::from_slice(signature).expect("64 bytes");
+        public.verify_strict(message, &signature).expect("good");
+        let (image, seal) = message.split_at(message.len() - 32);
+        assert_eq!(&seal[..4], b"SEAL");
+        assert_eq!(seal[8..12], 3_u32.to_le_bytes());
+        let output = run(folder.path(), &["inspect", name, "--key", "iltm.key"]);
+        assert!(said(&output).contains("(verified)"), "{}", said(&output));
+        image.to_vec()
+    });
+    assert_eq!(later, table());
+    assert_eq!(once, later);
+}
+
+#[test]
+fn inspect_refuses_a_table_that_another_key_signed_or_nobody() {
+    let folder = signed();
+    let output = run(folder.path(), &["key", "new", "-o", "other.key"]);
+    assert!(output.status.success(), "{}", said(&output));
+    let inspect = |name, key| {
+        let output = run(folder.path(), &["inspect", name, "--key", key]);
+        output.status.code()
+    };
+    assert_eq!(inspect("signed.iltm", "other.key"), Some(22));
+    assert_eq!(inspect("plain.iltm", "iltm.key"), Some(21));
+    let mut altered = fs::read(folder.path().join("signed.iltm")).expect("written");
+    *altered.last_mut().expect("long") ^= 1;
+    fs::write(folder.path().join("altered.iltm"), altered).expect("writable");
+    assert_eq!(inspect("altered.iltm", "iltm.key"), Some(23));
+}
+
+#[test]
+fn a_signed_table_compensates_as_the_same_one_unsigned() {
+    let folder = signed();
+    let wanted = image::GrayImage::from_fn(64, 40, |x, y| Luma([(3 * x + 2 * y) as u8]));
+    wanted.save(folder.path().join("w.png")).expect("writable");
+    let [plain, signed] = ["plain", "later"].map(|name| {
+        let (table, picture) = (format!("{name}.iltm"), format!("{name}.png"));
+        let output = run(
+            folder.path(),
+            &["compensate", &table, "w.png", "-o", &picture],
+        );
+        assert!(output.status.success(), "{}", said(&output));
+        let reader = ImageReader::open(folder.path().join(picture)).expect("written");
+        reader.decode().expect("a picture").into_luma8()
+    });
+    assert_eq!(plain, signed);
+    assert_ne!(plain, wanted);
 }
 
 #[test]

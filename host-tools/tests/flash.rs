@@ -190,7 +190,7 @@ fn in_json_every_step_is_a_line_and_the_last_one_the_result() {
     let mut kinds = names.clone();
     kinds.dedup();
     let kinds: Vec<_> = kinds.into_iter().flatten().collect();
-    assert_eq!(kinds, ["started", "progress", "verified", "done"]);
+    assert_eq!(kinds, ["started", "progress", "verified", "trial", "done"]);
     let (started, done) = (&events[0], &events[events.len() - 1]);
     assert_eq!(started["bytes"], tables()[0].len());
     assert_eq!(started["to_send"], tables()[0].len());
@@ -254,6 +254,55 @@ fn the_table_that_is_in_use_is_not_sent_again() {
     assert_eq!(writes(&port), sent);
     let after = port.look(|device| device.tables().contents());
     assert_eq!(after[slot(0)], before[slot(0)]);
+}
+
+#[test]
+fn a_table_that_was_signed_again_to_revoke_others_is_another_file() {
+    let (user, port) = (User::new(), strict_device());
+    let sent = writes(&port);
+    let flash = |name: &str| {
+        let flash = ["flash", name, "--confirm", "--port", port.path()];
+        user.says(&flash)
+    };
+    user.write("5.iltm", &signed(&tables()[0], 5));
+    let said = flash("5.iltm");
+    assert!(said.ends_with("is in use already.\n"), "{said}");
+    assert_eq!(writes(&port), sent);
+    let terms = SealTerms {
+        version: 5,
+        oldest: 5,
+        device: 0,
+    };
+    let revoking = sign(&tables()[0], &key(), terms).expect("a table");
+    user.write("revoking.iltm", &revoking);
+    let said = user.says(&["flash", "revoking.iltm", "--port", port.path()]);
+    assert!(said.contains("is in use, on trial"), "{said}");
+    assert_eq!(writes(&port), sent + revoking.len().div_ceil(CHUNK));
+    // By now both are there under one name, and the device tells them apart.
+    user.fails(26, &["flash", "5.iltm", "--port", port.path()]);
+    let said = flash("revoking.iltm");
+    assert!(said.contains("is in use already, confirmed"), "{said}");
+    assert_eq!(writes(&port), sent + revoking.len().div_ceil(CHUNK));
+}
+
+#[test]
+fn who_signed_a_table_matters_on_a_device_that_has_no_key_yet() {
+    let (user, port) = (User::new(), device());
+    let terms = SealTerms {
+        version: 1,
+        oldest: 0,
+        device: 0,
+    };
+    for seed in [8, 7] {
+        let key = SigningKey::from_bytes(&[seed; 32]);
+        let file = sign(&tables()[0], &key, terms).expect("a table");
+        user.write("t.iltm", &file);
+        let said = user.says(&["flash", "t.iltm", "--confirm", "--port", port.path()]);
+        assert!(said.contains("is in use, confirmed"), "{said}");
+        let contents = port.look(|device| device.tables().contents());
+        let slots = [slot(0), slot(1)].map(|slot| contents[slot].starts_with(&file));
+        assert!(slots.contains(&true), "seed {seed}");
+    }
 }
 
 #[test]
@@ -456,6 +505,39 @@ fn an_excluded_port_is_never_opened() {
     user.exclude(&[]);
     user.says(&["status"]);
     assert_ne!(port.look(|device| device.heard), 0);
+}
+
+#[test]
+fn a_terminal_that_has_the_remembered_name_by_now_is_not_asked() {
+    let (user, port) = (User::new(), device());
+    let folders = user.folders();
+    let board = emulated::register(&folders, port.path(), "one").expect("writable");
+    user.says(&["status"]);
+    let config = fs::read_to_string(user.path("config/config.toml")).expect("there");
+    assert!(config.contains(port.path()), "remembered: {config}");
+    drop(board);
+    let heard = port.look(|device| device.heard);
+    let said = user.fails(14, &["status"]);
+    assert!(said.contains("there is no serial port to ask"), "{said}");
+    assert_eq!(port.look(|device| device.heard), heard);
+    // Whoever names it means it.
+    user.says(&["status", "--port", port.path()]);
+}
+
+#[test]
+fn an_included_port_is_asked_and_one_that_is_excluded_too_is_not() {
+    let (user, port) = (User::new(), device());
+    let settings = |exclude: &str| {
+        let (path, own) = (port.path(), "\"/dev/tty*\", \"/dev/cu*\"");
+        let text = format!("include = [\"{path}\"]\nexclude = [{own}{exclude}]\n");
+        user.write("config/config.toml", text.as_bytes());
+    };
+    settings(", \"/dev/pts/*\"");
+    user.fails(14, &["status"]);
+    assert_eq!(port.look(|device| device.heard), 0);
+    settings("");
+    let data = &user.events(&["status"])[0];
+    assert_eq!(data["port"], port.path());
 }
 
 #[test]

@@ -16,8 +16,57 @@ pub(super) enum Active {
     },
     /// It does not answer.
     Unknown,
+    /// It does not answer any more.
+    Lost(Lost),
     /// It was not asked, nor sent anything.
     Untouched,
+}
+
+/// A device that was lost during an update.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Lost {
+    /// The table in use when it was last asked.
+    pub(super) before: Option<TableName>,
+    /// What it was asked for since.
+    pub(super) asked: Asked,
+}
+
+/// How far an update had come, as seen from the host: the device may have done what it
+/// was asked for last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Asked {
+    /// To receive.
+    Transfer,
+    /// To use the table on trial.
+    Trial,
+    /// To keep it.
+    Confirmation,
+}
+
+impl fmt::Display for Lost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("The device cannot be asked now. ")?;
+        let before = match self.before {
+            Some(table) => format!("table {table}"),
+            None => "no table, frames passing unchanged,".to_owned(),
+        };
+        match self.asked {
+            Asked::Transfer => write!(
+                f,
+                "It goes on with {before} as before: the new one was not activated."
+            ),
+            Asked::Trial => write!(
+                f,
+                "The new table may be on trial; when that is over, or at the next start, the \
+                 device goes back to {before} by itself."
+            ),
+            Asked::Confirmation => write!(
+                f,
+                "If the confirmation has reached it the new table stays in use; if not, the \
+                 device goes back to {before} by itself."
+            ),
+        }
+    }
 }
 
 impl Active {
@@ -48,6 +97,15 @@ impl Active {
                 "trial_ms": trial_ms,
             }),
             Self::Unknown | Self::Untouched => json!({ "known": false }),
+            Self::Lost(Lost { before, asked }) => json!({
+                "known": false,
+                "before": table_name(*before),
+                "asked": match asked {
+                    Asked::Transfer => "transfer",
+                    Asked::Trial => "trial",
+                    Asked::Confirmation => "confirmation",
+                },
+            }),
         }
     }
 }
@@ -70,6 +128,7 @@ impl fmt::Display for Active {
             Self::Known { table: None, .. } => {
                 f.write_str("No table is in use: frames pass unchanged.")
             }
+            Self::Lost(lost) => lost.fmt(f),
             Self::Untouched => {
                 f.write_str("Nothing was sent: the device goes on with the table that it has.")
             }

@@ -270,6 +270,12 @@ pub(super) struct Emulate {
     /// File that holds the board's memory and keeps it for the next time
     #[arg(long, value_name = "FILE")]
     pub(super) memory: Option<PathBuf>,
+    /// Key that the board gets in its factory: it takes only tables signed with it
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
+    /// Number that the board gets with the key
+    #[arg(long, value_name = "NUMBER", value_parser = device_number, default_value = "0", hide_default_value = true, requires = "key")]
+    pub(super) device: u64,
 }
 
 /// A number, or the 16 hexadecimal digits that `iltm status` shows.

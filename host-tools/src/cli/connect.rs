@@ -3,7 +3,8 @@
 use super::args::SerialLine;
 use super::failure::{Failure, Kind};
 use super::output::Output;
-use crate::device::ports::{self, Candidate, Found};
+use crate::device::candidates::{Candidate, Candidates};
+use crate::device::ports::{self, Found};
 use crate::device::transcript::Transcribed;
 use crate::device::{Client, DeviceError, Patience, Port};
 use crate::user::{Config, Folders};
@@ -42,7 +43,10 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
     let folders = Folders::of_user();
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
-    if let Some(port) = config.port.clone().filter(|port| !config.excludes(port)) {
+    let candidates = folders.map(|folders| Candidates::find(&folders, &config));
+    let candidates = candidates.unwrap_or_default();
+    let may_be_asked = |port: &String| !config.excludes(port) && candidates.may_ask_again(port);
+    if let Some(port) = config.port.clone().filter(may_be_asked) {
         let greeted = ports::greet(&port, line.baud, REMEMBERED, Transcribed::new);
         match greeted {
             Ok((client, baud)) => return Ok(Connection::new(client, &port, baud, None)),
@@ -52,10 +56,9 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
             Err(_) => output.remark(&format!("no device at {port}; asking the other ports")),
         }
     }
-    let candidates = folders.map_or_else(Vec::new, |it| ports::candidates(&it, &config));
-    let (mut found, silent) = ports::ask(&candidates, line.baud);
+    let (mut found, silent) = ports::ask(&candidates.asked, line.baud);
     let found = match found.len() {
-        0 => return Err(nobody(&silent)),
+        0 => return Err(nobody(&silent, &candidates.unasked)),
         1 => found.remove(0),
         _ => choose(found, output)?,
     };
@@ -130,17 +133,25 @@ impl Connection {
     }
 }
 
-fn nobody(silent: &[(Candidate, DeviceError)]) -> Failure {
+fn nobody(silent: &[(Candidate, DeviceError)], unasked: &[Candidate]) -> Failure {
+    let mut message = if silent.is_empty() {
+        "there is no serial port to ask".to_owned()
+    } else {
+        "no device answers".to_owned()
+    };
+    for (candidate, error) in silent {
+        let _ = write!(message, "; {}: {error}", candidate.path);
+    }
+    if !unasked.is_empty() {
+        let names: Vec<_> = unasked.iter().map(|port| port.path.as_str()).collect();
+        let _ = write!(message, "; not asked: {}", names.join(", "));
+    }
     if silent.is_empty() {
         return Failure::new(
             Kind::NoDevice,
-            "there is no serial port to ask",
+            message,
             "Plug the device in, or name its port with --port; `iltm emulate` runs one without hardware.",
         );
-    }
-    let mut message = "no device answers".to_owned();
-    for (candidate, error) in silent {
-        let _ = write!(message, "; {}: {error}", candidate.path);
     }
     // What keeps a port from being asked matters more than silence.
     let unopened = silent.iter().map(|(_, error)| error);

@@ -5,7 +5,8 @@ use super::compensate;
 use super::failure::{Failure, Kind};
 use super::inspect::check;
 use super::interrupt;
-use super::output::{Output, cannot_read, read_file};
+use super::output::{Output, cannot_read, cannot_write, read_file};
+use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frames::Frames;
 use crate::device::memory::Memory;
@@ -32,6 +33,9 @@ const RATE: f64 = 25.0;
 
 pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     let memory = memory(arguments)?;
+    if let Some(path) = &arguments.key {
+        provision(&memory, path, arguments.device)?;
+    }
     let image = arguments.table.as_deref().map(read_file).transpose()?;
     let table = match (&arguments.table, &image) {
         (Some(path), Some(image)) => Some(check(path, image)?),
@@ -93,6 +97,22 @@ fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
         })?,
     };
     Ok(memory)
+}
+
+fn provision(memory: &Memory, path: &Path, device: u64) -> Result<(), Failure> {
+    let key = read_public_key(path)?;
+    let provisioned = memory.provision(key.to_bytes(), device);
+    provisioned.map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => Failure::new(
+            Kind::HasKey,
+            format!(
+                "{}: the board has another key or number",
+                memory.path().display()
+            ),
+            "A device keeps them for good: give the same --key and --device, or another --memory.",
+        ),
+        _ => cannot_write(memory.path(), &error),
+    })
 }
 
 fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> {
@@ -201,6 +221,7 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
             "firmware": shown(firmware),
             "table": arguments.table.as_deref().map(shown),
             "memory": arguments.memory.as_deref().map(shown),
+            "key": arguments.key.as_deref().map(shown),
         });
         writeln!(out, "{data}")
     } else {

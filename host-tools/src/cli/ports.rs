@@ -5,7 +5,8 @@ use super::failure::Failure;
 use super::output::Output;
 use super::status::{identity, table_name};
 use crate::device::DeviceError;
-use crate::device::ports::{Candidate, Found, ask, candidates};
+use crate::device::candidates::{Candidate, Candidates};
+use crate::device::ports::{Found, ask};
 use crate::user::{Config, Folders};
 use serde_json::json;
 use std::fmt::Write;
@@ -14,8 +15,9 @@ pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
     let folders = Folders::of_user();
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
-    let candidates = folders.map_or_else(Vec::new, |it| super::ports::candidates(&it, &config));
-    let (found, silent) = ask(&candidates, arguments.baud);
+    let candidates = folders.map(|folders| Candidates::find(&folders, &config));
+    let Candidates { asked, unasked } = candidates.unwrap_or_default();
+    let (found, silent) = ask(&asked, arguments.baud);
     let devices = found.iter().map(|found| {
         let mut data = identity(&found.device);
         data["port"] = json!(found.candidate.path);
@@ -31,12 +33,20 @@ pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
             "reason": error.to_string(),
         })
     });
+    let not_asked = unasked
+        .iter()
+        .map(|port| json!({ "port": port.path, "about": port.about }));
     let data = json!({
         "devices": devices.collect::<Vec<_>>(),
         "others": others.collect::<Vec<_>>(),
+        "not_asked": not_asked.collect::<Vec<_>>(),
         "remembered": config.port,
     });
-    output.result(&data, &text(&found, &silent, config.port.as_deref()));
+    let mut text = text(&found, &silent, config.port.as_deref());
+    for port in unasked {
+        let _ = writeln!(text, "  {}  not asked; name it with --port", port.path);
+    }
+    output.result(&data, &text);
     Ok(())
 }
 

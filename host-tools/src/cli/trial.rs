@@ -22,7 +22,8 @@ pub(super) fn confirm(line: &SerialLine, output: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-/// Keeps the table that is on trial.
+/// Keeps the table that is on trial. A failure says which table is in use, if it can
+/// be asked.
 pub(super) fn keep(connection: &mut Connection, table: TableName) -> Result<(), Failure> {
     match connection.client.confirm(table.id) {
         Ok(_) => Ok(()),

@@ -82,7 +82,15 @@ pub enum EmulatorError {
         /// Its first words.
         said: String,
     },
-    /// QEMU has ended.
+    /// QEMU ran and does not any more.
+    #[error("the emulated board has gone ({status}); the emulator says: {said}")]
+    Gone {
+        /// How it ended.
+        status: String,
+        /// Its last words.
+        said: String,
+    },
+    /// QEMU has ended at once.
     #[error("the emulator ended ({status}); it says: {said}")]
     Ended {
         /// How.
@@ -103,6 +111,9 @@ impl EmulatorError {
             Self::Start { .. } => "Check that it may be run: `qemu-system-arm --version`.",
             Self::Firmware { .. } => {
                 "Check the name, or build the firmware: `runtime/firmware/build.sh mps2-an500`."
+            }
+            Self::Gone { .. } => {
+                "Start it again: with the same --memory it finds its tables there."
             }
             Self::NoPort { .. } | Self::Ended { .. } => {
                 "Check that the firmware is an ELF file for this board, and QEMU's version: 7.2 works."
@@ -158,12 +169,12 @@ impl Emulator {
     /// That the board still runs.
     ///
     /// # Errors
-    /// [`EmulatorError::Ended`].
+    /// [`EmulatorError::Gone`].
     pub fn check(&mut self) -> Result<(), EmulatorError> {
         match self.child.try_wait() {
             Ok(None) => Ok(()),
-            Ok(Some(status)) => Err(self.ended(status.to_string())),
-            Err(error) => Err(self.ended(error.to_string())),
+            Ok(Some(status)) => Err(self.gone(status.to_string())),
+            Err(error) => Err(self.gone(error.to_string())),
         }
     }
 
@@ -193,12 +204,21 @@ impl Emulator {
     }
 
     fn ended(&mut self, status: String) -> EmulatorError {
-        // The last words may still be on their way.
+        let said = self.last_words();
+        EmulatorError::Ended { status, said }
+    }
+
+    fn gone(&mut self, status: String) -> EmulatorError {
+        let said = self.last_words();
+        EmulatorError::Gone { status, said }
+    }
+
+    fn last_words(&mut self) -> String {
+        // They may still be on their way.
         while let Ok(line) = self.lines.recv_timeout(Duration::from_millis(200)) {
             self.said.push(line);
         }
-        let said = self.said();
-        EmulatorError::Ended { status, said }
+        self.said()
     }
 
     /// What it said that matters: a crash ends with pages of registers.

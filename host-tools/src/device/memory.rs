@@ -6,6 +6,7 @@
 
 use iltm_runtime::exchange::layout::CONTROL_WORDS;
 use iltm_runtime::exchange::{ControlWords, psram};
+use iltm_runtime::store::identity_record;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::ops::Range;
@@ -95,6 +96,24 @@ impl Memory {
         self.write(&psram::SLOT_A, file)
     }
 
+    /// Gives the board a public key and a number, as its factory would.
+    ///
+    /// # Errors
+    /// What the operating system says, and [`io::ErrorKind::AlreadyExists`] if it has
+    /// others.
+    pub fn provision(&self, key: [u8; 32], device: u64) -> io::Result<()> {
+        let record = identity_record(key, device);
+        let mut there = [0; psram::SECTOR];
+        self.read(&psram::IDENTITY, &mut there)?;
+        if there.starts_with(&record) {
+            return Ok(());
+        }
+        if there.iter().any(|byte| *byte != 0xFF) {
+            return Err(io::ErrorKind::AlreadyExists.into());
+        }
+        self.write(&psram::IDENTITY, &record)
+    }
+
     /// The file.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -181,6 +200,23 @@ mod tests {
         std::fs::write(&path, b"something else").expect("writable");
         let error = Memory::kept(&path).expect_err("too short");
         assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+    }
+
+    #[test]
+    fn a_board_has_one_key_and_one_number() {
+        let memory = Memory::temporary().expect("a temporary file");
+        memory.provision([7; 32], 9).expect("it has none");
+        memory.put_table(b"table").expect("room");
+        memory.provision([7; 32], 9).expect("the same");
+        for (key, device) in [([8; 32], 9), ([7; 32], 10)] {
+            let error = memory.provision(key, device).expect_err("others");
+            assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        }
+        let mut record = [0; 44];
+        memory.read(&psram::IDENTITY, &mut record).expect("there");
+        assert_eq!(&record[..4], b"ILTI");
+        assert_eq!(record[4..36], [7; 32]);
+        assert_eq!(record[36..], 9_u64.to_le_bytes());
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! | requests, answers, events | [`client`] |
 //! | requests about tables | [`tables`] |
 //! | a table's file on its way, whatever breaks | [`upload`] |
+//! | ports that may be asked | [`candidates`] |
 //! | ports that a device answers at | [`ports`] |
 //! | what was said, in words | [`transcript`] |
 //! | log messages, with the firmware's ELF file | [`logs`] |
@@ -17,6 +18,7 @@
 //! What goes over the line is defined in [`iltm_runtime::link`], which the device
 //! uses as well.
 
+pub mod candidates;
 pub mod client;
 #[cfg(unix)]
 pub mod emulator;

@@ -1,11 +1,10 @@
-//! Which ports there are, and which of them a device answers at.
+//! Which ports a device answers at, and at which speed.
 
+use super::candidates::Candidate;
 use super::client::{Client, Patience};
 use super::port::{BAUD, Port};
 use super::{DeviceError, Line};
-use crate::user::{Config, Folders, emulated};
 use iltm_runtime::link::{Hello, Status};
-use serialport::SerialPortType;
 use std::thread;
 use std::time::Duration;
 
@@ -17,55 +16,6 @@ pub const SHORT: Patience = Patience {
     answer: Duration::from_millis(250),
     tries: 2,
 };
-
-/// A port that may have a device behind it.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub struct Candidate {
-    /// Its name.
-    pub path: String,
-    /// What the system says about it; may be empty.
-    pub about: String,
-}
-
-/// Ports of this machine and of emulated boards, without those that the user excluded.
-#[must_use]
-pub fn candidates(folders: &Folders, config: &Config) -> Vec<Candidate> {
-    let mut found = of_machine();
-    found.extend(
-        emulated::registered(folders)
-            .into_iter()
-            .map(|(path, board)| Candidate {
-                path,
-                about: format!("emulated {board}"),
-            }),
-    );
-    found.retain(|candidate| !config.excludes(&candidate.path));
-    found.sort();
-    found.dedup_by(|a, b| a.path == b.path);
-    found
-}
-
-fn of_machine() -> Vec<Candidate> {
-    // Without this folder, serialport does not return.
-    if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").is_dir() {
-        return Vec::new();
-    }
-    let ports = serialport::available_ports().unwrap_or_default();
-    let candidate = |port: serialport::SerialPortInfo| {
-        let about = match port.port_type {
-            SerialPortType::UsbPort(usb) => {
-                let parts = [usb.manufacturer, usb.product, usb.serial_number];
-                let parts: Vec<_> = parts.into_iter().flatten().collect();
-                parts.join(" ")
-            }
-            _ => String::new(),
-        };
-        // On macOS the `tty` of a pair waits for a carrier that these devices lack.
-        let path = port.port_name;
-        Candidate { path, about }
-    };
-    ports.into_iter().map(candidate).collect()
-}
 
 /// A device that answers.
 #[derive(Clone, PartialEq, Eq, Debug)]

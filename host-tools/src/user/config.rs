@@ -2,8 +2,11 @@
 //!
 //! ```toml
 //! port = "/dev/ttyACM0"              # remembered: where a device answered last
-//! exclude = ["/dev/ttyS*"]           # never opened unless named with --port
+//! include = ["/dev/ttyAMA0"]         # asked too, though soldered to this machine
+//! exclude = ["/dev/ttyUSB*"]         # never opened unless named with --port
 //! ```
+//!
+//! A port that both lists name is excluded.
 
 use super::Folders;
 use glob::Pattern;
@@ -21,6 +24,7 @@ const NAME: &str = "config.toml";
 pub struct Config {
     /// The port that is asked first.
     pub port: Option<String>,
+    include: Vec<Pattern>,
     exclude: Vec<Pattern>,
     path: PathBuf,
 }
@@ -29,6 +33,8 @@ pub struct Config {
 #[serde(deny_unknown_fields)]
 struct Written {
     port: Option<String>,
+    #[serde(default)]
+    include: Vec<String>,
     #[serde(default)]
     exclude: Vec<String>,
 }
@@ -53,10 +59,12 @@ pub enum ConfigError {
         reason: String,
     },
     /// A pattern is none.
-    #[error("{}: the pattern \"{pattern}\" in `exclude`: {reason}", path.display())]
+    #[error("{}: the pattern \"{pattern}\" in `{list}`: {reason}", path.display())]
     Pattern {
         /// The file.
         path: PathBuf,
+        /// The list that it is in.
+        list: &'static str,
         /// The pattern.
         pattern: String,
         /// What is wrong with it.
@@ -76,22 +84,36 @@ impl Config {
             path: path.clone(),
             reason: error.to_string().trim_end().to_owned(),
         })?;
-        let pattern = |text: &String| {
-            Pattern::new(text).map_err(|error| ConfigError::Pattern {
-                path: path.clone(),
-                pattern: text.clone(),
-                reason: error.msg.to_owned(),
-            })
+        let patterns = |list, texts: &[String]| {
+            let pattern = |text: &String| {
+                Pattern::new(text).map_err(|error| ConfigError::Pattern {
+                    path: path.clone(),
+                    list,
+                    pattern: text.clone(),
+                    reason: error.msg.to_owned(),
+                })
+            };
+            texts.iter().map(pattern).collect::<Result<_, _>>()
         };
         Ok(Self {
             port: written.port,
-            exclude: written
-                .exclude
-                .iter()
-                .map(pattern)
-                .collect::<Result<_, _>>()?,
+            include: patterns("include", &written.include)?,
+            exclude: patterns("exclude", &written.exclude)?,
             path,
         })
+    }
+
+    /// Whether a port is to be asked whatever kind it is, unless it is excluded.
+    #[must_use]
+    pub fn includes(&self, port: &str) -> bool {
+        self.include.iter().any(|pattern| pattern.matches(port))
+    }
+
+    /// Ports that are included by their whole name, which need be in no list of the
+    /// system.
+    pub fn included(&self) -> impl Iterator<Item = &str> {
+        let names = self.include.iter().map(Pattern::as_str);
+        names.filter(|name| !name.contains(['*', '?', '[']))
     }
 
     /// Whether a port must not be opened.
@@ -187,7 +209,12 @@ mod tests {
 
     #[test]
     fn what_cannot_be_read_is_an_error_and_not_an_empty_list() {
-        for text in ["exclude = 3", "exlude = []", "exclude = [\"[\"]"] {
+        for text in [
+            "exclude = 3",
+            "exlude = []",
+            "exclude = [\"[\"]",
+            "include = [\"[\"]",
+        ] {
             let (_folder, folders) = folders(text);
             let error = Config::read(&folders).expect_err("not good").to_string();
             assert!(error.contains("config.toml"), "{error}");

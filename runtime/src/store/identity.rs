@@ -1,9 +1,18 @@
 //! The device's key and number: a record that is written once.
 
 use super::map::Part;
-use super::record::{self, Identity, Place, places};
+use super::record::{self, Identity, Place, RECORD, places};
 use super::{StoreError, flash};
 use embedded_storage::nor_flash::NorFlash;
+
+/// What a factory programs at the start of the erased identity sector, so that the
+/// device never takes a table from a stranger: the public key that its tables are
+/// signed with, and the device's number. The device itself writes the same when it is
+/// asked to.
+#[must_use]
+pub fn identity_record(key: [u8; 32], device: u64) -> [u8; RECORD] {
+    record::bytes(&Identity { key, device })
+}
 
 /// Finds the identity; the first that is whole counts.
 pub(super) fn find<F: NorFlash>(flash: &mut F, part: Part) -> Option<Identity> {

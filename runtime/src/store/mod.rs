@@ -32,6 +32,7 @@ mod transfer;
 mod updater;
 
 pub use error::StoreError;
+pub use identity::identity_record;
 pub use map::{Map, MapError};
 pub use record::RECORD;
 pub use transfer::MAX_CHUNK;

@@ -186,13 +186,18 @@ pub(super) fn write<F: NorFlash, R: Record>(
     index: u32,
     record: &R,
 ) -> Result<(), StoreError> {
+    flash::write(flash, part, place(index), &bytes(record))
+}
+
+/// A record as it is in the flash.
+pub(super) fn bytes<R: Record>(record: &R) -> [u8; RECORD] {
     let mut bytes = [0; RECORD];
     put(&mut bytes, field::MAGIC, &R::MAGIC);
     record.write(&mut bytes);
     let covered = bytes.get(..field::CRC.start).unwrap_or_default();
     let crc = crc32(&[covered]);
     put(&mut bytes, field::CRC, &crc.to_le_bytes());
-    flash::write(flash, part, place(index), &bytes)
+    bytes
 }
 
 /// Records that a part has places for.

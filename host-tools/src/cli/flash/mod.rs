@@ -9,16 +9,17 @@
 mod preflight;
 mod show;
 
-use super::active::Active;
+use super::active::{Active, Asked, Lost};
 use super::args::Flash;
 use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
 use super::output::{Output, read_file};
 use super::slots::letter;
 use super::{interrupt, trial};
+use crate::device::DeviceError;
 use crate::device::upload::{Parcel, Plan, Summary, Upload, UploadError};
 use crate::user::{Folders, transcripts};
-use iltm_runtime::link::InUse;
+use iltm_runtime::link::{InUse, Refusal};
 use preflight::{Named, Now};
 use serde_json::json;
 use show::Show;
@@ -60,14 +61,15 @@ fn flash(
 ) -> Result<(), Failure> {
     let slots = connection.client.slots();
     let slots = slots.map_err(|error| connection.failed(&error))?;
+    let parcel = Parcel::new(bytes);
     let in_use = match table.check(connection.client.device(), &slots)? {
         Now::Send => None,
-        Now::InUse { trial_ms } => Some(InUse {
+        Now::InUse => Some(InUse {
             table: Some(table.name),
-            trial_ms,
+            trial_ms: 0,
         }),
+        Now::OnTrial => Some(on_trial(arguments, table, &parcel, connection)?),
     };
-    let parcel = Parcel::new(bytes);
     let mut ending = Ending {
         arguments,
         table,
@@ -81,7 +83,11 @@ fn flash(
     }
     interrupt::catch();
     let plan = Plan::make(&mut connection.client, &parcel, interrupt::stopped);
-    let plan = plan.map_err(|error| failed(connection, &error))?;
+    let mut lost = Lost {
+        before: super::slots::in_use(&slots),
+        asked: Asked::Transfer,
+    };
+    let plan = plan.map_err(|error| failed(connection, &error, lost))?;
     announce(table, &plan, connection, output);
     if arguments.dry_run {
         output.result(
@@ -109,6 +115,7 @@ fn flash(
                     "restarts": summary.restarts,
                 }),
             );
+            lost.asked = Asked::Trial;
             upload.activate(Duration::from_secs(arguments.trial.into()), &mut show)
         });
         match result {
@@ -122,27 +129,53 @@ fn flash(
                 );
             }
             Err(error) => {
-                show.end();
-                return Err(failed(connection, &error));
+                show.stop();
+                return Err(failed(connection, &error, lost));
             }
         }
     };
     show.end();
-    ending.end(connection, in_use, "is in use")
+    lost.asked = Asked::Confirmation;
+    let ended = ending.end(connection, in_use, "is in use");
+    ended.map_err(|failure| match failure.active {
+        Some(Active::Unknown) => failure.with(Active::Lost(lost)),
+        _ => failure,
+    })
+}
+
+/// Asks a device with a table on trial for the trial of this file, which changes
+/// nothing: it is that one, by its digest, or the device refuses.
+fn on_trial(
+    arguments: &Flash,
+    table: &Named,
+    parcel: &Parcel<'_>,
+    connection: &mut Connection,
+) -> Result<InUse, Failure> {
+    let trial = Duration::from_secs(arguments.trial.into());
+    let asked = connection.client.activate(parcel.transfer(), trial);
+    asked.map_err(|error| match error {
+        DeviceError::Refused {
+            refusal: Refusal::OnTrial,
+            ..
+        } => table.other_on_trial(),
+        error => connection.failed(&error),
+    })
 }
 
 /// Whether a lower speed may help.
 const fn is_silence(error: &UploadError) -> bool {
-    use crate::device::DeviceError::NoAnswer;
     matches!(
         error,
-        UploadError::Stalled { .. } | UploadError::Device(NoAnswer { .. })
+        UploadError::Stalled { .. } | UploadError::Device(DeviceError::NoAnswer { .. })
     )
 }
 
-fn failed(connection: &mut Connection, error: &UploadError) -> Failure {
+fn failed(connection: &mut Connection, error: &UploadError, lost: Lost) -> Failure {
     let message = format!("{}: {error}", connection.port);
-    let active = Active::ask(&mut connection.client);
+    let active = match Active::ask(&mut connection.client) {
+        Active::Unknown => Active::Lost(lost),
+        known => known,
+    };
     Failure::new(error.into(), message, error.next_step()).with(active)
 }
 
@@ -235,13 +268,13 @@ impl Ending<'_> {
             let message = format!("{}: the device uses another table by now", connection.port);
             return Err(Failure::new(Kind::Device, message, "Run `iltm status`."));
         }
-        if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
-            trial::keep(connection, name)?;
-            trial_ms = 0;
-        }
         if trial_ms > 0 {
             self.output
                 .event(&json!({ "event": "trial", "seconds": trial_ms.div_ceil(1_000) }));
+        }
+        if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
+            trial::keep(connection, name)?;
+            trial_ms = 0;
         }
         let mut text = match (trial_ms, self.arguments.confirm && in_use.trial_ms > 0) {
             (0, true) => format!("Table {name} {how}, confirmed.\n"),

@@ -26,7 +26,10 @@ pub(super) enum Now {
     /// Bring it.
     Send,
     /// Nothing: the device uses it.
-    InUse { trial_ms: u32 },
+    InUse,
+    /// A file of this name and length is on trial: the device knows whether it is this
+    /// one.
+    OnTrial,
 }
 
 impl Named {
@@ -56,17 +59,19 @@ impl Named {
     /// signature itself is the device's to verify.
     pub(super) fn check(&self, device: &Hello, slots: &Slots) -> Result<Now, Failure> {
         if uses(slots, self.name, self.bytes) {
-            let trial_ms = slots.trial_ms;
-            return Ok(Now::InUse { trial_ms });
+            if slots.trial_ms > 0 {
+                return Ok(Now::OnTrial);
+            }
+            if self.tells_all(slots) {
+                return Ok(Now::InUse);
+            }
         }
         let refused = |kind, why: String, next_step: &str| {
             let message = format!("{}: {why}", self.path.display());
             Err(Failure::new(kind, message, next_step))
         };
         if slots.trial_ms > 0 {
-            let why = "another table is on trial on the device".to_owned();
-            let next_step = "Run `iltm confirm` to keep that one, or `iltm rollback`, first.";
-            return refused(Kind::OnTrial, why, next_step);
+            return Err(self.other_on_trial());
         }
         let limits = &device.limits;
         if self.bytes as u64 > u64::from(limits.table_bytes) {
@@ -101,6 +106,25 @@ impl Named {
             Some(rejected) => refused((&rejected).into(), rejected.to_string(), cure(&rejected)),
             None => Ok(Now::Send),
         }
+    }
+
+    /// A device decides on one table at a time.
+    pub(super) fn other_on_trial(&self) -> Failure {
+        let message = format!(
+            "{}: another table is on trial on the device",
+            self.path.display()
+        );
+        let next_step = "Run `iltm confirm` to keep that one, or `iltm rollback`, first.";
+        Failure::new(Kind::OnTrial, message, next_step)
+    }
+
+    /// Whether name and length, which the device tells of a table in use, leave no
+    /// difference to this file that matters. Of a seal they leave out who signed it,
+    /// which a device with a key has verified, and what it revokes: a file that revokes
+    /// versions is brought again, or it might never.
+    fn tells_all(&self, slots: &Slots) -> bool {
+        self.seal
+            .is_none_or(|seal| seal.oldest == 0 && slots.key == Some(seal.key))
     }
 
     /// Why the device's terms do not admit it.

@@ -14,6 +14,8 @@ pub(super) struct Show<'a> {
     output: &'a Output,
     bar: Option<ProgressBar>,
     last: Option<Instant>,
+    /// Bytes that the slot held at last, of so many.
+    held: Option<[u32; 2]>,
 }
 
 impl<'a> Show<'a> {
@@ -22,6 +24,7 @@ impl<'a> Show<'a> {
             output,
             bar: None,
             last: None,
+            held: None,
         }
     }
 
@@ -40,7 +43,18 @@ impl<'a> Show<'a> {
         }
     }
 
+    /// Ends before all has arrived.
+    pub(super) fn stop(&mut self) {
+        self.end();
+        if let Some([done, total]) = self.held.filter(|[done, total]| done < total) {
+            self.output.remark(&format!(
+                "stopped with {done} of {total} bytes in the device's flash"
+            ));
+        }
+    }
+
     fn progress(&mut self, done: u32, skipped: u32, total: u32) {
+        self.held = Some([done, total]);
         let due = self.last.is_none_or(|last| last.elapsed() >= PERIOD);
         if self.output.is_json() && (due || done == total) {
             self.last = Some(Instant::now());
@@ -61,7 +75,7 @@ impl<'a> Show<'a> {
 /// What was there before does not count towards the rate.
 fn bar(skipped: u32, total: u32) -> ProgressBar {
     let bar = ProgressBar::new(total.into()).with_position(skipped.into());
-    let template = "sending  [{bar:30}] {bytes} of {total_bytes}, {bytes_per_sec}, {eta} left";
+    let template = "sending  [{bar:30}] {decimal_bytes} of {decimal_total_bytes}, {decimal_bytes_per_sec}, {eta} left";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.progress_chars("=> "));
     }
