@@ -1,9 +1,10 @@
 //! A device's table slots over simulated flash: the runtime's own updater and gate,
 //! with nothing but memory around them.
 
+use crate::fake_device::FakeDevice;
 use iltm_runtime::fault::NorSimulator;
 use iltm_runtime::image::content;
-use iltm_runtime::link::{Digest, PassThrough, Refusal, Request, Response};
+use iltm_runtime::link::{Device, Digest, Hello, PassThrough, Refusal, Request, Response, Status};
 use iltm_runtime::store::{Map, Shelf, Slot, Updater};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
 use sha2::{Digest as _, Sha512};
@@ -168,6 +169,12 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
         self.updater.flash()
     }
 
+    /// Where its slots are.
+    #[must_use]
+    pub const fn layout(&self) -> Layout {
+        self.layout
+    }
+
     /// Whether frames go through exactly this file.
     #[must_use]
     pub fn runs(&self, file: &[u8]) -> bool {
@@ -249,6 +256,28 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
             Response::Refused(refusal) => Err(refusal),
             _ => Ok(()),
         }
+    }
+}
+
+/// Tables and slots are its own, the rest is made up.
+impl<const W: usize, const E: usize> Device for SimDevice<W, E> {
+    fn identity(&self) -> Hello {
+        Hello {
+            device: self.updater.trust().device,
+            ..FakeDevice::default().identity()
+        }
+    }
+
+    fn status(&self) -> Status {
+        Status {
+            table: self.updater.table(),
+            slots: self.updater.states(),
+            ..FakeDevice::default().status
+        }
+    }
+
+    fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
+        self.updater.answer(request, now_ms, &mut self.shelf)
     }
 }
 

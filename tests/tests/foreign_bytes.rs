@@ -1,6 +1,7 @@
 //! A short run of every fuzz target: random bytes, and good files with some bytes
-//! changed. `docs/measured.md` says how to run them for long.
+//! changed. `docs/fuzzing.md` says how to run them for long.
 
+use iltm_tests::fuzz::{TARGETS, mutate};
 use iltm_tests::{fuzz, wedge_table};
 use proptest::prelude::*;
 
@@ -91,4 +92,42 @@ proptest! {
     fn changed_settings_are_no_trouble(bytes in mutated(sample("capture.toml"))) {
         fuzz::settings(&bytes);
     }
+}
+
+/// As many executions of a target as a test has time for; the driver makes the same
+/// ones with `--seed 1`.
+fn short_run(name: &str, executions: u64) {
+    let target = TARGETS.iter().find(|target| target.name == name);
+    let target = target.expect("a target");
+    let seeds = (target.seeds)();
+    for index in 0..executions {
+        let bytes = mutate::input(&seeds, target.groups, 1, index);
+        let run = std::panic::catch_unwind(|| (target.run)(&bytes));
+        assert!(run.is_ok(), "--seed 1 --first {index} --executions 1");
+    }
+}
+
+#[test]
+fn a_device_does_what_its_model_says_whatever_happens_to_it() {
+    short_run("session", 12_000);
+}
+
+#[test]
+fn a_device_starts_on_any_flash_and_takes_a_table() {
+    short_run("flash", 3_000);
+}
+
+#[test]
+fn nothing_gets_past_the_gate_that_was_not_signed_for_the_device() {
+    short_run("gate", 20_000);
+}
+
+#[test]
+fn a_table_with_right_checksums_and_changed_contents_is_no_trouble() {
+    short_run("contents", 10_000);
+}
+
+#[test]
+fn messages_are_read_as_they_were_written() {
+    short_run("messages", 50_000);
 }

@@ -72,6 +72,18 @@ pub(super) fn holds<F: NorFlash>(
     })
 }
 
+/// Whether `length` bytes of a part from `start` on read as erased.
+pub(super) fn is_blank<F: NorFlash>(
+    flash: &mut F,
+    part: Part,
+    start: u32,
+    length: u32,
+) -> Result<bool, StoreError> {
+    read(flash, part, start, length, |piece| {
+        piece.iter().all(|byte| *byte == ERASED)
+    })
+}
+
 /// Writes bytes to an erased place of a part, the last unit filled up with erased
 /// bytes, and reads them back.
 pub(super) fn write<F: NorFlash>(

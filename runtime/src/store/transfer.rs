@@ -36,7 +36,17 @@ impl Transfer {
         Some((word, 1 << (sector % 32)))
     }
 
-    /// Has the flash hold a chunk. Returns how many sectors were erased for it.
+    /// Whether it is one of the file's chunks.
+    pub(super) fn check(&self, map: &Map, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+        let chunk = u32::from(map.chunk());
+        let left = self.length.saturating_sub(offset);
+        if !offset.is_multiple_of(chunk) || left == 0 || bytes.len() != left.min(chunk) as usize {
+            return Err(Refusal::Chunk);
+        }
+        Ok(())
+    }
+
+    /// Has the flash hold a chunk that was [`check`](Self::check)ed. Returns how many sectors were erased for it.
     ///
     /// A sector is erased before the first chunk that goes there, whatever it holds:
     /// what looks like erased flash may have been cut in the middle.
@@ -48,11 +58,6 @@ impl Transfer {
         offset: u32,
         bytes: &[u8],
     ) -> Result<u32, Refusal> {
-        let chunk = u32::from(map.chunk());
-        let left = self.length.saturating_sub(offset);
-        if !offset.is_multiple_of(chunk) || left == 0 || bytes.len() != left.min(chunk) as usize {
-            return Err(Refusal::Chunk);
-        }
         let sector = offset / map.sector();
         let (word, bit) = self.flag(sector).ok_or(Refusal::Chunk)?;
         let mut erases = 0;
@@ -65,12 +70,24 @@ impl Transfer {
         }
         let failed = |_: StoreError| Refusal::Flash { offset };
         // The same chunk may come twice.
-        let done = flash::holds(flash, slot, offset, bytes).map_err(failed)?;
-        if !done && let Err(error) = flash::write(flash, slot, offset, bytes) {
+        if flash::holds(flash, slot, offset, bytes).map_err(failed)? {
+            return Ok(erases);
+        }
+        // Another one for the same place must not be written over it.
+        let length = bytes.len() as u32;
+        let blank = flash::is_blank(flash, slot, offset, length);
+        let written = blank.and_then(|blank| {
+            if blank {
+                flash::write(flash, slot, offset, bytes)
+            } else {
+                Err(StoreError::Flash { offset })
+            }
+        });
+        written.map_err(|error| {
             // The whole sector is to come again.
             *word &= !bit;
-            return Err(failed(error));
-        }
+            failed(error)
+        })?;
         Ok(erases)
     }
 

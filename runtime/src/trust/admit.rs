@@ -82,5 +82,6 @@ fn vouched(
             floor: terms.floor,
         });
     }
-    Ok(seal.oldest)
+    // A table that revoked itself would be lost at the start after its confirmation.
+    Ok(seal.oldest.min(seal.version))
 }

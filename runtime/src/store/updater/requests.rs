@@ -103,6 +103,7 @@ impl<F: NorFlash> Updater<F> {
         let running = self.transfer.as_mut();
         let running = running.filter(|running| running.digest.transfer() == transfer);
         let running = running.ok_or(Refusal::NoTransfer)?;
+        running.check(&self.map, offset, bytes)?;
         // Its bytes are about to change.
         shelf.unload(slot);
         *slot.of_mut(&mut self.tables) = None;
@@ -143,12 +144,14 @@ impl<F: NorFlash> Updater<F> {
             trust: self.trust,
             floor: self.oldest(),
         };
-        *slot.of_mut(&mut self.tables) = None;
-        *slot.of_mut(&mut self.broken) = true;
-        let accepted = shelf.load(&self.flash, slot, Some(running.length), &terms);
-        let accepted = accepted.map_err(Refusal::Table)?;
-        *slot.of_mut(&mut self.tables) = Some(accepted);
-        *slot.of_mut(&mut self.broken) = false;
+        let before = *slot.of(&self.tables);
+        if let Err(rejected) = self.take(slot, running.length, &terms, shelf) {
+            // What lay there already is still good to go back to.
+            if let Some(before) = before {
+                let _ = self.take(slot, before.length, &self.terms(), shelf);
+            }
+            return Err(Refusal::Table(rejected));
+        }
         let trial_ms = (u64::from(trial_s.max(1)) * 1_000).min(MAX_TRIAL_MS);
         self.trial = Some(Trial {
             ends_ms: now_ms.saturating_add(trial_ms),
@@ -158,6 +161,20 @@ impl<F: NorFlash> Updater<F> {
         self.transfer = None;
         self.use_slot(Some(slot), TableReason::Trial, shelf);
         Ok(self.use_now(now_ms))
+    }
+
+    /// Checks the file in a slot that is not in use, and has its table kept.
+    fn take(
+        &mut self,
+        slot: Slot,
+        length: u32,
+        terms: &Terms,
+        shelf: &mut impl Shelf<F>,
+    ) -> Result<(), Rejected> {
+        let loaded = shelf.load(&self.flash, slot, Some(length), terms);
+        *slot.of_mut(&mut self.tables) = loaded.ok();
+        *slot.of_mut(&mut self.broken) = loaded.is_err();
+        loaded.map(|_| ())
     }
 
     #[inline(never)]
@@ -185,12 +202,15 @@ impl<F: NorFlash> Updater<F> {
             return Ok(self.use_now(now_ms));
         }
         let other = self.target();
-        let there = other.of(&self.tables).ok_or(Refusal::NoOther)?;
-        let floor = self.terms().floor;
-        if self.trust.key.is_some() && there.version < floor {
-            let version = there.version;
-            return Err(Refusal::Table(Rejected::Older { version, floor }));
-        }
+        // The same table under another seal is none to go back to: a repetition of this
+        // request would undo it.
+        let there = other.of(&self.tables).filter(|there| there.id != table);
+        let there = there.ok_or(Refusal::NoOther)?;
+        // Since it was checked last, its version may have been revoked, or the device
+        // have got a key.
+        let terms = self.terms();
+        let taken = self.take(other, there.length, &terms, shelf);
+        taken.map_err(Refusal::Table)?;
         self.commit(Some(other), 0)?;
         self.transfer = None;
         self.use_slot(Some(other), TableReason::RolledBack, shelf);
@@ -217,8 +237,10 @@ impl<F: NorFlash> Updater<F> {
             self.trust = wanted;
             // From now on nobody goes back to a table that the next start would refuse.
             // The one in use stays until then.
-            if let Some(used) = self.in_use {
-                self.look(used.other(), shelf);
+            for slot in Slot::ALL {
+                if self.in_use != Some(slot) {
+                    self.look(slot, shelf);
+                }
             }
         }
         if self.trust != wanted {

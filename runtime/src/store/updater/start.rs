@@ -57,9 +57,8 @@ impl<F: NorFlash> Updater<F> {
     #[inline(never)]
     pub(super) fn look(&mut self, slot: Slot, shelf: &mut impl Shelf<F>) {
         let part = self.map.slot(slot);
-        let erased = |piece: &[u8]| piece.iter().all(|byte| *byte == flash::ERASED);
         let head = header::SIZE as u32;
-        let empty = flash::read(&mut self.flash, part, 0, head, erased).unwrap_or(false);
+        let empty = flash::is_blank(&mut self.flash, part, 0, head).unwrap_or(false);
         *slot.of_mut(&mut self.tables) = None;
         *slot.of_mut(&mut self.broken) = false;
         if empty {

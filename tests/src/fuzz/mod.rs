@@ -2,6 +2,20 @@
 //! return: the fuzz targets in `tests/fuzz` and the smoke test in
 //! `tests/tests/foreign_bytes.rs` call the same functions.
 
+mod files;
+mod flash;
+mod gate;
+mod messages;
+pub mod mutate;
+mod session;
+mod targets;
+
+pub use flash::flash;
+pub use gate::{contents, gate};
+pub use messages::messages;
+pub use session::{described, session};
+pub use targets::{TARGETS, Target};
+
 use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{self, CaptureOptions, Manifest, Settings};

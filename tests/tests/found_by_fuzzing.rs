@@ -1,0 +1,165 @@
+//! What the session fuzzer found (`docs/fuzzing.md`), each as it happens to a device.
+
+use ed25519_dalek::{Signer, SigningKey};
+use iltm::capture::Response as Projector;
+use iltm_runtime::fault::Violations;
+use iltm_runtime::image::Seal;
+use iltm_runtime::link::{Refusal, Request, Response, SlotState};
+use iltm_runtime::trust::Rejected;
+use iltm_tests::slots::{SimDevice, Step, digest};
+use iltm_tests::wedge_table_for;
+
+type Device = SimDevice<8, 256>;
+
+fn key() -> SigningKey {
+    SigningKey::from_bytes(&[42; 32])
+}
+
+fn image(cols: u16) -> Vec<u8> {
+    wedge_table_for(Projector::Linear, 1, cols, 1)
+}
+
+fn signed(cols: u16, version: u32, oldest: u32) -> Vec<u8> {
+    let mut file = image(cols);
+    let public = key().verifying_key().to_bytes();
+    file.extend(Seal::head(version, oldest, 0, &public));
+    let signature = key().sign(&file);
+    file.extend(signature.to_bytes());
+    file
+}
+
+fn provision() -> Request<'static> {
+    Request::Provision {
+        key: key().verifying_key().to_bytes(),
+        device: 7,
+    }
+}
+
+/// A device with a key that runs the last of these files, with the one before it in
+/// the other slot.
+fn with_key(files: &[&[u8]]) -> Device {
+    let mut device = Device::new(3, 1);
+    assert_eq!(device.ask(provision()), Response::Provisioned);
+    for file in files {
+        device.update(file, true).expect("a good file");
+    }
+    device
+}
+
+fn refused(response: Response) -> Refusal {
+    match response {
+        Response::Refused(refusal) => refusal,
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+#[test]
+fn a_table_that_revokes_its_own_version_still_runs_after_a_restart() {
+    let file = signed(1, 4, 6);
+    let device = with_key(&[&file]);
+    assert!(device.restarted().runs(&file));
+}
+
+#[test]
+fn a_device_without_a_key_names_no_oldest_version_as_it_takes_any() {
+    let mut device = Device::new(3, 1);
+    device.update(&signed(1, 9, 0), true).expect("a good file");
+    let Response::Slots(slots) = device.ask(Request::Slots) else {
+        panic!("slots");
+    };
+    assert_eq!(slots.oldest, 0);
+    device.update(&signed(2, 3, 0), true).expect("an older one");
+}
+
+#[test]
+fn other_bytes_for_a_place_that_was_written_are_refused_and_not_programmed() {
+    let file = image(1);
+    let mut device = Device::new(3, 1);
+    device
+        .carry_out(&file, &Step::Begin)
+        .expect("there is room");
+    let transfer = digest(&file).transfer();
+    let mut wrong = file.clone();
+    wrong[9] ^= 0x40;
+    let write = |bytes| Request::Write {
+        transfer,
+        offset: 0,
+        bytes,
+    };
+    assert_eq!(device.ask(write(&wrong)), Response::Written);
+    let refusal = refused(device.ask(write(&file)));
+    assert_eq!(refusal, Refusal::Flash { offset: 0 });
+    assert_eq!(device.flash().violations(), Violations::default());
+    // The sector is erased and written anew then.
+    assert_eq!(device.ask(write(&file)), Response::Written);
+    device.update(&file, true).expect("it is whole");
+}
+
+#[test]
+fn a_chunk_that_is_refused_leaves_the_other_table_there_to_go_back_to() {
+    let mut device = with_key(&[&signed(1, 1, 0), &signed(2, 2, 0)]);
+    let new = signed(3, 3, 0);
+    device.carry_out(&new, &Step::Begin).expect("there is room");
+    let chunk = Request::Write {
+        transfer: digest(&new).transfer(),
+        offset: 1,
+        bytes: &new[..256],
+    };
+    assert_eq!(refused(device.ask(chunk)), Refusal::Chunk);
+    assert_eq!(device.updater.states()[0], SlotState::Valid);
+    device
+        .carry_out(&new, &Step::Rollback)
+        .expect("nothing was written");
+}
+
+#[test]
+fn an_older_table_that_is_refused_stays_there_to_go_back_to() {
+    let (old, new) = (signed(1, 1, 0), signed(2, 2, 0));
+    let mut device = with_key(&[&old, &new]);
+    // All of it is in its slot already, so that no chunk is sent.
+    let refusal = device.update(&old, true).expect_err("it is older");
+    let (version, floor) = (1, 2);
+    assert_eq!(refusal, Refusal::Table(Rejected::Older { version, floor }));
+    device
+        .carry_out(&old, &Step::Rollback)
+        .expect("the way back");
+    assert!(device.runs(&old));
+}
+
+#[test]
+fn an_unsigned_table_is_none_to_go_back_to_once_the_device_has_a_key() {
+    let mut device = Device::new(3, 1);
+    device.update(&image(1), true).expect("a good file");
+    device.update(&signed(2, 2, 0), true).expect("a good file");
+    assert_eq!(device.ask(provision()), Response::Provisioned);
+    let refusal = device
+        .carry_out(&[], &Step::Rollback)
+        .expect_err("unsigned");
+    assert_eq!(refusal, Refusal::Table(Rejected::Unsigned));
+    assert!(device.runs(&signed(2, 2, 0)));
+}
+
+#[test]
+fn a_device_gets_no_key_while_a_table_is_on_trial_that_nobody_asked_who_signed() {
+    let mut device = Device::new(3, 1);
+    device.update(&image(1), false).expect("a good file");
+    assert_eq!(refused(device.ask(provision())), Refusal::OnTrial);
+    device
+        .carry_out(&[], &Step::Rollback)
+        .expect("it is on trial");
+    assert_eq!(device.ask(provision()), Response::Provisioned);
+}
+
+#[test]
+fn a_rollback_that_is_repeated_confirms_nothing() {
+    // The same image twice: what a rollback names does not tell them apart.
+    let (old, new) = (signed(1, 1, 0), signed(1, 2, 2));
+    let mut device = with_key(&[&old]);
+    device.update(&new, false).expect("a good file");
+    let table = device.updater.table().expect("it is on trial").id;
+    device.ask(Request::Rollback { table });
+    assert!(device.runs(&old));
+    let again = refused(device.ask(Request::Rollback { table }));
+    assert_eq!(again, Refusal::NoOther);
+    assert!(device.runs(&old) && device.restarted().runs(&old));
+}
