@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// A device checks the whole table, signature included, while frames go on; until then
 /// it may not answer at all.
-const ACTIVATION: Patience = Patience {
+const CHECK: Patience = Patience {
     answer: Duration::from_secs(4),
     tries: 8,
 };
@@ -77,7 +77,7 @@ impl<L: Line> Client<L> {
             transfer,
             trial_s: u16::try_from(trial.as_secs()).unwrap_or(u16::MAX),
         };
-        match self.talk.ask_patiently(request, ACTIVATION)? {
+        match self.talk.ask_patiently(request, CHECK)? {
             Response::InUse(in_use) => Ok(in_use),
             other => Err(unexpected(request, &other)),
         }
@@ -101,7 +101,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`].
     pub fn rollback(&mut self, table: u32) -> Result<InUse, DeviceError> {
         let request = Request::Rollback { table };
-        match self.talk.ask(request)? {
+        match self.talk.ask_patiently(request, CHECK)? {
             Response::InUse(in_use) => Ok(in_use),
             // The answer to an earlier copy of the request was lost: the table has gone.
             Response::Refused(Refusal::NotInUse { table }) => Ok(InUse { table, trial_ms: 0 }),
@@ -115,7 +115,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`]; [`Refusal::HasKey`] if it has others.
     pub fn provision(&mut self, key: [u8; 32], device: u64) -> Result<(), DeviceError> {
         let request = Request::Provision { key, device };
-        match self.talk.ask(request)? {
+        match self.talk.ask_patiently(request, CHECK)? {
             Response::Provisioned => Ok(()),
             other => Err(unexpected(request, &other)),
         }
