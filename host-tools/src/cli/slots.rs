@@ -75,11 +75,19 @@ pub(super) fn lines(slots: &Slots) -> Vec<String> {
             _ => String::new(),
         };
         let erases = match slot.erases {
+            // The device notes it when a table is confirmed.
+            0 if slot.state == SlotState::Broken => {
+                return format!("{} no whole table", letter(index));
+            }
             0 => "never erased".to_owned(),
             1 => "erased once".to_owned(),
             times => format!("erased {times} times"),
         };
-        let state = slot.state;
+        let state = match slot.state {
+            // A transfer that was cut is no defect.
+            SlotState::Broken => "no whole table".to_owned(),
+            state => state.to_string(),
+        };
         format!("{} {state}{trial}: {table}{erases}", letter(index))
     };
     (0..).zip(&slots.slots).map(line).collect()
