@@ -20,6 +20,9 @@ pub(super) struct Journal {
     spoiled: u32,
     /// Whether that part was erased since the start.
     is_fresh: bool,
+    /// Whether the record that counts was written whole, beyond doubt: its twin is
+    /// there.
+    is_firm: bool,
 }
 
 impl Journal {
@@ -32,11 +35,14 @@ impl Journal {
             last: None,
             spoiled: 0,
             is_fresh: false,
+            is_firm: false,
         };
         for (index, part) in parts.into_iter().enumerate() {
             let (mut newest, mut next, mut spoiled) = (None::<Commit>, 0, 0);
+            let (mut before, mut firm) = (None::<Commit>, false);
             for place in 0..places(part) {
                 let found = record::look::<F, Commit>(flash, part, place);
+                let previous = before.take();
                 match found.unwrap_or(Place::Spoiled) {
                     Place::Blank => {}
                     Place::Spoiled => {
@@ -45,9 +51,11 @@ impl Journal {
                     }
                     Place::Record(commit) => {
                         next = place + 1;
+                        before = Some(commit);
                         if newest.is_none_or(|newest| newest.sequence <= commit.sequence) {
                             newest = Some(commit);
                             spoiled = 0;
+                            firm = previous.is_some_and(|previous| previous.is_twin(&commit));
                         }
                     }
                 }
@@ -64,6 +72,7 @@ impl Journal {
                 journal.next = next;
                 journal.last = newest;
                 journal.spoiled = spoiled;
+                journal.is_firm = firm;
             }
         }
         journal
@@ -74,14 +83,18 @@ impl Journal {
         self.last
     }
 
-    /// Whether a record was cut after the one that counts. It might be read as whole
-    /// another time; a record behind it, with a higher number, ends that.
-    pub(super) const fn is_cut(&self) -> bool {
-        self.spoiled > 0
+    /// Whether a record was cut, the one that counts or one after it. It might be read
+    /// otherwise another time; a record behind it, with a higher number, ends that.
+    pub(super) const fn is_doubtful(&self) -> bool {
+        let [part, _] = self.parts;
+        self.spoiled > 0 || !self.is_firm && has_twins(part)
     }
 
     /// Writes a record; from then on it counts. Returns how many parts were erased for
     /// it.
+    ///
+    /// Its twin follows at once: where that has begun, the record before it is whole
+    /// however often it is read. A part with room for one record only has no twins.
     ///
     /// The first one after a start goes to the other part, erased anew: a place behind
     /// the last record may look blank and yet have been cut before any of its bits
@@ -129,16 +142,41 @@ impl Journal {
 
     /// Writes to the first place that takes it.
     fn try_places<F: NorFlash>(&mut self, flash: &mut F, part: Part, commit: &Commit) -> bool {
-        while self.next < places(part) {
+        let twins = has_twins(part);
+        while self.next + u32::from(twins) < places(part) {
             let place = self.next;
             self.next += 1;
             if record::write(flash, part, place, commit).is_ok() {
                 self.last = Some(*commit);
                 self.spoiled = 0;
+                if twins {
+                    self.add_twin(flash, part, commit);
+                }
                 return true;
             }
             self.spoiled += 1;
         }
         false
     }
+
+    /// Writes the record that counts once more. Where that fails, the next start does it.
+    fn add_twin<F: NorFlash>(&mut self, flash: &mut F, part: Part, commit: &Commit) {
+        let twin = Commit {
+            sequence: commit.sequence.saturating_add(1),
+            ..*commit
+        };
+        let place = self.next;
+        self.next += 1;
+        self.is_firm = record::write(flash, part, place, &twin).is_ok();
+        if self.is_firm {
+            self.last = Some(twin);
+        } else {
+            self.spoiled += 1;
+        }
+    }
+}
+
+/// Whether a part has room for a record and its twin.
+const fn has_twins(part: Part) -> bool {
+    places(part) > 1
 }

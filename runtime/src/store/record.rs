@@ -56,6 +56,17 @@ pub(super) struct Commit {
     pub(super) erases: [u32; 3],
 }
 
+impl Commit {
+    /// Whether `next` says the same and was written right after it.
+    pub(super) fn is_twin(&self, next: &Self) -> bool {
+        let twin = Self {
+            sequence: self.sequence.saturating_add(1),
+            ..*self
+        };
+        twin == *next
+    }
+}
+
 /// Who the device is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Identity {

@@ -45,10 +45,10 @@ impl<F: NorFlash> Updater<F> {
         updater
     }
 
-    /// Ends the doubt about a record that was cut. A flash that fails here leaves
+    /// Ends the doubt about a record that may have been cut. A flash that fails here leaves
     /// things as they are.
     fn settle(&mut self) {
-        if let Some(last) = self.journal.last().filter(|_| self.journal.is_cut()) {
+        if let Some(last) = self.journal.last().filter(|_| self.journal.is_doubtful()) {
             let _ = self.append(last);
         }
     }
