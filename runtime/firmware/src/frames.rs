@@ -182,15 +182,13 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
 
     /// The table in use is another one; frames stay as they are.
     pub(crate) fn restage(&mut self) {
-        match self.stream.take() {
-            Some(stream) => self.stage(stream.format, stream.lateness),
-            None => {
-                let mode = self
-                    .in_use
-                    .map_or_else(Mode::PassThrough, |_| Mode::Compensating);
-                self.vitals.set_mode(mode, 0, 0, 0);
-            }
+        if let Some(stream) = self.stream.take() {
+            self.stage(stream.format, stream.lateness);
+            return;
         }
+        let mode = self.in_use;
+        let mode = mode.map_or_else(Mode::PassThrough, |_| Mode::Compensating);
+        self.vitals.set_mode(mode, 0, 0, 0);
     }
 
     fn stage(&mut self, format: Format, lateness: Lateness) {
