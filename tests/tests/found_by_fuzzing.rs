@@ -2,7 +2,7 @@
 
 use ed25519_dalek::{Signer, SigningKey};
 use iltm::capture::Response as Projector;
-use iltm_runtime::fault::{NorSimulator, Violations};
+use iltm_runtime::fault::{ERASE_STAGES, NorSimulator, Violations};
 use iltm_runtime::image::Seal;
 use iltm_runtime::link::{Refusal, Request, Response, SlotState};
 use iltm_runtime::trust::Rejected;
@@ -203,4 +203,30 @@ fn a_record_cut_in_its_last_byte_reads_the_same_at_every_start() {
         }
     }
     assert!(kept.iter().all(|count| *count > 0), "both happen: {kept:?}");
+}
+
+#[test]
+fn the_first_record_of_a_part_cut_in_its_last_byte_reads_the_same_at_every_start() {
+    let file = image(1);
+    // A part has room for one record and its twin only: each record goes to the other.
+    let layout = Layout {
+        slot: 4,
+        sector: 128,
+    };
+    for seed in 0..400 {
+        let flash = NorSimulator::<16, 128>::new(layout.sectors(), seed).with_weak_bits();
+        let mut device = SimDevice::start(flash, layout);
+        device.update(&file, false).expect("a good file");
+        let flash = device.updater.flash_mut();
+        flash.reseed(seed);
+        flash.cut_after(ERASE_STAGES + 63);
+        let _ = device.carry_out(&file, &Step::Confirm);
+        assert!(!device.flash().is_on());
+        let mut device = device.restarted();
+        let first = device.updater.in_use();
+        for start in 0..20 {
+            device = device.restarted();
+            assert_eq!(device.updater.in_use(), first, "seed {seed}, start {start}");
+        }
+    }
 }

@@ -23,6 +23,8 @@ pub(super) struct Journal {
     /// Whether the record that counts was written whole, beyond doubt: its twin is
     /// there.
     is_firm: bool,
+    /// Whether the other part holds something behind its last record that is none now.
+    is_other_cut: bool,
 }
 
 impl Journal {
@@ -36,6 +38,7 @@ impl Journal {
             spoiled: 0,
             is_fresh: false,
             is_firm: false,
+            is_other_cut: false,
         };
         for (index, part) in parts.into_iter().enumerate() {
             let (mut newest, mut next, mut spoiled) = (None::<Commit>, 0, 0);
@@ -68,11 +71,14 @@ impl Journal {
                 (None, Some(_)) => false,
             };
             if index == 0 || newer {
+                journal.is_other_cut = index > 0 && journal.spoiled > 0;
                 journal.part = index;
                 journal.next = next;
                 journal.last = newest;
                 journal.spoiled = spoiled;
                 journal.is_firm = firm;
+            } else {
+                journal.is_other_cut = spoiled > 0;
             }
         }
         journal
@@ -87,7 +93,7 @@ impl Journal {
     /// otherwise another time; a record behind it, with a higher number, ends that.
     pub(super) const fn is_doubtful(&self) -> bool {
         let [part, _] = self.parts;
-        self.spoiled > 0 || !self.is_firm && has_twins(part)
+        self.spoiled > 0 || self.is_other_cut || !self.is_firm && has_twins(part)
     }
 
     /// Writes a record; from then on it counts. Returns how many parts were erased for
@@ -126,6 +132,7 @@ impl Journal {
         let [.., records] = &mut commit.erases;
         *records = records.saturating_add(1);
         flash::erase(flash, there, 0, there.length)?;
+        self.is_other_cut = false;
         let (part, next) = (self.part, self.next);
         self.part = 1 - part;
         self.next = 0;
