@@ -427,7 +427,12 @@ fn rolling_back_says_which_table_is_in_use_now() {
         format!("Table {a} is in use again, instead of {b}.\n")
     );
     assert_eq!(in_use(&port), a);
-    // Also back to one that was confirmed.
+    // Not on to the one that nobody confirmed; but back and forth between two that
+    // somebody did.
+    let said = user.fails(27, &["rollback", "--port", port.path()]);
+    assert!(said.contains(&format!("Table {a} is in use.")), "{said}");
+    user.says(&["flash", "b.iltm", "--confirm", "--port", port.path()]);
+    user.says(&["rollback", "--port", port.path()]);
     let said = user.says(&["rollback", "--port", port.path()]);
     assert_eq!(
         said,

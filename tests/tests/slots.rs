@@ -110,6 +110,19 @@ fn rolling_back_goes_to_the_other_table_and_counts_after_a_restart() {
 }
 
 #[test]
+fn nobody_goes_back_to_a_table_that_was_never_confirmed() {
+    let (first, second) = (table(3), table(4));
+    let mut device = Device::new(SLOT, 1);
+    device.update(&first, true).expect("a good table");
+    device.update(&second, false).expect("a good table");
+    roll_back(&mut device).expect("on trial");
+    assert_eq!(roll_back(&mut device), Err(Refusal::NoOther));
+    let mut device = device.restarted();
+    assert_eq!(roll_back(&mut device), Err(Refusal::NoOther));
+    assert!(device.runs(&first));
+}
+
+#[test]
 fn a_transfer_that_has_begun_leaves_nothing_to_go_back_to() {
     let mut device = Device::new(SLOT, 1);
     device.update(&table(3), true).expect("a good table");

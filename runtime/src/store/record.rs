@@ -32,6 +32,9 @@ mod commit {
     pub(super) const ERASES_RECORDS: Range<usize> = 28..32;
     pub(super) const LENGTH_A: Range<usize> = 32..36;
     pub(super) const LENGTH_B: Range<usize> = 36..40;
+    pub(super) const OTHER: Range<usize> = 40..44;
+    /// 1 if there is such a table; anything else is none.
+    pub(super) const HAS_OTHER: Range<usize> = 44..48;
 }
 
 /// The fields of an identity record.
@@ -48,6 +51,9 @@ pub(super) struct Commit {
     pub(super) sequence: u32,
     /// The slot whose table is to be used, and the table's id.
     pub(super) table: Option<(Slot, u32)>,
+    /// Id of the table in the other slot, if it has counted before: the one to go back
+    /// to. One that nobody ever confirmed is none.
+    pub(super) other: Option<u32>,
     /// Bytes of the file in slot A and in slot B, 0 if unknown.
     pub(super) lengths: [u32; 2],
     /// Tables of a lower version are refused.
@@ -107,6 +113,7 @@ impl Record for Commit {
         Self {
             sequence: u32_at(bytes, commit::SEQUENCE),
             table: slot.map(|slot| (slot, u32_at(bytes, commit::ID))),
+            other: (u32_at(bytes, commit::HAS_OTHER) == 1).then(|| u32_at(bytes, commit::OTHER)),
             floor: u32_at(bytes, commit::FLOOR),
             lengths: lengths.map(|field| u32_at(bytes, field)),
             erases: erases.map(|field| u32_at(bytes, field)),
@@ -128,6 +135,8 @@ impl Record for Commit {
             (commit::ERASES_RECORDS, records),
             (commit::LENGTH_A, length_a),
             (commit::LENGTH_B, length_b),
+            (commit::OTHER, self.other.unwrap_or(0)),
+            (commit::HAS_OTHER, self.other.is_some().into()),
         ] {
             put(bytes, field, &value.to_le_bytes());
         }

@@ -202,9 +202,11 @@ impl<F: NorFlash> Updater<F> {
             return Ok(self.use_now(now_ms));
         }
         let other = self.target();
-        // The same table under another seal is none to go back to: a repetition of this
-        // request would undo it.
-        let there = other.of(&self.tables).filter(|there| there.id != table);
+        // One that nobody ever confirmed is none to go back to; nor is the same table
+        // under another seal: a repetition of this request would undo it.
+        let counted = self.journal.last().and_then(|last| last.other);
+        let there = other.of(&self.tables);
+        let there = there.filter(|there| there.id != table && counted == Some(there.id));
         let there = there.ok_or(Refusal::NoOther)?;
         // Since it was checked last, its version may have been revoked, or the device
         // have got a key.

@@ -75,9 +75,19 @@ impl<F: NorFlash> Updater<F> {
         let id = |slot: Slot| Some((slot, slot.of(&self.tables).as_ref()?.id));
         let table = slot.and_then(id);
         let floor = self.terms().floor.max(oldest);
+        // The table that counted until now can be gone back to, if it is still there.
+        let other = self.journal.last().and_then(|last| {
+            let (before, id) = last.table?;
+            if slot == Some(before) {
+                return last.other;
+            }
+            let whole = before.of(&self.tables).as_ref();
+            whole.filter(|table| table.id == id).map(|_| id)
+        });
         let commit = Commit {
             sequence: 0,
             table,
+            other,
             floor,
             lengths: Slot::ALL.map(|slot| slot.of(&self.tables).map_or(0, |table| table.length)),
             erases: self.erases,

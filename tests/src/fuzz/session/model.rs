@@ -25,6 +25,8 @@ pub(super) struct Sizes {
 pub(super) struct Record {
     /// Slot and id.
     pub(super) table: Option<(usize, u32)>,
+    /// Id of the one in the other slot that was confirmed before it.
+    pub(super) other: Option<u32>,
     /// Tables below never run again.
     pub(super) floor: u32,
     /// Of the files in the slots; 0 if unknown.
@@ -389,7 +391,9 @@ impl Model {
             return Ok(self.now_in_use(now_ms));
         }
         let slot = self.target();
-        let other = self.whole(slot).filter(|facts| facts.id != table);
+        let confirmed = self.record.and_then(|record| record.other);
+        let other = self.whole(slot);
+        let other = other.filter(|facts| facts.id != table && Some(facts.id) == confirmed);
         let facts = other.ok_or(Refusal::NoOther)?;
         // It must be one that may run now; one that must not is no table.
         if let Err(rejected) = self.vouched(slot, facts) {
@@ -437,8 +441,15 @@ impl Model {
 
     fn note(&mut self, slot: Option<usize>, oldest: u32) {
         let id = |slot| Some((slot, self.whole(slot)?.id));
+        let before = self.record.unwrap_or_default();
+        let other = match before.table {
+            Some((old, _)) if Some(old) == slot => before.other,
+            Some((old, id)) => self.whole(old).filter(|it| it.id == id).map(|it| it.id),
+            None => None,
+        };
         self.record = Some(Record {
             table: slot.and_then(id),
+            other,
             floor: self.floor().max(oldest),
             lengths: [0, 1].map(|slot| self.whole(slot).map_or(0, |facts| facts.length)),
         });
