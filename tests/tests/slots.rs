@@ -338,6 +338,20 @@ fn a_key_is_installed_once_and_the_other_slot_must_meet_it() {
 }
 
 #[test]
+fn a_key_that_rots_in_one_place_still_counts() {
+    let mut device = strict();
+    device.update(&signed(3, 1, 0), true).expect("good");
+    // The identity's sector is the last of all.
+    let start = ((2 * SLOT + 2) * 256) as u32;
+    let flash = device.updater.flash_mut();
+    flash.rot(start..start + 64, 3).expect("there");
+    let mut device = device.restarted();
+    let refused = device.update(&table(4), true);
+    assert_eq!(refused, Err(Refusal::Table(Rejected::Unsigned)));
+    assert!(device.runs(&signed(3, 1, 0)));
+}
+
+#[test]
 fn a_shorter_table_does_not_take_the_seal_of_the_longer_one_before_it() {
     // The unsigned file is the signed one without its seal, which stays behind it.
     let (long, short) = (signed(3, 1, 0), table(3));

@@ -22,7 +22,8 @@ pub(super) fn find<F: NorFlash>(flash: &mut F, part: Part) -> Option<Identity> {
     })
 }
 
-/// Writes the identity of a device that has none. Erases first: what looks blank may
+/// Writes the identity of a device that has none, twice where there is room: a record
+/// that rots must not open the device to strangers. Erases first: what looks blank may
 /// have been cut before.
 pub(super) fn write<F: NorFlash>(
     flash: &mut F,
@@ -30,9 +31,13 @@ pub(super) fn write<F: NorFlash>(
     identity: &Identity,
 ) -> Result<(), StoreError> {
     flash::erase(flash, part, 0, part.length)?;
-    let mut places = 0..places(part);
-    if places.any(|place| record::write(flash, part, place, identity).is_ok()) {
-        return Ok(());
+    let mut written = |place: &u32| record::write(flash, part, *place, identity).is_ok();
+    match (0..places(part))
+        .filter(|place| written(place))
+        .take(2)
+        .count()
+    {
+        0 => Err(StoreError::Full),
+        _ => Ok(()),
     }
-    Err(StoreError::Full)
 }
