@@ -15,6 +15,7 @@ pub mod device;
 pub mod learn;
 pub mod progress;
 pub mod report;
+pub mod scene;
 pub mod solve;
 pub mod user;
 pub mod video;

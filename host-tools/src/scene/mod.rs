@@ -1,0 +1,3 @@
+//! From a described scene to the photographs that a camera would take of it.
+
+pub mod geometry;
