@@ -1,3 +1,4 @@
 //! From a described scene to the photographs that a camera would take of it.
 
+pub mod form_factor;
 pub mod geometry;
