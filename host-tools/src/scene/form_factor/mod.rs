@@ -19,11 +19,14 @@ mod contour;
 mod point;
 mod quadrature;
 mod sampled;
+pub(crate) mod shaft;
 #[cfg(test)]
 mod tests;
+mod visible;
 
 pub use point::from_point;
 pub use sampled::Sampled;
+pub use visible::visible_exchange_area;
 
 use crate::scene::geometry::Polygon;
 use std::cmp::Ordering;
@@ -76,7 +79,7 @@ pub fn exchange_area(a: &Polygon, b: &Polygon, tolerance: Tolerance) -> f64 {
 }
 
 /// The parts that are in front of each other's planes.
-fn parts_in_front(a: &Polygon, b: &Polygon) -> Option<(Polygon, Polygon)> {
+pub(crate) fn parts_in_front(a: &Polygon, b: &Polygon) -> Option<(Polygon, Polygon)> {
     if !facing(a, b) {
         return None;
     }
@@ -85,7 +88,7 @@ fn parts_in_front(a: &Polygon, b: &Polygon) -> Option<(Polygon, Polygon)> {
 
 /// Both in an order that depends on nothing but where they are, so that either
 /// way round gives the same bits.
-fn ordered<'a>(a: &'a Polygon, b: &'a Polygon) -> (&'a Polygon, &'a Polygon) {
+pub(crate) fn ordered<'a>(a: &'a Polygon, b: &'a Polygon) -> (&'a Polygon, &'a Polygon) {
     let coordinates = |p: &'a Polygon| p.corners().iter().flat_map(|c| c.iter());
     let first = a.area().total_cmp(&b.area()).then_with(|| {
         let mut pairs = coordinates(a).zip(coordinates(b));
