@@ -22,7 +22,7 @@ mod sampled;
 pub(crate) mod shaft;
 #[cfg(test)]
 mod tests;
-mod visible;
+pub(crate) mod visible;
 
 pub use point::from_point;
 pub use sampled::Sampled;

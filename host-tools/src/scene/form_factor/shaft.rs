@@ -60,15 +60,6 @@ impl Hull {
         &self.points
     }
 
-    /// Least and most coordinates.
-    pub(crate) fn bounds(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let first = self.points[0];
-        let grow = |(least, most): (Vector3<f64>, Vector3<f64>), p: &Vector3<f64>| {
-            (least.inf(p), most.sup(p))
-        };
-        self.points.iter().fold((first, first), grow)
-    }
-
     /// Whether all of it is in front of the plane, or on it.
     pub(crate) fn in_front_of(&self, plane: &Plane) -> bool {
         let near = TOUCHING * (self.points[0] - self.points[self.points.len() / 2]).norm();
@@ -150,7 +141,9 @@ pub(crate) fn blocks_all(from: &Hull, to: &Hull, polygon: &Polygon) -> bool {
     // Ends may touch the plane, but none may lie in it: lines within it are not
     // blocked.
     let apart = |d: &[f64]| d.iter().all(|d| *d >= -near) && d.iter().any(|d| *d > near);
-    there.iter_mut().for_each(|d| *d = -*d);
+    for distance in &mut there {
+        *distance = -*distance;
+    }
     if !apart(&here) || !apart(&there) {
         return false;
     }

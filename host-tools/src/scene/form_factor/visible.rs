@@ -58,7 +58,7 @@ pub(crate) fn visible_share(
     }
     let root = scene.part(a.clone(), &between);
     let error = tolerance.relative() * root.light.whole;
-    let light = scene.refined(root, error, QUARTERINGS);
+    let light = scene.refined(&root, error, QUARTERINGS);
     if light.whole > 0.0 {
         (light.seen / light.whole).clamp(0.0, 1.0)
     } else {
@@ -116,7 +116,7 @@ impl Scene<'_> {
     }
 
     /// Quarters a part until its quarters agree with it to `error`, m^2.
-    fn refined(&self, part: Part<'_>, error: f64, quarterings: usize) -> Light {
+    fn refined(&self, part: &Part<'_>, error: f64, quarterings: usize) -> Light {
         if part.between.is_empty() || quarterings == 0 {
             return part.light;
         }
@@ -136,7 +136,7 @@ impl Scene<'_> {
         let mut light = Light::default();
         for quarter in quarters {
             // Edges of shadows are lines: half of the quarters hold one.
-            let refined = self.refined(quarter, error / 2.0, quarterings - 1);
+            let refined = self.refined(&quarter, error / 2.0, quarterings - 1);
             light.seen += refined.seen;
             light.whole += refined.whole;
         }
