@@ -43,7 +43,7 @@ impl Default for ExchangeOptions {
     fn default() -> Self {
         Self {
             tolerance: Tolerance::default(),
-            visibility: Tolerance::new(1e-3),
+            visibility: Tolerance::new(2e-3),
             compression: 2e-5,
             occlusion: Occlusion::default(),
             separation: 2.0,

@@ -91,6 +91,13 @@ pub(crate) fn may_block(from: &Hull, to: &Hull, polygon: &Polygon) -> bool {
     if behind(from) || behind(to) {
         return false;
     }
+    // Most that stand between are met by the line between the middles.
+    let middle = |hull: &Hull| hull.points.iter().sum::<Vector3<f64>>() / hull.points.len() as f64;
+    let (start, end) = (middle(from), middle(to));
+    let (here, there) = (plane.distance(&start), plane.distance(&end));
+    if here * there < 0.0 && polygon.contains(&(start + (end - start) * (here / (here - there)))) {
+        return true;
+    }
     let separates = |axis: &Vector3<f64>| {
         let range = |points: &mut dyn Iterator<Item = &Vector3<f64>>| {
             points.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), p| {

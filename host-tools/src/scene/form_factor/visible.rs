@@ -5,20 +5,26 @@
 //! first polygon the share that is seen is integrated adaptively, and the exact
 //! exchange area without obstacles is multiplied by that share.
 
+use super::point::above_horizon;
 use super::quadrature::samples;
 use super::shaft::{Hull, blocks_all, may_block};
 use super::{Sampled, Tolerance, from_point, ordered, parts_in_front};
 use crate::scene::geometry::{Obstacles, Plane, Polygon};
 use nalgebra::Vector3;
 
+/// Share below which what is seen is not asked for more exactly: the tolerance is
+/// relative to the geometric mean of what is seen and the whole.
+const LEAST_SHARE: f64 = 1e-2;
 /// How often a part of the first polygon is quartered at most.
 const QUARTERINGS: usize = 9;
 /// Order of the rule on each part.
 const ORDER: usize = 2;
+/// Obstacles that are not looked at again for every part.
+const FEW: usize = 3;
 
 /// Exchange area `A_a F_ab`, m^2, with what `obstacles` leave of it; the same
-/// to the last bit whichever comes first. The error of the share that is seen is relative
-/// to the exchange area without obstacles.
+/// to the last bit whichever comes first. The tolerance is relative to the geometric
+/// mean of the exchange areas with and without obstacles.
 #[must_use]
 pub fn visible_exchange_area(
     a: &Polygon,
@@ -43,22 +49,23 @@ pub(crate) fn visible_share(
     tolerance: Tolerance,
     obstacles: &[&Polygon],
 ) -> f64 {
-    let scene = Scene {
+    let view = View {
         normal: a.normal(),
         b,
         hull: Hull::of(b),
     };
-    let from = Hull::of(a);
-    let between = obstacles.iter().copied();
-    let between: Vec<_> = between
-        .filter(|o| may_block(&from, &scene.hull, o))
-        .collect();
+    let between = view.between(a, obstacles);
     if between.is_empty() {
         return 1.0;
     }
-    let root = scene.part(a.clone(), &between);
-    let error = tolerance.relative() * root.light.whole;
-    let light = scene.refined(&root, error, QUARTERINGS);
+    let from = Hull::of(a);
+    if between.iter().any(|o| blocks_all(&from, &view.hull, o)) {
+        return 0.0;
+    }
+    let light = view.light(a, &between);
+    let share = (light.seen / light.whole.max(f64::MIN_POSITIVE)).clamp(LEAST_SHARE, 1.0);
+    let error = tolerance.relative() * light.whole * share.sqrt();
+    let light = view.refined(a, light, &between, error, QUARTERINGS);
     if light.whole > 0.0 {
         (light.seen / light.whole).clamp(0.0, 1.0)
     } else {
@@ -73,124 +80,212 @@ struct Light {
     whole: f64,
 }
 
-/// A part of `a`, and what may stand between it and `b`.
-struct Part<'o> {
-    polygon: Polygon,
-    between: Vec<&'o Polygon>,
-    light: Light,
+impl std::ops::AddAssign for Light {
+    fn add_assign(&mut self, other: Self) {
+        self.seen += other.seen;
+        self.whole += other.whole;
+    }
 }
 
-struct Scene<'b> {
+/// What parts of a polygon with this normal see of `b`.
+struct View<'b> {
     normal: Vector3<f64>,
     b: &'b Polygon,
     hull: Hull,
 }
 
-impl Scene<'_> {
-    fn part<'o>(&self, polygon: Polygon, obstacles: &[&'o Polygon]) -> Part<'o> {
-        let hull = Hull::of(&polygon);
-        let between = obstacles.iter().copied();
-        let mut between: Vec<_> = between
-            .filter(|o| may_block(&hull, &self.hull, o))
-            .collect();
-        let dark = between.iter().any(|o| blocks_all(&hull, &self.hull, o));
-        let mut light = Light::default();
-        for (place, area) in samples(&polygon, ORDER) {
-            let whole = from_point(&place, &self.normal, self.b);
-            light.whole += area * whole;
-            light.seen += area
-                * match (dark, between.is_empty()) {
-                    (true, _) => 0.0,
-                    (false, true) => whole,
-                    (false, false) => self.seen(&place, &between),
-                };
-        }
-        if dark {
-            between.clear();
-        }
-        Part {
-            polygon,
-            between,
-            light,
-        }
+impl View<'_> {
+    /// The obstacles that may stand between a part and `b`.
+    fn between<'o>(&self, part: &Polygon, obstacles: &[&'o Polygon]) -> Vec<&'o Polygon> {
+        let hull = Hull::of(part);
+        let may = |o: &&&Polygon| may_block(&hull, &self.hull, o);
+        obstacles.iter().filter(may).copied().collect()
     }
 
-    /// Quarters a part until its quarters agree with it to `error`, m^2.
-    fn refined(&self, part: &Part<'_>, error: f64, quarterings: usize) -> Light {
-        if part.between.is_empty() || quarterings == 0 {
-            return part.light;
-        }
-        let quarters = quartered(&part.polygon);
-        let quarters: Vec<_> = quarters.map(|q| self.part(q, &part.between)).collect();
-        let sum = |f: fn(&Light) -> f64| quarters.iter().map(|q| f(&q.light)).sum::<f64>();
-        let light = Light {
-            seen: sum(|l| l.seen),
-            whole: sum(|l| l.whole),
-        };
-        // The first look may miss a shadow between its few places.
-        let share = |l: Light| l.seen * light.whole / l.whole.max(f64::MIN_POSITIVE);
-        let agree = (share(part.light) - light.seen).abs() <= error;
-        if agree && quarterings < QUARTERINGS {
-            return light;
-        }
+    /// What a part receives, by the rule of its few places.
+    fn light(&self, part: &Polygon, between: &[&Polygon]) -> Light {
         let mut light = Light::default();
-        for quarter in quarters {
-            // Edges of shadows are lines: half of the quarters hold one.
-            let refined = self.refined(&quarter, error / 2.0, quarterings - 1);
-            light.seen += refined.seen;
-            light.whole += refined.whole;
+        for (place, area) in samples(part, ORDER) {
+            light.whole += area * from_point(&place, &self.normal, self.b);
+            light.seen += area * self.seen(&place, between);
         }
         light
     }
 
+    /// Quarters a part until its quarters agree with it to `error`, m^2.
+    fn refined(
+        &self,
+        part: &Polygon,
+        coarse: Light,
+        between: &[&Polygon],
+        error: f64,
+        quarterings: usize,
+    ) -> Light {
+        let quarters: Vec<_> = quartered(part)
+            .map(|quarter| {
+                let light = self.light(&quarter, between);
+                (quarter, light)
+            })
+            .collect();
+        let mut fine = Light::default();
+        for (_, light) in &quarters {
+            fine += *light;
+        }
+        let share = coarse.seen * fine.whole / coarse.whole.max(f64::MIN_POSITIVE);
+        // The rule is of second order where shadows end: of what both differ by, the
+        // finer one is off by a third.
+        let agree = (share - fine.seen).abs() <= 3.0 * error;
+        if quarterings == 0 || (agree && !self.missed(part, fine, between)) {
+            return fine;
+        }
+        let mut light = Light::default();
+        for (quarter, coarse) in quarters {
+            // Few obstacles cost less to look past than to rule out.
+            let nearer = (between.len() > FEW).then(|| self.between(&quarter, between));
+            let between = nearer.as_deref().unwrap_or(between);
+            // Edges of shadows are lines: half of the quarters hold one.
+            light += self.refined(&quarter, coarse, between, error / 2.0, quarterings - 1);
+        }
+        light
+    }
+
+    /// Whether a part that seems to see all or nothing sees something else from a corner.
+    fn missed(&self, part: &Polygon, light: Light, between: &[&Polygon]) -> bool {
+        let share = light.seen / light.whole.max(f64::MIN_POSITIVE);
+        let even = !(1e-9..=1.0 - 1e-9).contains(&share);
+        let centre = part.centroid();
+        even && part.corners().iter().any(|corner| {
+            // Just inside: the corner itself may lie on an obstacle.
+            let place = corner + (centre - corner) * 1e-3;
+            let whole = from_point(&place, &self.normal, self.b);
+            (self.seen(&place, between) - share * whole).abs() > 1e-6 * whole
+        })
+    }
+
     /// Form factor from a place to what of `b` is seen past the obstacles.
     fn seen(&self, place: &Vector3<f64>, between: &[&Polygon]) -> f64 {
-        let mut pieces = vec![self.b.clone()];
-        for obstacle in between {
+        let whole = from_point(place, &self.normal, self.b);
+        let Some((last, others)) = between.split_last() else {
+            return whole;
+        };
+        let mut hidden = 0.0;
+        let mut pieces = vec![self.b.corners().to_vec()];
+        for obstacle in others {
             let mut rest = Vec::with_capacity(pieces.len() + 1);
             for piece in pieces {
-                without_shadow(place, piece, obstacle, &mut rest);
+                let shadow = Shadow::new(place, obstacle, &piece);
+                let dark = shadow.of(piece, Some(&mut rest));
+                hidden += self.received(place, &dark);
             }
             pieces = rest;
         }
-        pieces
-            .iter()
-            .map(|p| from_point(place, &self.normal, p))
-            .sum()
+        for piece in pieces {
+            let dark = Shadow::new(place, last, &piece).of(piece, None);
+            hidden += self.received(place, &dark);
+        }
+        (whole - hidden).max(0.0)
+    }
+
+    /// Form factor to a part of `b`.
+    fn received(&self, place: &Vector3<f64>, corners: &[Vector3<f64>]) -> f64 {
+        if corners.len() < 3 || self.b.plane().distance(place) <= 0.0 {
+            return 0.0;
+        }
+        let horizon = Plane::through(*place, self.normal);
+        if corners.iter().all(|c| horizon.distance(c) >= 0.0) {
+            return above_horizon(place, &self.normal, corners);
+        }
+        above_horizon(place, &self.normal, &side_of(corners, &horizon, 1.0))
     }
 }
 
-/// Adds to `rest` the parts of `piece` that are seen from `place` past an obstacle.
-fn without_shadow(
-    place: &Vector3<f64>,
-    piece: Polygon,
-    obstacle: &Polygon,
-    rest: &mut Vec<Polygon>,
-) {
-    let side = obstacle.plane().distance(place);
-    if side.abs() <= 1e-12 * obstacle.size() {
-        rest.push(piece);
-        return;
-    }
-    let middle = obstacle.centroid() - place;
-    let mut shadowed = piece;
-    for (from, to) in obstacle.edges() {
-        let across = (from - place).cross(&(to - place));
-        let inwards = across * across.dot(&middle).signum();
-        let Some(normal) = inwards.try_normalize(0.0) else {
-            continue;
-        };
-        let rim = Plane::through(*place, normal);
-        rest.extend(shadowed.clipped(&rim.flipped()));
-        match shadowed.clipped(&rim) {
-            Some(part) => shadowed = part,
-            None => return,
+/// The shadow that an obstacle casts from a place on a convex outline: inside all of
+/// these planes, those that the outline crosses.
+enum Shadow {
+    Misses,
+    Within(Vec<Plane>),
+}
+
+impl Shadow {
+    fn new(place: &Vector3<f64>, obstacle: &Polygon, outline: &[Vector3<f64>]) -> Self {
+        let plane = obstacle.plane();
+        let side = plane.distance(place);
+        if side.abs() <= 1e-12 * obstacle.size() {
+            return Self::Misses;
         }
+        let corners = obstacle.corners();
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - place;
+        let rim_through = |(from, to): (Vector3<f64>, Vector3<f64>)| {
+            let across = (from - place).cross(&(to - place));
+            let normal = (across * across.dot(&middle).signum()).try_normalize(0.0)?;
+            Some(Plane::through(*place, normal))
+        };
+        // What is nearer than the obstacle is not in its shadow.
+        let top = if side > 0.0 { plane.flipped() } else { *plane };
+        let mut crossed = Vec::with_capacity(corners.len() + 1);
+        for rim in [top]
+            .into_iter()
+            .chain(obstacle.edges().filter_map(rim_through))
+        {
+            let inside = outline.iter().filter(|c| rim.distance(c) >= 0.0).count();
+            if inside == 0 {
+                return Self::Misses;
+            }
+            if inside < outline.len() {
+                crossed.push(rim);
+            }
+        }
+        Self::Within(crossed)
     }
-    // What is nearer than the obstacle is not in its shadow.
-    let plane = obstacle.plane();
-    let near = if side > 0.0 { *plane } else { plane.flipped() };
-    rest.extend(shadowed.clipped(&near));
+
+    /// The part of the outline in the shadow; those in the light are added to `rest`.
+    fn of(
+        self,
+        outline: Vec<Vector3<f64>>,
+        mut rest: Option<&mut Vec<Vec<Vector3<f64>>>>,
+    ) -> Vec<Vector3<f64>> {
+        let Self::Within(rims) = self else {
+            if let Some(rest) = rest {
+                rest.push(outline);
+            }
+            return Vec::new();
+        };
+        let mut dark = outline;
+        for rim in rims {
+            if let Some(rest) = &mut rest {
+                let lit = side_of(&dark, &rim, -1.0);
+                if lit.len() > 2 {
+                    rest.push(lit);
+                }
+            }
+            dark = side_of(&dark, &rim, 1.0);
+            if dark.len() < 3 {
+                return Vec::new();
+            }
+        }
+        dark
+    }
+}
+
+/// The part of a convex outline on one side of a plane, to the last bit: what one side
+/// loses, the other one has.
+fn side_of(outline: &[Vector3<f64>], plane: &Plane, sign: f64) -> Vec<Vector3<f64>> {
+    let mut kept = Vec::with_capacity(outline.len() + 1);
+    let Some(last) = outline.last() else {
+        return kept;
+    };
+    let (mut from, mut here) = (*last, sign * plane.distance(last));
+    for corner in outline {
+        let there = sign * plane.distance(corner);
+        if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+            kept.push(from + (corner - from) * (here / (here - there)));
+        }
+        if there >= 0.0 {
+            kept.push(*corner);
+        }
+        (from, here) = (*corner, there);
+    }
+    kept
 }
 
 /// Four parts of a triangle or quadrangle, the triangles of any other polygon's fan.
