@@ -202,7 +202,7 @@ impl Patches {
 }
 
 /// The part of a facet in the projector's frame, and what is beside it.
-fn split_by_frame(polygon: &Polygon, view: &View) -> (Option<Polygon>, Vec<Polygon>) {
+pub(super) fn split_by_frame(polygon: &Polygon, view: &View) -> (Option<Polygon>, Vec<Polygon>) {
     let borders = [
         view.depth_plane(NEAREST),
         view.column_plane(0.0),

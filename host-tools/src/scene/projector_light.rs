@@ -62,7 +62,9 @@ impl<'f> ProjectorLight<'f> {
         falling.max(0.0) * self.vignette(place)
     }
 
-    fn vignette(&self, place: FramePlace) -> f64 {
+    /// Share of the light that the frame has at a place.
+    #[must_use]
+    pub fn vignette(&self, place: FramePlace) -> f64 {
         if !self.beam.vignetting {
             return 1.0;
         }

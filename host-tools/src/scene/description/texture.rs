@@ -78,6 +78,16 @@ impl Texture {
         self.colour
     }
 
+    /// Largest difference between the channels of a pixel.
+    #[must_use]
+    pub fn widest_spread(&self) -> f64 {
+        let spread = |p: &[f32; 3]| {
+            p.iter().fold(0.0, |a: f32, b| a.max(*b))
+                - p.iter().fold(f32::INFINITY, |a, b| a.min(*b))
+        };
+        f64::from(self.pixels.iter().map(spread).fold(0.0, f32::max))
+    }
+
     /// The largest albedo of each channel.
     #[must_use]
     pub fn largest(&self) -> [f64; 3] {
