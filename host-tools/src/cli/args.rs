@@ -79,6 +79,9 @@ pub(super) struct Simulate {
     /// Say which effects are simulated and why
     #[arg(long)]
     pub(super) explain: bool,
+    /// Turn every effect the other way, one at a time, and say what that changes
+    #[arg(long)]
+    pub(super) ablate: bool,
     /// Bernoulli photographs, beside white, black and the Gray code
     #[arg(long, value_name = "M", default_value_t = 150)]
     pub(super) photos: usize,

@@ -5,9 +5,12 @@ use super::failure::{Failure, Kind};
 use super::output::{Output, cannot_write};
 use super::progress::progress;
 use crate::capture::shown;
+use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::{Scene, SceneError};
 use crate::scene::folder::{self, FolderError, Written};
-use crate::scene::{Decision, Effect, Forced, Simulation, SimulationError, SimulationOptions};
+use crate::scene::{
+    Decision, Effect, Forced, Simulation, SimulationError, SimulationOptions, percent,
+};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::time::Instant;
@@ -55,6 +58,10 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
         );
         written = Some(done.map_err(unwritten)?);
     }
+    let ablated = match arguments.ablate {
+        true => ablate(&scene, &options, bars.as_ref()).map_err(|error| unsimulated(&error))?,
+        false => Vec::new(),
+    };
     bars.end();
     let seconds = start.elapsed().as_secs_f64();
     let decisions = simulation.decisions();
@@ -71,6 +78,10 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     let mut text = String::new();
     if arguments.explain {
         explain(&simulation, &decisions, &mut text);
+    }
+    if arguments.ablate {
+        data["ablated"] = ablated.iter().map(difference).collect();
+        differences(&ablated, &mut text);
     }
     if let (Some(out), Some(written)) = (&arguments.output, written) {
         data["capture"] = json!(out.display().to_string());
@@ -114,7 +125,7 @@ fn explain(simulation: &Simulation<'_>, decisions: &[Decision], text: &mut Strin
         simulation.grid().rows(),
         simulation.grid().cols(),
         simulation.patches(),
-        crate::scene::percent(simulation.threshold()),
+        percent(simulation.threshold()),
     );
     for decision in decisions {
         let on = match (decision.on, decision.forced) {
@@ -132,6 +143,37 @@ fn explain(simulation: &Simulation<'_>, decisions: &[Decision], text: &mut Strin
             text,
             "{:16} {on:14} {seconds:>8}  {}",
             decision.effect, decision.reason
+        );
+    }
+    text.push('\n');
+}
+
+fn difference(ablated: &Ablated) -> Value {
+    json!({
+        "effect": ablated.effect.name(),
+        "on": ablated.on,
+        "error": ablated.error,
+        "largest": ablated.largest,
+        "seconds": ablated.seconds,
+    })
+}
+
+/// The table of what each effect contributes.
+fn differences(ablated: &[Ablated], text: &mut String) {
+    let _ = writeln!(
+        text,
+        "{:16} {:7} {:>12} {:>12} {:>10}   (shares of white)",
+        "turned", "", "rms change", "largest", "it costs"
+    );
+    for ablated in ablated {
+        let _ = writeln!(
+            text,
+            "{:16} {:7} {:>12} {:>12} {:>8.2} s",
+            ablated.effect,
+            if ablated.on { "off" } else { "on" },
+            percent(ablated.error),
+            percent(ablated.largest),
+            ablated.seconds,
         );
     }
     text.push('\n');

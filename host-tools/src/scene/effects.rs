@@ -119,6 +119,8 @@ pub struct Decision {
     pub on: bool,
     /// Whether somebody asked for this instead of what the scene says.
     pub forced: bool,
+    /// Whether the scene leaves a choice: what it does not have cannot be simulated.
+    pub possible: bool,
     /// Why, with the number that decided.
     pub reason: String,
     /// Seconds that simulating it took; 0 if it is off or costs nothing of its own.
@@ -183,6 +185,7 @@ impl Decisions {
             effect,
             on,
             forced,
+            possible: true,
             reason: reason.into(),
             seconds: 0.0,
         });
@@ -195,6 +198,7 @@ impl Decisions {
             effect,
             on: false,
             forced: false,
+            possible: false,
             reason: reason.into(),
             seconds: 0.0,
         });

@@ -13,6 +13,7 @@
 //! simulation    all of it, ready for patterns
 //! sensor        exposure, noise, bits, response
 //! folder        the photographs as a capture
+//! ablation      what each effect contributes
 //! ```
 //!
 //! Surfaces are Lambertian unless they say otherwise; each patch has one radiosity
@@ -20,6 +21,7 @@
 //! light, `F` the form factors (Goral, Torrance, Greenberg, Battaile, *Modeling the
 //! interaction of light between diffuse surfaces*, 1984).
 
+pub mod ablation;
 mod decide;
 pub mod description;
 mod effects;
