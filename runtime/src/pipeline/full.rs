@@ -11,8 +11,8 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use super::FrameError;
 use super::stages::{Workspace, correct, drive_row, subtract_ambient};
+use super::{FrameError, Stage};
 use crate::FrameSize;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
@@ -51,9 +51,18 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// A pipeline for frames of this size.
     ///
     /// # Errors
-    /// [`FrameError`] if the table has not `C` channels or the frame is smaller
-    /// than the grid.
+    /// [`FrameError`] if the table has not `C` channels, the frame is smaller
+    /// than the grid, or this build takes no frames larger than it.
+    #[inline]
     pub fn new(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
+        if Stage::FullResolution.is_built() {
+            Self::sized(table, frame)
+        } else {
+            Err(FrameError::NotBuilt(Stage::FullResolution))
+        }
+    }
+
+    fn sized(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
         if usize::from(table.channels()) != C {
             return Err(FrameError::Channels {
                 table: table.channels(),

@@ -224,3 +224,15 @@ fn pauses_come_as_often_as_the_work_asks_for() {
         assert!(more >= work / (Pace::STRIDE * 3 / 2), "{more}");
     }
 }
+
+#[test]
+fn a_table_that_lists_a_stage_that_is_not_built_is_rejected_with_the_stages_number() {
+    for (number, stage) in (0_u8..).zip(Stage::ALL) {
+        let why = Rejected::from(ImageError::NotBuilt(stage));
+        assert_eq!(why, Rejected::NotBuilt { stage });
+        let mut bytes = [0; 16];
+        let written = postcard::to_slice(&why, &mut bytes).expect("room");
+        assert_eq!(written, [10, number]);
+        assert!(why.to_string().contains(&stage.to_string()));
+    }
+}
