@@ -3,8 +3,9 @@
 use super::*;
 use crate::image::layout::{SectionKind, header, meta};
 use crate::image::made_up::{flat, image};
-use crate::image::{Seal, Table, seal::field};
+use crate::image::{ImageError, Seal, Table, seal::field};
 use crate::pace::{Pace, cost};
+use crate::pipeline::Stage;
 use ed25519_dalek::{Signer, SigningKey};
 use std::collections::BTreeSet;
 use std::string::ToString;
