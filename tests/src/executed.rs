@@ -14,7 +14,7 @@ use std::path::Path;
 pub struct Place {
     /// Its file, from `runtime/` on; empty where none is known.
     pub file: String,
-    /// Its function, with the path of its module; what is written in assembler has its
+    /// Its function, without module and types; what is written in assembler has its
     /// symbol here.
     pub function: String,
 }
@@ -40,24 +40,14 @@ impl Executed {
         let mut places = BTreeSet::new();
         for address in addresses {
             // Of Thumb code, symbols have an odd address and line tables an even one.
-            if let Some(name) = loader.find_symbol(address | 1) {
+            let symbol = loader.find_symbol(address | 1);
+            if let Some(name) = symbol.filter(|name| name.starts_with("iltm_")) {
                 places.insert(Place {
                     file: String::new(),
-                    function: demangled(name),
+                    function: name.to_owned(),
                 });
             }
-            let mut frames = loader.find_frames(address).expect("line tables");
-            while let Some(frame) = frames.next().expect("line tables") {
-                let file = frame.location.and_then(|location| location.file);
-                let function = frame.function.and_then(|function| {
-                    let name = function.demangle().ok()?;
-                    Some(name.into_owned())
-                });
-                places.insert(Place {
-                    file: own(file.unwrap_or_default()),
-                    function: function.unwrap_or_default(),
-                });
-            }
+            places.extend(inlined(&loader, address));
         }
         Self(places)
     }
@@ -80,8 +70,8 @@ impl Executed {
 pub enum Code {
     /// All of a file, or of a folder, of the runtime.
     File(&'static str),
-    /// Functions whose path ends so.
-    Function(&'static str),
+    /// A function of a file of the runtime.
+    Function(&'static str, &'static str),
     /// What is written in assembler and has a symbol that contains this.
     Symbol(&'static str),
     /// The same with one of these symbols.
@@ -92,15 +82,38 @@ impl Code {
     fn holds(&self, place: &Place) -> bool {
         match self {
             Self::File(file) => place.file.starts_with(file),
-            Self::Function(name) => place.function.ends_with(name),
+            Self::Function(file, name) => place.file == *file && place.function == *name,
             Self::Symbol(part) => {
-                let name = &place.function;
-                name.starts_with("iltm_") && !name.contains(':') && name.contains(part)
+                place.function.starts_with("iltm_") && place.function.contains(part)
             }
             Self::OneOf(names) => names.contains(&place.function.as_str()),
         }
     }
 }
+
+/// The functions that an address is in, one inlined in the other. What the check of a
+/// table has inlined is the check's: it asks of every stage whether the table lists it.
+fn inlined(loader: &Loader, address: u64) -> Vec<Place> {
+    let mut frames = loader.find_frames(address).expect("line tables");
+    let mut places = Vec::new();
+    while let Some(frame) = frames.next().expect("line tables") {
+        // Line 0: the compiler's own, or merged from several.
+        let location = frame.location.filter(|location| location.line > Some(0));
+        let file = location.and_then(|location| location.file);
+        let name = frame.function.as_ref().map(|function| function.raw_name());
+        let name = name.and_then(Result::ok).unwrap_or_default();
+        places.push(Place {
+            file: own(file.unwrap_or_default()),
+            function: name.split('<').next().unwrap_or_default().to_owned(),
+        });
+    }
+    if places.iter().any(|place| place.file == CHECK) {
+        places.retain(|place| place.file == CHECK);
+    }
+    places
+}
+
+const CHECK: &str = "runtime/src/image/check.rs";
 
 /// `0x00008478:  b5f0       push ...`
 fn address(line: &str) -> Option<u64> {
@@ -112,8 +125,4 @@ fn address(line: &str) -> Option<u64> {
 fn own(file: &str) -> String {
     file.rfind("/runtime/src/")
         .map_or(String::new(), |start| file[start + 1..].to_owned())
-}
-
-fn demangled(name: &str) -> String {
-    addr2line::demangle_auto(name.into(), None).into_owned()
 }

@@ -16,14 +16,17 @@ fn every_hard_frame_on_every_hard_grid_is_the_exact_one_within_its_roundings() {
         for channels in [1, 3] {
             let made = random(grid(rows, cols), channels, 8, seed);
             let worst = all_frames(&made, &Frame::all(made.grid));
-            println!("{rows} x {cols}, {channels} channels: {worst}");
-            assert!(worst.holds(), "{rows} x {cols}: {worst}");
+            let [samples, inside] = worst.samples;
+            println!("{rows} x {cols}, {channels} channels: {worst}, {inside} of {samples} inside");
+            assert!(worst.holds(), "{rows} x {cols}: {worst:?}");
+            // Where all is clipped there is nothing to compare.
+            assert!(10 * inside > samples, "{rows} x {cols}: {worst:?}");
         }
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn hard_frames_of_random_tables_are_exact_within_their_roundings(

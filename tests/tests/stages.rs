@@ -24,6 +24,8 @@ use iltm_tests::instructions::bench;
 use iltm_tests::stages::{choices, costs, csv, instructions, size_line, table};
 use std::time::Duration;
 
+const CHECK: &str = "runtime/src/image/check.rs";
+
 /// The code of a stage, down to what checks its part of a table.
 fn code(stage: Stage) -> Vec<Code> {
     use Code::{File, Function, OneOf, Symbol};
@@ -33,25 +35,21 @@ fn code(stage: Stage) -> Vec<Code> {
             File("runtime/src/kernel/gather/"),
             File("runtime/src/kernel/levels/"),
             File("runtime/src/haar/analysis.rs"),
-            File("runtime/src/haar/reconstruction.rs"),
             File("runtime/src/haar/source.rs"),
             File("runtime/src/haar/synthesis.rs"),
-            Function("pipeline::stages::Workspace::operate"),
+            Function("runtime/src/pipeline/stages.rs", "operate"),
             Symbol("merge"),
             Symbol("split"),
             Symbol("store"),
         ],
         Stage::Ambient => vec![
-            Function("pipeline::stages::subtract_ambient"),
-            Function("image::check::ambient"),
-            Function("ambient_row"),
+            Function("runtime/src/pipeline/full.rs", "ambient_row"),
+            Function("runtime/src/image/table.rs", "ambient_row"),
+            Function(CHECK, "ambient"),
             Symbol("_lit"),
         ],
         Stage::Response => vec![
-            File("runtime/src/pipeline/response.rs"),
-            Function("image::check::response"),
-            Function("image::check::codes"),
-            Function("pipeline::codes::code"),
+            Function(CHECK, "response"),
             OneOf(&[
                 "iltm_finish_1_dark",
                 "iltm_finish_1_lit",
@@ -70,7 +68,12 @@ fn code(stage: Stage) -> Vec<Code> {
             File("runtime/src/pipeline/whole.rs"),
             File("runtime/src/resample/"),
             File("runtime/src/kernel/lines/"),
-            Symbol("add_1_"),
+            OneOf(&[
+                "iltm_add_1_dark",
+                "iltm_add_1_lit",
+                "iltm_add_3_dark",
+                "iltm_add_3_lit",
+            ]),
             Symbol("blend"),
             Symbol("expand"),
         ],
@@ -103,22 +106,24 @@ fn executed_with(stages: &[Stage]) -> Executed {
 fn a_frame_runs_the_code_of_the_stages_that_its_table_lists_and_of_no_others() {
     let all = executed_with(&Stage::ALL);
     let none = executed_with(&[]);
+    let mut wrong = Vec::new();
     for stage in Stage::ALL {
         let others: Vec<_> = Stage::ALL.into_iter().filter(|s| *s != stage).collect();
         let without = executed_with(&others);
         for code in code(stage) {
             let found = all.of(&code).count();
             println!("{stage:?}: {found} places of {code:?}");
-            assert!(
-                found > 0,
-                "{stage:?}: nothing is {code:?}, even with the stage"
-            );
+            if found == 0 {
+                wrong.push(format!("{stage:?}: nothing is {code:?}, even with it"));
+            }
             for (executed, listed) in [(&without, "all others"), (&none, "none")] {
-                let found: Vec<_> = executed.of(&code).collect();
-                assert!(found.is_empty(), "{stage:?} with {listed}: {found:?}");
+                for place in executed.of(&code) {
+                    wrong.push(format!("{stage:?} with {listed}: {place:?}"));
+                }
             }
         }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
@@ -132,8 +137,12 @@ fn stages_that_a_table_does_not_list_cost_a_frame_the_same_few_instructions_at_a
         println!("{side} x {side}: {with} instructions with all stages built, {lean} without");
         more.push(with.abs_diff(lean));
     }
-    // A clock tick is 40 instructions. A sample more or less would be 4,096 here.
-    assert!(more.iter().all(|more| *more <= 240), "{more:?}");
+    // A clock tick is 40 instructions. One more for every sample would be 4,096 here.
+    let [least, most] = [more.iter().min(), more.iter().max()].map(|more| more.copied());
+    assert!(
+        most <= Some(320) && most <= least.map(|least| least + 80),
+        "{more:?}"
+    );
 }
 
 const COSTS: &str = include_str!("../../docs/stages.csv");

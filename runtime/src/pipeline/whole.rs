@@ -77,7 +77,12 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
                 store(line, channel, memory.values);
             }
         }
-        let lines = memory.ambient.chunks_exact_mut(width).take(height);
+        let lit = if self.table().ambient().is_some() {
+            height
+        } else {
+            0
+        };
+        let lines = memory.ambient.chunks_exact_mut(width).take(lit);
         for (y, line) in lines.enumerate() {
             for channel in 0..C {
                 if self.ambient_row(y, channel, &mut memory.row) {

@@ -60,6 +60,9 @@ impl<'c, K: Clock> Laps<'c, K> {
     }
 }
 
+/// Not inlined: the compiler would share instructions between this and the other, and
+/// a record of what was executed could not tell them apart.
+#[inline(never)]
 fn grid<const C: usize>(
     table: &Table<'_>,
     tier: u8,
@@ -84,6 +87,7 @@ fn grid<const C: usize>(
     Ok((laps.instructions(), clipped))
 }
 
+#[inline(never)]
 fn full<const C: usize>(
     table: &Table<'_>,
     (tier, size): (u8, FrameSize),
