@@ -14,8 +14,8 @@ use std::path::Path;
 pub struct Place {
     /// Its file, from `runtime/` on; empty where none is known.
     pub file: String,
-    /// Its function, without module and types; what is written in assembler has its
-    /// symbol here.
+    /// Its function, without its module and with its types; what is written in assembler
+    /// has its symbol here.
     pub function: String,
 }
 
@@ -70,8 +70,11 @@ impl Executed {
 pub enum Code {
     /// All of a file, or of a folder, of the runtime.
     File(&'static str),
-    /// A function of a file of the runtime.
+    /// A function of a file of the runtime, with any types.
     Function(&'static str, &'static str),
+    /// Functions of a folder of the runtime that exist once for every number, in the
+    /// instance for this one.
+    Instance(&'static str, u8),
     /// What is written in assembler and has a symbol that contains this.
     Symbol(&'static str),
     /// The same with one of these symbols.
@@ -82,7 +85,15 @@ impl Code {
     fn holds(&self, place: &Place) -> bool {
         match self {
             Self::File(file) => place.file.starts_with(file),
-            Self::Function(file, name) => place.file == *file && place.function == *name,
+            Self::Function(file, name) => {
+                let own = place.function.split('<').next();
+                place.file == *file && own == Some(name)
+            }
+            Self::Instance(folder, number) => {
+                let only = place.function.ends_with(&format!("<{number}>"));
+                let first = place.function.contains(&format!("<{number}, "));
+                place.file.starts_with(folder) && (only || first)
+            }
             Self::Symbol(part) => {
                 place.function.starts_with("iltm_") && place.function.contains(part)
             }
@@ -104,7 +115,7 @@ fn inlined(loader: &Loader, address: u64) -> Vec<Place> {
         let name = name.and_then(Result::ok).unwrap_or_default();
         places.push(Place {
             file: own(file.unwrap_or_default()),
-            function: name.split('<').next().unwrap_or_default().to_owned(),
+            function: name.into_owned(),
         });
     }
     if places.iter().any(|place| place.file == CHECK) {

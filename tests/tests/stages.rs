@@ -28,7 +28,7 @@ const CHECK: &str = "runtime/src/image/check.rs";
 
 /// The code of a stage, down to what checks its part of a table.
 fn code(stage: Stage) -> Vec<Code> {
-    use Code::{File, Function, OneOf, Symbol};
+    use Code::{File, Function, Instance, OneOf, Symbol};
     match stage {
         Stage::Operator => vec![
             File("runtime/src/operator/"),
@@ -38,6 +38,8 @@ fn code(stage: Stage) -> Vec<Code> {
             File("runtime/src/haar/source.rs"),
             File("runtime/src/haar/synthesis.rs"),
             Function("runtime/src/pipeline/stages.rs", "operate"),
+            Function("runtime/src/pipeline/whole.rs", "average_frame"),
+            Function("runtime/src/pipeline/full.rs", "correct_row"),
             Symbol("merge"),
             Symbol("split"),
             Symbol("store"),
@@ -58,6 +60,8 @@ fn code(stage: Stage) -> Vec<Code> {
             ]),
         ],
         Stage::Colour => vec![
+            Instance("runtime/src/pipeline/", 3),
+            Instance("runtime/src/kernel/", 3),
             Symbol("_three_"),
             Symbol("merge_3_"),
             Symbol("finish_3_"),

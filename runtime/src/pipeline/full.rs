@@ -106,6 +106,21 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.frame
     }
 
+    /// Whether frames of `tier` go through the operator. Those of others need neither
+    /// averages nor corrections.
+    #[must_use]
+    pub const fn operates(&self, tier: u8) -> bool {
+        tier > 0 && self.table.operator().is_some()
+    }
+
+    pub(super) fn check_tier(&self, tier: u8) -> Result<(), FrameError> {
+        let top = self.table.top_tier();
+        if tier > top {
+            return Err(FrameError::NoSuchTier { tier, top });
+        }
+        Ok(())
+    }
+
     /// Elements that [`Row::line`] needs.
     #[must_use]
     pub fn line_len(&self) -> usize {
@@ -177,10 +192,8 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         corrections: &mut [i32],
         workspace: &mut Workspace<'_>,
     ) -> Result<(), FrameError> {
-        let (top, needed) = (self.table.top_tier(), C * self.table.grid().cells());
-        if tier > top {
-            return Err(FrameError::NoSuchTier { tier, top });
-        }
+        self.check_tier(tier)?;
+        let needed = C * self.table.grid().cells();
         for (what, given) in [("sums", sums.len()), ("corrections", corrections.len())] {
             ShortSlice::check(what, needed, given)?;
         }

@@ -104,11 +104,15 @@ fn full<const C: usize>(
         pipeline.prepare(&mut frame)?;
     }
     let mut laps = Laps::new(clock);
-    pipeline.average_frame(ENCODING, wanted, &mut frame)?;
+    if pipeline.operates(tier) {
+        pipeline.average_frame(ENCODING, wanted, &mut frame)?;
+    }
     laps.mark();
-    pipeline.correct(tier, frame.sums, frame.corrections, &mut workspace)?;
+    if pipeline.operates(tier) {
+        pipeline.correct(tier, frame.sums, frame.corrections, &mut workspace)?;
+    }
     laps.mark();
-    let clipped = pipeline.finish_frame(ENCODING, wanted, input, &mut frame)?;
+    let clipped = pipeline.finish_frame((tier, ENCODING), wanted, input, &mut frame)?;
     laps.mark();
     Ok((laps.instructions(), clipped))
 }
