@@ -3,7 +3,15 @@
 //! `cargo test --release -p iltm-tests --test hard_frames -- --include-ignored
 //! --nocapture` runs a million frames, and prints the lines of `docs/hard-cases.md`.
 
+use iltm::device::emulator::{Board, Emulator};
+use iltm::device::memory::Memory;
+use iltm::device::playback::Playback;
+use iltm_runtime::FrameSize;
+use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::image::Table;
 use iltm_runtime::operator::{Bounds, OperatorError};
+use iltm_runtime::pipeline::Encoding;
+use iltm_tests::firmware::{elf, on_host, order, through, word};
 use iltm_tests::hard_frames::{
     Frame, GRIDS, all_frames, at_the_accumulators_limit, at_the_corrections_limit, corrections,
     drifted, grid, random, rows, verdict,
@@ -98,6 +106,44 @@ fn ten_thousand_frames_leave_no_trace() {
 #[ignore = "takes a minute where nothing is optimised"]
 fn a_million_frames_leave_no_trace() {
     assert_eq!(drifted(1_000_000), 0);
+}
+
+#[test]
+fn the_firmware_makes_of_hard_frames_what_the_host_makes_of_them() {
+    let mut tables = vec![at_the_accumulators_limit(3), at_the_corrections_limit(1)];
+    for (seed, (rows, cols)) in (0..).zip([(1, 1), (1, 37), (37, 1), (7, 11), (257, 3)]) {
+        tables.extend([1, 3].map(|channels| random(grid(rows, cols), channels, 8, seed)));
+    }
+    let firmware = elf(Board::An500, "selftest");
+    let mut compared = 0;
+    for made in tables {
+        let image = made.image();
+        let table = Table::check(&image).expect("made to be taken");
+        let memory = Memory::temporary().expect("a temporary file");
+        memory.write(&psram::SLOT_A, &image).expect("room");
+        let tier = table.top_tier();
+        order(&memory, word::TIER, u32::from(tier) + 1);
+        let _running = Emulator::start(Board::An500, &firmware, &memory).expect("QEMU runs");
+        let size = FrameSize::of_grid(made.grid);
+        let channels = made.channels;
+        let format = Format::new(size, channels as u8, Encoding::Linear, 100_000);
+        let format = format.expect("a format");
+        let mut playback = Playback::new(&memory, format).expect("it fits");
+        for frame in Frame::all(made.grid) {
+            let light = frame.light(made.grid);
+            let samples = light
+                .iter()
+                .map(|light| vec![(light * 255.0) as u8; channels]);
+            let wanted: Vec<u8> = samples.flatten().collect();
+            let (expected, _) = on_host(&table, tier, format, &wanted);
+            assert!(
+                through(&mut playback, &wanted) == expected,
+                "{size}, {channels} channels, {frame:?}"
+            );
+            compared += 1;
+        }
+    }
+    println!("{compared} frames equal");
 }
 
 #[test]
