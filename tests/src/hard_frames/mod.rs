@@ -13,16 +13,22 @@
 //! - gain times light to nearest: half a step;
 //!
 //! and the code that is compared, 16 bits, to nearest: a quarter of a step.
-//! [`rows`] is what `docs/hard-cases.md` says of them.
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`limits`] | tables at the edge of what the proof of the bounds takes |
+//! | [`page`] | what `docs/hard-cases.md` says of all of them |
+
+pub mod limits;
+pub mod page;
 
 use crate::made_up::MadeUp;
 use iltm::compile::image::StoredRow;
 use iltm::video::OperatorMemory;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::{Basis, Function};
-use iltm_runtime::image::{ImageError, Table};
-use iltm_runtime::operator::{Bounds, OperatorError};
-use iltm_runtime::pipeline::{Encoding, GridPipeline, Sample, stages};
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{Encoding, GridPipeline, Sample};
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
 
@@ -31,21 +37,6 @@ const UNIT: f64 = 32_768.0;
 
 /// What rounds a drive whatever the operator: correction, gain and code.
 const ALWAYS: f64 = 0.5 + 0.5 + 0.25;
-
-/// One line of the page of hard cases.
-#[derive(Clone, Debug)]
-pub struct Row {
-    /// The case.
-    pub case: &'static str,
-    /// Why it is hard.
-    pub reason: &'static str,
-    /// What theory allows, and which.
-    pub bound: String,
-    /// What was found.
-    pub measured: String,
-    /// Whether that is within the bound.
-    pub holds: bool,
-}
 
 /// The frames, full scale, of one channel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -364,84 +355,6 @@ pub const GRIDS: [(u16, u16); 11] = [
     (257, 3),
 ];
 
-/// A grid of 1 x 10 cells, of whose details at the finest level all five are as large
-/// as they can be in one frame: the checkerboard.
-fn five_details() -> Grid {
-    grid(1, 10)
-}
-
-/// Its constant function.
-const CONSTANT: u16 = 9;
-
-fn row(index: u16, shift: u16, values: &[i16]) -> StoredRow {
-    StoredRow {
-        index,
-        shift,
-        entries: (0..).zip(values.iter().copied()).collect(),
-    }
-}
-
-/// A table whose accumulator can reach `2^14` times 131,068 + `more`; `2^31 - 1` is
-/// 131,071.99 times that.
-#[must_use]
-pub fn at_the_accumulators_limit(more: i16) -> MadeUp {
-    let mut made = MadeUp::new(five_details(), 1);
-    let most = i16::MAX;
-    made.rows = vec![row(CONSTANT, 8, &[most, most, most, most, more])];
-    made
-}
-
-/// A table of whose corrections one can reach `2^12` times 262,142 + `more`, and 3 for
-/// what the three rows round; `2^30 - 1` is 262,143.99 times that.
-#[must_use]
-pub fn at_the_corrections_limit(more: i16) -> MadeUp {
-    let mut made = MadeUp::new(five_details(), 1);
-    let most = i16::MAX;
-    let all = [most, most, most, most, 3];
-    // The first functions of the finest level and of the next are positive at the first
-    // cell, as the constant is.
-    made.rows = vec![row(0, 2, &all), row(5, 2, &[more]), row(CONSTANT, 2, &all)];
-    made
-}
-
-/// What the check says of a table.
-///
-/// # Errors
-/// [`OperatorError`] if it is its operator that is refused.
-///
-/// # Panics
-/// If the table is refused for something else.
-pub fn verdict(made: &MadeUp) -> Result<Bounds, OperatorError> {
-    let image = made.image();
-    match Table::check(&image) {
-        Ok(table) => Ok(table.operator().map_or(Bounds::default(), |o| o.bounds())),
-        Err(ImageError::Operator(error)) => Err(error),
-        Err(error) => panic!("{error}"),
-    }
-}
-
-/// The corrections of the cells, bits of
-/// [`Correction`](iltm_runtime::units::Correction), for a frame.
-///
-/// # Panics
-/// If the table is refused.
-#[must_use]
-pub fn corrections(made: &MadeUp, frame: Frame) -> Vec<i32> {
-    let image = made.image();
-    let table = Table::check(&image).expect("made to be taken");
-    let light = frame.light(made.grid);
-    let mut cells: Vec<i32> = light.iter().map(|light| (light * UNIT) as i32).collect();
-    let mut memory = OperatorMemory::new(&table);
-    let done = stages::correct(
-        &table,
-        table.top_tier(),
-        &mut cells,
-        &mut memory.workspace(),
-    );
-    done.expect("everything has the grid's size");
-    cells
-}
-
 /// Frames of which the output differs from that of the first ones, among `count` that
 /// show the same two frames, unlike in every sample, in turn: black and white, then a
 /// checkerboard and its inverse. All stages at once, in 8 bits.
@@ -484,166 +397,4 @@ pub fn drifted(count: usize) -> usize {
             make(&frames[of]) != first[of]
         })
         .count()
-}
-
-/// The lines of the page of hard cases.
-#[must_use]
-pub fn rows() -> Vec<Row> {
-    let mut rows = frame_rows();
-    rows.extend(limit_rows());
-    rows.push(drift_row());
-    rows.extend(grid_rows());
-    rows
-}
-
-const ROUNDINGS: &str = "roundings of input coefficients, rows, correction, gain and code";
-
-fn within(case: &'static str, reason: &'static str, worst: Worst) -> Row {
-    Row {
-        case,
-        reason,
-        bound: format!(
-            "{:.2} steps of 2^-15 where it is largest: {ROUNDINGS}",
-            worst.bound
-        ),
-        measured: worst.to_string(),
-        holds: worst.holds(),
-    }
-}
-
-/// A frame on all grids.
-fn frame_rows() -> Vec<Row> {
-    let on_all = |choose: fn(&Frame) -> bool| {
-        let of = |(seed, (rows, cols)): (u64, (u16, u16))| {
-            let made = random(grid(rows, cols), 1, 6, seed);
-            let frames: Vec<_> = Frame::all(made.grid).into_iter().filter(choose).collect();
-            all_frames(&made, &frames)
-        };
-        (0..).zip(GRIDS).map(of).fold(Worst::default(), Worst::max)
-    };
-    vec![
-        within(
-            "a black frame",
-            "below the ambient light everywhere: differences must not wrap",
-            on_all(|frame| *frame == Frame::Black),
-        ),
-        within(
-            "a white frame",
-            "the largest mean that there is",
-            on_all(|frame| *frame == Frame::White),
-        ),
-        within(
-            "a checkerboard",
-            "the largest details of the finest level, all at once",
-            on_all(|frame| matches!(frame, Frame::Checkerboard(_))),
-        ),
-        within(
-            "a single white pixel",
-            "all levels have one detail each, small ones rounded away",
-            on_all(|frame| matches!(frame, Frame::SinglePixel(_))),
-        ),
-        within(
-            "a frame like a basis function",
-            "the largest coefficient that there is, of either sign",
-            on_all(|frame| matches!(frame, Frame::Extreme(..))),
-        ),
-    ]
-}
-
-fn limit_rows() -> Vec<Row> {
-    let beyond = |case, reason, limit: u64, error: OperatorError, bound: u64| Row {
-        case,
-        reason,
-        bound: format!("at most {limit}, or refused"),
-        measured: format!("refused: {error}"),
-        holds: bound > limit,
-    };
-    // Half a step of a drive is on every correction, beyond what the proof is about.
-    let half = 128;
-    let reached = |case, reason, made: &MadeUp, proved: u32, unit: i64| {
-        let frame = |side| corrections(made, Frame::Checkerboard(side));
-        let largest = [true, false].map(frame).concat();
-        let largest = largest
-            .into_iter()
-            .map(|c| (i64::from(c) - half).abs() * unit);
-        let largest = largest.max().unwrap_or(0);
-        let share = largest as f64 / f64::from(proved);
-        Row {
-            case,
-            reason,
-            bound: format!("{proved}, the table's proved bound"),
-            measured: format!("{share:.5} of it in the checkerboard that the proof has in mind"),
-            holds: share > 0.999 && largest <= i64::from(proved),
-        }
-    };
-    let mut rows = Vec::new();
-    let (under, over) = (at_the_accumulators_limit(3), at_the_accumulators_limit(4));
-    let reason = "all entries at their largest, and a frame with all of their coefficients so";
-    if let Ok(bounds) = verdict(&under) {
-        let case = "an accumulator just under its limit";
-        // The row's coefficient is the accumulator, shifted by 8.
-        rows.push(reached(case, reason, &under, bounds.accumulator, 1 << 8));
-    }
-    if let Err(error @ OperatorError::AccumulatorOverflow { bound, .. }) = verdict(&over) {
-        let case = "an accumulator at its limit";
-        rows.push(beyond(case, reason, Bounds::MAX_ACCUMULATOR, error, bound));
-    }
-    let (under, over) = (at_the_corrections_limit(1), at_the_corrections_limit(2));
-    let reason = "functions of three levels that add up at one cell";
-    if let Ok(bounds) = verdict(&under) {
-        let case = "a correction just under its limit";
-        rows.push(reached(case, reason, &under, bounds.correction, 1));
-    }
-    if let Err(error @ OperatorError::CorrectionOverflow { bound }) = verdict(&over) {
-        let case = "a correction at its limit";
-        rows.push(beyond(case, reason, Bounds::MAX_CORRECTION, error, bound));
-    }
-    rows
-}
-
-/// Frames of the page's line on drift; a test runs a million.
-const FRAMES: usize = 10_000;
-
-fn drift_row() -> Row {
-    let drifted = drifted(FRAMES);
-    Row {
-        case: "full-scale alternation, frame after frame",
-        reason: "what is left of a frame would show in the next, or grow",
-        bound: "0 frames: nothing of a frame is kept".to_owned(),
-        measured: format!("{drifted} of {FRAMES} differ from the first in any bit"),
-        holds: drifted == 0,
-    }
-}
-
-fn grid_rows() -> Vec<Row> {
-    let on = |sides: &[(u16, u16)]| {
-        let of = |(seed, (rows, cols)): (u64, &(u16, u16))| {
-            let made = random(grid(*rows, *cols), 3, 5, 100 + seed);
-            all_frames(&made, &Frame::all(made.grid))
-        };
-        (0..).zip(sides).map(of).fold(Worst::default(), Worst::max)
-    };
-    vec![
-        within(
-            "a grid of 1 x 1",
-            "no neighbour, no detail, no operator",
-            on(&[(1, 1)]),
-        ),
-        within(
-            "grids of one row or one column",
-            "splits along one axis only",
-            on(&[(1, 2), (2, 1), (1, 64), (64, 1), (1, 37), (37, 1)]),
-        ),
-        within(
-            "grids of prime sides",
-            "odd splits at every level, with weights",
-            on(&[(2, 3), (7, 11), (31, 23)]),
-        ),
-        within("a grid of 13 x 21", "the paper's", on(&[(13, 21)])),
-        within(
-            "a grid of 257 x 3",
-            "the most unequal splits: 256 to 1",
-            on(&[(257, 3)]),
-        ),
-    ]
 }
