@@ -111,7 +111,10 @@ fn inlined(loader: &Loader, address: u64) -> Vec<Place> {
         // Line 0: the compiler's own, or merged from several.
         let location = frame.location.filter(|location| location.line > Some(0));
         let file = location.and_then(|location| location.file);
-        let name = frame.function.as_ref().map(|function| function.raw_name());
+        let name = frame
+            .function
+            .as_ref()
+            .map(addr2line::FunctionName::raw_name);
         let name = name.and_then(Result::ok).unwrap_or_default();
         places.push(Place {
             file: own(file.unwrap_or_default()),

@@ -142,7 +142,7 @@ fn stages_that_a_table_does_not_list_cost_a_frame_the_same_few_instructions_at_a
         more.push(with.abs_diff(lean));
     }
     // A clock tick is 40 instructions. One more for every sample would be 4,096 here.
-    let [least, most] = [more.iter().min(), more.iter().max()].map(|more| more.copied());
+    let [least, most] = [more.iter().min(), more.iter().max()].map(Option::copied);
     assert!(
         most <= Some(320) && most <= least.map(|least| least + 80),
         "{more:?}"

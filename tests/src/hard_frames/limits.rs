@@ -7,7 +7,7 @@ use iltm::compile::image::StoredRow;
 use iltm::video::OperatorMemory;
 use iltm_runtime::Grid;
 use iltm_runtime::image::{ImageError, Table};
-use iltm_runtime::operator::{Bounds, OperatorError};
+use iltm_runtime::operator::{Bounds, Operator, OperatorError};
 use iltm_runtime::pipeline::stages;
 
 /// A grid of 1 x 10 cells, of whose details at the finest level all five are as large
@@ -60,7 +60,7 @@ pub fn at_the_corrections_limit(more: i16) -> MadeUp {
 pub fn verdict(made: &MadeUp) -> Result<Bounds, OperatorError> {
     let image = made.image();
     match Table::check(&image) {
-        Ok(table) => Ok(table.operator().map_or(Bounds::default(), |o| o.bounds())),
+        Ok(table) => Ok(table.operator().map_or(Bounds::default(), Operator::bounds)),
         Err(ImageError::Operator(error)) => Err(error),
         Err(error) => panic!("{error}"),
     }

@@ -28,6 +28,7 @@ use iltm::video::OperatorMemory;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::{Basis, Function};
 use iltm_runtime::image::Table;
+use iltm_runtime::operator::Segment;
 use iltm_runtime::pipeline::{Encoding, GridPipeline, Sample};
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
@@ -131,7 +132,7 @@ impl<'t, 'a> Reference<'t, 'a> {
         for row in segments
             .iter()
             .filter(|s| s.tier == tier)
-            .flat_map(|s| s.rows())
+            .flat_map(Segment::rows)
         {
             // To the last place of a drive, from that of a correction.
             let unit = scale * (-8.0 - f64::from(row.shift)).exp2();
@@ -294,7 +295,7 @@ pub fn random(grid: Grid, channels: usize, entries: usize, seed: u64) -> MadeUp 
     for (index, function) in basis.functions().enumerate().take(functions) {
         // Fifteen levels of three functions stay below 2^30 with these.
         let most = (24_000 / function.peak() / entries as u64).clamp(1, 8_000) as i16;
-        let mut places: Vec<u16> = (0..1 + random.usize(..entries))
+        let mut places: Vec<u16> = (0..=random.usize(..entries))
             .map(|_| random.u16(..grid.cells() as u16))
             .collect();
         places.sort_unstable();
