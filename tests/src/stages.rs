@@ -172,7 +172,11 @@ pub fn flash(features: &str) -> u64 {
 pub fn size_line(stages: &[Stage]) -> String {
     let features = features(stages);
     let bytes = flash(&features);
-    format!("{},{bytes}", features.replace(',', " + "))
+    let name = match features.as_str() {
+        "" => "none".to_owned(),
+        some => some.replace(',', " + "),
+    };
+    format!("{name},{bytes}")
 }
 
 /// All choices of stages, none first, all last.
