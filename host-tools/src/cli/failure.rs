@@ -85,6 +85,7 @@ impl From<&Rejected> for Kind {
             Rejected::Signature => Self::Signature,
             Rejected::Older { .. } => Self::Older,
             Rejected::OtherDevice { .. } => Self::OtherDevice,
+            Rejected::NotBuilt { .. } => Self::Device,
             Rejected::NotATable
             | Rejected::Truncated
             | Rejected::Format
