@@ -76,9 +76,10 @@ cargo clippy --workspace --all-targets --locked -- -D warnings
 has_target=
 [ -d "$(rustc --print sysroot)/lib/rustlib/thumbv7em-none-eabihf/lib" ] && has_target=yes
 if [ $has_target ]; then
-    for board in mps2-an500 mps2-an386; do
+    # Both boards with all stages, and one with gain alone.
+    for features in mps2-an500,stages mps2-an386,stages mps2-an500; do
         (cd "$firmware" && cargo clippy --release --lib --bins --locked \
-            --no-default-features --features "$board" -- -D warnings)
+            --no-default-features --features "$features" -- -D warnings)
     done
 fi
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the firmware: build.sh [BOARD] [BIN], by default mps2-an500 and firmware.
-# ILTM_FIRMWARE_FEATURES names features beside the board.
+# ILTM_FIRMWARE_STAGES names the stages, with commas between them, none if it is
+# empty; by default all. ILTM_FIRMWARE_FEATURES names features beside board and stages.
 # Finds a Rust that can build for the board, installing what is missing: rustup's
 # target, or else Debian's packages. The last line on standard output is the path
 # of the ELF file; everything else goes to standard error.
@@ -67,19 +68,28 @@ if [ $route = debian ] && ! debian_rust; then
 fi
 
 # A folder for each board and route: each has flags of its own, and cargo would
-# build everything anew at every change between them.
+# build everything anew at every change between them. Firmware of some stages only has
+# one too, so that nobody takes it for the whole.
+stages=${ILTM_FIRMWARE_STAGES-stages}
 more=${ILTM_FIRMWARE_FEATURES:-}
-folder=$PWD/target/$board${more:+-$more}
+features=$board${stages:+,$stages}${more:+,$more}
+case $stages in
+stages) some= ;;
+'') some=-lean ;;
+*) some=-some ;;
+esac
+folder=$board$some${more:+-$more}
 # The one of SHA-512's two implementations that is smaller by 32 KB; also in
 # .cargo/config.toml, which these flags replace.
 flags="-C target-cpu=$cpu --cfg sha2_backend_soft=\"compact\""
-options=(--release --locked --target "$target" --no-default-features --features "$board${more:+,$more}" --bin "$bin")
+options=(--release --locked --target "$target" --no-default-features --features "$features" --bin "$bin")
 if [ $route = debian ]; then
-    folder=$PWD/target/debian-$board${more:+-$more}
+    folder=$PWD/target/debian-$folder
     RUSTC_BOOTSTRAP=1 RUSTC=/usr/bin/rustc RUSTFLAGS="$flags -C linker=arm-none-eabi-ld" \
         CARGO_TARGET_DIR=$folder \
         /usr/bin/cargo build "${options[@]}" -Zbuild-std=core >&2
 else
+    folder=$PWD/target/$folder
     RUSTFLAGS=$flags CARGO_TARGET_DIR=$folder cargo build "${options[@]}" >&2
 fi
 echo "$folder/$target/release/$bin"

@@ -38,9 +38,12 @@ const SAME: u32 = 1 << RATIO_BITS;
 /// The largest ratio that is kept.
 const MOST: u32 = u32::MAX;
 
-/// Cost of one sample outside the operator, and of one multiplication in it, in
-/// instructions. Only their ratio counts, and only until it has been measured;
-/// too low a base makes the governor careful.
+/// Cost of one sample at a tier without operator, of one outside the operator at the
+/// others, and of one multiplication in it, in instructions. Only their ratios count,
+/// and only until they have been measured. The first is the largest that it is anywhere
+/// in `docs/instructions.csv`, in proportion to the second: a tier that is expected to
+/// take longer than it does might never be tried.
+const GAIN_COST: u64 = 17;
 const SAMPLE_COST: u64 = 40;
 const MULTIPLICATION_COST: u64 = 4;
 
@@ -136,8 +139,11 @@ impl Governor {
     /// A governor for frames of `samples` samples with this table.
     #[must_use]
     pub fn for_table(table: &Table<'_>, samples: usize, budget: u32) -> Self {
-        let base = samples as u64 * SAMPLE_COST;
-        let cost = |multiplications: u32| base + u64::from(multiplications) * MULTIPLICATION_COST;
+        let samples = samples as u64;
+        let cost = |multiplications: u32| match multiplications {
+            0 => samples * GAIN_COST,
+            some => samples * SAMPLE_COST + u64::from(some) * MULTIPLICATION_COST,
+        };
         let tiers = table.tiers().iter();
         Self::new(tiers.map(|tier| cost(tier.multiplications)), budget)
     }

@@ -19,19 +19,36 @@ use std::time::{Duration, Instant};
 /// Longest that anything is waited for: far more than it takes on a busy machine.
 pub const PATIENCE: Duration = Duration::from_mins(1);
 
-/// The ELF file of a firmware (`firmware` or `selftest`), built for the board.
+/// Stages of a firmware that has all.
+pub const ALL_STAGES: &str = "stages";
+
+/// Stages of a firmware that has gain and clip alone.
+pub const LEAN: &str = "";
+
+/// The ELF file of a firmware (`firmware`, `selftest` or `bench`), built for the board.
 ///
 /// # Panics
 /// If it cannot be built, with the reason.
 #[must_use]
 pub fn elf(board: Board, bin: &'static str) -> PathBuf {
+    elf_of(board, ALL_STAGES, bin)
+}
+
+/// The same with these stages only, features of the firmware with commas between them.
+/// Of those between [`LEAN`] and [`ALL_STAGES`] the last one built is kept.
+///
+/// # Panics
+/// If it cannot be built, with the reason.
+#[must_use]
+pub fn elf_of(board: Board, stages: &str, bin: &'static str) -> PathBuf {
     static BUILT: Mutex<Option<HashMap<(String, &str), PathBuf>>> = Mutex::new(None);
+    let key = (format!("{board} {stages}"), bin);
     // A build that failed must fail every test that needs it, not poison them.
     let mut built = BUILT
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
     let built = built.get_or_insert_default();
-    if let Some(path) = built.get(&(board.name().to_owned(), bin)) {
+    if let Some(path) = built.get(&key) {
         return path.clone();
     }
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/firmware/build.sh");
@@ -47,6 +64,7 @@ pub fn elf(board: Board, bin: &'static str) -> PathBuf {
     let output = command
         .arg(script)
         .args([board.name(), bin])
+        .env("ILTM_FIRMWARE_STAGES", stages)
         .output()
         .expect("bash is there");
     assert!(
@@ -56,8 +74,20 @@ pub fn elf(board: Board, bin: &'static str) -> PathBuf {
     );
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     let path = PathBuf::from(said.lines().last().expect("the script prints the path"));
-    built.insert((board.name().to_owned(), bin), path.clone());
+    built.insert(key, path.clone());
     path
+}
+
+/// Bytes of flash that an ELF file takes.
+///
+/// # Panics
+/// If it is none.
+#[must_use]
+pub fn flash_bytes(elf: &Path) -> u64 {
+    use object::{Object, ObjectSegment};
+    let bytes = std::fs::read(elf).expect("it has just been built");
+    let file = object::File::parse(bytes.as_slice()).expect("an ELF file");
+    file.segments().map(|segment| segment.file_range().1).sum()
 }
 
 /// Orders and findings of the self-test, by the names in

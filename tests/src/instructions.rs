@@ -4,7 +4,7 @@
 //! frame give the same count every time. `docs/firmware.md` shows the result,
 //! `docs/instructions.csv` holds it, and a test compares the two.
 
-mod made_up;
+mod like_a_scene;
 
 use crate::firmware::{counted, elf, order};
 use iltm::capture::{CaptureOptions, Response};
@@ -89,7 +89,7 @@ pub fn cases() -> Vec<Case> {
     wedge.channels[0].ambient.fill(0.0);
     let dark = compiled(&wedge, &targets);
     let shape = Table::check(&dark).expect("compile checked it");
-    let made_up = |rows, cols, entries| made_up::table(grid(rows, cols), 3, entries, &shape);
+    let made_up = |rows, cols, entries| like_a_scene::table(grid(rows, cols), 3, entries, &shape);
     let case = |name, image: Vec<u8>, size: Option<(u16, u16)>| {
         let own = FrameSize::of_grid(Table::check(&image).expect("a table").grid());
         let size = size.and_then(|(width, height)| FrameSize::new(width, height));
@@ -147,30 +147,9 @@ fn frame(size: FrameSize, channels: usize) -> Vec<u8> {
 #[must_use]
 pub fn count(case: &Case) -> Vec<Count> {
     let table = Table::check(&case.image).expect("a table");
-    let channels = usize::from(table.channels());
-    let memory = Memory::temporary().expect("a temporary file");
-    memory.write(&psram::SLOT_A, &case.image).expect("room");
-    let wanted = frame(case.size, channels);
-    let frames = psram::FRAMES.start..psram::FRAMES.start + wanted.len();
-    memory.write(&frames, &wanted).expect("room");
-    let size = case.size.width() as u32 | (case.size.height() as u32) << 16;
-    order(&memory, 0, size);
-    let mut qemu = counted(Board::An500, &elf(Board::An500, "bench"), &memory, "null");
-    let output = qemu.stdout(Stdio::piped()).output();
-    let output = output.expect("qemu-system-arm is installed: tests/run.sh does it");
-    // What semihosting prints goes to the emulator's standard error.
-    let said = [output.stdout, output.stderr].concat();
-    let said = String::from_utf8_lossy(&said).into_owned();
-    assert!(output.status.success(), "{}: {said}", case.name);
     let cells = table.grid().cells() as f64;
-    let read = |line: &str| {
-        let numbers: Vec<u64> = line
-            .split(' ')
-            .map_while(|field| field.parse().ok())
-            .collect();
-        let &[tier, first, second, third, frame, clipped] = numbers.as_slice() else {
-            panic!("{}: {said}", case.name);
-        };
+    let read = |numbers: [u64; 6]| {
+        let [tier, first, second, third, frame, clipped] = numbers;
         let info = &table.tiers()[tier as usize];
         let error: f64 = info.predicted_error.to_num();
         Count {
@@ -182,6 +161,44 @@ pub fn count(case: &Case) -> Vec<Count> {
             frame,
             clipped,
         }
+    };
+    let lines = bench(&elf(Board::An500, "bench"), &case.image, case.size, None);
+    lines.into_iter().map(read).collect()
+}
+
+/// What the bench finds for a natural-looking frame: for every tier its number,
+/// instructions of the three stages and of all, and samples clipped. With `executed`,
+/// the emulator writes there each block of code that it comes to, once or more.
+///
+/// # Panics
+/// If the bench cannot be run, or refuses the table.
+#[must_use]
+pub fn bench(elf: &Path, image: &[u8], size: FrameSize, executed: Option<&Path>) -> Vec<[u64; 6]> {
+    let table = Table::check(image).expect("a table");
+    let memory = Memory::temporary().expect("a temporary file");
+    memory.write(&psram::SLOT_A, image).expect("room");
+    let wanted = frame(size, usize::from(table.channels()));
+    let frames = psram::FRAMES.start..psram::FRAMES.start + wanted.len();
+    memory.write(&frames, &wanted).expect("room");
+    order(
+        &memory,
+        0,
+        size.width() as u32 | (size.height() as u32) << 16,
+    );
+    let mut qemu = counted(Board::An500, elf, &memory, "null");
+    if let Some(log) = executed {
+        qemu.args(["-d", "in_asm", "-D"]).arg(log);
+    }
+    let output = qemu.stdout(Stdio::piped()).output();
+    let output = output.expect("qemu-system-arm is installed: tests/run.sh does it");
+    // What semihosting prints goes to the emulator's standard error.
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(output.status.success(), "{said}");
+    let read = |line: &str| {
+        let numbers = line.split(' ').map_while(|field| field.parse().ok());
+        let numbers: Vec<u64> = numbers.collect();
+        numbers.try_into().unwrap_or_else(|_| panic!("{said}"))
     };
     said.lines().map(read).collect()
 }

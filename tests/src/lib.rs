@@ -1,14 +1,18 @@
 //! What the tests across crates share: a scene whose inverse is known exactly, and
 //! a device that is none.
 
+pub mod executed;
 pub mod fake_device;
 pub mod fake_tables;
 pub mod firmware;
 pub mod fuzz;
+pub mod hard_frames;
 pub mod instructions;
+pub mod made_up;
 pub mod slots;
 #[cfg(unix)]
 pub mod socket;
+pub mod stages;
 
 use iltm::capture::Response;
 use iltm::compile::{CompileOptions, compile};

@@ -14,8 +14,8 @@ use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::trust::Rejected;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::firmware::{
-    Effects, PATIENCE, counted, elf, finding, on_host, order, random_frame, random_table, through,
-    word,
+    Effects, PATIENCE, counted, elf, finding, flash_bytes, on_host, order, random_frame,
+    random_table, through, word,
 };
 use iltm_tests::socket::Socket;
 use std::time::{Duration, Instant};
@@ -357,10 +357,11 @@ fn a_subscribed_host_hears_of_tiers_and_logs() {
 /// Flash and RAM of the product, bytes: what is loaded, and what else there is
 /// besides the workspace of a frame.
 fn sizes(board: Board) -> (u64, u64) {
-    use object::{Object, ObjectSection, ObjectSegment, ObjectSymbol, SectionKind};
-    let bytes = std::fs::read(elf(board, "firmware")).expect("it has just been built");
+    use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+    let path = elf(board, "firmware");
+    let bytes = std::fs::read(&path).expect("it has just been built");
     let file = object::File::parse(bytes.as_slice()).expect("an ELF file");
-    let flash = file.segments().map(|segment| segment.file_range().1).sum();
+    let flash = flash_bytes(&path);
     let data = file.sections().filter(|section| {
         let kind = section.kind();
         matches!(kind, SectionKind::Data | SectionKind::UninitializedData)

@@ -38,6 +38,7 @@ mod role;
 mod sequence;
 mod settings;
 mod sharing;
+mod shown;
 #[cfg(test)]
 mod test_capture;
 #[cfg(test)]
@@ -55,6 +56,7 @@ pub use response::Response;
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
+pub use shown::shown;
 
 use crate::progress::Progress;
 use measure::CellPixels;

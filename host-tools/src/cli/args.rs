@@ -3,6 +3,7 @@
 use super::failure::Kind;
 #[cfg(unix)]
 use crate::device::emulator::Board;
+use crate::scene::Effect;
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 #[cfg(unix)]
@@ -24,6 +25,8 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Do the whole job without hardware: photographs, table, compensated video, report
     Demo(Demo),
+    /// Take photographs of a described scene, with the effects that it calls for
+    Simulate(Simulate),
     /// Learn a scene from its photographs and write its table
     Solve(Solve),
     /// Say what is in a table
@@ -58,6 +61,43 @@ pub(super) struct Demo {
     /// Folder to write into; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "iltm-demo")]
     pub(super) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Simulate {
+    /// Scene to simulate
+    #[arg(value_name = "SCENE.toml")]
+    pub(super) scene: PathBuf,
+    /// Capture folder to make
+    #[arg(
+        short,
+        long,
+        value_name = "CAPTURE",
+        required_unless_present = "explain"
+    )]
+    pub(super) output: Option<PathBuf>,
+    /// Say which effects are simulated and why
+    #[arg(long)]
+    pub(super) explain: bool,
+    /// Turn every effect the other way, one at a time, and say what that changes
+    #[arg(long)]
+    pub(super) ablate: bool,
+    /// Bernoulli photographs, beside white, black and the Gray code
+    #[arg(long, value_name = "M", default_value_t = 150)]
+    pub(super) photos: usize,
+    /// Seed of the patterns and of the noise
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Simulate an effect whatever the scene says; may be repeated
+    #[arg(long, value_name = "EFFECT")]
+    pub(super) with: Vec<Effect>,
+    /// Leave an effect out whatever the scene says; may be repeated
+    #[arg(long, value_name = "EFFECT")]
+    pub(super) without: Vec<Effect>,
+    /// Share of white below which an effect is left out; by default what the
+    /// camera's noise hides
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub(super) threshold: Option<f64>,
 }
 
 #[derive(Debug, Args)]
@@ -288,6 +328,13 @@ fn device_number(text: &str) -> Result<u64, String> {
         None => text.parse(),
     };
     number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse::<f64>().ok();
+    share
+        .filter(|share| (0.0..1.0).contains(share))
+        .ok_or_else(|| "a share is a number from 0 to 1".to_owned())
 }
 
 #[cfg(unix)]

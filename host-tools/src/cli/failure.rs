@@ -73,6 +73,8 @@ pub(super) enum Kind {
     HasKey = 28,
     /// Stopped by the user before the end.
     Interrupted = 29,
+    /// A scene cannot be simulated as it is described.
+    Scene = 30,
 }
 
 impl From<&Rejected> for Kind {
@@ -83,6 +85,7 @@ impl From<&Rejected> for Kind {
             Rejected::Signature => Self::Signature,
             Rejected::Older { .. } => Self::Older,
             Rejected::OtherDevice { .. } => Self::OtherDevice,
+            Rejected::NotBuilt { .. } => Self::Device,
             Rejected::NotATable
             | Rejected::Truncated
             | Rejected::Format
@@ -128,7 +131,7 @@ impl From<&UploadError> for Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 28] = [
+    const ALL: [(Self, &'static str, &'static str); 29] = [
         (
             Self::Usage,
             "usage",
@@ -220,6 +223,11 @@ impl Kind {
             Self::Interrupted,
             "interrupted",
             "stopped by the user before the end",
+        ),
+        (
+            Self::Scene,
+            "scene",
+            "a scene cannot be simulated as it is described",
         ),
     ];
 

@@ -21,6 +21,7 @@ mod output;
 mod ports;
 mod progress;
 mod report;
+mod simulate;
 mod slots;
 mod solve;
 mod status;
@@ -38,6 +39,7 @@ pub fn run() -> ExitCode {
     let output = Output::new(arguments.json);
     let result = match &arguments.command {
         Command::Demo(demo) => demo::run(demo, &output),
+        Command::Simulate(simulate) => simulate::run(simulate, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),

@@ -155,5 +155,8 @@ pub const fn cure(rejected: &Rejected) -> &'static str {
         Rejected::OtherDevice { .. } => {
             "Take this device's table, or sign this one with --for-device."
         }
+        Rejected::NotBuilt { .. } => {
+            "Put firmware with all stages on the device, or make the table without that effect."
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The workspace of a frame: the one large piece of memory, taken once.
 
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FlatMemory, Halfword, Row, Workspace};
+use iltm_runtime::pipeline::{FlatMemory, Halfword, Row, Stage, Workspace};
 use iltm_runtime::units::InputCoefficient;
 use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
@@ -16,7 +16,15 @@ pub const MAX_PIXELS: usize = 320 * 240;
 /// Most pixels in a row of such a frame.
 pub const MAX_WIDTH: usize = 2_048;
 
-const CHANNELS: usize = 3;
+const CHANNELS: usize = if Stage::Colour.is_built() { 3 } else { 1 };
+
+/// Pixels of larger frames that there is memory for: none where there are no such
+/// frames.
+const PIXELS: usize = if Stage::FullResolution.is_built() {
+    MAX_PIXELS
+} else {
+    0
+};
 
 /// The workspace. Its size counts apart from the rest of the firmware's memory:
 /// it follows the largest table and frame that a board is to take.
@@ -27,8 +35,8 @@ pub struct Memory {
     coefficients: [i32; CHANNELS * MAX_CELLS],
     corrections: [i32; CHANNELS * MAX_CELLS],
     sums: [u64; CHANNELS * MAX_CELLS],
-    gains: [Halfword; CHANNELS * MAX_PIXELS],
-    ambient: [Halfword; CHANNELS * MAX_PIXELS],
+    gains: [Halfword; CHANNELS * PIXELS],
+    ambient: [Halfword; CHANNELS * PIXELS],
     columns: [u32; 2 * CHANNELS * MAX_WIDTH],
     line: [i32; MAX_WIDTH],
     spread: [i32; MAX_WIDTH],
@@ -46,8 +54,8 @@ static FRAME_WORKSPACE: ConstStaticCell<Memory> = ConstStaticCell::new(Memory {
     coefficients: [0; CHANNELS * MAX_CELLS],
     corrections: [0; CHANNELS * MAX_CELLS],
     sums: [0; CHANNELS * MAX_CELLS],
-    gains: [[0; 2]; CHANNELS * MAX_PIXELS],
-    ambient: [[0; 2]; CHANNELS * MAX_PIXELS],
+    gains: [[0; 2]; CHANNELS * PIXELS],
+    ambient: [[0; 2]; CHANNELS * PIXELS],
     columns: [0; 2 * CHANNELS * MAX_WIDTH],
     line: [0; MAX_WIDTH],
     spread: [0; MAX_WIDTH],

@@ -5,7 +5,7 @@ use iltm_runtime::FrameSize;
 use iltm_runtime::exchange::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, compensate_cells, compensate_pixels};
+use iltm_runtime::pipeline::{self, Encoding, FrameError, compensate_cells, compensate_pixels};
 
 /// What is done to the frames of a format.
 #[derive(Clone, Copy)]
@@ -35,6 +35,9 @@ impl Stage {
         }
         if size == FrameSize::of_grid(table.grid()) {
             return Self::Grid(format.encoding());
+        }
+        if !pipeline::Stage::FullResolution.is_built() {
+            return Self::PassThrough(PassThrough::OtherFrames);
         }
         if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
             return Self::PassThrough(PassThrough::Memory);

@@ -10,8 +10,8 @@ use super::{FineGain, ImageError, SectionProblem, Table, TierInfo};
 use crate::haar::Basis;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
 use crate::pace::{Pace, cost};
-use crate::pipeline::RESPONSE_KNOTS;
 use crate::pipeline::codes::{CODES, code};
+use crate::pipeline::{RESPONSE_KNOTS, Stage};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U1F15, U8F24};
@@ -48,17 +48,15 @@ impl<'a> Checked<'a> {
         let meta = Meta::read(whole.required(SectionKind::Meta)?)?;
         let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
         let _ = tiers(whole.required(SectionKind::Tiers)?)?;
+        check_stages(&whole, &meta)?;
         let gain = halfwords(whole.required(SectionKind::Gain)?, values)?;
-        let ambient = whole
-            .optional(SectionKind::Ambient)
+        let ambient = of_stage(Stage::Ambient, &whole, SectionKind::Ambient)
             .map(|section| ambient(section, values, pace))
             .transpose()?;
-        let response = whole
-            .optional(SectionKind::Response)
+        let response = of_stage(Stage::Response, &whole, SectionKind::Response)
             .map(|section| response(section, meta.channels, pace))
             .transpose()?;
-        let fine_gain = whole
-            .optional(SectionKind::FineGain)
+        let fine_gain = of_stage(Stage::FullResolution, &whole, SectionKind::FineGain)
             .map(|section| fine_gains(section, grid, meta.channels))
             .transpose()?;
         check_operator(&whole, &meta, pace)?;
@@ -72,7 +70,11 @@ impl<'a> Checked<'a> {
             provenance: whole
                 .optional(SectionKind::Provenance)
                 .map_or(Ok(&[][..]), |section| provenance(section, pace))?,
-            codes: codes(whole.optional(SectionKind::Codes), response, pace)?,
+            codes: codes(
+                of_stage(Stage::Response, &whole, SectionKind::Codes),
+                response,
+                pace,
+            )?,
         })
     }
 
@@ -92,7 +94,11 @@ impl<'a> Checked<'a> {
             response: self.response,
             codes: self.codes,
             fine_gain: self.fine_gain,
-            operator: operator(&self.whole, &self.meta).unwrap_or_default(),
+            operator: if Stage::Operator.is_built() {
+                operator(&self.whole, &self.meta).unwrap_or_default()
+            } else {
+                None
+            },
             provenance: self.provenance,
             bytes: self.whole.image.len(),
             id: self.id(),
@@ -287,6 +293,40 @@ fn fine_gains(section: Section<'_>, cells: Grid, channels: u8) -> Result<FineGai
     })
 }
 
+/// A table with a stage that is not built is refused as a whole: half of its stages
+/// would show a frame that is neither the wanted nor the compensated one.
+fn check_stages(whole: &Whole<'_>, meta: &Meta) -> Result<(), ImageError> {
+    for stage in Stage::ALL {
+        let sections: &[SectionKind] = match stage {
+            Stage::Operator => &[SectionKind::Operator],
+            Stage::Ambient => &[SectionKind::Ambient],
+            Stage::Response => &[SectionKind::Response, SectionKind::Codes],
+            Stage::Colour => &[],
+            Stage::FullResolution => &[SectionKind::FineGain],
+        };
+        let by_section = sections.iter().any(|kind| whole.optional(*kind).is_some());
+        let listed = by_section || stage == Stage::Colour && meta.channels > 1;
+        if listed && !stage.is_built() {
+            return Err(ImageError::NotBuilt(stage));
+        }
+    }
+    Ok(())
+}
+
+/// The section of a stage; none where the stage is not built.
+#[allow(
+    clippy::inline_always,
+    reason = "the compiler leaves out what handles a section only where it sees that there is none"
+)]
+#[inline(always)]
+fn of_stage<'a>(stage: Stage, whole: &Whole<'a>, kind: SectionKind) -> Option<Section<'a>> {
+    if stage.is_built() {
+        whole.optional(kind)
+    } else {
+        None
+    }
+}
+
 /// The operator with the bounds that the image states; `None` for a scene without.
 fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, ImageError> {
     let tiers = tiers(whole.required(SectionKind::Tiers)?)?.len();
@@ -326,7 +366,11 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
 /// Not inlined: what it needs, other checks need not stand on.
 #[inline(never)]
 fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result<(), ImageError> {
-    let operator = operator(whole, meta)?;
+    let operator = if Stage::Operator.is_built() {
+        operator(whole, meta)?
+    } else {
+        None
+    };
     let bounds = match &operator {
         Some(operator) => operator.prove(meta.grid, pace),
         None => Ok(Bounds::default()),

@@ -4,6 +4,7 @@ use super::SealError;
 use super::layout::{FORMAT_VERSION, SectionKind};
 use crate::GridError;
 use crate::operator::OperatorError;
+use crate::pipeline::Stage;
 use core::fmt;
 
 /// Why bytes are not a table that this runtime can use.
@@ -67,6 +68,8 @@ pub enum ImageError {
     Operator(OperatorError),
     /// What follows the image is not a seal that this runtime can read.
     Seal(SealError),
+    /// The table lists a stage that this runtime was built without.
+    NotBuilt(Stage),
 }
 
 /// What is wrong with a section as a whole.
@@ -137,6 +140,12 @@ impl fmt::Display for ImageError {
             ),
             Self::Operator(error) => write!(f, "the table's operator is unusable: {error}"),
             Self::Seal(error) => write!(f, "the table's seal {error}"),
+            Self::NotBuilt(stage) => {
+                write!(
+                    f,
+                    "the table lists {stage}, which this runtime was built without"
+                )
+            }
         }
     }
 }

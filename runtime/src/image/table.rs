@@ -5,7 +5,7 @@ use super::layout::MAX_TIERS;
 use super::{Checked, ImageError};
 use crate::haar::Basis;
 use crate::operator::Operator;
-use crate::pipeline::{CODES, RESPONSE_KNOTS, Response};
+use crate::pipeline::{CODES, RESPONSE_KNOTS, Response, Stage};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U8F24};
@@ -136,8 +136,13 @@ impl<'a> Table<'a> {
 
     /// Colour channels: 1 or 3.
     #[must_use]
+    #[inline]
     pub const fn channels(&self) -> u8 {
-        self.channels
+        if Stage::Colour.is_built() {
+            self.channels
+        } else {
+            1
+        }
     }
 
     /// What tells it from other tables: the CRC-32 in its header, which covers those
@@ -194,13 +199,8 @@ impl<'a> Table<'a> {
     /// Ambient light of one channel along a row of cells; `None` if the scene is
     /// dark.
     pub fn ambient_row(&self, row: usize, channel: usize) -> Option<impl Iterator<Item = Light>> {
-        let row = channel_row(
-            self.ambient?,
-            self.grid().cols(),
-            self.channels,
-            row,
-            channel,
-        );
+        let ambient = self.lit()?;
+        let row = channel_row(ambient, self.grid().cols(), self.channels, row, channel);
         Some(row.map(Light::from_bits))
     }
 
@@ -208,20 +208,26 @@ impl<'a> Table<'a> {
     /// says whether it is more than a straight line.
     #[must_use]
     pub fn response(&self, channel: usize) -> Response<'a> {
-        curve(self.response, channel)
+        curve(self.response.filter(|_| self.has_response()), channel)
     }
 
     /// Whether codes follow a response; otherwise they are proportional to drives.
     #[must_use]
+    #[inline]
     pub const fn has_response(&self) -> bool {
-        self.response.is_some()
+        Stage::Response.is_built() && self.response.is_some()
     }
 
     /// 8-bit projector codes of a channel by the upper bits of the drive
     /// ([`codes`](crate::pipeline::codes)); `None` if the projector is linear.
     #[must_use]
+    #[inline]
     pub fn codes(&self, channel: usize) -> Option<&'a [u8; CODES]> {
-        self.codes.get(channel).or(self.codes.first())
+        if Stage::Response.is_built() {
+            self.codes.get(channel).or(self.codes.first())
+        } else {
+            None
+        }
     }
 
     /// Gains of all cells, little-endian `u16`, channels of a cell side by side.
@@ -231,8 +237,18 @@ impl<'a> Table<'a> {
 
     /// Ambient light of all cells in the same way, [`Light`] bits; `None` if the
     /// scene is dark.
+    #[inline]
     pub(crate) fn ambient(&self) -> Option<&'a [[u8; 2]]> {
-        self.ambient.map(Halfwords::words)
+        self.lit().map(Halfwords::words)
+    }
+
+    #[inline]
+    const fn lit(&self) -> Option<Halfwords<'a>> {
+        if Stage::Ambient.is_built() {
+            self.ambient
+        } else {
+            None
+        }
     }
 
     /// Gains finer than the cells, where the table has them.
@@ -243,8 +259,13 @@ impl<'a> Table<'a> {
 
     /// The interreflection operator; `None` for a scene without.
     #[must_use]
+    #[inline]
     pub const fn operator(&self) -> Option<&Operator<'a>> {
-        self.operator.as_ref()
+        if Stage::Operator.is_built() {
+            self.operator.as_ref()
+        } else {
+            None
+        }
     }
 
     /// Where the table comes from, for people and host tools.

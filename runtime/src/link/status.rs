@@ -81,7 +81,8 @@ pub enum PassThrough {
     NoTable,
     /// There is one, but it is damaged or not for this firmware.
     BrokenTable,
-    /// The frames are smaller than the table's grid, or of other channels.
+    /// The frames are smaller than the table's grid, of other channels, or larger and
+    /// the firmware was built without that stage.
     OtherFrames,
     /// The table needs more memory than the device has.
     Memory,

@@ -11,8 +11,8 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use super::FrameError;
 use super::stages::{Workspace, correct, drive_row, subtract_ambient};
+use super::{FrameError, Stage};
 use crate::FrameSize;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
@@ -51,9 +51,18 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// A pipeline for frames of this size.
     ///
     /// # Errors
-    /// [`FrameError`] if the table has not `C` channels or the frame is smaller
-    /// than the grid.
+    /// [`FrameError`] if the table has not `C` channels, the frame is smaller
+    /// than the grid, or this build takes no frames larger than it.
+    #[inline]
     pub fn new(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
+        if Stage::FullResolution.is_built() {
+            Self::sized(table, frame)
+        } else {
+            Err(FrameError::NotBuilt(Stage::FullResolution))
+        }
+    }
+
+    fn sized(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
         if usize::from(table.channels()) != C {
             return Err(FrameError::Channels {
                 table: table.channels(),
@@ -95,6 +104,21 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     #[must_use]
     pub const fn frame(&self) -> FrameSize {
         self.frame
+    }
+
+    /// Whether frames of `tier` go through the operator. Those of others need neither
+    /// averages nor corrections.
+    #[must_use]
+    pub const fn operates(&self, tier: u8) -> bool {
+        tier > 0 && self.table.operator().is_some()
+    }
+
+    pub(super) fn check_tier(&self, tier: u8) -> Result<(), FrameError> {
+        let top = self.table.top_tier();
+        if tier > top {
+            return Err(FrameError::NoSuchTier { tier, top });
+        }
+        Ok(())
     }
 
     /// Elements that [`Row::line`] needs.
@@ -168,10 +192,8 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         corrections: &mut [i32],
         workspace: &mut Workspace<'_>,
     ) -> Result<(), FrameError> {
-        let (top, needed) = (self.table.top_tier(), C * self.table.grid().cells());
-        if tier > top {
-            return Err(FrameError::NoSuchTier { tier, top });
-        }
+        self.check_tier(tier)?;
+        let needed = C * self.table.grid().cells();
         for (what, given) in [("sums", sums.len()), ("corrections", corrections.len())] {
             ShortSlice::check(what, needed, given)?;
         }

@@ -9,7 +9,8 @@
 //! [`GridPipeline`] works on frames of one pixel a cell, [`FullPipeline`] on any
 //! larger ones. Both run the stages that the table lists and no others: without
 //! an ambient section nothing is subtracted, without an operator no transform is
-//! made, without a response codes are proportional to drives.
+//! made, without a response codes are proportional to drives. A build may have some
+//! of the stages only ([`Stage`]).
 //!
 //! All arithmetic is in integers and rounds in named places only
 //! ([`Sample`], [`analyse`](crate::haar::analyse),
@@ -17,6 +18,7 @@
 //! [`resample`](crate::resample)), so a frame comes out the same, bit for bit, on
 //! the device and on the host.
 
+mod built;
 pub mod codes;
 mod full;
 mod grid;
@@ -28,6 +30,7 @@ pub mod srgb;
 pub mod stages;
 mod whole;
 
+pub use built::Stage;
 pub use codes::CODES;
 pub use full::{FullPipeline, Row};
 pub use grid::GridPipeline;
@@ -67,6 +70,8 @@ pub enum FrameError {
     },
     /// A slice is too short.
     Short(ShortSlice),
+    /// This build has no such stage.
+    NotBuilt(Stage),
 }
 
 impl From<ShortSlice> for FrameError {
@@ -90,6 +95,7 @@ impl fmt::Display for FrameError {
                 write!(f, "the table has tiers 0 to {top}, not {tier}")
             }
             Self::Short(short) => short.fmt(f),
+            Self::NotBuilt(stage) => write!(f, "the runtime was built without {stage}"),
         }
     }
 }

@@ -77,7 +77,12 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
                 store(line, channel, memory.values);
             }
         }
-        let lines = memory.ambient.chunks_exact_mut(width).take(height);
+        let lit = if self.table().ambient().is_some() {
+            height
+        } else {
+            0
+        };
+        let lines = memory.ambient.chunks_exact_mut(width).take(lit);
         for (y, line) in lines.enumerate() {
             for channel in 0..C {
                 if self.ambient_row(y, channel, &mut memory.row) {
@@ -104,10 +109,13 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         memory: &mut FullMemory<'_, C>,
         workspace: &mut Workspace<'_>,
     ) -> Result<u32, FrameError> {
+        self.check_tier(tier)?;
         self.check_pixels("input", input.len())?;
-        self.average_frame(encoding, wanted, memory)?;
-        self.correct(tier, memory.sums, memory.corrections, workspace)?;
-        self.finish_frame(encoding, wanted, input, memory)
+        if self.operates(tier) {
+            self.average_frame(encoding, wanted, memory)?;
+            self.correct(tier, memory.sums, memory.corrections, workspace)?;
+        }
+        self.finish_frame((tier, encoding), wanted, input, memory)
     }
 
     /// First stage: adds up the light of a frame by cells.
@@ -138,13 +146,13 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     }
 
     /// Last stage: gain, interpolated corrections, clip and code; returns how many
-    /// samples were clipped.
+    /// samples were clipped. At a tier without operator there are no corrections.
     ///
     /// # Errors
     /// [`FrameError::Short`] if a slice is too short.
     pub fn finish_frame<S: Sample>(
         &self,
-        encoding: Encoding,
+        (tier, encoding): (u8, Encoding),
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         memory: &mut FullMemory<'_, C>,
@@ -153,6 +161,10 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         self.check_pixels("wanted", wanted.len())?;
         self.check_pixels("input", input.len())?;
         let (cells, width) = (self.table().grid().cells(), self.frame().width());
+        let operates = self.operates(tier);
+        if !operates {
+            memory.row.spread.fill(0);
+        }
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
@@ -161,7 +173,9 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         for (y, (line, gains)) in lines.zip(gains).enumerate() {
             let corrections = memory.corrections.chunks_exact(cells);
             for (channel, (corrections, curves)) in corrections.zip(curves).enumerate() {
-                self.correct_row(y, corrections, &mut memory.row);
+                if operates {
+                    self.correct_row(y, corrections, &mut memory.row);
+                }
                 let spread = memory.row.spread.get(..width).unwrap_or_default();
                 let pixels = self.pixels(wanted, memory.ambient, (y, channel), curves);
                 clipped += S::finish(&pixels, fraction, gains, spread, line);

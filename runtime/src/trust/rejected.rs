@@ -1,6 +1,7 @@
 //! Why a table may not run here.
 
 use crate::image::{ImageError, SealError, SectionProblem};
+use crate::pipeline::Stage;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +36,11 @@ pub enum Rejected {
         /// The device that it is for.
         device: u64,
     },
+    /// It lists a stage that this firmware was built without.
+    NotBuilt {
+        /// The stage.
+        stage: Stage,
+    },
 }
 
 impl From<ImageError> for Rejected {
@@ -58,6 +64,7 @@ impl From<ImageError> for Rejected {
             | ImageError::Field { .. }
             | ImageError::Operator(_)
             | ImageError::Seal(_) => Self::Contents,
+            ImageError::NotBuilt(stage) => Self::NotBuilt { stage },
         }
     }
 }
@@ -82,6 +89,10 @@ impl fmt::Display for Rejected {
             Self::OtherDevice { device } => {
                 write!(f, "the table is for the device {device:016x}")
             }
+            Self::NotBuilt { stage } => write!(
+                f,
+                "the table lists {stage}, which the firmware was built without"
+            ),
         }
     }
 }

@@ -3,8 +3,9 @@
 use super::*;
 use crate::image::layout::{SectionKind, header, meta};
 use crate::image::made_up::{flat, image};
-use crate::image::{Seal, Table, seal::field};
+use crate::image::{ImageError, Seal, Table, seal::field};
 use crate::pace::{Pace, cost};
+use crate::pipeline::Stage;
 use ed25519_dalek::{Signer, SigningKey};
 use std::collections::BTreeSet;
 use std::string::ToString;
@@ -222,5 +223,17 @@ fn pauses_come_as_often_as_the_work_asks_for() {
         let more = pauses(Some(section)) - without;
         // No stride is half as long again, for no single piece of work is so long.
         assert!(more >= work / (Pace::STRIDE * 3 / 2), "{more}");
+    }
+}
+
+#[test]
+fn a_table_that_lists_a_stage_that_is_not_built_is_rejected_with_the_stages_number() {
+    for (number, stage) in (0_u8..).zip(Stage::ALL) {
+        let why = Rejected::from(ImageError::NotBuilt(stage));
+        assert_eq!(why, Rejected::NotBuilt { stage });
+        let mut bytes = [0; 16];
+        let written = postcard::to_slice(&why, &mut bytes).expect("room");
+        assert_eq!(written, [10, number]);
+        assert!(why.to_string().contains(&stage.to_string()));
     }
 }

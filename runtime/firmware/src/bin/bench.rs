@@ -60,6 +60,9 @@ impl<'c, K: Clock> Laps<'c, K> {
     }
 }
 
+/// Not inlined: the compiler would share instructions between this and the other, and
+/// a record of what was executed could not tell them apart.
+#[inline(never)]
 fn grid<const C: usize>(
     table: &Table<'_>,
     tier: u8,
@@ -84,6 +87,7 @@ fn grid<const C: usize>(
     Ok((laps.instructions(), clipped))
 }
 
+#[inline(never)]
 fn full<const C: usize>(
     table: &Table<'_>,
     (tier, size): (u8, FrameSize),
@@ -100,11 +104,15 @@ fn full<const C: usize>(
         pipeline.prepare(&mut frame)?;
     }
     let mut laps = Laps::new(clock);
-    pipeline.average_frame(ENCODING, wanted, &mut frame)?;
+    if pipeline.operates(tier) {
+        pipeline.average_frame(ENCODING, wanted, &mut frame)?;
+    }
     laps.mark();
-    pipeline.correct(tier, frame.sums, frame.corrections, &mut workspace)?;
+    if pipeline.operates(tier) {
+        pipeline.correct(tier, frame.sums, frame.corrections, &mut workspace)?;
+    }
     laps.mark();
-    let clipped = pipeline.finish_frame(ENCODING, wanted, input, &mut frame)?;
+    let clipped = pipeline.finish_frame((tier, ENCODING), wanted, input, &mut frame)?;
     laps.mark();
     Ok((laps.instructions(), clipped))
 }

@@ -1,0 +1,137 @@
+//! A scene file as it is written: TOML, every key named, unknown ones refused.
+
+use crate::capture::Response;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// Everything a scene file says.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    #[serde(default)]
+    pub(super) name: Option<String>,
+    pub(super) projector: ProjectorTable,
+    pub(super) camera: CameraTable,
+    /// Light from elsewhere.
+    #[serde(default)]
+    pub(super) ambient: Colour,
+    #[serde(default, rename = "panel")]
+    pub(super) panels: Vec<PanelTable>,
+}
+
+/// `[projector]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ProjectorTable {
+    pub(super) position: [f64; 3],
+    pub(super) look_at: [f64; 3],
+    #[serde(default = "up")]
+    pub(super) up: [f64; 3],
+    pub(super) field_of_view: f64,
+    pub(super) rows: u16,
+    pub(super) cols: u16,
+    #[serde(default)]
+    pub(super) aspect: Option<f64>,
+    #[serde(default = "srgb")]
+    pub(super) response: Response,
+    #[serde(default)]
+    pub(super) vignetting: f64,
+    #[serde(default)]
+    pub(super) blur: f64,
+    #[serde(default)]
+    pub(super) black: f64,
+}
+
+/// `[camera]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraTable {
+    pub(super) position: [f64; 3],
+    pub(super) look_at: [f64; 3],
+    #[serde(default = "up")]
+    pub(super) up: [f64; 3],
+    pub(super) field_of_view: f64,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    #[serde(default = "exposed")]
+    pub(super) white: f64,
+    #[serde(default)]
+    pub(super) full_well: Option<f64>,
+    #[serde(default)]
+    pub(super) read_noise: f64,
+    #[serde(default)]
+    pub(super) bits: Option<u8>,
+    #[serde(default)]
+    pub(super) response: Response,
+}
+
+/// `[[panel]]`
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PanelTable {
+    #[serde(default)]
+    pub(super) name: Option<String>,
+    #[serde(default)]
+    pub(super) corners: Option<Vec<[f64; 3]>>,
+    #[serde(default)]
+    pub(super) mesh: Option<PathBuf>,
+    pub(super) albedo: AlbedoValue,
+    #[serde(default)]
+    pub(super) gloss: Option<GlossTable>,
+    #[serde(default)]
+    pub(super) mirror: f64,
+}
+
+/// `gloss = { reflectance = .., exponent = .. }`
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GlossTable {
+    pub(super) reflectance: f64,
+    pub(super) exponent: f64,
+}
+
+/// One number for all channels, or red, green and blue.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged, expecting = "a number, or [red, green, blue]")]
+pub(super) enum Colour {
+    Grey(f64),
+    Rgb([f64; 3]),
+}
+
+impl Default for Colour {
+    fn default() -> Self {
+        Self::Grey(0.0)
+    }
+}
+
+impl Colour {
+    pub(super) fn channels(self) -> [f64; 3] {
+        match self {
+            Self::Grey(value) => [value; 3],
+            Self::Rgb(channels) => channels,
+        }
+    }
+}
+
+/// A colour, or the path of a picture.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a number, [red, green, blue], or the path of a PNG picture"
+)]
+pub(super) enum AlbedoValue {
+    Uniform(Colour),
+    Texture(PathBuf),
+}
+
+const fn up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+const fn srgb() -> Response {
+    Response::Srgb
+}
+
+const fn exposed() -> f64 {
+    0.8
+}

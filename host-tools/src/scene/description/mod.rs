@@ -1,0 +1,189 @@
+//! What a scene is made of, checked: panels, projector, camera, ambient light.
+//!
+//! ```text
+//! file       scene.toml as it is written
+//! mesh       panels from OBJ files
+//! texture    albedo from pictures
+//! error      what can be wrong with them
+//! ```
+//!
+//! Lengths are in metres, angles in degrees. Light is relative to what the
+//! projector's white throws onto a surface that faces it at the place it looks at;
+//! a perfect white surface there sends back 1.
+
+mod error;
+mod file;
+mod load;
+mod mesh;
+mod texture;
+
+pub use error::SceneError;
+pub use texture::Texture;
+
+use super::geometry::Polygon;
+use super::view::View;
+use crate::capture::Response;
+use iltm_runtime::Grid;
+use nalgebra::{Vector2, Vector3};
+
+/// A scene and who looks at it.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// For people; `None` if the file names none.
+    pub name: Option<String>,
+    /// What lights it.
+    pub projector: Projector,
+    /// What photographs it.
+    pub camera: Camera,
+    /// Light from elsewhere that falls on every surface, by channel.
+    pub ambient: [f64; 3],
+    /// Its surfaces, at least one.
+    pub panels: Vec<Panel>,
+}
+
+/// The projector.
+#[derive(Clone, Debug)]
+pub struct Projector {
+    /// Where it stands and what it looks at.
+    pub view: View,
+    /// Its cells, spread evenly over the frame.
+    pub grid: Grid,
+    /// From input values to light; photographs of patterns do not depend on it.
+    pub response: Response,
+    /// Light lost in the corners of the frame, as a share: it falls off with the
+    /// square of the distance from the centre.
+    pub vignetting: f64,
+    /// Standard deviation of the Gaussian that a point of the frame becomes,
+    /// cells.
+    pub blur: f64,
+    /// Light of black, as a share of white.
+    pub black: f64,
+}
+
+/// The camera.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// Where it stands and what it looks at.
+    pub view: View,
+    /// Pixels across and down.
+    pub size: (u32, u32),
+    /// Share of full scale that the bright parts of a flood photograph reach: its
+    /// 99.5th percentile.
+    pub white: f64,
+    /// Electrons at full scale, which make shot noise; `None` for a camera without.
+    pub full_well: Option<f64>,
+    /// Noise of reading a pixel, electrons.
+    pub read_noise: f64,
+    /// Bits of its converter; `None` for as many as the file has.
+    pub bits: Option<u8>,
+    /// From light to the file's values.
+    pub response: Response,
+}
+
+/// A named part of the scene with one surface.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Its name, or `panel 3`.
+    pub name: String,
+    /// Its flat parts.
+    pub facets: Vec<Facet>,
+    /// Share of light that it sends back in all directions alike.
+    pub albedo: Albedo,
+    /// Light that it sends back around the mirror direction, if it is glossy.
+    pub gloss: Option<Gloss>,
+    /// Share of light that it sends back as a mirror.
+    pub mirror: f64,
+}
+
+/// A flat part of a panel.
+#[derive(Clone, Debug)]
+pub struct Facet {
+    /// Where it is.
+    pub polygon: Polygon,
+    /// Where each corner is in the panel's texture: from the left and from the top, 0
+    /// to 1.
+    pub texture: Vec<Vector2<f64>>,
+}
+
+/// Diffuse reflectance, by channel.
+#[derive(Clone, Debug)]
+pub enum Albedo {
+    /// The same everywhere.
+    Uniform([f64; 3]),
+    /// From a picture.
+    Texture(Texture),
+}
+
+/// A lobe around the mirror direction: the energy-conserving form of Phong's,
+/// `reflectance (n + 2) / (2 pi) cos^n` (Lafortune, Willems, *Using the modified
+/// Phong reflectance model for physically based rendering*, 1994).
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Gloss {
+    /// Share of light in the lobe at normal incidence.
+    pub reflectance: f64,
+    /// The exponent `n`: a lobe of about `1 / sqrt n` radians.
+    pub exponent: f64,
+}
+
+impl Facet {
+    /// Where a point of the facet is in the texture.
+    #[must_use]
+    pub fn texture_place(&self, world: &Vector3<f64>) -> Vector2<f64> {
+        let corners = self.polygon.corners();
+        let normal = self.polygon.normal();
+        let mut best = (f64::NEG_INFINITY, self.texture[0]);
+        for k in 1..corners.len() - 1 {
+            let [a, b, c] = [corners[0], corners[k], corners[k + 1]];
+            let doubled = (b - a).cross(&(c - a)).dot(&normal);
+            let share = |p: Vector3<f64>, q: Vector3<f64>| {
+                (p - world).cross(&(q - world)).dot(&normal) / doubled
+            };
+            let weights = [share(b, c), share(c, a), share(a, b)];
+            let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
+            if least > best.0 {
+                let place = self.texture[0] * weights[0]
+                    + self.texture[k] * weights[1]
+                    + self.texture[k + 1] * weights[2];
+                best = (least, place);
+            }
+        }
+        best.1
+    }
+}
+
+impl Albedo {
+    /// Albedo at a place of the texture.
+    #[must_use]
+    pub fn at(&self, place: Vector2<f64>) -> [f64; 3] {
+        match self {
+            Self::Uniform(channels) => *channels,
+            Self::Texture(texture) => texture.at(place),
+        }
+    }
+
+    /// Whether the channels differ anywhere.
+    #[must_use]
+    pub fn has_colour(&self) -> bool {
+        match self {
+            Self::Uniform([red, green, blue]) => red != green || green != blue,
+            Self::Texture(texture) => texture.has_colour(),
+        }
+    }
+
+    /// The largest in any place, by channel.
+    #[must_use]
+    pub fn largest(&self) -> [f64; 3] {
+        match self {
+            Self::Uniform(channels) => *channels,
+            Self::Texture(texture) => texture.largest(),
+        }
+    }
+}
+
+impl Scene {
+    /// All facets with the index of their panel, in the order of the panels.
+    pub fn facets(&self) -> impl Iterator<Item = (usize, &Facet)> {
+        let panels = self.panels.iter().enumerate();
+        panels.flat_map(|(index, panel)| panel.facets.iter().map(move |facet| (index, facet)))
+    }
+}

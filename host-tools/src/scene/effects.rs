@@ -1,0 +1,235 @@
+//! The effects that a simulation can have, and what was decided about each.
+
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// Something that light does, or that a camera makes of it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub enum Effect {
+    /// Red, green and blue are different.
+    Colour,
+    /// Surfaces throw shadows in the projector's light.
+    Shadows,
+    /// Surfaces light each other.
+    Interreflection,
+    /// Surfaces stand between others.
+    Occlusion,
+    /// What is beside the projector's frame sends light back.
+    Surroundings,
+    /// Sides turned away from the projector send light back.
+    Backs,
+    /// Bounced light differs within a patch.
+    Detail,
+    /// Glossy panels send light around the mirror direction.
+    Gloss,
+    /// Mirrors reflect.
+    Mirrors,
+    /// The projector's cells run into each other.
+    Blur,
+    /// The projector is darker in the corners.
+    Vignetting,
+    /// The projector's black is not dark.
+    Black,
+    /// Light from elsewhere.
+    Ambient,
+    /// Photographs are noisy.
+    Noise,
+    /// Photographs are rounded to the converter's bits.
+    Quantisation,
+    /// The camera's values are not in proportion to light.
+    Response,
+}
+
+impl Effect {
+    /// Every effect, in the order in which it is decided about.
+    pub const ALL: [Self; 16] = [
+        Self::Colour,
+        Self::Shadows,
+        Self::Interreflection,
+        Self::Occlusion,
+        Self::Surroundings,
+        Self::Backs,
+        Self::Detail,
+        Self::Gloss,
+        Self::Mirrors,
+        Self::Blur,
+        Self::Vignetting,
+        Self::Black,
+        Self::Ambient,
+        Self::Noise,
+        Self::Quantisation,
+        Self::Response,
+    ];
+
+    /// Its name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Colour => "colour",
+            Self::Shadows => "shadows",
+            Self::Interreflection => "interreflection",
+            Self::Occlusion => "occlusion",
+            Self::Surroundings => "surroundings",
+            Self::Backs => "backs",
+            Self::Detail => "detail",
+            Self::Gloss => "gloss",
+            Self::Mirrors => "mirrors",
+            Self::Blur => "blur",
+            Self::Vignetting => "vignetting",
+            Self::Black => "black",
+            Self::Ambient => "ambient",
+            Self::Noise => "noise",
+            Self::Quantisation => "quantisation",
+            Self::Response => "response",
+        }
+    }
+}
+
+impl fmt::Display for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no [`Effect`] has.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[error("there is no effect `{name}`; there are {}", Effect::ALL.map(Effect::name).join(", "))]
+pub struct UnknownEffect {
+    name: String,
+}
+
+impl FromStr for Effect {
+    type Err = UnknownEffect;
+
+    fn from_str(name: &str) -> Result<Self, UnknownEffect> {
+        let found = Self::ALL.into_iter().find(|effect| effect.name() == name);
+        found.ok_or_else(|| UnknownEffect {
+            name: name.to_owned(),
+        })
+    }
+}
+
+/// What was decided about an effect, and why.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Decision {
+    /// The effect.
+    pub effect: Effect,
+    /// Whether it is simulated.
+    pub on: bool,
+    /// Whether somebody asked for this instead of what the scene says.
+    pub forced: bool,
+    /// Whether the scene leaves a choice: what it does not have cannot be simulated.
+    pub possible: bool,
+    /// Why, with the number that decided.
+    pub reason: String,
+    /// Seconds that simulating it took; 0 if it is off or costs nothing of its own.
+    pub seconds: f64,
+}
+
+/// Effects that are wanted or unwanted whatever the scene says.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Forced {
+    on: Vec<Effect>,
+    off: Vec<Effect>,
+}
+
+impl Forced {
+    /// Wants `effect` on or off.
+    #[must_use]
+    pub fn with(mut self, effect: Effect, on: bool) -> Self {
+        self.on.retain(|e| *e != effect);
+        self.off.retain(|e| *e != effect);
+        if on { &mut self.on } else { &mut self.off }.push(effect);
+        self
+    }
+
+    fn wanted(&self, effect: Effect) -> Option<bool> {
+        if self.on.contains(&effect) {
+            return Some(true);
+        }
+        self.off.contains(&effect).then_some(false)
+    }
+}
+
+/// The decisions of one simulation, as they are made.
+#[derive(Clone, Debug)]
+pub struct Decisions {
+    forced: Forced,
+    made: Vec<Decision>,
+}
+
+impl Decisions {
+    /// None yet.
+    #[must_use]
+    pub fn new(forced: Forced) -> Self {
+        Self {
+            forced,
+            made: Vec::new(),
+        }
+    }
+
+    /// What somebody asked for about an effect.
+    #[must_use]
+    pub fn forced(&self, effect: Effect) -> Option<bool> {
+        self.forced.wanted(effect)
+    }
+
+    /// Decides about an effect: `on` is what the scene says, `reason` why. Returns
+    /// whether to simulate it.
+    pub fn decide(&mut self, effect: Effect, on: bool, reason: impl Into<String>) -> bool {
+        let wanted = self.forced.wanted(effect);
+        let forced = wanted.is_some_and(|wanted| wanted != on);
+        let on = wanted.unwrap_or(on);
+        self.made.push(Decision {
+            effect,
+            on,
+            forced,
+            possible: true,
+            reason: reason.into(),
+            seconds: 0.0,
+        });
+        on
+    }
+
+    /// An effect that the scene leaves no room for: it cannot be forced either.
+    pub fn rule_out(&mut self, effect: Effect, reason: impl Into<String>) {
+        self.made.push(Decision {
+            effect,
+            on: false,
+            forced: false,
+            possible: false,
+            reason: reason.into(),
+            seconds: 0.0,
+        });
+    }
+
+    /// Adds to an effect's time.
+    pub fn took(&mut self, effect: Effect, seconds: f64) {
+        if let Some(decision) = self.made.iter_mut().find(|d| d.effect == effect) {
+            decision.seconds += seconds;
+        }
+    }
+
+    /// Adds to an effect's reason what was found while simulating it.
+    pub fn found(&mut self, effect: Effect, what: &str) {
+        if let Some(decision) = self.made.iter_mut().find(|d| d.effect == effect) {
+            decision.reason.push_str("; ");
+            decision.reason.push_str(what);
+        }
+    }
+
+    /// Whether an effect is simulated.
+    #[must_use]
+    pub fn on(&self, effect: Effect) -> bool {
+        self.made.iter().any(|d| d.effect == effect && d.on)
+    }
+
+    /// All of them, in the order of [`Effect::ALL`].
+    #[must_use]
+    pub fn all(&self) -> Vec<Decision> {
+        let mut all = self.made.clone();
+        all.sort_by_key(|decision| decision.effect);
+        all
+    }
+}

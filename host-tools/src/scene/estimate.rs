@@ -1,0 +1,186 @@
+//! How much an effect could change a photograph, from the scene alone: what
+//! decisions are made by.
+//!
+//! Every estimate is a share of the brightest light that the projector's white
+//! makes on a surface, and is meant to be too large rather than too small.
+
+use super::facets::Facets;
+use super::form_factor::from_point;
+use super::geometry::{Obstacles, Polygon};
+use super::patches::split_by_frame;
+use super::view::View;
+use nalgebra::Vector3;
+
+/// Facets above which pairs are no longer looked at one by one.
+const MOST_FACETS: usize = 400;
+
+/// What is known of a scene before anything is simulated.
+#[derive(Clone, Debug)]
+pub(super) struct Estimate {
+    /// Largest light that comes back from another surface after one bounce, and
+    /// whose it is: from, to. `None` if no two surfaces face each other.
+    pub(super) bounce: Option<Pair>,
+    /// Largest light on what is beside the frame.
+    pub(super) surroundings: Option<f64>,
+    /// Largest light that back sides send to the camera or to front sides.
+    pub(super) backs: Option<f64>,
+    /// Pairs of facets that face each other, and all pairs.
+    pub(super) facing: (usize, usize),
+}
+
+/// Light from one facet on another.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Pair {
+    pub(super) light: f64,
+    pub(super) from: usize,
+    pub(super) to: usize,
+}
+
+/// One side of a facet, or a part of it.
+struct Side<'p> {
+    polygon: &'p Polygon,
+    facet: usize,
+    /// Largest diffuse reflectance, gloss and mirrors included.
+    reflectance: f64,
+    /// Largest irradiance by the projector's white and from elsewhere.
+    lit: f64,
+}
+
+impl Estimate {
+    /// Looks at all pairs of facets.
+    pub(super) fn new(facets: &Facets<'_>, ambient: f64) -> Self {
+        let count = facets.count();
+        let pairs = count * count.saturating_sub(1) / 2;
+        let projector = &facets.scene().projector.view;
+        let brightest = (0..count)
+            .map(|f| irradiance(facets.polygon(f), projector))
+            .fold(0.0, f64::max)
+            .max(f64::MIN_POSITIVE);
+        let side = |facet: usize, polygon, lit: f64| Side {
+            polygon,
+            facet,
+            reflectance: reflectance(facets, facet),
+            lit: lit / brightest + ambient,
+        };
+        let fronts: Vec<_> = (0..count)
+            .map(|f| {
+                side(
+                    f,
+                    facets.polygon(f),
+                    irradiance(facets.polygon(f), projector),
+                )
+            })
+            .collect();
+        if count > MOST_FACETS {
+            // A mesh of many facets is one that bends: it lights itself.
+            let reflectance = fronts.iter().map(|f| f.reflectance).fold(0.0, f64::max);
+            return Self {
+                bounce: Some(Pair {
+                    light: reflectance,
+                    from: 0,
+                    to: 0,
+                }),
+                surroundings: Some(reflectance),
+                backs: Some(reflectance * reflectance),
+                facing: (pairs, pairs),
+            };
+        }
+        let flipped: Vec<_> = (0..count).map(|f| facets.polygon(f).flipped()).collect();
+        let backs: Vec<_> = flipped
+            .iter()
+            .enumerate()
+            .map(|(f, p)| side(f, p, 0.0))
+            .collect();
+        let beside: Vec<_> = (0..count)
+            .flat_map(|f| {
+                split_by_frame(facets.polygon(f), projector)
+                    .1
+                    .into_iter()
+                    .map(move |p| (f, p))
+            })
+            .collect();
+        let beside: Vec<_> = beside.iter().map(|(f, p)| side(*f, p, 0.0)).collect();
+        let mut facing = 0;
+        let mut bounce: Option<Pair> = None;
+        for to in &fronts {
+            for from in &fronts {
+                let Some(light) = bounced(from, to, facets.obstacles()) else {
+                    continue;
+                };
+                facing += 1;
+                if bounce.is_none_or(|pair| light > pair.light) {
+                    bounce = Some(Pair {
+                        light,
+                        from: from.facet,
+                        to: to.facet,
+                    });
+                }
+            }
+        }
+        Self {
+            bounce,
+            surroundings: largest_on(&beside, &fronts, facets.obstacles()),
+            backs: largest_on(&backs, &fronts, facets.obstacles()),
+            facing: (facing / 2, pairs),
+        }
+    }
+}
+
+/// Largest light that any of `sides` gets from `fronts` or from elsewhere and sends
+/// on; `None` if there are no such sides, or nothing reaches them.
+fn largest_on(sides: &[Side<'_>], fronts: &[Side<'_>], obstacles: &Obstacles) -> Option<f64> {
+    let on = |side: &Side<'_>| {
+        let from_fronts = fronts
+            .iter()
+            .filter_map(|front| bounced(front, side, obstacles));
+        side.reflectance * from_fronts.fold(side.lit, f64::max)
+    };
+    let largest = sides.iter().map(on).fold(0.0, f64::max);
+    (largest > 0.0).then_some(largest)
+}
+
+/// Light that comes to one side from another after a bounce there: largest over the
+/// places looked at. `None` if the two do not face each other.
+fn bounced(from: &Side<'_>, to: &Side<'_>, obstacles: &Obstacles) -> Option<f64> {
+    if from.facet == to.facet || from.lit == 0.0 || from.reflectance == 0.0 {
+        return None;
+    }
+    let seen = to.polygon.clipped(from.polygon.plane())?;
+    let visible = from.polygon.clipped(to.polygon.plane())?;
+    let normal = to.polygon.normal();
+    let factor = |place: &Vector3<f64>| from_point(place, &normal, &visible);
+    // Just inside the corners: there, form factors are largest and still defined.
+    let inside = |polygon: &Polygon| {
+        let centre = polygon.centroid();
+        let corners = polygon.corners().iter().map(|c| c + 0.01 * (centre - c));
+        corners.chain([centre]).collect::<Vec<_>>()
+    };
+    let (places, others) = (inside(&seen), inside(&visible));
+    // Only what is hidden from every place looked at counts as hidden.
+    let open = |a: &Vector3<f64>| others.iter().any(|b| !obstacles.blocked(a, b));
+    if !places.iter().any(open) {
+        return None;
+    }
+    let largest = places.iter().map(factor).fold(0.0, f64::max);
+    Some(largest * from.reflectance * from.lit)
+}
+
+fn reflectance(facets: &Facets<'_>, facet: usize) -> f64 {
+    let panel = &facets.scene().panels[facets.panel(facet)];
+    let diffuse = panel.albedo.largest().into_iter().fold(0.0, f64::max);
+    diffuse + panel.gloss.map_or(0.0, |gloss| gloss.reflectance) + panel.mirror
+}
+
+/// Largest irradiance by the projector's white on the part of a polygon in its frame.
+fn irradiance(polygon: &Polygon, view: &View) -> f64 {
+    let Some(part) = split_by_frame(polygon, view).0 else {
+        return 0.0;
+    };
+    let normal = part.normal();
+    let at = |world: &Vector3<f64>| {
+        let way = world - view.position();
+        let depth = way.dot(&view.forward());
+        (-normal.dot(&way) * view.focus().powi(2) / depth.powi(3)).max(0.0)
+    };
+    part.corners().iter().map(at).fold(0.0, f64::max)
+}

@@ -1,0 +1,71 @@
+//! A sparse matrix by rows: what each pixel or patch gets from a few of many.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// A sparse matrix whose rows list their entries.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// Where each row begins in `entries`, one more than rows.
+    begin: Vec<usize>,
+    entries: Vec<(u32, f32)>,
+}
+
+impl Rows {
+    /// From the entries of each row: column and value.
+    #[must_use]
+    pub fn from_rows(rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
+        let (mut begin, mut entries) = (vec![0], Vec::new());
+        for row in rows {
+            entries.extend(
+                row.into_iter()
+                    .map(|(column, value)| (column, value as f32)),
+            );
+            begin.push(entries.len());
+        }
+        Self { begin, entries }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.begin.len() - 1
+    }
+
+    /// Number of entries.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// The entries of a row: column and value.
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[(u32, f32)] {
+        &self.entries[self.begin[row]..self.begin[row + 1]]
+    }
+
+    /// The product with a vector that is given by its elements.
+    pub fn times(&self, row: usize, vector: impl Fn(usize) -> f64) -> f64 {
+        let entries = self.row(row).iter();
+        entries
+            .map(|(column, value)| f64::from(*value) * vector(*column as usize))
+            .sum()
+    }
+
+    /// The product with a matrix of as many rows as this one has columns.
+    #[must_use]
+    pub fn product(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut result = DMatrix::zeros(self.count(), right.ncols());
+        if self.count() == 0 {
+            return result;
+        }
+        let columns = result.as_mut_slice().par_chunks_mut(self.count());
+        columns.enumerate().for_each(|(k, column)| {
+            let right = right.column(k);
+            for (row, value) in column.iter_mut().enumerate() {
+                *value = self.times(row, |at| right[at]);
+            }
+        });
+        result
+    }
+}

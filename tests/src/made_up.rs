@@ -1,0 +1,139 @@
+//! Tables that are made up: any gains, ambient light, response and operator, without a
+//! scene behind them.
+
+use fixed::types::U1F15;
+use iltm::capture::Response;
+use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
+use iltm::compile::response;
+use iltm_runtime::Grid;
+use iltm_runtime::haar::Basis;
+use iltm_runtime::image::layout::{SectionKind, meta, tier};
+use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use std::ops::Range;
+
+/// What a table is to hold.
+#[derive(Clone, Debug)]
+pub struct MadeUp {
+    /// Its grid.
+    pub grid: Grid,
+    /// Its channels, 1 or 3.
+    pub channels: usize,
+    /// Fraction bits of the gains.
+    pub gain_fraction: u8,
+    /// Gains of every cell, channels of a cell side by side.
+    pub gains: Vec<u16>,
+    /// Ambient light in the same way, bits of [`Light`](iltm_runtime::units::Light).
+    pub ambient: Option<Vec<u16>>,
+    /// Whether codes follow a projector's response (sRGB).
+    pub response: bool,
+    /// Rows of the operator of tier 1, the only one above 0; none without an operator.
+    pub rows: Vec<StoredRow>,
+    /// Scale of the operator in each channel that there is.
+    pub scales: [U1F15; 3],
+}
+
+impl MadeUp {
+    /// Gain 1 and nothing else.
+    #[must_use]
+    pub fn new(grid: Grid, channels: usize) -> Self {
+        let mut scales = [U1F15::ZERO; 3];
+        scales[..channels].fill(U1F15::ONE);
+        Self {
+            grid,
+            channels,
+            gain_fraction: 13,
+            gains: vec![1 << 13; grid.cells() * channels],
+            ambient: None,
+            response: false,
+            rows: Vec::new(),
+            scales,
+        }
+    }
+
+    /// The bounds that the runtime proves for its operator.
+    ///
+    /// # Errors
+    /// [`OperatorError`] as the runtime has it.
+    ///
+    /// # Panics
+    /// Never: a segment is made of whole words.
+    pub fn bounds(&self) -> Result<Bounds, OperatorError> {
+        if self.rows.is_empty() {
+            return Ok(Bounds::default());
+        }
+        let segment = segment_bytes(self.grid.cells(), &self.rows);
+        Ok(self.operator(&segment)?.bounds())
+    }
+
+    fn operator<'a>(&self, segment: &'a [u8]) -> Result<Operator<'a>, OperatorError> {
+        let segment = Segment::new(0, 1, Channels::All, segment)?;
+        let segments = std::iter::once(segment).collect();
+        Operator::new(&Basis::new(self.grid), segments, self.scales)
+    }
+
+    /// The bytes of the image. Where the runtime refuses the operator, so does it the
+    /// image, for the same reason.
+    ///
+    /// # Panics
+    /// If sRGB were linear.
+    #[must_use]
+    pub fn image(&self) -> Vec<u8> {
+        let segment = segment_bytes(self.grid.cells(), &self.rows);
+        let operator = (!self.rows.is_empty()).then(|| self.operator(&segment));
+        let operator = operator.and_then(Result::ok);
+        let mut image = ImageWriter::default();
+        image.section(SectionKind::Meta, 0, self.meta(operator.as_ref()));
+        let top = u8::from(!self.rows.is_empty());
+        let tiers = (0..=top).flat_map(|number| {
+            let cost = operator.as_ref();
+            let cost = cost.map_or((0, 0), |o| o.cost(number, self.channels as u8));
+            let mut entry = vec![0; tier::SIZE];
+            put(&mut entry, tier::ENTRIES, &cost.0.to_le_bytes());
+            put(&mut entry, tier::MULTIPLICATIONS, &cost.1.to_le_bytes());
+            entry
+        });
+        image.section(SectionKind::Tiers, 0, tiers.collect());
+        image.section(SectionKind::Gain, 0, halfwords(self.gains.iter().copied()));
+        if let Some(ambient) = &self.ambient {
+            image.section(SectionKind::Ambient, 0, halfwords(ambient.iter().copied()));
+        }
+        if self.response {
+            let knots = response::knots(Response::Srgb).expect("not linear");
+            image.section(SectionKind::Codes, 0, response::codes(&knots));
+            image.section(SectionKind::Response, 0, halfwords(knots));
+        }
+        if !self.rows.is_empty() {
+            image.section(SectionKind::Operator, 1, segment.clone());
+        }
+        image.finish()
+    }
+
+    fn meta(&self, operator: Option<&Operator<'_>>) -> Vec<u8> {
+        let bounds = operator.map_or(Bounds::default(), Operator::bounds);
+        let sides = [self.grid.rows(), self.grid.cols()].map(|side| (side as u16).to_le_bytes());
+        let mut head = vec![0; meta::SIZE];
+        put(&mut head, meta::ROWS, &sides[0]);
+        put(&mut head, meta::COLS, &sides[1]);
+        head[meta::CHANNELS] = self.channels as u8;
+        head[meta::GAIN_FRACTION] = self.gain_fraction;
+        let white = 1_u32 << 23;
+        for (field, value) in [
+            (meta::REFERENCE_WHITE, white),
+            (meta::ACCUMULATOR_BOUND, bounds.accumulator),
+            (meta::CORRECTION_BOUND, bounds.correction),
+        ] {
+            put(&mut head, field, &value.to_le_bytes());
+        }
+        let scales = self.scales.map(U1F15::to_bits);
+        put(&mut head, meta::CHANNEL_SCALES, &halfwords(scales));
+        head
+    }
+}
+
+fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
+    bytes[field].copy_from_slice(value);
+}
+
+fn halfwords(values: impl IntoIterator<Item = u16>) -> Vec<u8> {
+    values.into_iter().flat_map(u16::to_le_bytes).collect()
+}

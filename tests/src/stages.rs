@@ -1,0 +1,193 @@
+//! What the stages of the pipeline take: instructions a sample, and bytes of firmware.
+//!
+//! Counted on the reference board as in [`instructions`](crate::instructions), for
+//! tables that are made up and list more stages one after the other.
+//! `docs/stages.csv` and `docs/firmware-sizes.csv` hold the results, and tests compare
+//! them.
+
+use crate::firmware::{elf, elf_of, flash_bytes};
+use crate::instructions::bench;
+use crate::made_up::MadeUp;
+use iltm::compile::image::StoredRow;
+use iltm::device::emulator::Board;
+use iltm_runtime::pipeline::Stage;
+use iltm_runtime::{FrameSize, Grid};
+use std::fmt::Write as _;
+
+/// Entries of each row of a made-up operator, in pairs.
+pub const ENTRIES: usize = 8;
+
+/// A table that lists these stages, and no others, for frames of the grid's size.
+/// [`Stage::FullResolution`] is no section of it but gains finer than the cells, which
+/// it has not.
+#[must_use]
+pub fn table(grid: Grid, stages: &[Stage]) -> MadeUp {
+    let channels = if stages.contains(&Stage::Colour) {
+        3
+    } else {
+        1
+    };
+    let mut table = MadeUp::new(grid, channels);
+    // Just under one, so that natural frames are not clipped more than usual.
+    table.gains.fill(7_800);
+    if stages.contains(&Stage::Ambient) {
+        table.ambient = Some(vec![330; table.gains.len()]);
+    }
+    table.response = stages.contains(&Stage::Response);
+    if stages.contains(&Stage::Operator) {
+        table.rows = rows(grid);
+    }
+    table
+}
+
+/// Pairs at random even places, so that none runs into the next.
+fn rows(grid: Grid) -> Vec<StoredRow> {
+    let mut random = fastrand::Rng::with_seed(0x57A6);
+    let cells = grid.cells() as u16;
+    let mut row = |index| {
+        let mut places = std::collections::BTreeSet::new();
+        while places.len() < ENTRIES / 2 {
+            places.insert(2 * random.u16(..cells / 2));
+        }
+        let pair = |at: u16| [(at, random.i16(1..20)), (at + 1, -random.i16(1..20))];
+        StoredRow {
+            index,
+            shift: 8,
+            entries: places.into_iter().flat_map(pair).collect(),
+        }
+    };
+    (0..cells).map(&mut row).collect()
+}
+
+/// What a frame takes, instructions a sample.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Cost {
+    /// The stages that the table lists.
+    pub stages: &'static str,
+    /// Of a frame of one pixel a cell.
+    pub cells: f64,
+    /// Of a frame of sixteen pixels a cell.
+    pub pixels: f64,
+}
+
+/// The tables of the list.
+const TABLES: [(&str, &[Stage]); 7] = [
+    ("gain", &[]),
+    ("gain + ambient", &[Stage::Ambient]),
+    ("gain + response", &[Stage::Response]),
+    ("gain + operator", &[Stage::Operator]),
+    (
+        "gain + operator + ambient",
+        &[Stage::Operator, Stage::Ambient],
+    ),
+    (
+        "gain + operator + ambient + response",
+        &[Stage::Operator, Stage::Ambient, Stage::Response],
+    ),
+    (
+        "gain + operator + ambient + response + colour",
+        &[
+            Stage::Operator,
+            Stage::Ambient,
+            Stage::Response,
+            Stage::Colour,
+        ],
+    ),
+];
+
+/// Instructions of a frame at the top tier.
+///
+/// # Panics
+/// If the bench cannot be run.
+#[must_use]
+pub fn instructions(table: &MadeUp, size: FrameSize, firmware_stages: &str) -> u64 {
+    let bench_elf = elf_of(Board::An500, firmware_stages, "bench");
+    let lines = bench(&bench_elf, &table.image(), size, None);
+    let [.., frame, _] = lines.last().expect("tier 0 at least");
+    *frame
+}
+
+/// Counts the tables of the list.
+///
+/// # Panics
+/// If the bench cannot be run.
+#[must_use]
+pub fn costs() -> Vec<Cost> {
+    let grid = Grid::new(64, 64).expect("a small grid");
+    let larger = FrameSize::new(256, 256).expect("not empty");
+    let cost = |&(name, stages): &(&'static str, &[Stage])| {
+        let table = table(grid, stages);
+        let of = |size: FrameSize| {
+            let samples = size.pixels() * table.channels;
+            let all = crate::firmware::ALL_STAGES;
+            instructions(&table, size, all) as f64 / samples as f64
+        };
+        Cost {
+            stages: name,
+            cells: of(FrameSize::of_grid(grid)),
+            pixels: of(larger),
+        }
+    };
+    TABLES.iter().map(cost).collect()
+}
+
+/// The list as `docs/stages.csv` holds it.
+#[must_use]
+pub fn csv(costs: &[Cost]) -> String {
+    let mut text =
+        String::from("stages,instructions a sample,a sample of a frame with 16 pixels a cell\n");
+    for cost in costs {
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "{},{:.2},{:.2}", cost.stages, cost.cells, cost.pixels);
+    }
+    text
+}
+
+/// The features of a firmware with some of the stages, as its build takes them.
+#[must_use]
+pub fn features(stages: &[Stage]) -> String {
+    let names: Vec<_> = stages.iter().map(|stage| stage.feature()).collect();
+    names.join(",")
+}
+
+/// Bytes of flash of a product with these features, none of which is lean.
+///
+/// # Panics
+/// If it cannot be built.
+#[must_use]
+pub fn flash(features: &str) -> u64 {
+    let all = features == self::features(&Stage::ALL);
+    flash_bytes(&if all {
+        elf(Board::An500, "firmware")
+    } else {
+        elf_of(Board::An500, features, "firmware")
+    })
+}
+
+/// The line of `docs/firmware-sizes.csv` for a product with some of the stages.
+///
+/// # Panics
+/// If it cannot be built.
+#[must_use]
+pub fn size_line(stages: &[Stage]) -> String {
+    let features = features(stages);
+    let bytes = flash(&features);
+    let name = match features.as_str() {
+        "" => "none".to_owned(),
+        some => some.replace(',', " + "),
+    };
+    format!("{name},{bytes}")
+}
+
+/// All choices of stages, none first, all last.
+#[must_use]
+pub fn choices() -> Vec<Vec<Stage>> {
+    let choice = |bits: usize| {
+        let chosen = |place: &usize| bits >> place & 1 == 1;
+        (0..Stage::ALL.len())
+            .filter(chosen)
+            .map(|place| Stage::ALL[place])
+            .collect()
+    };
+    (0..1 << Stage::ALL.len()).map(choice).collect()
+}
