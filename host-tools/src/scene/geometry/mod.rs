@@ -1,5 +1,6 @@
 //! Points, planes, polygons, and what is in whose way.
 
+mod bounds;
 mod obstacles;
 mod plane;
 mod polygon;

@@ -1,5 +1,6 @@
 //! Which surface a ray meets first, and whether two places see each other.
 
+use super::bounds::{Bounds, Stretch};
 use super::polygon::Polygon;
 use nalgebra::Vector3;
 
@@ -7,10 +8,15 @@ use nalgebra::Vector3;
 /// starts and ends on.
 const ENDS: f64 = 1e-6;
 
+/// Surfaces from which on looking through their boxes first is faster.
+const MANY: usize = 16;
+
 /// All surfaces of a scene as obstacles to light, whichever way they face.
 #[derive(Clone, Debug)]
 pub struct Obstacles {
     facets: Vec<Polygon>,
+    /// Boxes around them, if there are [`MANY`].
+    bounds: Option<Bounds>,
 }
 
 /// Where a ray meets a surface.
@@ -26,7 +32,8 @@ impl Obstacles {
     /// Obstacles in the order that [`Hit::facet`] counts them.
     #[must_use]
     pub fn new(facets: Vec<Polygon>) -> Self {
-        Self { facets }
+        let bounds = (facets.len() >= MANY).then(|| Bounds::new(&facets));
+        Self { facets, bounds }
     }
 
     /// The surfaces.
@@ -43,15 +50,23 @@ impl Obstacles {
         direction: &Vector3<f64>,
         least: f64,
     ) -> Option<Hit> {
-        let hits = self
-            .facets
-            .iter()
-            .enumerate()
-            .filter_map(|(facet, polygon)| {
-                let along = meets(polygon, origin, direction)?;
-                (along > least).then_some(Hit { facet, along })
-            });
-        hits.min_by(|a, b| a.along.total_cmp(&b.along))
+        let stretch = Stretch {
+            origin: *origin,
+            direction: *direction,
+            lengths: f64::INFINITY,
+        };
+        let mut first: Option<Hit> = None;
+        self.near(&stretch, |facet| {
+            if let Some(along) = meets(&self.facets[facet], origin, direction) {
+                // Of surfaces met together, the first in the list.
+                let nearer = first.is_none_or(|f| (along, facet) < (f.along, f.facet));
+                if along > least && nearer {
+                    first = Some(Hit { facet, along });
+                }
+            }
+            false
+        });
+        first
     }
 
     /// Whether a surface stands between two places that are on surfaces
@@ -59,9 +74,23 @@ impl Obstacles {
     #[must_use]
     pub fn blocked(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let direction = to - from;
-        self.facets.iter().any(|polygon| {
-            meets(polygon, from, &direction).is_some_and(|along| along > ENDS && along < 1.0 - ENDS)
+        let stretch = Stretch {
+            origin: *from,
+            direction,
+            lengths: 1.0,
+        };
+        self.near(&stretch, |facet| {
+            meets(&self.facets[facet], from, &direction)
+                .is_some_and(|along| along > ENDS && along < 1.0 - ENDS)
         })
+    }
+
+    /// Shows the surfaces near a stretch until one is the last; whether one was.
+    fn near(&self, stretch: &Stretch, mut last: impl FnMut(usize) -> bool) -> bool {
+        match &self.bounds {
+            Some(bounds) => bounds.near(stretch).any(last),
+            None => (0..self.facets.len()).any(&mut last),
+        }
     }
 }
 
@@ -79,6 +108,7 @@ fn meets(polygon: &Polygon, origin: &Vector3<f64>, direction: &Vector3<f64>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn square(z: f64) -> Polygon {
         let corner = |x, y| Vector3::new(x, y, z);
@@ -103,5 +133,50 @@ mod tests {
         assert!(!obstacles.blocked(&bottom, &Vector3::new(0.0, 0.0, 1.0)));
         let past = Vector3::new(3.0, 0.0, 1.0);
         assert!(!obstacles.blocked(&bottom, &past));
+    }
+
+    /// Triangles in all directions, some in planes along the axes.
+    fn scattered(seed: u64, many: usize) -> Vec<Polygon> {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut triangles = Vec::new();
+        while triangles.len() < many {
+            let centre = Vector3::from_fn(|_, _| 4.0 * random.f64() - 2.0);
+            let flat = random.usize(0..6);
+            let corners = (0..3).map(|_| {
+                Vector3::from_fn(|axis, _| {
+                    let off = if axis == flat {
+                        0.0
+                    } else {
+                        random.f64() - 0.5
+                    };
+                    centre[axis] + off
+                })
+            });
+            triangles.extend(Polygon::new(corners.collect()).ok());
+        }
+        triangles
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        /// The reference looks at every surface.
+        #[test]
+        fn boxes_first_meet_what_looking_at_every_surface_meets(seed in any::<u64>(), many in 16..400_usize) {
+            let fast = Obstacles::new(scattered(seed, many));
+            let plain = Obstacles { bounds: None, ..fast.clone() };
+            prop_assert!(fast.bounds.is_some());
+            let mut random = fastrand::Rng::with_seed(!seed);
+            for _ in 0..50 {
+                let mut place = || Vector3::from_fn(|_, _| 5.0 * random.f64() - 2.5);
+                let (from, mut to) = (place(), place());
+                if random.bool() {
+                    to[random.usize(0..3)] = from[0];
+                }
+                let least = random.f64() * 0.3;
+                let direction = to - from;
+                prop_assert_eq!(fast.first_hit(&from, &direction, least), plain.first_hit(&from, &direction, least));
+                prop_assert_eq!(fast.blocked(&from, &to), plain.blocked(&from, &to));
+            }
+        }
     }
 }
