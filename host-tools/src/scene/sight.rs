@@ -43,6 +43,12 @@ pub struct Sight {
     /// Light that leaves patches and reaches a pixel's surface more or less than its
     /// patch's mean, pixels x patches, one entry a channel.
     pub detail: Vec<Rows>,
+    /// Light that leaves patches and reaches the pixel over lobes, pixels x patches,
+    /// the same in all channels.
+    pub lobes: Rows,
+    /// Share of each pixel that sees no surface, and with it the light from
+    /// elsewhere.
+    pub open: Vec<f32>,
 }
 
 impl Sight {
@@ -53,6 +59,8 @@ impl Sight {
             direct: Vec::new(),
             indirect: Vec::new(),
             detail: Vec::new(),
+            lobes: Rows::from_rows([]),
+            open: Vec::new(),
         }
     }
 
@@ -89,6 +97,11 @@ impl Sight {
             direct: rows(|pixel| &pixel.direct),
             indirect: rows(|pixel| &pixel.indirect),
             detail: rows(|pixel| &pixel.detail),
+            lobes: Rows::from_rows(pixels.iter().map(|pixel| {
+                let lobes = pixel.lobes.iter();
+                lobes.map(|seen| (seen.index, seen.share[0])).collect()
+            })),
+            open: pixels.iter().map(|pixel| pixel.open as f32).collect(),
         }
     }
 }
@@ -104,6 +117,8 @@ struct Pixel {
     direct: Vec<Seen>,
     indirect: Vec<Seen>,
     detail: Vec<Seen>,
+    lobes: Vec<Seen>,
+    open: f64,
     /// Where each patch is seen, for what varies over it.
     places: Vec<Place>,
 }
@@ -153,7 +168,12 @@ impl<'e> Eye<'e> {
             self.follow(camera.view.position(), way, &mut pixel);
         }
         self.vary(&mut pixel);
-        for seen in [&mut pixel.direct, &mut pixel.indirect, &mut pixel.detail] {
+        for seen in [
+            &mut pixel.direct,
+            &mut pixel.indirect,
+            &mut pixel.detail,
+            &mut pixel.lobes,
+        ] {
             merge(seen, 1.0 / (RAYS * RAYS) as f64);
         }
         pixel
@@ -165,6 +185,7 @@ impl<'e> Eye<'e> {
         let mut least = 0.0;
         for _ in 0..=MOST_MIRRORS {
             let Some(point) = self.point(&origin, &way, least) else {
+                pixel.open += part / (RAYS * RAYS) as f64;
                 return;
             };
             self.look(&point, part, pixel);
@@ -284,7 +305,7 @@ impl<'e> Eye<'e> {
                 );
             }
             if let Some((gloss, part)) = place.gloss {
-                self.shine(place, gloss, part, &mut pixel.detail);
+                self.shine(place, gloss, part, &mut pixel.lobes);
             }
         }
     }

@@ -99,6 +99,8 @@ pub struct Exposed {
     indirect: Vec<DMatrix<f64>>,
     /// Light that leaves patches.
     leaving: Vec<DMatrix<f64>>,
+    /// Light from elsewhere.
+    ambient: Vec<f64>,
     /// Bounces that were followed, or steps of the solve.
     pub bounces: usize,
     /// How the light after all bounces was found; `None` without any.
@@ -248,6 +250,7 @@ impl<'s> Simulation<'s> {
             shown,
             indirect: Vec::new(),
             leaving: Vec::new(),
+            ambient: Vec::new(),
             bounces: 0,
             how: None,
         };
@@ -258,13 +261,18 @@ impl<'s> Simulation<'s> {
                 0.0
             };
             let albedo: Vec<f64> = self.patches.iter().map(|p| p.albedo[channel]).collect();
-            let mut indirect = DMatrix::from_element(direct.nrows(), direct.ncols(), ambient);
+            // It comes from where no other surface is in the way.
+            let open = self.exchange.as_ref().map(Exchange::row_sums);
+            let mut indirect = DMatrix::from_fn(direct.nrows(), direct.ncols(), |patch, _| {
+                ambient * (1.0 - open.as_ref().map_or(0.0, |sums| sums[patch]))
+            });
             if let Some(specular) = &self.specular {
                 indirect += specular.from_cells.product(&exposed.shown);
             }
             let leaving = self.bounce(&albedo, &direct, &mut indirect, &mut exposed)?;
             exposed.indirect.push(indirect);
             exposed.leaving.push(leaving);
+            exposed.ambient.push(ambient);
         }
         Ok(exposed)
     }
@@ -327,11 +335,16 @@ impl<'s> Simulation<'s> {
             .map(|channel| {
                 let indirect = exposed.indirect[channel].column(pattern);
                 let leaving = exposed.leaving[channel].column(pattern);
+                let ambient = exposed.ambient[channel];
                 let pixel = |pixel| {
                     let direct = self.sight.direct[channel].times(pixel, |cell| shown[cell]);
                     let bounced = self.sight.indirect[channel].times(pixel, |at| indirect[at]);
-                    let detail = self.sight.detail[channel].times(pixel, |at| leaving[at]);
-                    (direct + bounced + detail).max(0.0) as f32
+                    let detail = self.sight.detail[channel]
+                        // Where a surface is in view, light from elsewhere is not.
+                        .times(pixel, |at| leaving[at] - ambient);
+                    let lobes = self.sight.lobes.times(pixel, |at| leaving[at]);
+                    let elsewhere = ambient * f64::from(self.sight.open[pixel]);
+                    (direct + bounced + detail + lobes + elsewhere).max(0.0) as f32
                 };
                 let (width, height) = self.scene.camera.size;
                 (0..(width * height) as usize)

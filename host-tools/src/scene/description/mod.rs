@@ -35,7 +35,8 @@ pub struct Scene {
     pub projector: Projector,
     /// What photographs it.
     pub camera: Camera,
-    /// Light from elsewhere that falls on every surface, by channel.
+    /// Light from all around, by channel: what a surface with nothing in view gets,
+    /// and what the camera sees beside the scene.
     pub ambient: [f64; 3],
     /// Its surfaces, at least one.
     pub panels: Vec<Panel>,
