@@ -90,9 +90,7 @@ fn cluster(patches: &[Patch], members: &[usize], range: Range<usize>) -> Cluster
         planar_hull(patches, members)
     } else {
         let corners = members.iter().flat_map(|p| patches[*p].polygon.corners());
-        let nothing = Vector3::repeat(f64::INFINITY);
-        let (least, most) = corners.fold((nothing, -nothing), |(l, m), c| (l.inf(c), m.sup(c)));
-        Hull::of_box(&least, &most)
+        Hull::around(corners.copied().collect())
     };
     let points = hull.points();
     let centre = points.iter().sum::<Vector3<f64>>() / points.len() as f64;

@@ -9,6 +9,23 @@
 //!
 //! [`radiosity`] sums the bounces, or solves for all of them at once.
 //!
+//! What it takes on M-shaped panels whose cells are no rectangles (2 shared cores of a
+//! virtual machine; all in blocks; light is 230 columns at albedo 0.7 to 1e-4, 6 bounces; the
+//! error is of the irradiance, beside form factors asked to 1e-9 one by one):
+//!
+//! | patches | build | stored | at most while building | one product | light | error |
+//! |---|---|---|---|---|---|---|
+//! | 1,024 | 0.13 s | 0.5 MB | 2 MB | 0.02 s | 0.1 s | 1.4e-7 |
+//! | 4,096 | 0.5 s | 3.5 MB | 11 MB | 0.1 s | 0.6 s | 1.5e-7 |
+//! | 12,288 | 1.3 s | 10 MB | 32 MB | 0.3 s | 1.6 s | 1.7e-7 |
+//! | 24,576 | 2.5 s | 20 MB | 64 MB | 0.6 s | 4 s | 2.7e-7 |
+//!
+//! `cargo bench -p iltm --bench exchange` repeats it. Pairs of patches that something may stand
+//! between take 15 to 25 us of a core each: with a vane in a valley (`-- 12288 vane`), 4.1
+//! million of them, 24 MB and 75 s of one core in all, error 2.2e-6 (`-- 1024 vane`, where a
+//! patch that the vane stands on is larger: 7e-4). Their error is set by
+//! [`ExchangeOptions::visibility`].
+//!
 //! Hackbusch, *A Sparse Matrix Arithmetic Based on H-Matrices* (1999).
 
 mod blocks;

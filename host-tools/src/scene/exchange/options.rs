@@ -21,7 +21,8 @@ pub enum Occlusion {
 pub struct ExchangeOptions {
     /// Relative error of each form factor that is evaluated.
     pub tolerance: Tolerance,
-    /// Relative error of the share of each that obstacles leave, where they hide a part.
+    /// Error of each that obstacles hide in part, relative to the geometric mean of what they
+    /// leave and the whole.
     pub visibility: Tolerance,
     /// Relative error of the irradiance that blocks of low rank may add, on top.
     pub compression: f64,
@@ -39,7 +40,7 @@ pub struct ExchangeOptions {
 }
 
 impl Default for ExchangeOptions {
-    /// Irradiance to better than 1e-4, dense up to 1024 patches (8 MB), at most 1.5 GB.
+    /// Irradiance to better than 1e-4 where nothing is hidden in part, dense up to 1024 patches (8 MB), at most 1.5 GB.
     fn default() -> Self {
         Self {
             tolerance: Tolerance::default(),

@@ -109,7 +109,7 @@ pub enum RadiosityError {
 const LEAST_LOSS: f64 = 1e-9;
 /// A multiply-add of Cholesky's factors costs as much as this many of a product.
 /// Measured by `cargo bench -p iltm --bench exchange -- cholesky`.
-const CHOLESKY_COST: f64 = 8.0;
+const CHOLESKY_COST: f64 = 4.0;
 /// A step of conjugate gradients costs as much as this many bounces: its sums over all
 /// columns come on top of the product.
 const STEP_COST: f64 = 1.5;

@@ -27,7 +27,8 @@ pub struct ExchangeReport {
     pub occludable: usize,
     /// Pairs of those that a single third surface blocks wholly.
     pub blocked: usize,
-    /// Those pairs one by one, at most [`ExchangeReport::MOST_PAIRS`].
+    /// The pairs that were looked at, those with something between first, at most
+    /// [`ExchangeReport::MOST_PAIRS`].
     pub pairs: Vec<FacetPair>,
     /// Blocks stored in full; 1 if there is one dense matrix.
     pub dense_blocks: usize,

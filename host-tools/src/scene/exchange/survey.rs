@@ -43,7 +43,9 @@ pub(super) fn survey(
         .collect();
     report.occludable = found.iter().filter(|p| p.between.is_some()).count();
     report.blocked = found.iter().filter(|p| p.blocked).count();
-    report.pairs = found.into_iter().take(ExchangeReport::MOST_PAIRS).collect();
+    let (with, without): (Vec<_>, Vec<_>) = found.into_iter().partition(|p| p.between.is_some());
+    let listed = with.into_iter().chain(without);
+    report.pairs = listed.take(ExchangeReport::MOST_PAIRS).collect();
 }
 
 fn between((a, b): (usize, usize), polygons: &[Polygon]) -> FacetPair {

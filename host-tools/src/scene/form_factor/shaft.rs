@@ -19,6 +19,9 @@ pub(crate) struct Hull {
     edges: Vec<Vector3<f64>>,
     /// The plane in front of which all its light is, if it lies in one.
     plane: Option<Plane>,
+    /// All corners of the surfaces inside, where the hull is much wider than they are;
+    /// else empty. They decide on which side of a plane it is.
+    corners: Vec<Vector3<f64>>,
 }
 
 impl Hull {
@@ -33,12 +36,16 @@ impl Hull {
         Self {
             edges: points.iter().zip(next).map(|(a, b)| b - a).collect(),
             plane: Some(plane),
+            corners: Vec::new(),
             points,
         }
     }
 
-    /// Of a box along the axes.
-    pub(crate) fn of_box(least: &Vector3<f64>, most: &Vector3<f64>) -> Self {
+    /// A box along the axes around the corners of several surfaces.
+    pub(crate) fn around(corners: Vec<Vector3<f64>>) -> Self {
+        let nothing = Vector3::repeat(f64::INFINITY);
+        let grow = |(l, m): (Vector3<f64>, Vector3<f64>), c: &Vector3<f64>| (l.inf(c), m.sup(c));
+        let (least, most) = corners.iter().fold((nothing, -nothing), grow);
         let corner = |k: usize| {
             Vector3::from_fn(|axis, _| {
                 if k >> axis & 1 == 0 {
@@ -52,6 +59,7 @@ impl Hull {
             points: (0..8).map(corner).collect(),
             edges: vec![Vector3::x(), Vector3::y(), Vector3::z()],
             plane: None,
+            corners,
         }
     }
 
@@ -63,13 +71,22 @@ impl Hull {
     /// Whether all of it is in front of the plane, or on it.
     pub(crate) fn in_front_of(&self, plane: &Plane) -> bool {
         let near = TOUCHING * (self.points[0] - self.points[self.points.len() / 2]).norm();
-        self.points.iter().all(|p| plane.distance(p) >= -near)
+        self.tight().iter().all(|p| plane.distance(p) >= -near)
     }
 
     /// Whether any of it is in front of the plane.
     pub(crate) fn reaches_front_of(&self, plane: &Plane) -> bool {
         let near = TOUCHING * (self.points[0] - self.points[self.points.len() / 2]).norm();
-        self.points.iter().any(|p| plane.distance(p) > near)
+        self.tight().iter().any(|p| plane.distance(p) > near)
+    }
+
+    /// Points whose own hull holds all surfaces as closely as is known.
+    fn tight(&self) -> &[Vector3<f64>] {
+        if self.corners.is_empty() {
+            &self.points
+        } else {
+            &self.corners
+        }
     }
 }
 
@@ -80,7 +97,8 @@ pub(crate) fn may_block(from: &Hull, to: &Hull, polygon: &Polygon) -> bool {
     let near = TOUCHING * ((to.points[0] - from.points[0]).norm() + polygon.size());
     // All light stays on one side of it.
     let plane = polygon.plane();
-    if points().all(|p| plane.distance(p) >= -near) || points().all(|p| plane.distance(p) <= near) {
+    let tight = || from.tight().iter().chain(to.tight());
+    if tight().all(|p| plane.distance(p) >= -near) || tight().all(|p| plane.distance(p) <= near) {
         return false;
     }
     // It is behind one of the ends.
