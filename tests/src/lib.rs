@@ -5,6 +5,7 @@ pub mod fake_device;
 pub mod fake_tables;
 pub mod firmware;
 pub mod fuzz;
+pub mod hard_cases;
 pub mod instructions;
 pub mod slots;
 #[cfg(unix)]

@@ -8,7 +8,7 @@ use super::progress::progress;
 use crate::capture::{CaptureOptions, Why};
 use crate::compile::sign::read_key;
 use crate::learn::{Learned, learn};
-use crate::solve::SolveOptions;
+use crate::solve::{Compensation, SolveOptions};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::time::Instant;
@@ -80,11 +80,13 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "lambda": report.lambda,
         "iterations": report.iterations,
         "condition": report.condition,
-        "predicted_error": report.prediction.map(|prediction| json!({
-            "uncompensated": prediction.uncompensated,
-            "gain_only": prediction.gain_only,
-            "compensated": prediction.compensated,
-        })),
+        "compensation": report.compensation.name(),
+        "predicted_error": {
+            "uncompensated": report.prediction.uncompensated,
+            "gain_only": report.prediction.gain_only,
+            // `null` where the inverse found would let light grow without end.
+            "compensated": report.prediction.compensated,
+        },
         "reference_white": learned.compiled.white.light,
         "bytes": learned.compiled.image.len(),
         "tiers": tiers(learned),
@@ -145,12 +147,19 @@ pub(super) fn text(learned: &Learned) -> String {
         "scene       condition {:.2}, reference white {:.4} of the camera's full scale",
         report.condition, learned.compiled.white.light
     );
-    if let Some(prediction) = report.prediction {
-        let _ = writeln!(
-            text,
-            "error       {:.4} with this table; {:.4} with gain alone, {:.4} with nothing\n\
-             \x20           (predicted from photographs that the solve had not seen)",
-            prediction.compensated, prediction.gain_only, prediction.uncompensated
+    let prediction = report.prediction;
+    let _ = writeln!(
+        text,
+        "error       {:.4} with an operator; {:.4} with gain alone, {:.4} with nothing\n\
+         \x20           (predicted from {} photographs that the solve had not seen)",
+        prediction.compensated,
+        prediction.gain_only,
+        prediction.uncompensated,
+        prediction.photographs,
+    );
+    if report.compensation == Compensation::GainOnly {
+        text.push_str(
+            "            the operator does not prove to be better: the table has gains alone\n",
         );
     }
     text

@@ -11,9 +11,9 @@
 use super::admm::Consensus;
 use super::convergence::{Convergence, Stop};
 use super::data_term::DataTerm;
-use super::forward::{Inverse, product};
+use super::forward::product;
 use super::haar::Haar;
-use super::held_out::{Split, misfit};
+use super::held_out::{Judged, Split, squared_light, squared_misfit};
 use super::prepare::Prepared;
 use super::report::LambdaTrial;
 use super::solution::{Channel, Solution, drop_dead};
@@ -26,8 +26,8 @@ const WEIGHT_BASE: f64 = 1.3;
 const STRONGEST: f64 = 0.032;
 /// Most weights tried.
 const MOST_TRIALS: i32 = 8;
-/// What `lambda` is when no photographs can be held out.
-pub(super) const FALLBACK_LAMBDA: f64 = 0.008;
+/// `lambda` while the channels' scales are looked for.
+const FALLBACK_LAMBDA: f64 = 0.008;
 /// Solves on the way to `lambda` need not be closer than this.
 const TRIAL: Stop = Stop {
     tolerance: 4e-3,
@@ -56,12 +56,21 @@ pub(super) struct Solver<'p> {
 }
 
 /// What the search for `lambda` found.
-#[derive(Debug)]
-pub(super) struct Choice {
+pub(super) struct Choice<'s> {
     pub(super) lambda: f64,
     pub(super) trials: Vec<LambdaTrial>,
-    /// The best inverses found without the held-out photographs.
-    pub(super) inverses: Vec<Inverse>,
+    /// The best inverses found without held-out photographs, one entry a split;
+    /// none if no solve gave any.
+    pub(super) judged: Vec<Judged<'s>>,
+}
+
+/// The search with one part of the photographs held out.
+struct Fold<'h, 's> {
+    split: &'s Split,
+    photographs: Photographs,
+    data: DataTerm,
+    consensus: Consensus<'h>,
+    best: Option<Solution>,
 }
 
 impl<'p> Solver<'p> {
@@ -79,47 +88,77 @@ impl<'p> Solver<'p> {
         }
     }
 
-    /// Finds `lambda` by the held-out photographs of `split`, or judges the one
-    /// that is given.
-    pub(super) fn choose(
+    /// Finds `lambda` by the held-out photographs of all `splits`, or judges the
+    /// one that is given.
+    pub(super) fn choose<'s>(
         &mut self,
-        split: &Split,
+        splits: &'s [Split],
         given: Option<f64>,
         progress: &dyn Progress,
-    ) -> Choice {
-        let photographs = self.photographs(&split.solved);
+    ) -> Choice<'s> {
         progress.begin("choosing lambda", 0);
-        self.settle_scales(&photographs, progress);
-        let data = self.data(&photographs);
+        let mut folds: Vec<Fold<'_, 's>> = Vec::new();
+        for split in splits {
+            let photographs = self.photographs(&split.solved);
+            if folds.is_empty() {
+                self.settle_scales(&photographs, progress);
+            }
+            folds.push(Fold {
+                split,
+                data: self.data(&photographs),
+                photographs,
+                consensus: Consensus::new(self.haar, &self.weights, &self.prepared.live, None),
+                best: None,
+            });
+        }
+        if let Some(first) = folds.first_mut() {
+            std::mem::swap(&mut first.consensus, &mut self.consensus);
+        }
         let path = match given {
             Some(lambda) => vec![lambda],
             None => (0..MOST_TRIALS)
                 .map(|k| STRONGEST / f64::from(1 << k))
                 .collect(),
         };
+        let total: f64 = splits.iter().map(|s| squared_light(self.prepared, &s.held_out)).sum();
         let mut choice = Choice {
             lambda: path[0],
             trials: Vec::new(),
-            inverses: Vec::new(),
+            judged: Vec::new(),
         };
         let mut least = f64::INFINITY;
-        let mut best = None;
         for lambda in path {
-            self.run(&data, lambda, TRIAL, progress);
-            let found = self.found(&photographs);
-            let misfit = misfit(self.prepared, &found.inverses(), &split.held_out);
+            let mut squared = 0.0;
+            let mut found = Vec::new();
+            for fold in &mut folds {
+                std::mem::swap(&mut fold.consensus, &mut self.consensus);
+                self.run(&fold.data, lambda, TRIAL, progress);
+                let solution = self.found(&fold.photographs);
+                std::mem::swap(&mut fold.consensus, &mut self.consensus);
+                squared += squared_misfit(self.prepared, &solution.inverses(), &fold.split.held_out);
+                found.push(solution);
+            }
+            let misfit = (squared / total).sqrt();
             choice.trials.push(LambdaTrial { lambda, misfit });
             if misfit < least {
                 least = misfit;
                 choice.lambda = lambda;
-                best = Some(found);
+                for (fold, solution) in folds.iter_mut().zip(found) {
+                    fold.best = Some(solution);
+                }
             } else if misfit > ENOUGH * least {
                 break;
             }
         }
-        if let Some(mut best) = best {
-            self.add_deviations(&mut best, &photographs, choice.lambda, TRIAL, progress);
-            choice.inverses = best.inverses();
+        for fold in &mut folds {
+            if let Some(mut best) = fold.best.take() {
+                self.add_deviations(&mut best, &fold.photographs, choice.lambda, TRIAL, progress);
+                choice.judged.push(Judged { split: fold.split, inverses: best.inverses() });
+            }
+        }
+        // The solve of all photographs starts from here.
+        if let Some(first) = folds.first_mut() {
+            std::mem::swap(&mut first.consensus, &mut self.consensus);
         }
         progress.end();
         choice

@@ -9,11 +9,13 @@
 //!
 //! ```text
 //! observed, prepare     what is solved from, checked and scaled
+//! blur                  where a projector out of focus throws its light
 //! haar, lane            the sparse basis, sixteen images at a time
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
 //! direct                the paper's method, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
+//! gain_only             what it is judged against, and what remains if it loses
 //! ```
 //!
 //! # Cost
@@ -35,12 +37,14 @@
 
 mod admm;
 mod basis_pursuit;
+mod blur;
 mod column_block;
 mod convergence;
 mod data_term;
 mod direct;
 mod error;
 mod forward;
+mod gain_only;
 mod haar;
 mod held_out;
 mod inverse;
@@ -62,20 +66,24 @@ mod test_scene;
 #[cfg(test)]
 mod tests;
 
+pub use blur::blur;
 pub use convergence::Convergence;
 pub use error::SolveError;
 pub use forward::Inverse;
+pub use gain_only::{GainOnly, gain_only};
 pub use haar::{Basis, Haar};
 pub use inverse::{ChannelInverse, InverseTransport};
 pub use observed::{CellNoise, Observed, ObservedChannel};
 pub use options::{Method, SolveOptions, UnknownMethod};
-pub use report::{LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport};
+pub use report::{
+    Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
+};
 
 use crate::capture::{Measurements, Role};
 use crate::progress::Progress;
 use convergence::Stop;
-use held_out::{Split, predict};
-use joint::{FALLBACK_LAMBDA, Solver};
+use held_out::{Judged, Split, predict};
+use joint::Solver;
 use prepare::Prepared;
 use solution::Solution;
 use std::time::Instant;
@@ -116,7 +124,7 @@ pub fn solve_observed(
     let prepared = Prepared::new(observed)?;
     check_count(&prepared, options.method)?;
     let haar = Haar::new(observed.grid, options.basis);
-    let split = Split::new(&prepared);
+    let splits = Split::all(&prepared);
     let mut seconds = Seconds {
         prepare: clock.lap(),
         ..Seconds::default()
@@ -128,7 +136,7 @@ pub fn solve_observed(
     let task = Task {
         prepared: &prepared,
         haar: &haar,
-        split: split.as_ref(),
+        splits: &splits,
         stop,
         progress,
     };
@@ -140,14 +148,11 @@ pub fn solve_observed(
     check_answer(&outcome.solution, &inverses, &prepared, options)?;
     let condition = |inverse: &Inverse| inverse.condition(&prepared.live);
     let condition = inverses.iter().map(condition).fold(1.0, f64::max);
-    let prediction = split
-        .as_ref()
-        .zip(outcome.without_held_out.as_ref())
-        .map(|(split, inverses)| predict(&prepared, inverses, &split.held_out));
+    let prediction = predict(&prepared, &outcome.judged);
     seconds.finish = clock.lap();
     let report = SolveReport {
         method: options.method,
-        photographs: count(&prepared, options.method, split.as_ref()),
+        photographs: count(&prepared, options.method, &splits),
         live_cells: prepared.live_cells(),
         cells: prepared.cells(),
         lambda: outcome.lambda,
@@ -156,6 +161,7 @@ pub fn solve_observed(
         iterations: outcome.iterations,
         coefficients: outcome.solution.coefficients,
         condition,
+        compensation: prediction.best(),
         prediction,
         seconds,
     };
@@ -169,47 +175,40 @@ pub fn solve_observed(
 struct Task<'t> {
     prepared: &'t Prepared,
     haar: &'t Haar,
-    split: Option<&'t Split>,
+    splits: &'t [Split],
     stop: Stop,
     progress: &'t dyn Progress,
 }
 
 /// What a method returns beside its answer.
-struct Outcome {
+struct Outcome<'t> {
     solution: Solution,
     lambda: f64,
     trials: Vec<LambdaTrial>,
     iterations: u32,
     /// Inverses that have not seen the held-out photographs.
-    without_held_out: Option<Vec<Inverse>>,
+    judged: Vec<Judged<'t>>,
 }
 
-impl Task<'_> {
-    fn joint(&self, lambda: Option<f64>, seconds: &mut Seconds, clock: &mut Clock) -> Outcome {
+impl<'t> Task<'t> {
+    fn joint(&self, lambda: Option<f64>, seconds: &mut Seconds, clock: &mut Clock) -> Outcome<'t> {
         let mut solver = Solver::new(self.prepared, self.haar, self.stop);
-        let choice = self
-            .split
-            .map(|split| solver.choose(split, lambda, self.progress));
+        let choice = solver.choose(self.splits, lambda, self.progress);
         seconds.choose = clock.lap();
-        let chosen = choice.as_ref().map(|choice| choice.lambda);
-        let lambda = lambda.or(chosen).unwrap_or(FALLBACK_LAMBDA);
+        let lambda = choice.lambda;
         let solution = solver.solve(lambda, self.progress);
         seconds.solve = clock.lap();
         let iterations = solver.iterations();
-        let (trials, without_held_out) = match choice {
-            Some(choice) => (choice.trials, Some(choice.inverses)),
-            None => (Vec::new(), None),
-        };
         Outcome {
             solution,
             lambda,
-            trials,
+            trials: choice.trials,
             iterations,
-            without_held_out,
+            judged: choice.judged,
         }
     }
 
-    fn direct(&self, seconds: &mut Seconds, clock: &mut Clock) -> Outcome {
+    fn direct(&self, seconds: &mut Seconds, clock: &mut Clock) -> Outcome<'t> {
         let usable = self.prepared.with_role(direct::uses);
         let solve = |chosen: &[usize], what| {
             self.progress.begin(what, 0);
@@ -217,20 +216,26 @@ impl Task<'_> {
             self.progress.end();
             found
         };
-        let trial = self.split.map(|split| {
+        let mut iterations = 0;
+        let mut judged = Vec::new();
+        for split in self.splits {
             let kept = |k: &usize| !split.held_out.contains(k);
             let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
-            solve(&chosen, "solving without the held-out photographs")
-        });
+            let trial = solve(&chosen, "solving without the held-out photographs");
+            iterations += trial.convergence.iterations;
+            judged.push(Judged {
+                split,
+                inverses: trial.inverses(),
+            });
+        }
         seconds.choose = clock.lap();
         let solution = solve(&usable, "solving");
         seconds.solve = clock.lap();
-        let trial_iterations = trial.as_ref().map_or(0, |t| t.convergence.iterations);
         Outcome {
             lambda: 0.0,
             trials: Vec::new(),
-            iterations: trial_iterations + solution.convergence.iterations,
-            without_held_out: trial.map(|trial| trial.inverses()),
+            iterations: iterations + solution.convergence.iterations,
+            judged,
             solution,
         }
     }
@@ -241,7 +246,8 @@ fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
         Method::Joint => prepared.roles.len(),
         Method::Direct => prepared.with_role(direct::uses).len(),
     };
-    let least = prepared.live_cells().min(LEAST_PHOTOGRAPHS);
+    // One cell needs a second photograph too: the first one's judge.
+    let least = (prepared.live_cells() + 1).min(LEAST_PHOTOGRAPHS);
     if given < least {
         return Err(SolveError::TooFewPhotographs {
             method: method.name(),
@@ -276,7 +282,7 @@ fn check_answer(
     Ok(())
 }
 
-fn count(prepared: &Prepared, method: Method, split: Option<&Split>) -> PhotographCounts {
+fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCounts {
     let gray = |role| matches!(role, Role::Column { .. } | Role::Row { .. });
     PhotographCounts {
         white: prepared.with_role(|role| role == Role::White).len(),
@@ -285,7 +291,7 @@ fn count(prepared: &Prepared, method: Method, split: Option<&Split>) -> Photogra
             Method::Direct => 0,
         },
         bernoulli: prepared.with_role(|role| role == Role::Bernoulli).len(),
-        held_out: split.map_or(0, |split| split.held_out.len()),
+        held_out: splits.iter().map(|split| split.held_out.len()).sum(),
     }
 }
 

@@ -1,6 +1,8 @@
 //! Checks what was observed and brings them to the solver's units.
 
+use super::blur::blur;
 use super::error::SolveError;
+use super::forward::product;
 use super::observed::{CellNoise, Observed, ObservedChannel, is_lit};
 use crate::capture::Role;
 use nalgebra::DMatrix;
@@ -15,7 +17,10 @@ const MOST_WEIGHT: f64 = 10.0;
 pub(super) struct Prepared {
     /// Cells that are seen and that some light reaches in every channel.
     pub(super) live: Vec<bool>,
-    /// `L`, `N x m`; rows of cells that are not live are zero.
+    /// What the projector showed, `N x m`.
+    pub(super) shown: DMatrix<f64>,
+    /// `L`, `N x m`, after the projector's blur; rows of cells that are not live
+    /// are zero.
     pub(super) patterns: DMatrix<f64>,
     /// `C_c` with the mean flood light of all channels scaled to 1, `N x m`;
     /// rows of cells that are not live are zero.
@@ -27,6 +32,8 @@ pub(super) struct Prepared {
     pub(super) roles: Vec<Role>,
     /// Camera units of one unit of `light`.
     pub(super) unit: f64,
+    /// `B`, `N x N`, already applied to `patterns`; `None` if in focus.
+    pub(super) blur: Option<DMatrix<f64>>,
 }
 
 impl Prepared {
@@ -51,7 +58,12 @@ impl Prepared {
                 if live[cell] { matrix[(cell, k)] } else { 0.0 }
             })
         };
-        let patterns = keep(observed.patterns);
+        let shown = keep(observed.patterns);
+        let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
+        let patterns = match &blur {
+            Some(blur) => keep(&product(blur, &shown)),
+            None => shown.clone(),
+        };
         let mut light: Vec<_> = observed
             .channels
             .iter()
@@ -73,13 +85,15 @@ impl Prepared {
             })
             .collect();
         Ok(Self {
-            weights: weights(&patterns, &noise),
+            weights: weights(&shown, &noise),
             live,
+            shown: observed.patterns.clone(),
             patterns,
             light,
             noise,
             roles: observed.roles.to_vec(),
             unit,
+            blur,
         })
     }
 

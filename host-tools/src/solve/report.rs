@@ -1,6 +1,7 @@
 //! What a solve did, for people and for the table's provenance.
 
 use super::convergence::Convergence;
+use super::gain_only::GainOnly;
 use super::options::Method;
 
 /// How an inverse came about and how good it is.
@@ -20,8 +21,7 @@ pub struct SolveReport {
     /// Weight of the l1 term, light scaled so that a mean flood photograph is 1.
     /// 0 for [`Method::Direct`], which has no such weight.
     pub lambda: f64,
-    /// Every weight tried, largest first; empty if none was chosen by held-out
-    /// photographs.
+    /// Every weight tried, largest first; empty for [`Method::Direct`].
     pub lambda_path: Vec<LambdaTrial>,
     /// How the last solve ended.
     pub convergence: Convergence,
@@ -32,9 +32,10 @@ pub struct SolveReport {
     /// Largest over smallest singular value of the forward transport, worst
     /// channel.
     pub condition: f64,
-    /// What held-out photographs say; `None` if there were too few to hold any
-    /// out.
-    pub prediction: Option<Prediction>,
+    /// What held-out photographs say.
+    pub prediction: Prediction,
+    /// Which way to project they say is best.
+    pub compensation: Compensation,
     /// Wall-clock time.
     pub seconds: Seconds,
 }
@@ -71,10 +72,72 @@ pub struct LambdaTrial {
 pub struct Prediction {
     /// Projecting the wanted image as it is.
     pub uncompensated: f64,
-    /// Dividing by the flood photograph.
+    /// Correcting each cell's brightness alone.
     pub gain_only: f64,
-    /// This inverse, found without the held-out photographs.
+    /// This inverse, found without the held-out photographs; infinite if it has
+    /// no forward transport.
     pub compensated: f64,
+    /// By how many standard errors, photograph by photograph, `compensated` is
+    /// better than `gain_only`.
+    pub confidence: f64,
+    /// Held-out photographs.
+    pub photographs: usize,
+    /// Which gains without an operator predict best.
+    pub gain_only_kind: GainOnly,
+}
+
+/// Standard errors by which an operator must be better than gain alone. Below
+/// that the difference may well be chance, and a table without an operator is
+/// safe, small and fast.
+const CONFIDENT: f64 = 2.0;
+
+impl Prediction {
+    /// Error of the way that [`Self::best`] names.
+    #[must_use]
+    pub fn chosen(&self) -> f64 {
+        match self.best() {
+            Compensation::Operator => self.compensated,
+            Compensation::GainOnly => self.gain_only,
+            Compensation::Nothing => self.uncompensated,
+        }
+    }
+
+    /// Which way to project errs least.
+    #[must_use]
+    pub fn best(&self) -> Compensation {
+        let other = self.gain_only.min(self.uncompensated);
+        // Written so that what is not a number loses.
+        if self.compensated < other && self.confidence > CONFIDENT {
+            Compensation::Operator
+        } else if self.gain_only <= self.uncompensated {
+            Compensation::GainOnly
+        } else {
+            Compensation::Nothing
+        }
+    }
+}
+
+/// A way to project.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Compensation {
+    /// With the whole inverse.
+    Operator,
+    /// With gains and no operator.
+    GainOnly,
+    /// As it is.
+    Nothing,
+}
+
+impl Compensation {
+    /// Its name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Operator => "operator",
+            Self::GainOnly => "gain-only",
+            Self::Nothing => "nothing",
+        }
+    }
 }
 
 /// Where the time went.

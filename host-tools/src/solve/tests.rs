@@ -53,6 +53,7 @@ impl Capture {
             roles: &self.roles,
             live: &self.live,
             channels: self.light.iter().map(channel).collect(),
+            blur: 0.0,
         }
     }
 
