@@ -9,7 +9,7 @@
 //! each has been. A pattern and its complement, or the same pattern taken twice,
 //! are held out together: the one would tell the other.
 
-use super::forward::Inverse;
+use super::solution::Candidate;
 use super::gain_only::{GainOnly, gains};
 use super::prepare::Prepared;
 use super::report::Prediction;
@@ -89,17 +89,16 @@ fn groups(prepared: &Prepared) -> Vec<Vec<usize>> {
 /// Inverses, one a channel, with the photographs they have not seen.
 pub(super) struct Judged<'j> {
     pub(super) split: &'j Split,
-    pub(super) inverses: Vec<Inverse>,
+    pub(super) candidates: Vec<Candidate>,
 }
 
 /// Squared misfit `||T p - c||^2` over all channels of the photographs `chosen`;
 /// infinite if an inverse has no forward transport.
-pub(super) fn squared_misfit(prepared: &Prepared, inverses: &[Inverse], chosen: &[usize]) -> f64 {
+pub(super) fn squared_misfit(prepared: &Prepared, candidates: &[Candidate], chosen: &[usize]) -> f64 {
     let mut difference = 0.0;
     for (channel, light) in prepared.light.iter().enumerate() {
         let observed = light.select_columns(chosen);
-        let Some(predicted) = inverses[channel].light(&prepared.patterns.select_columns(chosen))
-        else {
+        let Some(predicted) = candidates[channel].light(prepared, chosen) else {
             return f64::INFINITY;
         };
         difference += (predicted - &observed).norm_squared();
@@ -123,8 +122,8 @@ pub(super) fn predict(prepared: &Prepared, judged: &[Judged<'_>]) -> Prediction 
             Some(lit_alone(&gain, patterns))
         })
     };
-    let compensated = wanted(prepared, judged, |judged, channel, patterns| {
-        judged.inverses[channel].light(patterns)
+    let compensated = wanted(prepared, judged, |judged, channel, _| {
+        judged.candidates[channel].light(prepared, &judged.split.held_out)
     });
     let candidates = GainOnly::ALL.map(|kind| (kind, of_gain(kind)));
     let [flood, fitted] = candidates;

@@ -16,7 +16,7 @@ use super::haar::Haar;
 use super::held_out::{Judged, Split, squared_light, squared_misfit};
 use super::prepare::Prepared;
 use super::report::LambdaTrial;
-use super::solution::{Channel, Solution, drop_dead};
+use super::solution::{Channel, Solution, drop_dead_rows};
 use crate::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
@@ -135,7 +135,7 @@ impl<'p> Solver<'p> {
                 self.run(&fold.data, lambda, TRIAL, progress);
                 let solution = self.found(&fold.photographs);
                 std::mem::swap(&mut fold.consensus, &mut self.consensus);
-                squared += squared_misfit(self.prepared, &solution.inverses(), &fold.split.held_out);
+                squared += squared_misfit(self.prepared, &solution.candidates(&self.prepared.live), &fold.split.held_out);
                 found.push(solution);
             }
             let misfit = (squared / total).sqrt();
@@ -153,7 +153,7 @@ impl<'p> Solver<'p> {
         for fold in &mut folds {
             if let Some(mut best) = fold.best.take() {
                 self.add_deviations(&mut best, &fold.photographs, choice.lambda, TRIAL, progress);
-                choice.judged.push(Judged { split: fold.split, inverses: best.inverses() });
+                choice.judged.push(Judged { split: fold.split, candidates: best.candidates(&self.prepared.live) });
             }
         }
         // The solve of all photographs starts from here.
@@ -185,8 +185,10 @@ impl<'p> Solver<'p> {
     }
 
     fn photographs(&self, chosen: &[usize]) -> Photographs {
+        let channels = 0..self.prepared.light.len();
         let light = self.prepared.light.iter();
         Photographs {
+            sources: channels.map(|c| self.prepared.sources(c, chosen)).collect(),
             patterns: self.prepared.patterns.select_columns(chosen),
             weights: self.prepared.weights.select_columns(chosen),
             light: light.map(|c| c.select_columns(chosen)).collect(),
@@ -196,7 +198,7 @@ impl<'p> Solver<'p> {
     /// The data term of the joint solve: light scaled so that all channels have
     /// the same operator.
     fn data(&self, photographs: &Photographs) -> DataTerm {
-        let light = photographs.light.iter().zip(&self.scales);
+        let light = photographs.sources.iter().zip(&self.scales);
         DataTerm::new(
             light.map(|(c, scale)| c * *scale).collect(),
             vec![photographs.patterns.clone(); self.scales.len()],
@@ -224,11 +226,11 @@ impl<'p> Solver<'p> {
         let mut shared = self.consensus.operator();
         shared.apply(|value| *value = value.max(0.0));
         shared.fill_diagonal(0.0);
-        drop_dead(&mut shared, &self.prepared.live);
-        let channels = photographs.light.iter().zip(&self.scales);
+        drop_dead_rows(&mut shared, &self.prepared.live);
+        let channels = photographs.channels().zip(&self.scales);
         let channels = channels
-            .map(|(light, scale)| Channel {
-                gain: photographs.fitted_gain(light, &(product(&shared, light) * *scale)),
+            .map(|((light, sources), scale)| Channel {
+                gain: photographs.fitted_gain(light, &(product(&shared, sources) * *scale)),
                 scale: *scale,
                 deviation: None,
             })
@@ -251,9 +253,11 @@ impl<'p> Solver<'p> {
             let data = self.data(photographs);
             self.run(&data, FALLBACK_LAMBDA, TRIAL, progress);
             let shared = self.found(photographs).shared;
-            let light = photographs.light.iter();
-            let fitted: Vec<f64> = light
-                .map(|light| fitted_scale(light, &product(&shared, light), &photographs.patterns))
+            let fitted: Vec<f64> = photographs
+                .channels()
+                .map(|(light, sources)| {
+                    fitted_scale(light, &product(&shared, sources), &photographs.patterns)
+                })
                 .collect();
             // Where the light tells nothing (no interreflection) nothing is told.
             if fitted
@@ -287,10 +291,10 @@ impl<'p> Solver<'p> {
         if found.channels.len() < 2 {
             return;
         }
-        for (channel, light) in found.channels.iter_mut().zip(&photographs.light) {
+        for (channel, (light, sources)) in found.channels.iter_mut().zip(photographs.channels()) {
             let own = &found.shared * channel.scale;
-            let target = &photographs.patterns + product(&own, light);
-            let data = DataTerm::new(vec![light.clone()], vec![target], &photographs.weights);
+            let target = &photographs.patterns + product(&own, sources);
+            let data = DataTerm::new(vec![sources.clone()], vec![target], &photographs.weights);
             let floor = -&own;
             let mut consensus =
                 Consensus::new(self.haar, &self.weights, &self.prepared.live, Some(&floor));
@@ -300,8 +304,8 @@ impl<'p> Solver<'p> {
             self.iterations += end.iterations;
             let mut deviation = consensus.operator().zip_map(&floor, f64::max);
             deviation.fill_diagonal(0.0);
-            drop_dead(&mut deviation, &self.prepared.live);
-            let reflected = product(&(&own + &deviation), light);
+            drop_dead_rows(&mut deviation, &self.prepared.live);
+            let reflected = product(&(&own + &deviation), sources);
             channel.gain = photographs.fitted_gain(light, &reflected);
             channel.deviation = Some(deviation);
         }
@@ -314,9 +318,16 @@ struct Photographs {
     patterns: DMatrix<f64>,
     weights: DMatrix<f64>,
     light: Vec<DMatrix<f64>>,
+    /// [`Prepared::sources`].
+    sources: Vec<DMatrix<f64>>,
 }
 
 impl Photographs {
+    /// Light and sources of each channel.
+    fn channels(&self) -> impl Iterator<Item = (&DMatrix<f64>, &DMatrix<f64>)> {
+        self.light.iter().zip(&self.sources)
+    }
+
     /// Gains that explain a channel's light best, given the light that the
     /// operator takes away; zero for a cell without light.
     fn fitted_gain(&self, light: &DMatrix<f64>, reflected: &DMatrix<f64>) -> DVector<f64> {

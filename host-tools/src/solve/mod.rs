@@ -9,6 +9,7 @@
 //!
 //! ```text
 //! observed, prepare     what is solved from, checked and scaled
+//! own_light             which cells can be solved for
 //! blur                  where a projector out of focus throws its light
 //! haar, lane            the sparse basis, sixteen images at a time
 //! joint                 lambda, scales of the channels, solve, gains, deviations
@@ -52,6 +53,7 @@ mod joint;
 mod lane;
 mod observed;
 mod options;
+mod own_light;
 mod prepare;
 mod report;
 mod row_block;
@@ -74,6 +76,7 @@ pub use gain_only::{GainOnly, gain_only};
 pub use haar::{Basis, Haar};
 pub use inverse::{ChannelInverse, InverseTransport};
 pub use observed::{CellNoise, Observed, ObservedChannel};
+pub use own_light::{LeftOut, WhyLeftOut};
 pub use options::{Method, SolveOptions, UnknownMethod};
 pub use report::{
     Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
@@ -85,7 +88,7 @@ use convergence::Stop;
 use held_out::{Judged, Split, predict};
 use joint::Solver;
 use prepare::Prepared;
-use solution::Solution;
+use solution::{Candidate, Solution};
 use std::time::Instant;
 
 /// A solve that ends with a residual above this is no answer.
@@ -144,15 +147,16 @@ pub fn solve_observed(
         Method::Joint => task.joint(options.lambda, &mut seconds, &mut clock),
         Method::Direct => task.direct(&mut seconds, &mut clock),
     };
-    let inverses = outcome.solution.inverses();
-    check_answer(&outcome.solution, &inverses, &prepared, options)?;
-    let condition = |inverse: &Inverse| inverse.condition(&prepared.live);
-    let condition = inverses.iter().map(condition).fold(1.0, f64::max);
+    let candidates = outcome.solution.candidates(&prepared.live);
+    check_answer(&outcome.solution, &candidates, &prepared, options)?;
+    let condition = |candidate: &Candidate| candidate.inverse.condition(&prepared.live);
+    let condition = candidates.iter().map(condition).fold(1.0, f64::max);
     let prediction = predict(&prepared, &outcome.judged);
     seconds.finish = clock.lap();
     let report = SolveReport {
         method: options.method,
         photographs: count(&prepared, options.method, &splits),
+        left_out: prepared.left_out.clone(),
         live_cells: prepared.live_cells(),
         cells: prepared.cells(),
         lambda: outcome.lambda,
@@ -225,7 +229,7 @@ impl<'t> Task<'t> {
             iterations += trial.convergence.iterations;
             judged.push(Judged {
                 split,
-                inverses: trial.inverses(),
+                candidates: trial.candidates(&self.prepared.live),
             });
         }
         seconds.choose = clock.lap();
@@ -260,7 +264,7 @@ fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
 
 fn check_answer(
     solution: &Solution,
-    inverses: &[Inverse],
+    candidates: &[Candidate],
     prepared: &Prepared,
     options: &SolveOptions,
 ) -> Result<(), SolveError> {
@@ -274,8 +278,8 @@ fn check_answer(
             tolerance: options.tolerance,
         });
     }
-    for (channel, inverse) in inverses.iter().enumerate() {
-        if let Some(why) = inverse.flaw(&prepared.live) {
+    for (channel, candidate) in candidates.iter().enumerate() {
+        if let Some(why) = candidate.inverse.flaw(&prepared.live) {
             return Err(SolveError::NotPhysical { channel, why });
         }
     }

@@ -3,7 +3,8 @@
 use super::blur::blur;
 use super::error::SolveError;
 use super::forward::product;
-use super::observed::{CellNoise, Observed, ObservedChannel, is_lit};
+use super::observed::{CellNoise, Observed, is_lit};
+use super::own_light::{self, LeftOut};
 use crate::capture::Role;
 use nalgebra::DMatrix;
 
@@ -15,8 +16,10 @@ const MOST_WEIGHT: f64 = 10.0;
 /// at least one cell is live.
 #[derive(Debug)]
 pub(super) struct Prepared {
-    /// Cells that are seen and that some light reaches in every channel.
+    /// Cells that are seen and give back light of their own in every channel.
     pub(super) live: Vec<bool>,
+    /// The others.
+    pub(super) left_out: Vec<LeftOut>,
     /// What the projector showed, `N x m`.
     pub(super) shown: DMatrix<f64>,
     /// `L`, `N x m`, after the projector's blur; rows of cells that are not live
@@ -25,6 +28,16 @@ pub(super) struct Prepared {
     /// `C_c` with the mean flood light of all channels scaled to 1, `N x m`;
     /// rows of cells that are not live are zero.
     pub(super) light: Vec<DMatrix<f64>>,
+    /// What cells that are not live throw on the others is explained by: the
+    /// light that falls on them, `N x m`, rows of live cells zero. `None` if all
+    /// are live.
+    ///
+    /// A cell at the border of a scene may be too small for the camera, or out of
+    /// its sight, and still light the rest. Its light is not known, but what is
+    /// projected there is, and its column of `K` is as sparse and non-negative as
+    /// any other's. Light that it only passes on needs no column: eliminating it
+    /// leaves an operator of the same kind between the live cells.
+    pub(super) unseen: Option<DMatrix<f64>>,
     /// Standard deviation of an element of `light` by channel and cell.
     pub(super) noise: Vec<Vec<CellNoise>>,
     /// Weight of each squared residual, `N x m`, mean 1 in each row.
@@ -43,13 +56,11 @@ impl Prepared {
     pub(super) fn new(observed: &Observed<'_>) -> Result<Self, SolveError> {
         check_sizes(observed)?;
         check_finite(observed)?;
-        let live: Vec<bool> = (0..observed.grid.cells())
-            .map(|cell| {
-                let reached =
-                    |c: &ObservedChannel<'_>| c.light.row(cell).iter().any(|light| *light > 0.0);
-                observed.live[cell] && observed.channels.iter().all(reached)
-            })
-            .collect();
+        let left_out = own_light::left_out(observed);
+        let mut live = vec![true; observed.grid.cells()];
+        for out in &left_out {
+            live[out.cell] = false;
+        }
         if !live.contains(&true) {
             return Err(SolveError::NoLiveCells { cells: live.len() });
         }
@@ -58,12 +69,13 @@ impl Prepared {
                 if live[cell] { matrix[(cell, k)] } else { 0.0 }
             })
         };
-        let shown = keep(observed.patterns);
         let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
-        let patterns = match &blur {
-            Some(blur) => keep(&product(blur, &shown)),
-            None => shown.clone(),
+        let landed = match &blur {
+            Some(blur) => product(blur, observed.patterns),
+            None => observed.patterns.clone(),
         };
+        let patterns = keep(&landed);
+        let unseen = live.contains(&false).then(|| &landed - &patterns);
         let mut light: Vec<_> = observed
             .channels
             .iter()
@@ -85,8 +97,10 @@ impl Prepared {
             })
             .collect();
         Ok(Self {
-            weights: weights(&shown, &noise),
+            weights: weights(observed.patterns, &noise),
+            unseen,
             live,
+            left_out,
             shown: observed.patterns.clone(),
             patterns,
             light,
@@ -103,6 +117,16 @@ impl Prepared {
 
     pub(super) fn live_cells(&self) -> usize {
         self.live.iter().filter(|live| **live).count()
+    }
+
+    /// Light of one channel with that of [`Self::unseen`], of the photographs
+    /// `chosen`: what the columns of `K` belong to.
+    pub(super) fn sources(&self, channel: usize, chosen: &[usize]) -> DMatrix<f64> {
+        let light = self.light[channel].select_columns(chosen);
+        match &self.unseen {
+            Some(unseen) => light + unseen.select_columns(chosen),
+            None => light,
+        }
     }
 
     /// The photographs whose role passes `filter`, by index.

@@ -3,6 +3,7 @@
 use super::convergence::Convergence;
 use super::gain_only::GainOnly;
 use super::options::Method;
+use super::own_light::LeftOut;
 
 /// How an inverse came about and how good it is.
 ///
@@ -14,7 +15,9 @@ pub struct SolveReport {
     pub method: Method,
     /// Photographs it was found from.
     pub photographs: PhotographCounts,
-    /// Cells that took part, and cells of the grid.
+    /// Cells that took no part, in order.
+    pub left_out: Vec<LeftOut>,
+    /// Cells that took part.
     pub live_cells: usize,
     /// Cells of the grid.
     pub cells: usize,

@@ -23,37 +23,35 @@ pub struct LoopErrors {
     pub perfect: f64,
 }
 
-/// Wanted images: natural ones whose darkest parts still are a fifth of white, as
-/// bounced light keeps walls from being darker; then few inputs clip.
-#[must_use]
-pub fn wanted(scene: &Scene) -> DMatrix<f64> {
-    natural_images(scene.grid).map(|light| 0.2 + 0.8 * light)
-}
-
 /// Closed-loop errors of an inverse in a scene.
+///
+/// Wanted are natural images whose darkest parts still are a fifth of reference
+/// white: walls that light each other cannot be darker. A projector out of focus
+/// cannot show their edges at all; there the wanted images are those that it
+/// makes of natural ones.
 #[must_use]
 pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
     let transport = scene.transport();
     let judged: Vec<bool> = (0..scene.grid.cells())
         .map(|cell| found.live[cell] && scene.coverage[cell] > 1e-9)
         .collect();
-    let images = keep(&wanted(scene), &judged);
+    let natural = natural_images(scene.grid).map(|light| 0.2 + 0.8 * light);
     let white = reference_white(found).map_or(0.0, |white| white.light);
+    let wanted = match scene.blur {
+        Some(_) => &transport * &natural,
+        None => natural * white,
+    };
+    let images = keep(&wanted, &judged);
+    let judge = Judge { transport: &transport, images: &images, judged: &judged };
     let matrix = dense(found);
-    let compensated = error(&transport, &images, &judged, |d| &matrix * d * white);
     let flood = &transport * DVector::from_element(scene.grid.cells(), 1.0);
     let mut gain = flood.map(|light| if light > 1e-12 { light.recip() } else { 0.0 });
     mask(&mut gain, &judged);
-    gain /= gain.max().max(f64::MIN_POSITIVE);
-    let gain_only = error(&transport, &images, &judged, |d| gain.component_mul(d));
-    let nothing = error(&transport, &images, &judged, Clone::clone);
     let chosen: Vec<usize> = (0..judged.len()).filter(|cell| judged[*cell]).collect();
     let part = transport.select_rows(&chosen).select_columns(&chosen);
     let perfect = part.try_inverse().map_or(f64::INFINITY, |inverse| {
-        let ones = DVector::from_element(chosen.len(), 1.0);
-        let white = (&inverse * ones).max().recip();
-        error(&transport, &images, &judged, |d| {
-            let drive = &inverse * d.select_rows(&chosen) * white;
+        judge.error(|d| {
+            let drive = &inverse * d.select_rows(&chosen);
             let mut all = DVector::zeros(judged.len());
             for (cell, value) in chosen.iter().zip(drive.iter()) {
                 all[*cell] = *value;
@@ -61,7 +59,16 @@ pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
             all
         })
     });
-    LoopErrors { nothing, gain_only, compensated, perfect }
+    LoopErrors {
+        nothing: judge.error(|d| d / d.max().max(f64::MIN_POSITIVE)),
+        gain_only: judge.error(|d| {
+            let drive = gain.component_mul(d);
+            let most = drive.max().max(f64::MIN_POSITIVE);
+            drive / most
+        }),
+        compensated: judge.error(|d| &matrix * d),
+        perfect,
+    }
 }
 
 /// `diag(g) - K` of the first channel.
@@ -71,22 +78,26 @@ pub fn dense(found: &InverseTransport) -> DMatrix<f64> {
     DMatrix::from_diagonal(&channel.gain) - channel.operator
 }
 
-fn error(
-    transport: &DMatrix<f64>,
-    images: &DMatrix<f64>,
-    judged: &[bool],
-    drive: impl Fn(&DVector<f64>) -> DVector<f64>,
-) -> f64 {
-    let of_image = |wanted: DVector<f64>| {
-        let projected = drive(&wanted).map(|value| value.clamp(0.0, 1.0));
-        let mut light = transport * projected;
-        mask(&mut light, judged);
-        let both = light.dot(&wanted);
-        let scale = if both > 0.0 { both / light.norm_squared() } else { 0.0 };
-        (light * scale - &wanted).norm() / wanted.norm()
-    };
-    let images: Vec<f64> = images.column_iter().map(|image| of_image(image.into_owned())).collect();
-    images.iter().sum::<f64>() / images.len().max(1) as f64
+/// What projected images are judged by.
+struct Judge<'a> {
+    transport: &'a DMatrix<f64>,
+    images: &'a DMatrix<f64>,
+    judged: &'a [bool],
+}
+
+impl Judge<'_> {
+    fn error(&self, drive: impl Fn(&DVector<f64>) -> DVector<f64>) -> f64 {
+        let of_image = |wanted: DVector<f64>| {
+            let projected = drive(&wanted).map(|value| value.clamp(0.0, 1.0));
+            let mut light = self.transport * projected;
+            mask(&mut light, self.judged);
+            let both = light.dot(&wanted);
+            let scale = if both > 0.0 { both / light.norm_squared() } else { 0.0 };
+            (light * scale - &wanted).norm() / wanted.norm()
+        };
+        let errors = self.images.column_iter().map(|image| of_image(image.into_owned()));
+        errors.sum::<f64>() / self.images.ncols().max(1) as f64
+    }
 }
 
 fn mask(values: &mut DVector<f64>, judged: &[bool]) {
