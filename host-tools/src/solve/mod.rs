@@ -16,6 +16,7 @@
 //!   admm                the iteration, over data_term, row_block and column_block
 //! direct                the paper's method, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
+//! sharpen               undoes the projector's blur as well
 //! gain_only             what it is judged against, and what remains if it loses
 //! ```
 //!
@@ -57,6 +58,7 @@ mod own_light;
 mod prepare;
 mod report;
 mod row_block;
+mod sharpen;
 mod solution;
 #[cfg(test)]
 mod test_linear_program;
@@ -152,6 +154,13 @@ pub fn solve_observed(
     let condition = |candidate: &Candidate| candidate.inverse.condition(&prepared.live);
     let condition = candidates.iter().map(condition).fold(1.0, f64::max);
     let prediction = predict(&prepared, &outcome.judged);
+    let sharpened = sharpen::sharpen(observed.grid, &prepared, &candidates, &prediction);
+    let compensation = match prediction.best() {
+        Compensation::Operator if sharpened.as_ref().is_some_and(|s| !s.helps) => {
+            Compensation::GainOnly
+        }
+        best => best,
+    };
     seconds.finish = clock.lap();
     let report = SolveReport {
         method: options.method,
@@ -165,12 +174,14 @@ pub fn solve_observed(
         iterations: outcome.iterations,
         coefficients: outcome.solution.coefficients,
         condition,
-        compensation: prediction.best(),
+        compensation,
         prediction,
         seconds,
     };
     Ok((
-        outcome.solution.in_camera_units(observed, &prepared),
+        outcome
+            .solution
+            .in_camera_units(observed, &prepared, sharpened.map(|s| s.parts)),
         report,
     ))
 }

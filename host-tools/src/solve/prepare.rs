@@ -12,6 +12,9 @@ use nalgebra::DMatrix;
 /// model's own error rules.
 const MOST_WEIGHT: f64 = 10.0;
 
+/// Cells over which a projector may spread a cell's light.
+const MOST_BLUR: f64 = 4.0;
+
 /// Observations that a solve can rely on: sizes agree, everything is finite,
 /// at least one cell is live.
 #[derive(Debug)]
@@ -225,8 +228,19 @@ fn check_finite(observed: &Observed<'_>) -> Result<(), SolveError> {
         }),
     };
     check("pattern", 0, observed.patterns)?;
+    if !(0.0..=MOST_BLUR).contains(&observed.blur) {
+        return Err(SolveError::Option {
+            option: "the projector's blur",
+            value: observed.blur,
+            must: "from 0 to 4 cells",
+        });
+    }
     for (index, channel) in observed.channels.iter().enumerate() {
         check("light", index, channel.light)?;
+        let cells = channel.ambient.len();
+        check("ambient light", index, &DMatrix::from_column_slice(cells, 1, channel.ambient))?;
+        let noise = |cell: usize, _| channel.noise[cell].lit + channel.noise[cell].unlit;
+        check("noise", index, &DMatrix::from_fn(cells, 1, noise))?;
     }
     Ok(())
 }

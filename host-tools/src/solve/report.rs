@@ -37,7 +37,8 @@ pub struct SolveReport {
     pub condition: f64,
     /// What held-out photographs say.
     pub prediction: Prediction,
-    /// Which way to project they say is best.
+    /// Which way to project is best: [`Prediction::best`], and gain alone if the
+    /// projector's blur cannot be undone to any use.
     pub compensation: Compensation,
     /// Wall-clock time.
     pub seconds: Seconds,

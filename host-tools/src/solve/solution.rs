@@ -71,18 +71,20 @@ impl Solution {
         self.channels.iter().map(candidate).collect()
     }
 
-    /// The inverse for light in camera units.
+    /// The inverse for light in camera units; `sharpened` is what stands for the
+    /// operators and channels if it undoes the projector's blur.
     pub(super) fn in_camera_units(
         mut self,
         observed: &Observed<'_>,
         prepared: &Prepared,
+        sharpened: Option<(DMatrix<f64>, Vec<Channel>)>,
     ) -> InverseTransport {
         drop_dead(&mut self.shared, &prepared.live);
         for deviation in self.channels.iter_mut().filter_map(|c| c.deviation.as_mut()) {
             drop_dead(deviation, &prepared.live);
         }
-        if let Some(blur) = &prepared.blur {
-            self.sharpen(blur, &prepared.live);
+        if let Some(sharpened) = sharpened {
+            (self.shared, self.channels) = sharpened;
         }
         let channels = self.channels.into_iter().zip(&observed.channels);
         InverseTransport {
@@ -100,48 +102,6 @@ impl Solution {
         }
     }
 }
-
-impl Solution {
-    /// From `T0^-1 = diag(g) - K` to `B^-1 T0^-1`. The gains stay; the operator
-    /// takes the rest and with it a diagonal.
-    fn sharpen(&mut self, blur: &DMatrix<f64>, live: &[bool]) {
-        let mut kept = blur.clone();
-        drop_dead(&mut kept, live);
-        let sharper = sharpener(&kept);
-        let apply = |operator: &DMatrix<f64>, gain: &DVector<f64>| {
-            let whole = DMatrix::from_diagonal(gain) - operator;
-            let mut sharp = DMatrix::from_diagonal(gain) - product(&sharper, &whole);
-            drop_dead(&mut sharp, live);
-            sharp
-        };
-        if let [channel] = &mut self.channels[..] {
-            self.shared = apply(&(&self.shared * channel.scale), &channel.gain);
-            channel.scale = 1.0;
-            return;
-        }
-        let wholes = self.candidates(live);
-        let sharp: Vec<_> = wholes.iter().map(|w| apply(&w.inverse.operator, &w.inverse.gain)).collect();
-        let count = sharp.len() as f64;
-        self.shared = sharp.iter().fold(DMatrix::zeros(live.len(), live.len()), |a, b| a + b) / count;
-        for (channel, sharp) in self.channels.iter_mut().zip(sharp) {
-            channel.scale = 1.0;
-            channel.deviation = Some(sharp - &self.shared);
-        }
-    }
-}
-
-/// What undoes a blur as far as [`LEAST_SHARPENED`] allows, by Tikhonov.
-fn sharpener(blur: &DMatrix<f64>) -> DMatrix<f64> {
-    let cells = blur.nrows();
-    let normal = blur.tr_mul(blur) + DMatrix::identity(cells, cells) * (LEAST_SHARPENED * LEAST_SHARPENED);
-    normal.cholesky().map_or_else(
-        || DMatrix::identity(cells, cells),
-        |factor| factor.solve(&blur.transpose()),
-    )
-}
-
-/// Singular values of a blur below this are given up rather than undone.
-const LEAST_SHARPENED: f64 = 0.01;
 
 /// Zeroes the rows of cells that did not take part.
 pub(super) fn drop_dead_rows(operator: &mut DMatrix<f64>, live: &[bool]) {

@@ -135,7 +135,7 @@ fn enough_noiseless_photographs_give_the_exact_inverse() {
             relative(&inverse(&found, 0), &scene.inverse()) < 2e-5,
             "{basis:?}"
         );
-        let predicted = report.prediction.unwrap().compensated;
+        let predicted = report.prediction.compensated;
         assert!(predicted < 1e-3, "{predicted}");
     }
 }
@@ -262,7 +262,7 @@ fn held_out_photographs_predict_the_error_of_new_ones() {
     capture.light[0] = capture.light[0].columns(0, 100).into_owned();
     capture.roles.truncate(100);
     let (found, report) = capture.solved();
-    let predicted = report.prediction.unwrap();
+    let predicted = report.prediction;
     let light = inverse(&found, 0).try_inverse().unwrap() * rest;
     let actual = relative(&observed, &light);
     assert!(
@@ -506,7 +506,7 @@ fn photographs_of_other_patterns_are_not_taken_for_an_inverse() {
     }
     match capture.solve(&SolveOptions::default()) {
         Ok((_, report)) => {
-            let prediction = report.prediction.unwrap();
+            let prediction = report.prediction;
             assert!(prediction.compensated > 0.2, "{prediction:?}");
         }
         Err(error) => assert!(matches!(

@@ -70,6 +70,34 @@ impl Capture {
         self
     }
 
+    /// Takes cells out of the camera's sight.
+    #[must_use]
+    pub fn unseen(mut self, hidden: impl Fn(usize) -> bool) -> Self {
+        for cell in (0..self.live.len()).filter(|cell| hidden(*cell)) {
+            self.live[cell] = false;
+            for light in &mut self.light {
+                light.row_mut(cell).fill(0.0);
+            }
+        }
+        self
+    }
+
+    /// Says how far the projector is out of focus.
+    #[must_use]
+    pub const fn with_blur(mut self, deviation: f64) -> Self {
+        self.blur = deviation;
+        self
+    }
+
+    /// Does something to all light.
+    #[must_use]
+    pub fn map(mut self, with: impl Fn(f64) -> f64) -> Self {
+        for light in &mut self.light {
+            light.apply(|value| *value = with(*value));
+        }
+        self
+    }
+
     /// What the solver sees.
     #[must_use]
     pub fn observed(&self) -> Observed<'_> {

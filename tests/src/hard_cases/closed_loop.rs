@@ -1,7 +1,7 @@
 //! How far the picture on the wall is from the wanted one.
 
 use super::scene::Scene;
-use iltm::compile::content::natural_images;
+use iltm::content::natural_images;
 use iltm::compile::white::reference_white;
 use iltm::solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
