@@ -63,18 +63,14 @@ pub fn learn(
 ) -> Result<Learned, LearnError> {
     let measurements = capture::read(capture, photographs, progress)?;
     let (inverse, report) = solve::solve(&measurements, options, progress)?;
-    let prediction = report.prediction;
-    let (inverse, inverse_error) = match report.compensation {
-        Compensation::Operator => (inverse, prediction.compensated),
-        Compensation::GainOnly => {
-            let inverse = solve::gain_only(&(&measurements).into(), &report)?;
-            (inverse, prediction.gain_only)
-        }
+    let inverse = match report.compensation {
+        Compensation::Operator => inverse,
+        Compensation::GainOnly => solve::gain_only(&(&measurements).into(), &report)?,
         Compensation::Nothing => {
             return Err(LearnError::Worse {
-                uncompensated: prediction.uncompensated,
-                gain_only: prediction.gain_only,
-                compensated: prediction.compensated,
+                uncompensated: report.prediction.uncompensated,
+                gain_only: report.prediction.gain_only,
+                compensated: report.prediction.compensated,
             });
         }
     };
@@ -83,7 +79,7 @@ pub fn learn(
     let options = CompileOptions {
         projector: measurements.settings.projector.response,
         reference_white,
-        inverse_error,
+        inverse_error: report.predicted_error(),
         provenance: provenance(capture, &measurements, &report),
         targets: None,
     };

@@ -57,6 +57,12 @@ pub enum CompileError {
         /// The light asked for.
         light: f64,
     },
+    /// A predicted error or a tier's target is no error.
+    #[error("an error of {error}; an error is a number from 0")]
+    Error {
+        /// What was given.
+        error: f64,
+    },
     /// A number of the inverse is not finite.
     #[error("the inverse has a value that is not finite in {place}")]
     NotFinite {
@@ -100,6 +106,7 @@ impl CompileError {
         match self {
             Self::Dark => "Check that the flood photograph shows the projection.",
             Self::ReferenceWhite { .. } => "Leave the reference white to the default.",
+            Self::Error { .. } => "Solve again: the prediction that was given is not usable.",
             Self::Provenance { .. } => "Shorten the scene's name.",
             Self::NotFinite { .. } | Self::TooStrong { .. } | Self::Gain { .. } => {
                 "Take the photographs again: the inverse that they give is not usable."
@@ -127,6 +134,7 @@ pub fn compile(
             bytes: options.provenance.len(),
         });
     }
+    check_options(options)?;
     let mut white = reference_white(inverse).ok_or(CompileError::Dark)?;
     white.light = options.reference_white.unwrap_or(white.light);
     if !(white.light > 0.0 && white.light < 256.0) {
@@ -212,6 +220,17 @@ pub fn compile(
         white,
         ladder,
     })
+}
+
+fn check_options(options: &CompileOptions) -> Result<(), CompileError> {
+    let targets = options.targets.iter().flatten();
+    let errors = std::iter::once(&options.inverse_error).chain(targets);
+    for error in errors {
+        if !(0.0..=f64::MAX).contains(error) {
+            return Err(CompileError::Error { error: *error });
+        }
+    }
+    Ok(())
 }
 
 fn check_finite(inverse: &InverseTransport) -> Result<(), CompileError> {

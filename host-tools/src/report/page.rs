@@ -50,7 +50,7 @@ impl Report<'_> {
                 body { main {
                     (self.opening(words, prediction))
                     (self.scene())
-                    (self.pictures_section(prediction))
+                    (self.pictures_section())
                     (self.bounces())
                     (self.operator())
                     (self.accuracy())
@@ -115,7 +115,7 @@ impl Report<'_> {
         }
     }
 
-    fn pictures_section(&self, prediction: Prediction) -> Markup {
+    fn pictures_section(&self) -> Markup {
         html! {
             section {
                 h2 { "What it does to images" }
@@ -131,7 +131,7 @@ impl Report<'_> {
                 }
                 p .quiet {
                     "What they cannot show is how far the learned transport itself is off: the held-out photographs "
-                    "put that at " (percent(prediction.chosen())) ". It comes on top of the errors below (as the root of the sum "
+                    "put that at " (percent(self.learned.report.predicted_error())) ". It comes on top of the errors below (as the root of the sum "
                     "of squares)."
                 }
                 @for example in &self.examples { (self.example(example)) }
@@ -277,7 +277,7 @@ impl Report<'_> {
     }
 
     fn accuracy(&self) -> Markup {
-        let own = self.learned.report.prediction.chosen();
+        let own = self.learned.report.predicted_error();
         let point = |(tier, rung): (usize, &Rung)| Point {
             x: rung.microseconds,
             y: rung.left_out,

@@ -43,6 +43,12 @@ impl Inverse {
         }
     }
 
+    /// `diag(gain) - operator`, `N x N`.
+    #[must_use]
+    pub fn dense(&self) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.gain) - &self.operator
+    }
+
     /// Why this cannot be the inverse of a real scene's transport, if so.
     ///
     /// With an operator that is nowhere negative, light fades if and only if the

@@ -16,6 +16,7 @@
 //!   admm                the iteration, over data_term, row_block and column_block
 //! direct                the paper's method, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
+//! content_loop          what clipping makes of natural images
 //! sharpen               undoes the projector's blur as well
 //! gain_only             what it is judged against, and what remains if it loses
 //! ```
@@ -41,6 +42,7 @@ mod admm;
 mod basis_pursuit;
 mod blur;
 mod column_block;
+mod content_loop;
 mod convergence;
 mod data_term;
 mod direct;
@@ -81,20 +83,26 @@ pub use observed::{CellNoise, Observed, ObservedChannel};
 pub use own_light::{LeftOut, WhyLeftOut};
 pub use options::{Method, SolveOptions, UnknownMethod};
 pub use report::{
-    Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
+    Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };
 
 use crate::capture::{Measurements, Role};
 use crate::progress::Progress;
+use content_loop::ContentLoop;
 use convergence::Stop;
 use held_out::{Judged, Split, predict};
 use joint::Solver;
 use prepare::Prepared;
-use solution::{Candidate, Solution};
+use sharpen::sharpen;
+use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
 
 /// A solve that ends with a residual above this is no answer.
 const HOPELESS: f64 = 0.05;
+/// A predicted error above this means that patterns and photographs do not belong
+/// together: random patterns that have nothing to do with the light are off by
+/// 0.5 to 0.7.
+const UNPREDICTABLE: f64 = 0.4;
 /// Photographs below which no scene of more cells can be told.
 const LEAST_PHOTOGRAPHS: usize = 8;
 
@@ -154,12 +162,26 @@ pub fn solve_observed(
     let condition = |candidate: &Candidate| candidate.inverse.condition(&prepared.live);
     let condition = candidates.iter().map(condition).fold(1.0, f64::max);
     let prediction = predict(&prepared, &outcome.judged);
-    let sharpened = sharpen::sharpen(observed.grid, &prepared, &candidates, &prediction);
-    let compensation = match prediction.best() {
-        Compensation::Operator if sharpened.as_ref().is_some_and(|s| !s.helps) => {
-            Compensation::GainOnly
-        }
-        best => best,
+    check_prediction(&prediction)?;
+    let blur = prepared.blur.clone().map(|mut blur| {
+        drop_dead(&mut blur, &prepared.live);
+        blur
+    });
+    let content = ContentLoop::new(observed.grid, &prepared, &candidates, blur.as_ref());
+    let sharpened = blur
+        .as_ref()
+        .and_then(|blur| sharpen(blur, &prepared.live, &candidates, &content));
+    let with_operator = sharpened.as_ref().map_or_else(
+        || {
+            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
+            content.operator(&inverses).0
+        },
+        |sharpened| sharpened.error,
+    );
+    let clipped = Clipped {
+        uncompensated: content.nothing(),
+        gain_only: content.gain_only(&prediction),
+        compensated: with_operator,
     };
     seconds.finish = clock.lap();
     let report = SolveReport {
@@ -174,8 +196,9 @@ pub fn solve_observed(
         iterations: outcome.iterations,
         coefficients: outcome.solution.coefficients,
         condition,
-        compensation,
+        compensation: prediction.best(clipped),
         prediction,
+        clipped,
         seconds,
     };
     Ok((
@@ -295,6 +318,20 @@ fn check_answer(
         }
     }
     Ok(())
+}
+
+/// Refuses photographs that do not follow from their patterns.
+fn check_prediction(prediction: &Prediction) -> Result<(), SolveError> {
+    let least = prediction.compensated.min(prediction.gain_only);
+    // Written so that what is not a number is refused too.
+    let usable = least <= UNPREDICTABLE;
+    if usable {
+        return Ok(());
+    }
+    Err(SolveError::Unpredictable {
+        percent: 100.0 * least,
+        limit: 100.0 * UNPREDICTABLE,
+    })
 }
 
 fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCounts {

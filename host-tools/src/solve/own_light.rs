@@ -7,6 +7,7 @@
 
 use super::observed::{Observed, ObservedChannel};
 use crate::capture::Role;
+use nalgebra::DMatrix;
 
 /// A cell has to give back this much of a typical cell's own light: a step of an
 /// 8-bit code.
@@ -38,7 +39,10 @@ pub enum WhyLeftOut {
 }
 
 /// All cells that cannot be solved for, in order.
-pub(super) fn left_out(observed: &Observed<'_>) -> Vec<LeftOut> {
+///
+/// `landed` is the light that falls on each cell, `N x m`: the patterns, blurred if
+/// the projector is.
+pub(super) fn left_out(observed: &Observed<'_>, landed: &DMatrix<f64>) -> Vec<LeftOut> {
     let cells = observed.grid.cells();
     let chosen = photographs(observed);
     let mut why: Vec<Option<WhyLeftOut>> = observed
@@ -48,7 +52,7 @@ pub(super) fn left_out(observed: &Observed<'_>) -> Vec<LeftOut> {
         .collect();
     for channel in &observed.channels {
         let own: Vec<Own> = (0..cells)
-            .map(|cell| Own::new(observed, channel, cell, &chosen))
+            .map(|cell| Own::new(landed, channel, cell, &chosen))
             .collect();
         let seen = own.iter().zip(observed.live).filter(|(_, live)| **live);
         let mut slopes: Vec<f64> = seen.map(|(own, _)| own.slope).collect();
@@ -95,14 +99,14 @@ struct Own {
 
 impl Own {
     fn new(
-        observed: &Observed<'_>,
+        landed: &DMatrix<f64>,
         channel: &ObservedChannel<'_>,
         cell: usize,
         chosen: &[usize],
     ) -> Self {
         let count = chosen.len() as f64;
         let pairs = || {
-            let of = |k: &usize| (observed.patterns[(cell, *k)], channel.light[(cell, *k)]);
+            let of = |k: &usize| (landed[(cell, *k)], channel.light[(cell, *k)]);
             chosen.iter().map(of)
         };
         let (shown, seen) = pairs().fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));

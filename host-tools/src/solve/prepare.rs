@@ -7,6 +7,7 @@ use super::observed::{CellNoise, Observed, is_lit};
 use super::own_light::{self, LeftOut};
 use crate::capture::Role;
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Weight of a photograph in which a cell is dark, at most: below that noise the
 /// model's own error rules.
@@ -14,6 +15,10 @@ const MOST_WEIGHT: f64 = 10.0;
 
 /// Cells over which a projector may spread a cell's light.
 const MOST_BLUR: f64 = 4.0;
+
+/// Mean light under white, of full scale, that can come from a camera; squares and
+/// reciprocals of others leave the range of numbers.
+const LEVELS: Range<f64> = 1e-12..1e12;
 
 /// Observations that a solve can rely on: sizes agree, everything is finite,
 /// at least one cell is live.
@@ -59,7 +64,12 @@ impl Prepared {
     pub(super) fn new(observed: &Observed<'_>) -> Result<Self, SolveError> {
         check_sizes(observed)?;
         check_finite(observed)?;
-        let left_out = own_light::left_out(observed);
+        let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
+        let landed = match &blur {
+            Some(blur) => product(blur, observed.patterns),
+            None => observed.patterns.clone(),
+        };
+        let left_out = own_light::left_out(observed, &landed);
         let mut live = vec![true; observed.grid.cells()];
         for out in &left_out {
             live[out.cell] = false;
@@ -72,11 +82,6 @@ impl Prepared {
                 if live[cell] { matrix[(cell, k)] } else { 0.0 }
             })
         };
-        let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
-        let landed = match &blur {
-            Some(blur) => product(blur, observed.patterns),
-            None => observed.patterns.clone(),
-        };
         let patterns = keep(&landed);
         let unseen = live.contains(&false).then(|| &landed - &patterns);
         let mut light: Vec<_> = observed
@@ -85,6 +90,9 @@ impl Prepared {
             .map(|channel| keep(channel.light))
             .collect();
         let unit = flood_level(&light, &patterns);
+        if !LEVELS.contains(&unit) {
+            return Err(SolveError::Level { level: unit });
+        }
         for light in &mut light {
             *light /= unit;
         }
@@ -171,14 +179,7 @@ fn weights(patterns: &DMatrix<f64>, noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
 /// total projected share.
 fn flood_level(light: &[DMatrix<f64>], patterns: &DMatrix<f64>) -> f64 {
     let total: f64 = light.iter().map(DMatrix::sum).sum();
-    let level = total / light.len() as f64 / patterns.sum();
-    // Neither can be zero in a capture that is worth solving; an odd one must not
-    // become a division by zero.
-    if level.is_finite() && level > 0.0 {
-        level
-    } else {
-        1.0
-    }
+    total / light.len() as f64 / patterns.sum()
 }
 
 fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {

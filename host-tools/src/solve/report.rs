@@ -37,8 +37,9 @@ pub struct SolveReport {
     pub condition: f64,
     /// What held-out photographs say.
     pub prediction: Prediction,
-    /// Which way to project is best: [`Prediction::best`], and gain alone if the
-    /// projector's blur cannot be undone to any use.
+    /// What clipping makes of natural images.
+    pub clipped: Clipped,
+    /// Which way to project is best, [`Prediction::best`].
     pub compensation: Compensation,
     /// Wall-clock time.
     pub seconds: Seconds,
@@ -96,29 +97,34 @@ pub struct Prediction {
 const CONFIDENT: f64 = 2.0;
 
 impl Prediction {
-    /// Error of the way that [`Self::best`] names.
+    /// Which way to project errs least: by held-out photographs, and on natural
+    /// images that the projector has to clip.
     #[must_use]
-    pub fn chosen(&self) -> f64 {
-        match self.best() {
-            Compensation::Operator => self.compensated,
-            Compensation::GainOnly => self.gain_only,
-            Compensation::Nothing => self.uncompensated,
-        }
-    }
-
-    /// Which way to project errs least.
-    #[must_use]
-    pub fn best(&self) -> Compensation {
+    pub fn best(&self, clipped: Clipped) -> Compensation {
         let other = self.gain_only.min(self.uncompensated);
+        let proven = self.compensated < other && self.confidence > CONFIDENT;
         // Written so that what is not a number loses.
-        if self.compensated < other && self.confidence > CONFIDENT {
-            Compensation::Operator
-        } else if self.gain_only <= self.uncompensated {
+        if proven && clipped.compensated < clipped.gain_only.min(clipped.uncompensated) {
+            return Compensation::Operator;
+        }
+        if self.gain_only <= self.uncompensated && clipped.gain_only <= clipped.uncompensated {
             Compensation::GainOnly
         } else {
             Compensation::Nothing
         }
     }
+}
+
+/// Errors of natural images in the scene as it was found, inputs clipped to what a
+/// projector can show: what no knowledge of the scene can avoid.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Clipped {
+    /// As they are.
+    pub uncompensated: f64,
+    /// With gains alone.
+    pub gain_only: f64,
+    /// With the operator.
+    pub compensated: f64,
 }
 
 /// A way to project.
@@ -140,6 +146,18 @@ impl Compensation {
             Self::Operator => "operator",
             Self::GainOnly => "gain-only",
             Self::Nothing => "nothing",
+        }
+    }
+}
+
+impl SolveReport {
+    /// Predicted error of the way to project that was chosen.
+    #[must_use]
+    pub const fn predicted_error(&self) -> f64 {
+        match self.compensation {
+            Compensation::Operator => self.prediction.compensated,
+            Compensation::GainOnly => self.prediction.gain_only,
+            Compensation::Nothing => self.prediction.uncompensated,
         }
     }
 }

@@ -1,83 +1,56 @@
 //! From `T0^-1 = diag(g) - K` to `T^-1 = B^-1 T0^-1` for a projector out of focus.
 //!
-//! A blur takes fine detail away, and nothing brings back what is not there:
-//! singular values of `B` near zero must be given up (Tikhonov). How far to go is
-//! tried out: natural images are compensated, clipped to what a projector can
-//! show and sent through `T0 B`, and what errs least is taken. If even that errs
-//! more than gain alone, the report says so.
+//! A blur takes fine detail away, and nothing brings back what is not there. So
+//! its inverse is approached in a few rounds (Landweber's, with a Tikhonov step:
+//! Engl, Hanke, Neubauer, *Regularization of Inverse Problems*, 1996, section 5.1):
+//! nearly exact where singular values of `B` are above some softness, nothing
+//! where they are far below. The softness is tried out on natural images and on
+//! those that the blurred projector can show.
 
+use super::content_loop::ContentLoop;
 use super::forward::product;
-use super::gain_only::gains;
-use super::prepare::Prepared;
-use super::report::Prediction;
 use super::solution::{Candidate, Channel, drop_dead};
-use crate::content::natural_images;
-use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values of the blur that are halved; infinite sharpens nothing.
-const SOFTNESS: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, f64::INFINITY];
+/// Softnesses that are tried; infinite sharpens nothing.
+const SOFTNESS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.4, 1.0, f64::INFINITY];
+/// Rounds of the approach.
+const ROUNDS: usize = 6;
 
-/// The operator all channels share and the channels, sharpened.
+/// What an inverse that undoes the blur as well consists of.
 pub(super) struct Sharpened {
+    /// Error on natural images.
+    pub(super) error: f64,
+    /// The operator all channels share, and the channels.
     pub(super) parts: (DMatrix<f64>, Vec<Channel>),
-    /// Whether it beats gain alone on natural images.
-    pub(super) helps: bool,
 }
 
-/// `None` for a projector in focus.
+/// `blur` is that of live cells only; `None` if there is no channel.
 pub(super) fn sharpen(
-    grid: Grid,
-    prepared: &Prepared,
+    blur: &DMatrix<f64>,
+    live: &[bool],
     candidates: &[Candidate],
-    prediction: &Prediction,
+    content: &ContentLoop<'_>,
 ) -> Option<Sharpened> {
-    let mut blur = prepared.blur.clone()?;
-    drop_dead(&mut blur, &prepared.live);
-    let mut images = natural_images(grid);
-    for (cell, _) in prepared.live.iter().enumerate().filter(|(_, live)| !**live) {
-        images.row_mut(cell).fill(0.0);
-    }
-    let wholes: Vec<DMatrix<f64>> = candidates
-        .iter()
-        .map(|c| DMatrix::from_diagonal(&c.inverse.gain) - &c.inverse.operator)
-        .collect();
-    let error = |drives: &dyn Fn(usize) -> DMatrix<f64>| {
-        let of_channel = |(channel, candidate): (usize, &Candidate)| {
-            let drive = drives(channel).map(|value| value.clamp(0.0, 1.0));
-            let light = candidate.inverse.light(&product(&blur, &drive));
-            light.map_or(f64::INFINITY, |light| mean_error(&light, &images))
-        };
-        candidates.iter().enumerate().map(of_channel).sum::<f64>()
-    };
-    let all: Vec<usize> = (0..prepared.roles.len()).collect();
-    let gain_only = error(&|channel| {
-        let gain = gains(prepared, channel, &all, prediction.gain_only_kind);
-        DMatrix::from_diagonal(&(&gain / gain.max())) * &images
-    });
-    let mut best: Option<(f64, Vec<DMatrix<f64>>)> = None;
+    let wholes: Vec<DMatrix<f64>> = candidates.iter().map(|c| c.inverse.dense()).collect();
+    let mut best: Option<(f64, f64, Vec<DMatrix<f64>>)> = None;
     for softness in SOFTNESS {
-        let sharper = sharpener(&blur, softness);
+        let sharper = sharpener(blur, softness);
         let sharp: Vec<_> = wholes.iter().map(|whole| product(&sharper, whole)).collect();
-        let tried = error(&|channel| {
-            let drive = &sharp[channel] * &images;
-            // Reference white: the brightest even grey.
-            let grey = sharp[channel].column_sum().max();
-            drive / grey.max(f64::MIN_POSITIVE)
-        });
-        if best.as_ref().is_none_or(|(least, _)| tried < *least) {
-            best = Some((tried, sharp));
+        let (natural, both) = content.operator(&sharp);
+        if best.as_ref().is_none_or(|(_, least, _)| both < *least) {
+            best = Some((natural, both, sharp));
         }
     }
-    let (least, sharp) = best?;
+    let (error, _, sharp) = best?;
     let operators = sharp.iter().zip(candidates).map(|(sharp, candidate)| {
         let mut operator = DMatrix::from_diagonal(&candidate.inverse.gain) - sharp;
-        drop_dead(&mut operator, &prepared.live);
+        drop_dead(&mut operator, live);
         (candidate.inverse.gain.clone(), operator)
     });
     Some(Sharpened {
+        error,
         parts: parts(operators.collect()),
-        helps: least < gain_only,
     })
 }
 
@@ -99,31 +72,17 @@ fn parts(operators: Vec<(DVector<f64>, DMatrix<f64>)>) -> (DMatrix<f64>, Vec<Cha
     (shared, channels)
 }
 
-/// `(B^T B + s^2)^-1 (B^T + s^2)`: undoes the blur where its singular values are
-/// above `softness`, leaves alone what is far below.
 fn sharpener(blur: &DMatrix<f64>, softness: f64) -> DMatrix<f64> {
     let cells = blur.nrows();
     let one = DMatrix::identity(cells, cells);
-    if softness.is_infinite() {
+    let normal = blur.tr_mul(blur) + &one * (softness * softness);
+    let Some(factor) = normal.cholesky().filter(|_| softness.is_finite()) else {
         return one;
-    }
-    let soft = &one * (softness * softness);
-    let normal = blur.tr_mul(blur) + &soft;
-    match normal.cholesky() {
-        Some(factor) => factor.solve(&(blur.transpose() + soft)),
-        None => one,
-    }
-}
-
-/// Mean over images of `min_s ||s light - wanted|| / ||wanted||`.
-fn mean_error(light: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
-    let of_image = |k: usize| {
-        let (light, wanted) = (light.column(k), wanted.column(k));
-        let (seen, asked) = (light.norm_squared(), wanted.norm_squared());
-        if seen == 0.0 || asked == 0.0 {
-            return 1.0;
-        }
-        (1.0 - light.dot(&wanted).powi(2) / (seen * asked)).max(0.0).sqrt()
     };
-    (0..wanted.ncols()).map(of_image).sum::<f64>() / wanted.ncols().max(1) as f64
+    let step = factor.solve(&blur.transpose());
+    let mut sharper = one.clone();
+    for _ in 0..ROUNDS {
+        sharper += product(&step, &(&one - product(blur, &sharper)));
+    }
+    sharper
 }

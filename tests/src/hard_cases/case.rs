@@ -116,13 +116,14 @@ pub fn closed_loop(
     let bound = demand.required.unwrap_or(f64::INFINITY).min(theory);
     let gain_alone = chosen.iter().filter(|c| **c == Compensation::GainOnly).count();
     let how = match gain_alone {
+        _ if chosen.contains(&Compensation::Nothing) => ", no table".to_owned(),
         0 => String::new(),
         some if some == chosen.len() => ", with gains alone".to_owned(),
         some => format!(", {some} of {} with gains alone", chosen.len()),
     };
     let measured = format!(
-        "{median:.4}, worst of {seeds} {worst:.4}{how}; gain alone {:.4}, nothing {:.4}",
-        errors.gain_only, errors.nothing
+        "{median:.4}, worst of {seeds} {worst:.4}{how}; the true inverse {:.4}, gain alone {:.4}, nothing {:.4}",
+        errors.perfect, errors.gain_only, errors.nothing
     );
     if demand.no_harm_only {
         let bound = "at most gain alone and nothing";

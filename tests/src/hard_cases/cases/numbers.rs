@@ -59,6 +59,9 @@ fn capture() -> Capture {
 
 /// All must be refused; measured is the first message.
 fn all_refused(results: Vec<Result<(), String>>) -> Outcome {
+    for (index, _) in results.iter().enumerate().filter(|(_, result)| result.is_ok()) {
+        eprintln!("number {index} is not refused");
+    }
     let count = results.len();
     let messages: Vec<String> = results.into_iter().filter_map(Result::err).collect();
     Outcome {

@@ -38,20 +38,20 @@ pub(super) const CASES: [Case; 6] = [
         theory: "superposition must hold to 8 %",
         run: |_| {
             let camera = Camera { gamma: 2.2, full_scale: 255, ..Camera::default() };
-            refused(camera, "not linear")
+            refused(camera, "light does not add up")
         },
     },
     Case {
         name: "saturated photographs",
         reason: "white is 1.5 times what the camera can tell",
         theory: "at most 10 % of the lit pixels may be saturated",
-        run: |_| refused(Camera { exposure: 1.6, ..Camera::default() }, "saturated"),
+        run: |_| refused(Camera { exposure: 1.6, ..Camera::default() }, "overexposed"),
     },
     Case {
         name: "too dark to tell anything",
         reason: "white is a fifth of the noise",
         theory: "a cell needs pixels that follow its pattern",
-        run: |_| refused(Camera { exposure: 0.002, noise: 0.01, ..Camera::default() }, ""),
+        run: |_| refused(Camera { exposure: 0.002, noise: 0.01, ..Camera::default() }, "cells were found"),
     },
 ];
 

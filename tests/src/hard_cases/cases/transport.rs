@@ -4,18 +4,24 @@ use super::super::capture::Capture;
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::scene::{Panels, Scene};
 use super::super::{GRID, grid, theory};
-use iltm::solve::{Compensation, SolveError};
+use iltm::solve::Compensation;
 
-pub(super) const CASES: [Case; 6] = [
+pub(super) const CASES: [Case; 7] = [
     Case {
         name: "albedo .99 in a 30 degree wedge",
-        reason: "light bounces dozens of times before it leaves: condition above 100",
+        reason: "three quarters of all light come back: condition 7 by (1/rho + F) / (1/rho - F), F = 1 - sin(angle / 2)",
         theory: "error of the inverse times the condition number",
         run: white_wedge,
     },
     Case {
-        name: "nearly singular: albedo .999 in a 10 degree wedge",
-        reason: "almost nothing is lost at a bounce; the floor of the wedge gets hardly any direct light",
+        name: "albedo .99 in a 30 degree wedge, light falls to a twentieth",
+        reason: "the same with a dim border: condition above 100",
+        theory: "error of the inverse times the condition number",
+        run: dim_wedge,
+    },
+    Case {
+        name: "nearly singular: albedo .999 in a 1 degree wedge",
+        reason: "99 % of all light come back: condition above 100, and 200 bounces are not enough",
         theory: "error of the inverse times the condition number",
         run: deep_wedge,
     },
@@ -40,7 +46,7 @@ pub(super) const CASES: [Case; 6] = [
     Case {
         name: "photographs of other patterns",
         reason: "every photograph shows the pattern before: no transport explains them",
-        theory: "the held-out misfit of independent patterns is near 1",
+        theory: "light that has nothing to do with a pattern is off by 0.5 to 0.7; at most 0.4 is used",
         run: shifted,
     },
 ];
@@ -49,14 +55,21 @@ fn white_wedge(seeds: u64) -> Outcome {
     let grid = grid(GRID);
     let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99);
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| Capture::new(&scene, 100, seed));
+    with_condition(&scene, 6.0, outcome)
+}
+
+fn dim_wedge(seeds: u64) -> Outcome {
+    let grid = grid(GRID);
+    let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.05);
+    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| Capture::new(&scene, 100, seed));
     with_condition(&scene, 100.0, outcome)
 }
 
 fn deep_wedge(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let scene = Scene::new(grid, &Panels::corner(grid, 10.0), 0.999);
+    let scene = Scene::new(grid, &Panels::corner(grid, 1.0), 0.999);
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| Capture::new(&scene, 100, seed));
-    with_condition(&scene, 300.0, outcome)
+    with_condition(&scene, 100.0, outcome)
 }
 
 fn with_condition(scene: &Scene, least: f64, mut outcome: Outcome) -> Outcome {
@@ -71,19 +84,19 @@ fn doubled_light(seeds: u64) -> Outcome {
     let mut scene = Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
     let cells = grid.cells();
     let mut merge = nalgebra::DMatrix::identity(cells, cells);
-    for cell in [30, 100, 200] {
+    for cell in [30, 101, 200] {
         merge[(cell, cell)] = 0.0;
         merge[(cell - 1, cell)] = 1.0;
     }
     scene.blur = Some(merge);
-    let mut left_out = Vec::new();
-    for seed in 0..seeds {
-        match Capture::new(&scene, 80, seed).solve() {
-            Ok((_, report)) => left_out = report.left_out.iter().map(|out| out.cell).collect(),
-            Err(error) => return Outcome::new(false, "an inverse", error.to_string()),
-        }
+    let demand = Demand { no_harm_only: true, ..Demand::default() };
+    let mut outcome = closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 80, seed));
+    if let Ok((_, report)) = Capture::new(&scene, 80, 0).solve() {
+        let left_out: Vec<usize> = report.left_out.iter().map(|out| out.cell).collect();
+        outcome.holds &= left_out == [30, 101, 200];
+        outcome.measured = format!("left out: {left_out:?}; {}", outcome.measured);
     }
-    Outcome::new(left_out == [30, 100, 200], "cells 30, 100, 200 left out", format!("left out: {left_out:?}"))
+    outcome
 }
 
 fn flat(seeds: u64) -> Outcome {
@@ -130,13 +143,6 @@ fn shifted(_: u64) -> Outcome {
     for k in 1..shown.ncols() {
         capture.patterns.set_column(k, &shown.column((k + 1) % shown.ncols()));
     }
-    let message = match capture.solve() {
-        Ok((_, report)) if report.compensation == Compensation::Operator => {
-            Ok(format!("{:?}", report.prediction))
-        }
-        Ok((_, report)) => Err(format!("no operator: predicted error {:.3}", report.prediction.compensated)),
-        Err(error @ SolveError::NotPhysical { .. }) => Err(format!("no operator: {error}")),
-        Err(error) => Err(format!("no operator: {error}")),
-    };
-    Outcome::refusal(message, "no operator")
+    let result = capture.solve().map(|(_, report)| format!("{:?}", report.prediction));
+    Outcome::refusal(result.map_err(|error| error.to_string()), "check that the patterns belong")
 }
