@@ -6,12 +6,20 @@ use rayon::prelude::*;
 /// One seed each: the page has the worst of five.
 #[test]
 fn every_hard_case_holds() {
-    let all: Vec<_> = cases::all().into_iter().flat_map(|(_, cases)| cases).collect();
+    let all: Vec<_> = cases::all()
+        .into_iter()
+        .flat_map(|(_, cases)| cases)
+        .collect();
     let failures: Vec<String> = all
         .par_iter()
         .filter_map(|case| {
             let outcome = (case.run)(1);
-            (!outcome.holds).then(|| format!("{}: {} where {} must hold", case.name, outcome.measured, outcome.bound))
+            (!outcome.holds).then(|| {
+                format!(
+                    "{}: {} where {} must hold",
+                    case.name, outcome.measured, outcome.bound
+                )
+            })
         })
         .collect();
     assert!(failures.is_empty(), "{failures:#?}");
@@ -23,7 +31,11 @@ fn the_page_lists_every_case_and_none_that_fails() {
     for (title, cases) in cases::all() {
         assert!(page.contains(&format!("## {title}")), "{title}");
         for case in cases {
-            assert!(page.contains(&format!("| {} | {} |", case.name, case.reason)), "{}", case.name);
+            assert!(
+                page.contains(&format!("| {} | {} |", case.name, case.reason)),
+                "{}",
+                case.name
+            );
         }
     }
     assert!(!page.contains("| FAILS |"));

@@ -47,7 +47,9 @@ fn along(count: usize, deviation: f64) -> Vec<f64> {
         half(distance as f64 - 1.0) + half(distance as f64)
     };
     if deviation < LEAST {
-        return (0..count).map(|distance| if distance == 0 { 1.0 } else { 0.0 }).collect();
+        return (0..count)
+            .map(|distance| if distance == 0 { 1.0 } else { 0.0 })
+            .collect();
     }
     (0..count).map(part).collect()
 }
@@ -64,7 +66,10 @@ mod tests {
         let grid = Grid::new(15, 17).unwrap();
         for deviation in [0.05, 0.3, 0.5, 1.0] {
             let blur = blur(grid, deviation);
-            assert!((blur.column(7 * 17 + 8).sum() - 1.0).abs() < 1e-6, "{deviation}");
+            assert!(
+                (blur.column(7 * 17 + 8).sum() - 1.0).abs() < 1e-6,
+                "{deviation}"
+            );
             assert!(blur.column(0).sum() < 1.0);
         }
     }
@@ -74,7 +79,11 @@ mod tests {
     fn the_spread_has_the_variance_that_was_asked_for() {
         for deviation in [0.1, 0.5, 1.0, 2.0_f64] {
             let parts = along(40, deviation);
-            let variance: f64 = parts.iter().enumerate().map(|(k, p)| 2.0 * (k * k) as f64 * p).sum();
+            let variance: f64 = parts
+                .iter()
+                .enumerate()
+                .map(|(k, p)| 2.0 * (k * k) as f64 * p)
+                .sum();
             // A cell's own place counts as one number: the triangle's variance is 1/6.
             let wanted = deviation * deviation + 1.0 / 6.0;
             if deviation >= 0.5 {

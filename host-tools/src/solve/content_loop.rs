@@ -44,7 +44,13 @@ impl<'c> ContentLoop<'c> {
             images.row_mut(cell).fill(0.0);
         }
         let reachable = blur.map(|blur| product(blur, &images));
-        Self { prepared, candidates, blur, images, reachable }
+        Self {
+            prepared,
+            candidates,
+            blur,
+            images,
+            reachable,
+        }
     }
 
     /// Error with inverses, one a channel, `N x N`: on the images, and as the
@@ -59,7 +65,10 @@ impl<'c> ContentLoop<'c> {
             })
         };
         let natural = error(&self.images);
-        let both = self.reachable.as_ref().map_or(natural, |images| (natural * error(images)).sqrt());
+        let both = self
+            .reachable
+            .as_ref()
+            .map_or(natural, |images| (natural * error(images)).sqrt());
         (natural, both)
     }
 
@@ -105,7 +114,9 @@ fn mean_error(light: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
         if seen == 0.0 || asked == 0.0 {
             return 1.0;
         }
-        (1.0 - light.dot(&wanted).powi(2) / (seen * asked)).max(0.0).sqrt()
+        (1.0 - light.dot(&wanted).powi(2) / (seen * asked))
+            .max(0.0)
+            .sqrt()
     };
     (0..wanted.ncols()).map(of_image).sum::<f64>() / wanted.ncols().max(1) as f64
 }

@@ -54,7 +54,7 @@ pub enum SolveError {
     },
     /// No cell is seen by the camera and lit by the projector.
     #[error(
-        "none of the {cells} cells is both lit and seen; check that the camera sees the projection and that the flood photograph is exposed"
+        "none of the {cells} cells is seen to answer to its own light; check that the camera sees the projection, that the patterns belong to the photographs and that the flood photograph is exposed"
     )]
     NoLiveCells {
         /// Cells of the grid.

@@ -235,3 +235,53 @@ fn power(
     }
     Some(value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Inside of a sphere every cell sees every other alike: with `F = 1/N` and an
+    /// albedo `r` the light under white is `r / (1 - r)` everywhere.
+    fn sphere(cells: usize, albedo: f64) -> Inverse {
+        let operator = DMatrix::from_element(cells, cells, 1.0 / cells as f64);
+        Inverse::new(DVector::from_element(cells, albedo.recip()), operator)
+    }
+
+    #[test]
+    fn light_that_fades_too_slowly_to_follow_is_solved_for() {
+        let white = DMatrix::from_element(10, 1, 1.0);
+        for albedo in [0.5, 0.9, 0.99, 0.9999] {
+            let light = sphere(10, albedo).light(&white).unwrap();
+            let wanted = albedo / (1.0 - albedo);
+            for light in light.iter() {
+                assert!((light / wanted - 1.0).abs() < 1e-5, "{albedo}: {light}");
+            }
+        }
+    }
+
+    #[test]
+    fn light_that_grows_is_a_flaw_and_its_growth_is_said() {
+        assert_eq!(sphere(10, 0.999).flaw(&[true; 10]), None);
+        let why = sphere(10, 1.25).flaw(&[true; 10]).unwrap();
+        assert!(why.contains("1.250 of the light"), "{why}");
+    }
+
+    #[test]
+    fn the_condition_of_a_sphere_is_that_of_its_closed_form() {
+        // Largest singular value of T: r / (1 - r), smallest: r.
+        let condition = sphere(10, 0.995).condition(&[true; 10]);
+        assert!((condition / 200.0 - 1.0).abs() < 0.02, "{condition}");
+    }
+
+    #[test]
+    fn a_cell_that_is_not_live_stays_dark_either_way() {
+        for albedo in [0.5, 0.999] {
+            let mut inverse = sphere(10, albedo);
+            inverse.gain[3] = 0.0;
+            inverse.operator.row_mut(3).fill(0.0);
+            inverse.operator.column_mut(3).fill(0.0);
+            let light = inverse.light(&DMatrix::from_element(10, 2, 1.0)).unwrap();
+            assert!(light.row(3).amax() < 1e-300);
+        }
+    }
+}

@@ -38,7 +38,10 @@ pub fn gain_only(
     let kind = report.prediction.gain_only_kind;
     let channels = observed.channels.iter().enumerate();
     let channels = channels.map(|(index, channel)| ChannelInverse {
-        gain: (gains(&prepared, index, &all, kind) / prepared.unit).iter().copied().collect(),
+        gain: (gains(&prepared, index, &all, kind) / prepared.unit)
+            .iter()
+            .copied()
+            .collect(),
         scale: 1.0,
         deviation: None,
         ambient: channel.ambient.to_vec(),
@@ -97,6 +100,9 @@ fn flood(prepared: &Prepared, light: &DMatrix<f64>, chosen: &[usize]) -> DVector
         return sum / weight;
     }
     // As much light as all photographs together imply.
-    let projected: f64 = chosen.iter().map(|k| prepared.patterns.column(*k).max()).sum();
+    let projected: f64 = chosen
+        .iter()
+        .map(|k| prepared.patterns.column(*k).max())
+        .sum();
     light.select_columns(chosen).column_sum() / projected.max(1.0)
 }

@@ -9,10 +9,10 @@
 //! each has been. A pattern and its complement, or the same pattern taken twice,
 //! are held out together: the one would tell the other.
 
-use super::solution::Candidate;
 use super::gain_only::{GainOnly, gains};
 use super::prepare::Prepared;
 use super::report::Prediction;
+use super::solution::Candidate;
 use crate::capture::Role;
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -94,7 +94,11 @@ pub(super) struct Judged<'j> {
 
 /// Squared misfit `||T p - c||^2` over all channels of the photographs `chosen`;
 /// infinite if an inverse has no forward transport.
-pub(super) fn squared_misfit(prepared: &Prepared, candidates: &[Candidate], chosen: &[usize]) -> f64 {
+pub(super) fn squared_misfit(
+    prepared: &Prepared,
+    candidates: &[Candidate],
+    chosen: &[usize],
+) -> f64 {
     let mut difference = 0.0;
     for (channel, light) in prepared.light.iter().enumerate() {
         let observed = light.select_columns(chosen);
@@ -127,7 +131,11 @@ pub(super) fn predict(prepared: &Prepared, judged: &[Judged<'_>]) -> Prediction 
     });
     let candidates = GainOnly::ALL.map(|kind| (kind, of_gain(kind)));
     let [flood, fitted] = candidates;
-    let (gain_only_kind, gain_only) = if fitted.1.error < flood.1.error { fitted } else { flood };
+    let (gain_only_kind, gain_only) = if fitted.1.error < flood.1.error {
+        fitted
+    } else {
+        flood
+    };
     Prediction {
         uncompensated: nothing.error,
         gain_only: gain_only.error,
@@ -157,7 +165,10 @@ fn wanted(
         let patterns = prepared.patterns.select_columns(&judged.split.held_out);
         for (channel, light) in prepared.light.iter().enumerate() {
             let Some(wanted) = wanted(judged, channel, &patterns) else {
-                return Error { error: f64::INFINITY, squares: Vec::new() };
+                return Error {
+                    error: f64::INFINITY,
+                    squares: Vec::new(),
+                };
             };
             let observed = light.select_columns(&judged.split.held_out);
             pairs.push((observed, wanted));
@@ -165,7 +176,10 @@ fn wanted(
     }
     let sum = |of: fn(&(DMatrix<f64>, DMatrix<f64>)) -> f64| pairs.iter().map(of).sum::<f64>();
     let both = sum(|(observed, wanted)| observed.dot(wanted));
-    let (seen, asked) = (sum(|pair| pair.0.norm_squared()), sum(|pair| pair.1.norm_squared()));
+    let (seen, asked) = (
+        sum(|pair| pair.0.norm_squared()),
+        sum(|pair| pair.1.norm_squared()),
+    );
     // Written so that light without any wanted is an error of 1, not NaN.
     let scale = if seen > 0.0 { both / seen } else { 0.0 };
     let mut squares = Vec::new();
@@ -177,13 +191,20 @@ fn wanted(
             squares.push(channels.iter().map(square).sum::<f64>() / asked.max(f64::MIN_POSITIVE));
         }
     }
-    Error { error: squares.iter().sum::<f64>().sqrt(), squares }
+    Error {
+        error: squares.iter().sum::<f64>().sqrt(),
+        squares,
+    }
 }
 
 /// By how many standard errors the second is better than the first, photograph
 /// by photograph; nothing can be said of fewer than two.
 fn confidence(first: &Error, second: &Error) -> f64 {
-    let differences = first.squares.iter().zip(&second.squares).map(|(a, b)| a - b);
+    let differences = first
+        .squares
+        .iter()
+        .zip(&second.squares)
+        .map(|(a, b)| a - b);
     let differences = DVector::from_vec(differences.collect());
     let count = differences.len() as f64;
     if count < 2.0 {
@@ -192,7 +213,11 @@ fn confidence(first: &Error, second: &Error) -> f64 {
     let mean = differences.mean();
     let spread = differences.add_scalar(-mean).norm_squared() / (count - 1.0);
     let deviation = (spread / count).sqrt();
-    if mean == 0.0 { 0.0 } else { mean / deviation.max(f64::MIN_POSITIVE) }
+    if mean == 0.0 {
+        0.0
+    } else {
+        mean / deviation.max(f64::MIN_POSITIVE)
+    }
 }
 
 /// What a pattern would show if every cell only dimmed its own light.
@@ -209,10 +234,22 @@ fn lit_alone(gain: &DVector<f64>, patterns: &DMatrix<f64>) -> DMatrix<f64> {
 /// white.
 pub(super) fn complements(prepared: &Prepared, chosen: &[usize]) -> Vec<(usize, Option<usize>)> {
     let lit = |k: usize| -> Vec<bool> {
-        prepared.shown.column(k).iter().zip(&prepared.live).map(|(share, live)| *share > 0.5 || !live).collect()
+        prepared
+            .shown
+            .column(k)
+            .iter()
+            .zip(&prepared.live)
+            .map(|(share, live)| *share > 0.5 || !live)
+            .collect()
     };
     let dark = |k: usize| -> Vec<bool> {
-        prepared.shown.column(k).iter().zip(&prepared.live).map(|(share, live)| *share < 0.5 || !live).collect()
+        prepared
+            .shown
+            .column(k)
+            .iter()
+            .zip(&prepared.live)
+            .map(|(share, live)| *share < 0.5 || !live)
+            .collect()
     };
     let mut found = Vec::new();
     let mut waiting: HashMap<Vec<bool>, Vec<usize>> = HashMap::new();

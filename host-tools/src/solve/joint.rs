@@ -120,7 +120,10 @@ impl<'p> Solver<'p> {
                 .map(|k| STRONGEST / f64::from(1 << k))
                 .collect(),
         };
-        let total: f64 = splits.iter().map(|s| squared_light(self.prepared, &s.held_out)).sum();
+        let total: f64 = splits
+            .iter()
+            .map(|s| squared_light(self.prepared, &s.held_out))
+            .sum();
         let mut choice = Choice {
             lambda: path[0],
             trials: Vec::new(),
@@ -135,7 +138,11 @@ impl<'p> Solver<'p> {
                 self.run(&fold.data, lambda, TRIAL, progress);
                 let solution = self.found(&fold.photographs);
                 std::mem::swap(&mut fold.consensus, &mut self.consensus);
-                squared += squared_misfit(self.prepared, &solution.candidates(&self.prepared.live), &fold.split.held_out);
+                squared += squared_misfit(
+                    self.prepared,
+                    &solution.candidates(&self.prepared.live),
+                    &fold.split.held_out,
+                );
                 found.push(solution);
             }
             let misfit = (squared / total).sqrt();
@@ -153,7 +160,10 @@ impl<'p> Solver<'p> {
         for fold in &mut folds {
             if let Some(mut best) = fold.best.take() {
                 self.add_deviations(&mut best, &fold.photographs, choice.lambda, TRIAL, progress);
-                choice.judged.push(Judged { split: fold.split, candidates: best.candidates(&self.prepared.live) });
+                choice.judged.push(Judged {
+                    split: fold.split,
+                    candidates: best.candidates(&self.prepared.live),
+                });
             }
         }
         // The solve of all photographs starts from here.

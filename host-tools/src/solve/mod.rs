@@ -80,8 +80,8 @@ pub use gain_only::{GainOnly, gain_only};
 pub use haar::{Basis, Haar};
 pub use inverse::{ChannelInverse, InverseTransport};
 pub use observed::{CellNoise, Observed, ObservedChannel};
-pub use own_light::{LeftOut, WhyLeftOut};
 pub use options::{Method, SolveOptions, UnknownMethod};
+pub use own_light::{LeftOut, WhyLeftOut};
 pub use report::{
     Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };

@@ -119,17 +119,32 @@ impl Own {
         let noise = channel.noise[cell].unlit;
         let lit_by_others = seen > 0.0 && seen > SIGNIFICANT * noise / count.sqrt();
         if spread < 1e-9 {
-            return Self { slope: seen, error: None, mean: seen, lit_by_others };
+            return Self {
+                slope: seen,
+                error: None,
+                mean: seen,
+                lit_by_others,
+            };
         }
         let slope = both / spread;
-        let rest: f64 = pairs().map(|(p, c)| (c - seen - slope * (p - shown)).powi(2)).sum();
+        let rest: f64 = pairs()
+            .map(|(p, c)| (c - seen - slope * (p - shown)).powi(2))
+            .sum();
         let error = (rest / (count - 2.0).max(1.0) / spread).sqrt();
-        Self { slope, error: Some(error), mean: seen, lit_by_others }
+        Self {
+            slope,
+            error: Some(error),
+            mean: seen,
+            lit_by_others,
+        }
     }
 
     fn counts(&self, typical: f64) -> bool {
         // Written so that what is not a number does not count.
         let enough = self.slope > 0.0 && self.slope >= LEAST_OWN * typical && self.mean > 0.0;
-        enough && self.error.is_none_or(|error| self.slope > SIGNIFICANT * error)
+        enough
+            && self
+                .error
+                .is_none_or(|error| self.slope > SIGNIFICANT * error)
     }
 }

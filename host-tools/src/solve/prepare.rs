@@ -239,7 +239,11 @@ fn check_finite(observed: &Observed<'_>) -> Result<(), SolveError> {
     for (index, channel) in observed.channels.iter().enumerate() {
         check("light", index, channel.light)?;
         let cells = channel.ambient.len();
-        check("ambient light", index, &DMatrix::from_column_slice(cells, 1, channel.ambient))?;
+        check(
+            "ambient light",
+            index,
+            &DMatrix::from_column_slice(cells, 1, channel.ambient),
+        )?;
         let noise = |cell: usize, _| channel.noise[cell].lit + channel.noise[cell].unlit;
         check("noise", index, &DMatrix::from_fn(cells, 1, noise))?;
     }

@@ -96,13 +96,27 @@ pub struct Prediction {
 /// safe, small and fast.
 const CONFIDENT: f64 = 2.0;
 
+/// An operator that cancels less than this is not called for: half a step of an
+/// 8-bit code. What one photograph of black leaves in all others looks like as much.
+const LEAST_CANCELLED: f64 = 0.5 / 255.0;
+
 impl Prediction {
+    /// The part of the light that only the operator cancels, relative: what is
+    /// left of gain alone's error without what is noise in both.
+    #[must_use]
+    pub fn cancelled(&self) -> f64 {
+        (self.gain_only.powi(2) - self.compensated.powi(2))
+            .max(0.0)
+            .sqrt()
+    }
+
     /// Which way to project errs least: by held-out photographs, and on natural
     /// images that the projector has to clip.
     #[must_use]
     pub fn best(&self, clipped: Clipped) -> Compensation {
         let other = self.gain_only.min(self.uncompensated);
         let proven = self.compensated < other && self.confidence > CONFIDENT;
+        let proven = proven && self.cancelled() > LEAST_CANCELLED;
         // Written so that what is not a number loses.
         if proven && clipped.compensated < clipped.gain_only.min(clipped.uncompensated) {
             return Compensation::Operator;

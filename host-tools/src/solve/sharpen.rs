@@ -36,7 +36,10 @@ pub(super) fn sharpen(
     let mut best: Option<(f64, f64, Vec<DMatrix<f64>>)> = None;
     for softness in SOFTNESS {
         let sharper = sharpener(blur, softness);
-        let sharp: Vec<_> = wholes.iter().map(|whole| product(&sharper, whole)).collect();
+        let sharp: Vec<_> = wholes
+            .iter()
+            .map(|whole| product(&sharper, whole))
+            .collect();
         let (natural, both) = content.operator(&sharp);
         if best.as_ref().is_none_or(|(_, least, _)| both < *least) {
             best = Some((natural, both, sharp));

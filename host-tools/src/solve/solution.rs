@@ -80,7 +80,11 @@ impl Solution {
         sharpened: Option<(DMatrix<f64>, Vec<Channel>)>,
     ) -> InverseTransport {
         drop_dead(&mut self.shared, &prepared.live);
-        for deviation in self.channels.iter_mut().filter_map(|c| c.deviation.as_mut()) {
+        for deviation in self
+            .channels
+            .iter_mut()
+            .filter_map(|c| c.deviation.as_mut())
+        {
             drop_dead(deviation, &prepared.live);
         }
         if let Some(sharpened) = sharpened {

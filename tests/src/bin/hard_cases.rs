@@ -15,7 +15,9 @@ fn main() -> ExitCode {
         (at < words.len()).then(|| words.remove(at))
     };
     let file = take("--write");
-    let seeds = take("--seeds").and_then(|seeds| seeds.parse().ok()).unwrap_or(5);
+    let seeds = take("--seeds")
+        .and_then(|seeds| seeds.parse().ok())
+        .unwrap_or(5);
     let mut groups = Vec::new();
     for (title, cases) in cases::all() {
         let chosen = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));

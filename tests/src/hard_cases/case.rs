@@ -36,7 +36,12 @@ impl Outcome {
     /// Of a condition.
     #[must_use]
     pub fn new(holds: bool, bound: impl Into<String>, measured: impl Into<String>) -> Self {
-        Self { bound: bound.into(), measured: measured.into(), holds, refused: false }
+        Self {
+            bound: bound.into(),
+            measured: measured.into(),
+            holds,
+            refused: false,
+        }
     }
 
     /// Of input that must be refused with `words` in the diagnosis, which must
@@ -114,7 +119,10 @@ pub fn closed_loop(
     });
     let theory = theory::bound(scene, &live, photographs, demand.noise, errors.perfect);
     let bound = demand.required.unwrap_or(f64::INFINITY).min(theory);
-    let gain_alone = chosen.iter().filter(|c| **c == Compensation::GainOnly).count();
+    let gain_alone = chosen
+        .iter()
+        .filter(|c| **c == Compensation::GainOnly)
+        .count();
     let how = match gain_alone {
         _ if chosen.contains(&Compensation::Nothing) => ", no table".to_owned(),
         0 => String::new(),
@@ -152,5 +160,10 @@ fn loop_of(
         }
     };
     let errors = errors(scene, &inverse);
-    Ok((errors.compensated, errors, report.compensation, inverse.live))
+    Ok((
+        errors.compensated,
+        errors,
+        report.compensation,
+        inverse.live,
+    ))
 }

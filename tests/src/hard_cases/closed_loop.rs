@@ -1,8 +1,8 @@
 //! How far the picture on the wall is from the wanted one.
 
 use super::scene::Scene;
-use iltm::content::natural_images;
 use iltm::compile::white::reference_white;
+use iltm::content::natural_images;
 use iltm::solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
 
@@ -42,7 +42,11 @@ pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
         None => natural * white,
     };
     let images = keep(&wanted, &judged);
-    let judge = Judge { transport: &transport, images: &images, judged: &judged };
+    let judge = Judge {
+        transport: &transport,
+        images: &images,
+        judged: &judged,
+    };
     let matrix = dense(found);
     let flood = &transport * DVector::from_element(scene.grid.cells(), 1.0);
     let mut gain = flood.map(|light| if light > 1e-12 { light.recip() } else { 0.0 });
@@ -92,10 +96,17 @@ impl Judge<'_> {
             let mut light = self.transport * projected;
             mask(&mut light, self.judged);
             let both = light.dot(&wanted);
-            let scale = if both > 0.0 { both / light.norm_squared() } else { 0.0 };
+            let scale = if both > 0.0 {
+                both / light.norm_squared()
+            } else {
+                0.0
+            };
             (light * scale - &wanted).norm() / wanted.norm()
         };
-        let errors = self.images.column_iter().map(|image| of_image(image.into_owned()));
+        let errors = self
+            .images
+            .column_iter()
+            .map(|image| of_image(image.into_owned()));
         errors.sum::<f64>() / self.images.ncols().max(1) as f64
     }
 }

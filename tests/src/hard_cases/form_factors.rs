@@ -60,7 +60,11 @@ fn parallel(distance: f64, a: (f64, f64), b: (f64, f64)) -> f64 {
         if squared == 0.0 {
             return 0.0;
         }
-        let turn = if distance > 0.0 { distance * t * (t / distance).atan() } else { 0.0 };
+        let turn = if distance > 0.0 {
+            distance * t * (t / distance).atan()
+        } else {
+            0.0
+        };
         0.25 * (t * t - distance * distance) * squared.ln() - 0.75 * t * t + turn
     };
     twice(a.1 - b.0) - twice(a.1 - b.1) - twice(a.0 - b.0) + twice(a.0 - b.1)
@@ -76,7 +80,11 @@ fn slanted(apart: f64, a: (f64, f64), b: (f64, f64), angle: f64) -> f64 {
             if squared == 0.0 {
                 return 0.0;
             }
-            let turn = if height > 0.0 { height * (t / height).atan() } else { 0.0 };
+            let turn = if height > 0.0 {
+                height * (t / height).atan()
+            } else {
+                0.0
+            };
             0.5 * t * squared.ln() - t + turn
         };
         once(b.1) - once(b.0)
@@ -112,7 +120,10 @@ mod tests {
     /// C-14: rectangles with a common edge at a right angle, `h = w = 1`.
     #[test]
     fn squares_at_a_right_angle_have_the_catalogues_factor() {
-        let square = Rectangle { u: (0.0, 1.0), y: (0.0, 1.0) };
+        let square = Rectangle {
+            u: (0.0, 1.0),
+            y: (0.0, 1.0),
+        };
         let found = exchange(&square, &square, PI / 2.0);
         assert!((found - 0.200_044).abs() < 1e-6, "{found}");
     }
@@ -124,7 +135,10 @@ mod tests {
         for angle in [30.0_f64, 60.0, 75.0, 90.0, 120.0] {
             let angle = angle.to_radians();
             let long = 4e4;
-            let wall = Rectangle { u: (0.0, 1.0), y: (0.0, long) };
+            let wall = Rectangle {
+                u: (0.0, 1.0),
+                y: (0.0, long),
+            };
             let found = exchange(&wall, &wall, angle) / wall.area();
             let wanted = 1.0 - (angle / 2.0).sin();
             assert!((found - wanted).abs() < 2e-4, "{angle}: {found} {wanted}");
@@ -134,12 +148,18 @@ mod tests {
     #[test]
     fn parts_add_up_to_the_whole() {
         let angle = 30.0_f64.to_radians();
-        let whole = Rectangle { u: (0.0, 1.0), y: (0.0, 1.0) };
+        let whole = Rectangle {
+            u: (0.0, 1.0),
+            y: (0.0, 1.0),
+        };
         let parts = [0.0, 0.3, 1.0];
         let mut sum = 0.0;
         for a in parts.windows(2) {
             for b in parts.windows(2) {
-                let part = Rectangle { u: (a[0], a[1]), y: (b[0], b[1]) };
+                let part = Rectangle {
+                    u: (a[0], a[1]),
+                    y: (b[0], b[1]),
+                };
                 sum += exchange(&part, &whole, angle);
             }
         }

@@ -22,7 +22,7 @@ nothing, may never be worse than gains alone or nothing by more than a tenth.
 Unless a case says otherwise the scene is 13 x 21 cells on M-shaped panels at 75 degrees,
 photographed under white, Gray code with inverses and random patterns. The bound is
 
-    perfect + 2 tail(s) + cond (sigma sqrt(s ln N / m) + tolerance),   s = m / (2 ln(N / m)) <= N
+    perfect + min over s of (2 tail(s) + cond sigma sqrt(s ln N / m)) + cond tolerance,   s <= m / (2 ln(N / m)) <= N
 
 with `perfect` the error of the true inverse (clipping), `tail(s)` that of its best `s`
 Haar coefficients a row, `cond` the condition number, `sigma` the noise, `m` photographs,

@@ -30,7 +30,13 @@ pub struct Camera {
 
 impl Default for Camera {
     fn default() -> Self {
-        Self { exposure: 0.8, noise: 0.002, full_scale: u16::MAX, gamma: 1.0, bernoulli: 60 }
+        Self {
+            exposure: 0.8,
+            noise: 0.002,
+            full_scale: u16::MAX,
+            gamma: 1.0,
+            bernoulli: 60,
+        }
     }
 }
 
@@ -40,7 +46,12 @@ impl Camera {
     ///
     /// # Errors
     /// What cannot be written.
-    pub fn write(&self, scene: &Scene, folder: &Path, settings: &str) -> Result<(), image::ImageError> {
+    pub fn write(
+        &self,
+        scene: &Scene,
+        folder: &Path,
+        settings: &str,
+    ) -> Result<(), image::ImageError> {
         for part in ["patterns", "photos"] {
             std::fs::create_dir_all(folder.join(part))?;
         }
@@ -50,7 +61,10 @@ impl Camera {
         let transport = scene.transport();
         let flood = (&transport * DMatrix::from_element(scene.grid.cells(), 1, 1.0)).max();
         let mut random = fastrand::Rng::with_seed(2);
-        let all = roles.iter().copied().zip(patterns.column_iter().map(|c| c.into_owned()));
+        let all = roles
+            .iter()
+            .copied()
+            .zip(patterns.column_iter().map(|c| c.into_owned()));
         let all = std::iter::once((Role::Black, black.column(0).into_owned())).chain(all);
         for (index, (role, pattern)) in (0..).zip(all) {
             let shot = Shot {
@@ -63,14 +77,21 @@ impl Camera {
             let (rows, cols) = (scene.grid.rows(), scene.grid.cols());
             let shown: ImageBuffer<Luma<u8>, _> =
                 ImageBuffer::from_fn(cols as u32, rows as u32, |x, y| {
-                    Luma([if pattern[y as usize * cols + x as usize] > 0.5 { 255 } else { 0 }])
+                    Luma([if pattern[y as usize * cols + x as usize] > 0.5 {
+                        255
+                    } else {
+                        0
+                    }])
                 });
             shown.save(folder.join(&shot.pattern))?;
             let light = &transport * pattern * (self.exposure / flood);
             let side = |cells: usize| (2 * MARGIN + PITCH * cells) as u32;
             let value = |x: u32, y: u32, random: &mut fastrand::Rng| {
                 let cell = |at: u32, cells: usize| {
-                    (at as usize).checked_sub(MARGIN).map(|at| at / PITCH).filter(|at| *at < cells)
+                    (at as usize)
+                        .checked_sub(MARGIN)
+                        .map(|at| at / PITCH)
+                        .filter(|at| *at < cells)
                 };
                 let seen = match (cell(y, rows), cell(x, cols)) {
                     (Some(row), Some(col)) => light[row * cols + col],
@@ -82,11 +103,15 @@ impl Camera {
             let path = folder.join(&shot.photo);
             if self.full_scale == 255 {
                 let photo: ImageBuffer<Luma<u8>, _> =
-                    ImageBuffer::from_fn(side(cols), side(rows), |x, y| Luma([value(x, y, &mut random) as u8]));
+                    ImageBuffer::from_fn(side(cols), side(rows), |x, y| {
+                        Luma([value(x, y, &mut random) as u8])
+                    });
                 photo.save(path)?;
             } else {
                 let photo: ImageBuffer<Luma<u16>, _> =
-                    ImageBuffer::from_fn(side(cols), side(rows), |x, y| Luma([value(x, y, &mut random)]));
+                    ImageBuffer::from_fn(side(cols), side(rows), |x, y| {
+                        Luma([value(x, y, &mut random)])
+                    });
                 photo.save(path)?;
             }
             shots.push(shot);

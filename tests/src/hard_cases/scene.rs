@@ -53,7 +53,9 @@ impl Panels {
     pub fn m_shape(grid: Grid, wedge: f64) -> Self {
         let (rows, cols) = (grid.rows() as f64, grid.cols() as f64);
         Self {
-            folds: [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| (part * cols).round()).to_vec(),
+            folds: [0.0, 0.25, 0.5, 0.75, 1.0]
+                .map(|part| (part * cols).round())
+                .to_vec(),
             rows: (0.0, rows),
             wedge,
         }
@@ -112,7 +114,8 @@ impl Scene {
     #[must_use]
     pub fn textured(mut self, least: f64, most: f64, seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
-        self.albedo.apply(|albedo| *albedo = least + (most - least) * random.f64());
+        self.albedo
+            .apply(|albedo| *albedo = least + (most - least) * random.f64());
         self
     }
 
@@ -192,7 +195,10 @@ fn patches(grid: Grid, panels: &Panels) -> Vec<Patch> {
         // Valleys lie between panels 0 and 1, 2 and 3, and so on.
         let hinge = if panel % 2 == 0 { ends[1] } else { ends[0] };
         for row in 0..grid.rows() {
-            let y = (panels.rows.0.max(row as f64), panels.rows.1.min((row + 1) as f64));
+            let y = (
+                panels.rows.0.max(row as f64),
+                panels.rows.1.min((row + 1) as f64),
+            );
             for col in 0..grid.cols() {
                 let x = (ends[0].max(col as f64), ends[1].min((col + 1) as f64));
                 if x.1 - x.0 < 1e-9 || y.1 - y.0 < 1e-9 {
@@ -202,7 +208,10 @@ fn patches(grid: Grid, panels: &Panels) -> Vec<Patch> {
                 patches.push(Patch {
                     cell: row * grid.cols() + col,
                     panel,
-                    place: Rectangle { u: (a.min(b), a.max(b)), y },
+                    place: Rectangle {
+                        u: (a.min(b), a.max(b)),
+                        y,
+                    },
                 });
             }
         }

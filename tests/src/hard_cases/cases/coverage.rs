@@ -77,13 +77,20 @@ fn unlit(seeds: u64) -> Outcome {
 /// The closed loop over the other cells, and whether all of `wanted` and no
 /// others are left out for the right reason.
 fn named(scene: &Scene, seeds: u64, wanted: fn(usize) -> bool, why: WhyLeftOut) -> Outcome {
-    let demand = Demand { noise: 1e-3, ..Demand::default() };
+    let demand = Demand {
+        noise: 1e-3,
+        ..Demand::default()
+    };
     let make = |seed| Capture::new(scene, 80, seed).noisy(60.0, seed);
     let mut outcome = closed_loop(scene, seeds, demand, make);
     let Ok((_, report)) = make(0).solve() else {
         return outcome;
     };
-    let right = report.left_out.iter().filter(|out| wanted(out.cell) && out.why == why).count();
+    let right = report
+        .left_out
+        .iter()
+        .filter(|out| wanted(out.cell) && out.why == why)
+        .count();
     let cells = (0..scene.grid.cells()).filter(|cell| wanted(*cell)).count();
     outcome.holds &= right == cells && report.left_out.len() == cells;
     outcome.measured = format!("{right} of {cells} named ({why:?}); {}", outcome.measured);
@@ -94,8 +101,13 @@ fn unseen(seeds: u64) -> Outcome {
     let scene = textured();
     // A block of 4 x 5 cells at a valley.
     let hidden = |cell: usize| (4..8).contains(&(cell / 21)) && (3..8).contains(&(cell % 21));
-    let demand = Demand { required: Some(0.015), ..Demand::default() };
-    closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 80, seed).unseen(hidden))
+    let demand = Demand {
+        required: Some(0.015),
+        ..Demand::default()
+    };
+    closed_loop(&scene, seeds, demand, |seed| {
+        Capture::new(&scene, 80, seed).unseen(hidden)
+    })
 }
 
 /// Cells covered to less than `least` are too small for the camera.
@@ -108,7 +120,11 @@ fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> Outcome {
     };
     let scene = Scene::new(grid, &panels, 0.7).textured(0.4, 0.9, 2);
     let noise = decibels.map_or(0.0, |decibels| 10_f64.powf(-decibels / 20.0));
-    let demand = Demand { noise, required: Some(0.015), ..Demand::default() };
+    let demand = Demand {
+        noise,
+        required: Some(0.015),
+        ..Demand::default()
+    };
     closed_loop(&scene, seeds, demand, |seed| {
         let capture = Capture::new(&scene, 80, seed).unseen(|cell| scene.coverage[cell] < least);
         match decibels {

@@ -15,7 +15,10 @@ use super::case::Case;
 pub fn all() -> Vec<(&'static str, Vec<Case>)> {
     vec![
         ("Strong and singular transport", transport::CASES.to_vec()),
-        ("Cells that take no part, or only in part", coverage::CASES.to_vec()),
+        (
+            "Cells that take no part, or only in part",
+            coverage::CASES.to_vec(),
+        ),
         ("Optics", optics::CASES.to_vec()),
         ("Noise and number of photographs", sampling::CASES.to_vec()),
         ("Grids", grids::CASES.to_vec()),

@@ -59,16 +59,17 @@ fn capture() -> Capture {
 
 /// All must be refused; measured is the first message.
 fn all_refused(results: Vec<Result<(), String>>) -> Outcome {
-    for (index, _) in results.iter().enumerate().filter(|(_, result)| result.is_ok()) {
-        eprintln!("number {index} is not refused");
-    }
     let count = results.len();
     let messages: Vec<String> = results.into_iter().filter_map(Result::err).collect();
     Outcome {
         holds: messages.len() == count,
         refused: true,
         bound: format!("{count} of {count} refused"),
-        measured: format!("{} refused, as: {}", messages.len(), messages.first().cloned().unwrap_or_default()),
+        measured: format!(
+            "{} refused, as: {}",
+            messages.len(),
+            messages.first().cloned().unwrap_or_default()
+        ),
     }
 }
 
@@ -85,7 +86,12 @@ fn observations(_: u64) -> Outcome {
         for value in NOT_FINITE {
             let mut capture = capture();
             spoil(&mut capture, value);
-            results.push(capture.solve().map(|_| ()).map_err(|error| error.to_string()));
+            results.push(
+                capture
+                    .solve()
+                    .map(|_| ())
+                    .map_err(|error| error.to_string()),
+            );
         }
     }
     all_refused(results)
@@ -99,24 +105,50 @@ fn options(_: u64) -> Outcome {
     };
     let mut results = Vec::new();
     for value in NOT_FINITE {
-        results.push(solve(SolveOptions { lambda: Some(value), ..SolveOptions::default() }));
-        results.push(solve(SolveOptions { tolerance: value, ..SolveOptions::default() }));
+        results.push(solve(SolveOptions {
+            lambda: Some(value),
+            ..SolveOptions::default()
+        }));
+        results.push(solve(SolveOptions {
+            tolerance: value,
+            ..SolveOptions::default()
+        }));
     }
     let Ok((inverse, _)) = capture.solve() else {
         return Outcome::new(false, "an inverse", "none");
     };
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e300] {
-        results.push(compiled(&inverse, &CompileOptions { reference_white: Some(value), ..CompileOptions::default() }));
+        results.push(compiled(
+            &inverse,
+            &CompileOptions {
+                reference_white: Some(value),
+                ..CompileOptions::default()
+            },
+        ));
     }
     for value in NOT_FINITE {
-        results.push(compiled(&inverse, &CompileOptions { inverse_error: value, ..CompileOptions::default() }));
-        results.push(compiled(&inverse, &CompileOptions { targets: Some(vec![value]), ..CompileOptions::default() }));
+        results.push(compiled(
+            &inverse,
+            &CompileOptions {
+                inverse_error: value,
+                ..CompileOptions::default()
+            },
+        ));
+        results.push(compiled(
+            &inverse,
+            &CompileOptions {
+                targets: Some(vec![value]),
+                ..CompileOptions::default()
+            },
+        ));
     }
     all_refused(results)
 }
 
 fn compiled(inverse: &InverseTransport, options: &CompileOptions) -> Result<(), String> {
-    compile(inverse, None, options).map(|_| ()).map_err(|error| error.to_string())
+    compile(inverse, None, options)
+        .map(|_| ())
+        .map_err(|error| error.to_string())
 }
 
 fn inverses(_: u64) -> Outcome {
@@ -155,7 +187,11 @@ fn settings(_: u64) -> Outcome {
             format!("[projector]\nblur = {value}\n"),
         ] {
             let parsed = Settings::parse(text.as_bytes(), Path::new("capture.toml"));
-            results.push(parsed.map(|_| ()).map_err(|error| error.to_string().replace('\n', " ")));
+            results.push(
+                parsed
+                    .map(|_| ())
+                    .map_err(|error| error.to_string().replace('\n', " ")),
+            );
         }
     }
     all_refused(results)
@@ -171,7 +207,9 @@ fn scaled(factor: f64) -> Outcome {
     match small.solve() {
         Ok((found, _)) => {
             let same = found.channels[0].gain.iter().zip(&plain.channels[0].gain);
-            let change = same.map(|(a, b)| (a * factor / b - 1.0).abs()).fold(0.0, f64::max);
+            let change = same
+                .map(|(a, b)| (a * factor / b - 1.0).abs())
+                .fold(0.0, f64::max);
             let table = compiled(&found, &CompileOptions::default());
             Outcome {
                 holds: change < 1e-6 || table.is_err(),
@@ -183,6 +221,9 @@ fn scaled(factor: f64) -> Outcome {
                 },
             }
         }
-        Err(error) => Outcome { refused: true, ..Outcome::new(true, bound, error.to_string()) },
+        Err(error) => Outcome {
+            refused: true,
+            ..Outcome::new(true, bound, error.to_string())
+        },
     }
 }

@@ -61,8 +61,13 @@ pub(super) const CASES: [Case; 10] = [
         theory: NO_HARM,
         run: |seeds| {
             let scene = uniform().blurred(0.5);
-            let demand = Demand { no_harm_only: true, ..Demand::default() };
-            closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 60, seed).with_blur(0.55))
+            let demand = Demand {
+                no_harm_only: true,
+                ..Demand::default()
+            };
+            closed_loop(&scene, seeds, demand, |seed| {
+                Capture::new(&scene, 60, seed).with_blur(0.55)
+            })
         },
     },
     Case {
@@ -85,19 +90,33 @@ fn uniform() -> Scene {
 }
 
 fn noiseless(scene: &Scene, seeds: u64, required: Option<f64>) -> Outcome {
-    let demand = Demand { required, ..Demand::default() };
+    let demand = Demand {
+        required,
+        ..Demand::default()
+    };
     closed_loop(scene, seeds, demand, |seed| Capture::new(scene, 60, seed))
 }
 
 fn no_harm(scene: &Scene, seeds: u64) -> Outcome {
-    let demand = Demand { no_harm_only: true, ..Demand::default() };
-    closed_loop(scene, seeds, demand, |seed| Capture::new(scene, 60, seed).noisy(50.0, seed))
+    let demand = Demand {
+        no_harm_only: true,
+        ..Demand::default()
+    };
+    closed_loop(scene, seeds, demand, |seed| {
+        Capture::new(scene, 60, seed).noisy(50.0, seed)
+    })
 }
 
 fn blurred(seeds: u64, deviation: f64, required: Option<f64>) -> Outcome {
     let scene = uniform().blurred(deviation);
-    let demand = Demand { required, no_harm_only: required.is_none(), ..Demand::default() };
-    closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 60, seed).with_blur(deviation))
+    let demand = Demand {
+        required,
+        no_harm_only: required.is_none(),
+        ..Demand::default()
+    };
+    closed_loop(&scene, seeds, demand, |seed| {
+        Capture::new(&scene, 60, seed).with_blur(deviation)
+    })
 }
 
 /// Each cell shows `part` of the cell that stands opposite in the same valley.

@@ -10,11 +10,36 @@ const LASSO: &str = "cond sigma sqrt(s ln N / m) and the tail of K";
 const FOLDS: &str = "every pattern is held out once; without proof there is no operator";
 
 pub(super) const CASES: [Case; 11] = [
-    Case { name: "noise, 60 dB", reason: "200 photographs of a textured scene", theory: LASSO, run: |s| noise(s, 60.0, None) },
-    Case { name: "noise, 50 dB", reason: "200 photographs of a textured scene", theory: LASSO, run: |s| noise(s, 50.0, Some(0.004)) },
-    Case { name: "noise, 40 dB", reason: "200 photographs of a textured scene", theory: LASSO, run: |s| noise(s, 40.0, Some(0.008)) },
-    Case { name: "noise, 30 dB", reason: "200 photographs of a textured scene", theory: LASSO, run: |s| noise(s, 30.0, None) },
-    Case { name: "noise, 20 dB", reason: "noise is a tenth of the light and more than the interreflection of most cells", theory: LASSO, run: |s| noise(s, 20.0, None) },
+    Case {
+        name: "noise, 60 dB",
+        reason: "200 photographs of a textured scene",
+        theory: LASSO,
+        run: |s| noise(s, 60.0, None),
+    },
+    Case {
+        name: "noise, 50 dB",
+        reason: "200 photographs of a textured scene",
+        theory: LASSO,
+        run: |s| noise(s, 50.0, Some(0.004)),
+    },
+    Case {
+        name: "noise, 40 dB",
+        reason: "200 photographs of a textured scene",
+        theory: LASSO,
+        run: |s| noise(s, 40.0, Some(0.008)),
+    },
+    Case {
+        name: "noise, 30 dB",
+        reason: "200 photographs of a textured scene",
+        theory: LASSO,
+        run: |s| noise(s, 30.0, None),
+    },
+    Case {
+        name: "noise, 20 dB",
+        reason: "noise is a tenth of the light and more than the interreflection of most cells",
+        theory: LASSO,
+        run: |s| noise(s, 20.0, None),
+    },
     Case {
         name: "8 random photographs",
         reason: "far fewer than any theory of recovery asks for",
@@ -60,18 +85,29 @@ fn scene() -> Scene {
 
 fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> Outcome {
     let scene = scene();
-    let demand = Demand { noise: 10_f64.powf(-decibels / 20.0), required, ..Demand::default() };
-    closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 200, seed).noisy(decibels, seed))
+    let demand = Demand {
+        noise: 10_f64.powf(-decibels / 20.0),
+        required,
+        ..Demand::default()
+    };
+    closed_loop(&scene, seeds, demand, |seed| {
+        Capture::new(&scene, 200, seed).noisy(decibels, seed)
+    })
 }
 
 fn no_harm(seeds: u64, make: impl Fn(&Scene, u64) -> Capture) -> Outcome {
     let scene = scene();
-    let demand = Demand { no_harm_only: true, ..Demand::default() };
+    let demand = Demand {
+        no_harm_only: true,
+        ..Demand::default()
+    };
     closed_loop(&scene, seeds, demand, |seed| make(&scene, seed))
 }
 
 fn few(seeds: u64, bernoulli: usize) -> Outcome {
-    no_harm(seeds, |scene, seed| Capture::new(scene, bernoulli, seed).noisy(50.0, seed))
+    no_harm(seeds, |scene, seed| {
+        Capture::new(scene, bernoulli, seed).noisy(50.0, seed)
+    })
 }
 
 /// Keeps the photographs whose index passes.
@@ -88,11 +124,19 @@ fn kept(mut capture: Capture, filter: impl Fn(usize) -> bool) -> Capture {
 fn five(_: u64) -> Outcome {
     let capture = kept(Capture::new(&scene(), 20, 1), |k| k % 8 == 0);
     let result = capture.solve().map(|_| "an inverse".to_owned());
-    Outcome::refusal(result.map_err(|error| error.to_string()), "it needs at least 8")
+    Outcome::refusal(
+        result.map_err(|error| error.to_string()),
+        "it needs at least 8",
+    )
 }
 
 /// Photographs of other patterns, without noise.
-fn taken(scene: &Scene, seed: u64, bernoulli: usize, change: impl Fn(&mut DMatrix<f64>)) -> Capture {
+fn taken(
+    scene: &Scene,
+    seed: u64,
+    bernoulli: usize,
+    change: impl Fn(&mut DMatrix<f64>),
+) -> Capture {
     let mut capture = Capture::new(scene, bernoulli, seed);
     change(&mut capture.patterns);
     capture.light = vec![scene.transport() * &capture.patterns];

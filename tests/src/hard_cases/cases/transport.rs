@@ -14,16 +14,16 @@ pub(super) const CASES: [Case; 7] = [
         run: white_wedge,
     },
     Case {
-        name: "albedo .99 in a 30 degree wedge, light falls to a twentieth",
+        name: "albedo .99 in a 30 degree wedge, light falls to a fiftieth",
         reason: "the same with a dim border: condition above 100",
         theory: "error of the inverse times the condition number",
         run: dim_wedge,
     },
     Case {
-        name: "nearly singular: albedo .999 in a 1 degree wedge",
-        reason: "99 % of all light come back: condition above 100, and 200 bounces are not enough",
-        theory: "error of the inverse times the condition number",
-        run: deep_wedge,
+        name: "nearly singular: inside of a sphere, albedo .995",
+        reason: "every cell lights every other alike, F = 1/N; 200 bounces are not enough",
+        theory: "closed form: condition 1 / (1 - albedo) = 200; images are those that light can make",
+        run: sphere,
     },
     Case {
         name: "exactly singular: two lights on one patch",
@@ -54,22 +54,31 @@ pub(super) const CASES: [Case; 7] = [
 fn white_wedge(seeds: u64) -> Outcome {
     let grid = grid(GRID);
     let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99);
-    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| Capture::new(&scene, 100, seed));
+    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
+        Capture::new(&scene, 100, seed)
+    });
     with_condition(&scene, 6.0, outcome)
 }
 
 fn dim_wedge(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.05);
-    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| Capture::new(&scene, 100, seed));
+    let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.02);
+    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
+        Capture::new(&scene, 100, seed)
+    });
     with_condition(&scene, 100.0, outcome)
 }
 
-fn deep_wedge(seeds: u64) -> Outcome {
+fn sphere(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let scene = Scene::new(grid, &Panels::corner(grid, 1.0), 0.999);
-    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| Capture::new(&scene, 100, seed));
-    with_condition(&scene, 100.0, outcome)
+    let mut scene = Scene::new(grid, &Panels::corner(grid, 90.0), 0.995);
+    scene.form_factors.fill(1.0 / grid.cells() as f64);
+    // In focus; but light is so even there that only images it can make are fair.
+    scene.blur = Some(nalgebra::DMatrix::identity(grid.cells(), grid.cells()));
+    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
+        Capture::new(&scene, 100, seed)
+    });
+    with_condition(&scene, 190.0, outcome)
 }
 
 fn with_condition(scene: &Scene, least: f64, mut outcome: Outcome) -> Outcome {
@@ -89,7 +98,10 @@ fn doubled_light(seeds: u64) -> Outcome {
         merge[(cell - 1, cell)] = 1.0;
     }
     scene.blur = Some(merge);
-    let demand = Demand { no_harm_only: true, ..Demand::default() };
+    let demand = Demand {
+        no_harm_only: true,
+        ..Demand::default()
+    };
     let mut outcome = closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 80, seed));
     if let Ok((_, report)) = Capture::new(&scene, 80, 0).solve() {
         let left_out: Vec<usize> = report.left_out.iter().map(|out| out.cell).collect();
@@ -105,7 +117,10 @@ fn flat(seeds: u64) -> Outcome {
 
 fn even(seeds: u64) -> Outcome {
     let outcome = chosen(0.95, seeds, Compensation::Nothing);
-    Outcome { refused: outcome.holds, ..outcome }
+    Outcome {
+        refused: outcome.holds,
+        ..outcome
+    }
 }
 
 /// What is chosen for a flat scene with albedos from `least` to .95, at 40 dB.
@@ -141,8 +156,15 @@ fn shifted(_: u64) -> Outcome {
     let mut capture = Capture::new(&scene, 60, 1);
     let shown = capture.patterns.clone();
     for k in 1..shown.ncols() {
-        capture.patterns.set_column(k, &shown.column((k + 1) % shown.ncols()));
+        capture
+            .patterns
+            .set_column(k, &shown.column((k + 1) % shown.ncols()));
     }
-    let result = capture.solve().map(|(_, report)| format!("{:?}", report.prediction));
-    Outcome::refusal(result.map_err(|error| error.to_string()), "check that the patterns belong")
+    let result = capture
+        .solve()
+        .map(|(_, report)| format!("{:?}", report.prediction));
+    Outcome::refusal(
+        result.map_err(|error| error.to_string()),
+        "check that the patterns belong",
+    )
 }
