@@ -7,7 +7,7 @@ use super::super::scene::{Panels, Scene};
 use super::super::{GRID, grid};
 use iltm::solve::WhyLeftOut;
 
-pub(super) const CASES: [Case; 6] = [
+pub(super) const CASES: [Case; 7] = [
     Case {
         name: "black cells",
         reason: "albedo 0: no gain makes them bright",
@@ -43,6 +43,12 @@ pub(super) const CASES: [Case; 6] = [
         reason: "every border cell throws light that the camera cannot measure",
         theory: "the same",
         run: |seeds| partly(seeds, 0.95, None),
+    },
+    Case {
+        name: "partly covered cells in colour, 50 dB",
+        reason: "three channels vote on one operator, and the unseen cells' albedo differs in each",
+        theory: "the same; a small deviation a channel",
+        run: colour,
     },
 ];
 
@@ -110,15 +116,39 @@ fn unseen(seeds: u64) -> Outcome {
     })
 }
 
-/// Cells covered to less than `least` are too small for the camera.
-fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> Outcome {
+fn partly_covered() -> Scene {
     let grid = grid(GRID);
     let panels = Panels {
         folds: vec![1.7, 6.1, 10.6, 15.2, 19.4],
         rows: (0.4, 11.6),
         wedge: 75.0,
     };
-    let scene = Scene::new(grid, &panels, 0.7).textured(0.4, 0.9, 2);
+    Scene::new(grid, &panels, 0.7).textured(0.4, 0.9, 2)
+}
+
+/// Judged in the first channel.
+fn colour(seeds: u64) -> Outcome {
+    let scene = partly_covered();
+    let others = [3, 4].map(|texture| scene.clone().textured(0.2, 0.8, texture));
+    let demand = Demand {
+        noise: 10_f64.powf(-2.5),
+        required: Some(0.015),
+        ..Demand::default()
+    };
+    closed_loop(&scene, seeds.min(2), demand, |seed| {
+        let mut capture = Capture::new(&scene, 80, seed);
+        for other in &others {
+            capture.light.push(other.transport() * &capture.patterns);
+        }
+        capture
+            .unseen(|cell| scene.coverage[cell] < 0.4)
+            .noisy(50.0, seed)
+    })
+}
+
+/// Cells covered to less than `least` are too small for the camera.
+fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> Outcome {
+    let scene = partly_covered();
     let noise = decibels.map_or(0.0, |decibels| 10_f64.powf(-decibels / 20.0));
     let demand = Demand {
         noise,
