@@ -145,9 +145,11 @@ impl<'p> Solver<'p> {
                 );
                 found.push(solution);
             }
-            let misfit = (squared / total).sqrt();
+            // Without light to predict, or without forward transport, nothing is told.
+            let misfit = Some((squared / total).sqrt()).filter(|misfit| misfit.is_finite());
+            let misfit = misfit.unwrap_or(f64::INFINITY);
             choice.trials.push(LambdaTrial { lambda, misfit });
-            if misfit < least {
+            if misfit < least || choice.trials.len() == 1 {
                 least = misfit;
                 choice.lambda = lambda;
                 for (fold, solution) in folds.iter_mut().zip(found) {

@@ -64,7 +64,7 @@ impl Camera {
         let all = roles
             .iter()
             .copied()
-            .zip(patterns.column_iter().map(|c| c.into_owned()));
+            .zip(patterns.column_iter().map(nalgebra::Matrix::into_owned));
         let all = std::iter::once((Role::Black, black.column(0).into_owned())).chain(all);
         for (index, (role, pattern)) in (0..).zip(all) {
             let shot = Shot {
