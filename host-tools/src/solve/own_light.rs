@@ -7,13 +7,15 @@
 
 use super::observed::{Observed, ObservedChannel};
 use crate::capture::Role;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A cell has to give back this much of a typical cell's own light: a step of an
 /// 8-bit code.
 const LEAST_OWN: f64 = 1.0 / 255.0;
 /// Standard errors by which own light has to differ from none.
 const SIGNIFICANT: f64 = 3.5;
+/// With fewer cells, one cell's own light is much of all cells' together.
+const ENOUGH_CELLS: usize = 32;
 /// With fewer random patterns than this, all patterns are used.
 const RANDOM: usize = 8;
 
@@ -51,8 +53,9 @@ pub(super) fn left_out(observed: &Observed<'_>, landed: &DMatrix<f64>) -> Vec<Le
         .map(|live| (!live).then_some(WhyLeftOut::Unseen))
         .collect();
     for channel in &observed.channels {
+        let total = total(channel, observed.live, &chosen);
         let own: Vec<Own> = (0..cells)
-            .map(|cell| Own::new(landed, channel, cell, &chosen))
+            .map(|cell| Own::new(landed, channel, cell, (&chosen, total.as_ref())))
             .collect();
         let seen = own.iter().zip(observed.live).filter(|(_, live)| **live);
         let mut slopes: Vec<f64> = seen.map(|(own, _)| own.slope).collect();
@@ -98,53 +101,73 @@ struct Own {
 }
 
 impl Own {
+    /// `total` is the light of all cells together, by photograph: what follows
+    /// it is not a cell's own.
     fn new(
         landed: &DMatrix<f64>,
         channel: &ObservedChannel<'_>,
         cell: usize,
-        chosen: &[usize],
+        (chosen, total): (&[usize], Option<&DVector<f64>>),
     ) -> Self {
         let count = chosen.len() as f64;
-        let pairs = || {
-            let of = |k: &usize| (landed[(cell, *k)], channel.light[(cell, *k)]);
-            chosen.iter().map(of)
+        let of = |matrix: &DMatrix<f64>| -> Vec<f64> {
+            chosen.iter().map(|k| matrix[(cell, *k)]).collect()
         };
-        let (shown, seen) = pairs().fold((0.0, 0.0), |sum, pair| (sum.0 + pair.0, sum.1 + pair.1));
-        let (shown, seen) = (shown / count, seen / count);
-        let (mut both, mut spread) = (0.0, 0.0);
-        for (p, c) in pairs() {
-            both += (p - shown) * (c - seen);
-            spread += (p - shown).powi(2);
-        }
+        let (mut shown, mut seen) = (
+            DVector::from_vec(of(landed)),
+            DVector::from_vec(of(channel.light)),
+        );
+        let mean = seen.mean();
         let noise = channel.noise[cell].unlit;
-        let lit_by_others = seen > 0.0 && seen > SIGNIFICANT * noise / count.sqrt();
-        if spread < 1e-9 {
-            return Self {
-                slope: seen,
-                error: None,
-                mean: seen,
-                lit_by_others,
-            };
+        let lit_by_others = mean > 0.0 && mean > SIGNIFICANT * noise / count.sqrt();
+        for series in [&mut shown, &mut seen] {
+            let mean = series.mean();
+            series.add_scalar_mut(-mean);
+            if let Some(total) = total {
+                *series -= total * (total.dot(series) / total.norm_squared());
+            }
         }
-        let slope = both / spread;
-        let rest: f64 = pairs()
-            .map(|(p, c)| (c - seen - slope * (p - shown)).powi(2))
-            .sum();
-        let error = (rest / (count - 2.0).max(1.0) / spread).sqrt();
+        let spread = shown.norm_squared();
+        let (slope, error) = if spread < 1e-9 {
+            (mean, None)
+        } else {
+            let slope = shown.dot(&seen) / spread;
+            let rest = (&seen - &shown * slope).norm_squared();
+            let freedom = (count - 3.0).max(1.0);
+            (slope, Some((rest / freedom / spread).sqrt()))
+        };
         Self {
             slope,
-            error: Some(error),
-            mean: seen,
+            error,
+            mean,
             lit_by_others,
         }
     }
 
+    /// Whether there is no proof that the cell has hardly any light of its own.
     fn counts(&self, typical: f64) -> bool {
         // Written so that what is not a number does not count.
         let enough = self.slope > 0.0 && self.slope >= LEAST_OWN * typical && self.mean > 0.0;
-        enough
-            && self
-                .error
-                .is_none_or(|error| self.slope > SIGNIFICANT * error)
+        match self.error {
+            Some(error) => {
+                let unknown = self.slope + 2.0 * error > 0.5 * typical;
+                self.mean > 0.0 && (unknown || enough && self.slope > SIGNIFICANT * error)
+            }
+            None => enough,
+        }
     }
+}
+
+/// Light of all seen cells together in the photographs `chosen`, mean removed;
+/// `None` if one cell's own would be much of it, or it never changes.
+fn total(channel: &ObservedChannel<'_>, live: &[bool], chosen: &[usize]) -> Option<DVector<f64>> {
+    let seen: Vec<usize> = (0..live.len()).filter(|cell| live[*cell]).collect();
+    if seen.len() < ENOUGH_CELLS {
+        return None;
+    }
+    let of = |k: &usize| seen.iter().map(|cell| channel.light[(*cell, *k)]).sum();
+    let mut total = DVector::from_vec(chosen.iter().map(of).collect::<Vec<f64>>());
+    let mean = total.mean();
+    total.add_scalar_mut(-mean);
+    (total.norm() > 1e-9 * mean.abs()).then_some(total)
 }

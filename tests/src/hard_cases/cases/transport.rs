@@ -78,7 +78,16 @@ fn sphere(seeds: u64) -> Outcome {
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
         Capture::new(&scene, 100, seed)
     });
-    with_condition(&scene, 190.0, outcome)
+    let mut outcome = with_condition(&scene, 190.0, outcome);
+    if let Ok((_, report)) = Capture::new(&scene, 100, 0).solve() {
+        outcome.holds &= report.left_out.is_empty();
+        outcome.measured = format!(
+            "{} cells left out; {}",
+            report.left_out.len(),
+            outcome.measured
+        );
+    }
+    outcome
 }
 
 fn with_condition(scene: &Scene, least: f64, mut outcome: Outcome) -> Outcome {
