@@ -86,6 +86,7 @@ fn measure(
         roles: &roles,
         live: &vec![true; grid.cells()],
         channels: channels.clone(),
+        blur: 0.0,
     };
     let options = SolveOptions {
         method,

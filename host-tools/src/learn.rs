@@ -3,7 +3,7 @@
 use crate::capture::{self, CaptureError, CaptureOptions, FineFlood, Measurements};
 use crate::compile::{self, CompileError, CompileOptions, Compiled};
 use crate::progress::Progress;
-use crate::solve::{self, InverseTransport, SolveError, SolveOptions, SolveReport};
+use crate::solve::{self, Compensation, InverseTransport, SolveError, SolveOptions, SolveReport};
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
@@ -13,7 +13,8 @@ use thiserror::Error;
 pub struct Learned {
     /// The registered photographs.
     pub measurements: Measurements,
-    /// The inverse light transport.
+    /// The inverse light transport that the table has: without an operator if
+    /// [`SolveReport::compensation`] says so.
     pub inverse: InverseTransport,
     /// How the inverse came about.
     pub report: SolveReport,
@@ -33,25 +34,26 @@ pub enum LearnError {
     /// The inverse cannot be stored.
     #[error(transparent)]
     Compile(#[from] CompileError),
-    /// By the photographs held out of the solve, the table would do harm.
+    /// By the photographs held out of the solve, any table would do harm.
     #[error(
-        "the table would make the picture worse: predicted error {compensated:.4}, {other:.4} with {instead}"
+        "no table helps: photographs that the solve had not seen predict an error of {uncompensated:.4} with nothing, {gain_only:.4} with gain alone and {compensated:.4} with the operator"
     )]
     Worse {
-        /// Predicted error with the table.
+        /// Predicted error of the picture as it is.
+        uncompensated: f64,
+        /// Predicted error with gain alone.
+        gain_only: f64,
+        /// Predicted error with the operator.
         compensated: f64,
-        /// Predicted error of what is better.
-        other: f64,
-        /// What is better.
-        instead: &'static str,
     },
 }
 
-/// Reads a capture, solves it and compiles the table.
+/// Reads a capture, solves it and compiles the table; one without an operator if
+/// photographs that the solve had not seen do not show that the operator helps.
 ///
 /// # Errors
 /// [`LearnError`] by the step that failed; also if photographs that the solve had
-/// not seen say that the table would be worse than none or than gain alone.
+/// not seen say that any table would be worse than none.
 pub fn learn(
     capture: &Path,
     photographs: &CaptureOptions,
@@ -61,27 +63,23 @@ pub fn learn(
 ) -> Result<Learned, LearnError> {
     let measurements = capture::read(capture, photographs, progress)?;
     let (inverse, report) = solve::solve(&measurements, options, progress)?;
-    if let Some(prediction) = report.prediction {
-        let compensated = prediction.compensated;
-        for (other, instead) in [
-            (prediction.uncompensated, "no compensation"),
-            (prediction.gain_only, "gain alone"),
-        ] {
-            if compensated > other {
-                return Err(LearnError::Worse {
-                    compensated,
-                    other,
-                    instead,
-                });
-            }
+    let inverse = match report.compensation {
+        Compensation::Operator => inverse,
+        Compensation::GainOnly => solve::gain_only(&(&measurements).into(), &report)?,
+        Compensation::Nothing => {
+            return Err(LearnError::Worse {
+                uncompensated: report.prediction.uncompensated,
+                gain_only: report.prediction.gain_only,
+                compensated: report.prediction.compensated,
+            });
         }
-    }
+    };
     progress.begin("compiling the table", 0);
     let fine = compile::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
     let options = CompileOptions {
         projector: measurements.settings.projector.response,
         reference_white,
-        inverse_error: report.prediction.map_or(0.0, |p| p.compensated),
+        inverse_error: report.predicted_error(),
         provenance: provenance(capture, &measurements, &report),
         targets: None,
     };
@@ -106,8 +104,8 @@ struct Provenance<'a> {
     live_cells: usize,
     lambda: f64,
     condition: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    predicted_error: Option<PredictedError>,
+    compensation: &'static str,
+    predicted_error: PredictedError,
 }
 
 #[derive(Serialize)]
@@ -146,11 +144,12 @@ fn provenance(capture: &Path, measurements: &Measurements, report: &SolveReport)
         live_cells: report.live_cells,
         lambda: report.lambda,
         condition: report.condition,
-        predicted_error: report.prediction.map(|prediction| PredictedError {
-            uncompensated: prediction.uncompensated,
-            gain_only: prediction.gain_only,
-            compensated: prediction.compensated,
-        }),
+        compensation: report.compensation.name(),
+        predicted_error: PredictedError {
+            uncompensated: report.prediction.uncompensated,
+            gain_only: report.prediction.gain_only,
+            compensated: report.prediction.compensated,
+        },
     };
     // A struct of numbers and strings always has a TOML form.
     toml::to_string(&provenance).unwrap_or_default()

@@ -10,6 +10,7 @@
 pub mod capture;
 pub mod cli;
 pub mod compile;
+pub mod content;
 pub mod demo;
 pub mod device;
 pub mod learn;

@@ -1,7 +1,8 @@
 //! `capture.toml`: what photographs cannot say about themselves.
 
 use super::{CaptureError, Response};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
@@ -20,6 +21,7 @@ const MAX_BYTES: u64 = 64 << 10;
 /// response = "linear"     # "linear", "srgb" or a gamma number
 /// [projector]
 /// response = "srgb"       # the same choice
+/// blur = 0.5              # out of focus: standard deviation in cells, 0 to 4
 /// [scene]
 /// name = "M-shaped panels"
 /// ```
@@ -49,12 +51,30 @@ pub struct ProjectorSettings {
     /// From projector input values to light. Patterns are only on or off, so
     /// photographs do not depend on it; compensated frames do.
     pub response: Response,
+    /// Standard deviation of the projector's blur on the scene, in cells, 0 to
+    /// 4; 0 if it is in focus.
+    #[serde(deserialize_with = "blur")]
+    pub blur: f64,
+}
+
+/// Most blur that makes sense: a cell's light then spreads over some hundred.
+const MOST_BLUR: f64 = 4.0;
+
+/// Reads a blur and refuses what cannot be one.
+fn blur<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let blur = f64::deserialize(from)?;
+    if (0.0..=MOST_BLUR).contains(&blur) {
+        return Ok(blur);
+    }
+    let message = format!("a blur of {blur} cells; it must be from 0 to {MOST_BLUR}");
+    Err(D::Error::custom(message))
 }
 
 impl Default for ProjectorSettings {
     fn default() -> Self {
         Self {
             response: Response::Srgb,
+            blur: 0.0,
         }
     }
 }

@@ -329,7 +329,8 @@ impl From<LearnError> for Failure {
             LearnError::Worse { .. } => Self::new(
                 Kind::Solve,
                 error,
-                "Take more Bernoulli photographs, or average several of each pattern.",
+                "Project as it is: an even, flat scene needs no table. If it is neither, take more \
+                 Bernoulli photographs, or average several of each pattern.",
             ),
         }
     }

@@ -8,13 +8,13 @@ use super::progress::progress;
 use crate::capture::{CaptureOptions, Why};
 use crate::compile::sign::read_key;
 use crate::learn::{Learned, learn};
-use crate::solve::SolveOptions;
+use crate::solve::{Compensation, SolveOptions, WhyLeftOut};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::time::Instant;
 
-/// Cells that are named one by one before the rest is only counted.
-const MOST_LINES: usize = 8;
+/// Places that are named before the rest is only counted.
+const MOST_PLACES: usize = 6;
 
 pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
@@ -71,6 +71,7 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "cols": grid.cols(),
         "channels": learned.inverse.channels.len(),
         "live_cells": report.live_cells,
+        "left_out": left_out(learned),
         "method": report.method.name(),
         "photographs": {
             "white": report.photographs.white,
@@ -80,11 +81,13 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "lambda": report.lambda,
         "iterations": report.iterations,
         "condition": report.condition,
-        "predicted_error": report.prediction.map(|prediction| json!({
-            "uncompensated": prediction.uncompensated,
-            "gain_only": prediction.gain_only,
-            "compensated": prediction.compensated,
-        })),
+        "compensation": report.compensation.name(),
+        "predicted_error": {
+            "uncompensated": report.prediction.uncompensated,
+            "gain_only": report.prediction.gain_only,
+            // `null` where the inverse found would let light grow without end.
+            "compensated": report.prediction.compensated,
+        },
         "reference_white": learned.compiled.white.light,
         "bytes": learned.compiled.image.len(),
         "tiers": tiers(learned),
@@ -100,26 +103,81 @@ fn tiers(learned: &Learned) -> Vec<Value> {
         .collect()
 }
 
-/// What the capture could not be used for, a line each.
+/// Cells that the table leaves dark, a line for each reason.
 fn left_out(learned: &Learned) -> Vec<String> {
-    let diagnostics = &learned.measurements.diagnostics;
     let cols = learned.inverse.grid.cols();
-    let mut lines: Vec<String> = Vec::new();
-    for left_out in diagnostics.left_out.iter().take(MOST_LINES) {
-        let (row, col) = (left_out.cell / cols, left_out.cell % cols);
-        let why = match left_out.why {
-            Why::TooFewPixels { pixels } => format!("only {pixels} camera pixels see it alone"),
-            Why::Saturated { saturated, pixels } => {
-                format!("{saturated} of its {pixels} pixels are saturated")
-            }
+    let mut by_reason: Vec<(&str, Vec<usize>)> = Vec::new();
+    for out in &learned.report.left_out {
+        let why = match out.why {
+            WhyLeftOut::Unlit => "lit by nothing, though light of others is seen there",
+            WhyLeftOut::Black => "black: they give back no light",
+            WhyLeftOut::Unseen => unseen(learned, out.cell),
         };
-        lines.push(format!("row {row}, column {col} left out: {why}"));
+        match by_reason.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, cells)) => cells.push(out.cell),
+            None => by_reason.push((why, vec![out.cell])),
+        }
     }
-    let more = diagnostics.left_out.len().saturating_sub(MOST_LINES);
+    let line = |(why, cells): (&str, Vec<usize>)| {
+        let (count, verb) = (
+            cells.len(),
+            if cells.len() == 1 {
+                "cell is"
+            } else {
+                "cells are"
+            },
+        );
+        let places = places(&cells, cols);
+        format!("{count} {verb} left out, {why}: {places}")
+    };
+    by_reason.into_iter().map(line).collect()
+}
+
+/// Why the camera could not measure a cell.
+fn unseen(learned: &Learned, cell: usize) -> &'static str {
+    let diagnostics = &learned.measurements.diagnostics;
+    let found = diagnostics.left_out.iter().find(|out| out.cell == cell);
+    match found.map(|out| out.why) {
+        Some(Why::Saturated { .. }) => "saturated in the flood photograph",
+        _ => "seen alone by too few camera pixels (what they throw on others is accounted for)",
+    }
+}
+
+/// Cells as rows and columns: whole rows together, the others by runs.
+fn places(cells: &[usize], cols: usize) -> String {
+    let mut whole: Vec<usize> = Vec::new();
+    let mut runs: Vec<String> = Vec::new();
+    for of_row in cells.chunk_by(|a, b| a / cols == b / cols) {
+        let row = of_row[0] / cols;
+        if of_row.len() == cols {
+            whole.push(row);
+            continue;
+        }
+        for run in of_row.chunk_by(|a, b| a + 1 == *b) {
+            let columns = range("column", run[0] % cols, run[run.len() - 1] % cols);
+            runs.push(format!("row {row} {columns}"));
+        }
+    }
+    let rows = whole.chunk_by(|a, b| a + 1 == *b);
+    let mut named: Vec<String> = rows
+        .map(|run| range("row", run[0], run[run.len() - 1]))
+        .collect();
+    named.append(&mut runs);
+    let more = named.len().saturating_sub(MOST_PLACES);
+    named.truncate(MOST_PLACES);
+    let mut text = named.join(", ");
     if more > 0 {
-        lines.push(format!("and {more} more cells left out"));
+        let _ = write!(text, " and {more} more places");
     }
-    lines
+    text
+}
+
+fn range(what: &str, first: usize, last: usize) -> String {
+    if first == last {
+        format!("{what} {first}")
+    } else {
+        format!("{what}s {first}-{last}")
+    }
 }
 
 /// What was learned, for people.
@@ -145,13 +203,53 @@ pub(super) fn text(learned: &Learned) -> String {
         "scene       condition {:.2}, reference white {:.4} of the camera's full scale",
         report.condition, learned.compiled.white.light
     );
-    if let Some(prediction) = report.prediction {
+    let prediction = report.prediction;
+    let _ = writeln!(
+        text,
+        "error       {:.4} with an operator; {:.4} with gain alone, {:.4} with nothing\n\
+         \x20           (predicted from {} photographs that the solve had not seen)",
+        prediction.compensated,
+        prediction.gain_only,
+        prediction.uncompensated,
+        prediction.photographs,
+    );
+    if report.compensation == Compensation::GainOnly {
+        let clipped = report.clipped;
+        let cancelled = 100.0 * prediction.cancelled();
+        let why = if cancelled < 0.2 {
+            format!("it would cancel {cancelled:.2} % of the light")
+        } else if clipped.compensated < clipped.gain_only {
+            format!(
+                "it is not proven better: {:.1} standard errors, and 2 are asked for",
+                prediction.confidence
+            )
+        } else {
+            format!(
+                "clipped images err by {:.4} with it and {:.4} without",
+                clipped.compensated, clipped.gain_only
+            )
+        };
         let _ = writeln!(
             text,
-            "error       {:.4} with this table; {:.4} with gain alone, {:.4} with nothing\n\
-             \x20           (predicted from photographs that the solve had not seen)",
-            prediction.compensated, prediction.gain_only, prediction.uncompensated
+            "            the table has gains and no operator: {why}"
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_named_by_whole_rows_and_runs() {
+        let two_rows: Vec<usize> = (0..12).collect();
+        assert_eq!(places(&two_rows, 6), "rows 0-1");
+        assert_eq!(
+            places(&[7, 8, 10, 18, 19, 20, 21, 22, 23], 6),
+            "row 3, row 1 columns 1-2, row 1 column 4"
+        );
+        let scattered: Vec<usize> = (0..10).map(|k| 12 * k).collect();
+        assert!(places(&scattered, 6).ends_with("and 4 more places"));
+    }
 }

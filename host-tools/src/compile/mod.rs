@@ -3,7 +3,7 @@
 //! | step | file |
 //! |---|---|
 //! | light of the brightest uniform grey | [`white`] |
-//! | what video looks like, for choosing and predicting | [`content`] |
+//! | what video looks like, for choosing and predicting | [`content`](crate::content) |
 //! | `K` in the Haar domain, most useful entries first, cut into tiers | [`ladder`] |
 //! | `i16` entries with a power of two a row | [`quantise`] |
 //! | gains, also finer than the cells | [`gain`] |
@@ -14,7 +14,6 @@
 //! The image is checked by the runtime's own reader before it is returned, so
 //! what leaves here is known to load.
 
-pub mod content;
 pub mod gain;
 pub mod image;
 pub mod ladder;
@@ -24,6 +23,7 @@ pub mod sign;
 mod table;
 pub mod white;
 
+pub use crate::content;
 pub use gain::FineGains;
 pub use ladder::Ladder;
 pub use table::{CompileError, CompileOptions, Compiled, compile};

@@ -15,6 +15,7 @@ use iltm_runtime::image::layout::{MAX_PROVENANCE, SectionKind, fine_gain, meta, 
 use iltm_runtime::image::{ImageError, Table};
 use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
 use iltm_runtime::units::Light;
+use std::ops::Range;
 use thiserror::Error;
 
 /// What a table needs beside the inverse.
@@ -34,6 +35,12 @@ pub struct CompileOptions {
     pub provenance: String,
 }
 
+/// What the image can hold as the light of reference white, camera units.
+const WHITES: Range<f64> = 1.0 / 16_777_216.0..256.0;
+
+/// Light under black that can come from a camera, in camera units.
+const MOST_AMBIENT: f64 = 256.0;
+
 /// A table image and how it came about.
 #[derive(Clone, Debug)]
 pub struct Compiled {
@@ -52,16 +59,34 @@ pub enum CompileError {
     #[error("no cell of the scene can reach any brightness")]
     Dark,
     /// The reference white is not a positive number the image can hold.
-    #[error("a reference white of {light} camera units; it must be above 0 and below 256")]
+    #[error(
+        "a reference white of {light} camera units; it must be at least 2^-24 (6e-8) and below 256"
+    )]
     ReferenceWhite {
         /// The light asked for.
         light: f64,
+    },
+    /// A predicted error or a tier's target is no error.
+    #[error("an error of {error}; an error is a number from 0")]
+    Error {
+        /// What was given.
+        error: f64,
     },
     /// A number of the inverse is not finite.
     #[error("the inverse has a value that is not finite in {place}")]
     NotFinite {
         /// Where.
         place: &'static str,
+    },
+    /// Light under black that no camera gives.
+    #[error(
+        "the ambient light of cell {cell} is {light:.1e} camera units; at most {MOST_AMBIENT:.0} can be"
+    )]
+    Ambient {
+        /// The cell.
+        cell: usize,
+        /// Its light.
+        light: f64,
     },
     /// A row of the operator is too strong to be stored.
     #[error("row {row} of the operator is too strong for the table's number format")]
@@ -100,8 +125,12 @@ impl CompileError {
         match self {
             Self::Dark => "Check that the flood photograph shows the projection.",
             Self::ReferenceWhite { .. } => "Leave the reference white to the default.",
+            Self::Error { .. } => "Solve again: the prediction that was given is not usable.",
             Self::Provenance { .. } => "Shorten the scene's name.",
-            Self::NotFinite { .. } | Self::TooStrong { .. } | Self::Gain { .. } => {
+            Self::NotFinite { .. }
+            | Self::Ambient { .. }
+            | Self::TooStrong { .. }
+            | Self::Gain { .. } => {
                 "Take the photographs again: the inverse that they give is not usable."
             }
             Self::Operator(_) | Self::Image(_) => {
@@ -127,9 +156,10 @@ pub fn compile(
             bytes: options.provenance.len(),
         });
     }
+    check_options(options)?;
     let mut white = reference_white(inverse).ok_or(CompileError::Dark)?;
     white.light = options.reference_white.unwrap_or(white.light);
-    if !(white.light > 0.0 && white.light < 256.0) {
+    if !WHITES.contains(&white.light) {
         return Err(CompileError::ReferenceWhite { light: white.light });
     }
     let content = natural_images(inverse.grid) * white.light;
@@ -214,6 +244,17 @@ pub fn compile(
     })
 }
 
+fn check_options(options: &CompileOptions) -> Result<(), CompileError> {
+    let targets = options.targets.iter().flatten();
+    let errors = std::iter::once(&options.inverse_error).chain(targets);
+    for error in errors {
+        if !(0.0..=f64::MAX).contains(error) {
+            return Err(CompileError::Error { error: *error });
+        }
+    }
+    Ok(())
+}
+
 fn check_finite(inverse: &InverseTransport) -> Result<(), CompileError> {
     let refuse = |place| Err(CompileError::NotFinite { place });
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
@@ -230,6 +271,14 @@ fn check_finite(inverse: &InverseTransport) -> Result<(), CompileError> {
         }
         if !finite(&channel.ambient) {
             return refuse("the ambient light");
+        }
+        let ambient = channel.ambient.iter().enumerate();
+        let largest = ambient.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        if let Some((cell, light)) = largest.filter(|(_, light)| light.abs() > MOST_AMBIENT) {
+            return Err(CompileError::Ambient {
+                cell,
+                light: *light,
+            });
         }
     }
     Ok(())

@@ -4,7 +4,7 @@ use super::chart::{Axis, Chart, Point};
 use super::colour_scale::number;
 use super::facts::facts;
 use super::{ColourScale, Example, Report, Rung, Shown, Treatment};
-use crate::solve::Prediction;
+use crate::solve::{Compensation, Prediction};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -50,7 +50,7 @@ impl Report<'_> {
                 body { main {
                     (self.opening(words, prediction))
                     (self.scene())
-                    (self.pictures_section(prediction))
+                    (self.pictures_section())
                     (self.bounces())
                     (self.operator())
                     (self.accuracy())
@@ -62,26 +62,26 @@ impl Report<'_> {
         page.into_string()
     }
 
-    fn opening(&self, words: &Words, prediction: Option<Prediction>) -> Markup {
+    fn opening(&self, words: &Words, prediction: Prediction) -> Markup {
         let counts = self.learned.report.photographs;
+        let chosen = self.learned.report.compensation;
+        let mark = |way| if way == chosen { "best" } else { "" };
         html! {
             header {
                 p .over { "iltm report" }
                 h1 { (words.title) }
                 p .lead { (words.scene) }
-                @if let Some(prediction) = prediction {
-                    div .numbers {
-                        (headline(prediction.uncompensated, "projected as it is", ""))
-                        (headline(prediction.gain_only, "each pixel's brightness and colour corrected", ""))
-                        (headline(prediction.compensated, "interreflections cancelled as well", "best"))
-                    }
-                    p .quiet {
-                        "Error of the projection relative to the wanted image, by " (counts.held_out)
-                        " photographs that were kept out of the solve (and chose its one weight): "
-                        span .formula { "\u{2016}s\u{b7}photograph \u{2212} wanted\u{2016} / \u{2016}wanted\u{2016}" }
-                        ", with the one factor s for all pixels and colours that suits the photograph best, so that a "
-                        "dim projection alone is no error."
-                    }
+                div .numbers {
+                    (headline(prediction.uncompensated, "projected as it is", ""))
+                    (headline(prediction.gain_only, "each pixel's brightness and colour corrected", mark(Compensation::GainOnly)))
+                    (headline(prediction.compensated, "interreflections cancelled as well", mark(Compensation::Operator)))
+                }
+                p .quiet {
+                    "Error of the projection relative to the wanted image, by " (counts.held_out)
+                    " photographs that were kept out of the solve (and chose its one weight): "
+                    span .formula { "\u{2016}s\u{b7}photograph \u{2212} wanted\u{2016} / \u{2016}wanted\u{2016}" }
+                    ", with the one factor s for all pixels and colours that suits the photograph best, so that a "
+                    "dim projection alone is no error."
                 }
             }
         }
@@ -115,7 +115,7 @@ impl Report<'_> {
         }
     }
 
-    fn pictures_section(&self, prediction: Option<Prediction>) -> Markup {
+    fn pictures_section(&self) -> Markup {
         html! {
             section {
                 h2 { "What it does to images" }
@@ -129,12 +129,10 @@ impl Report<'_> {
                     "Light can be added but not taken back: where an image is darker than what arrives from elsewhere "
                     "anyway, the input is clipped at black, and an error remains that no projector could avoid."
                 }
-                @if let Some(prediction) = prediction {
-                    p .quiet {
-                        "What they cannot show is how far the learned transport itself is off: the held-out photographs "
-                        "put that at " (percent(prediction.compensated)) ". It comes on top of the errors below (as the root of the sum "
-                        "of squares)."
-                    }
+                p .quiet {
+                    "What they cannot show is how far the learned transport itself is off: the held-out photographs "
+                    "put that at " (percent(self.learned.report.predicted_error())) ". It comes on top of the errors below (as the root of the sum "
+                    "of squares)."
                 }
                 @for example in &self.examples { (self.example(example)) }
             }
@@ -279,11 +277,7 @@ impl Report<'_> {
     }
 
     fn accuracy(&self) -> Markup {
-        let own = self
-            .learned
-            .report
-            .prediction
-            .map(|prediction| prediction.compensated);
+        let own = self.learned.report.predicted_error();
         let point = |(tier, rung): (usize, &Rung)| Point {
             x: rung.microseconds,
             y: rung.left_out,
@@ -301,7 +295,7 @@ impl Report<'_> {
             },
             points: self.ladder.iter().enumerate().map(point).collect(),
             marked: None,
-            level: own.map(|own| (own, "error of the inverse itself")),
+            level: Some((own, "error of the inverse itself")),
         };
         html! {
             section {

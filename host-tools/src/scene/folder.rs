@@ -110,7 +110,7 @@ pub fn write(
     };
     let texts = [
         (MANIFEST_FILE, manifest.to_csv()),
-        (SETTINGS_FILE, settings(scene)),
+        (SETTINGS_FILE, settings(scene, simulation)),
     ];
     for (name, text) in texts {
         let path = folder.join(name);
@@ -186,13 +186,19 @@ fn shot((index, (role, _)): (usize, &(Role, Pattern))) -> Shot {
     }
 }
 
-fn settings(scene: &Scene) -> String {
+fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
     let settings = Settings {
         camera: CameraSettings {
             response: scene.camera.response,
         },
         projector: ProjectorSettings {
             response: scene.projector.response,
+            // Known exactly here, as whoever focused the projector might know it.
+            blur: if simulation.blurred() {
+                scene.projector.blur
+            } else {
+                0.0
+            },
         },
         scene: SceneSettings {
             name: scene.name.clone(),

@@ -49,7 +49,7 @@ pub use patches::{Cut, Patch, Patches};
 pub use projector_light::{Beam, ProjectorLight};
 pub use sensor::{Readout, Sensor};
 pub use sight::{Looks, Sight};
-pub use simulation::{Exposed, Simulation, SimulationError, SimulationOptions};
+pub use simulation::{Exposed, Simulation, SimulationError, SimulationOptions, Work};
 pub use sparse::Rows;
 pub use specular::{Specular, Surfaces, TooGlossy};
 pub use view::{FramePlace, View};

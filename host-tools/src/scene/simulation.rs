@@ -89,6 +89,15 @@ pub struct Simulation<'s> {
     rays: f64,
 }
 
+/// What a simulation consists of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Work {
+    /// Pairs of a patch and a cell that lights it.
+    pub lit: usize,
+    /// Form factors evaluated.
+    pub exchanged: u64,
+}
+
 /// Light in the scene under some patterns, all `patches x patterns`, one entry a
 /// channel.
 #[derive(Clone, Debug)]
@@ -371,6 +380,21 @@ impl<'s> Simulation<'s> {
     #[must_use]
     pub fn threshold(&self) -> f64 {
         self.threshold
+    }
+
+    /// What the simulation consists of.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        Work {
+            lit: self.on_patches.entries(),
+            exchanged: self.exchange.as_ref().map_or(0, |e| e.report().evaluated),
+        }
+    }
+
+    /// Whether the projector's blur is simulated.
+    #[must_use]
+    pub fn blurred(&self) -> bool {
+        self.decisions.on(Effect::Blur)
     }
 
     /// The projector's cells.

@@ -54,11 +54,29 @@ pub enum SolveError {
     },
     /// No cell is seen by the camera and lit by the projector.
     #[error(
-        "none of the {cells} cells is both lit and seen; check that the camera sees the projection and that the flood photograph is exposed"
+        "none of the {cells} cells is seen to answer to its own light; check that the camera sees the projection, that the patterns belong to the photographs and that the flood photograph is exposed"
     )]
     NoLiveCells {
         /// Cells of the grid.
         cells: usize,
+    },
+    /// The light is too weak or too strong to be a camera's.
+    #[error(
+        "the mean light under white is {level:.1e} of the camera's full scale; check the exposure, and that values are from 0 to 1"
+    )]
+    Level {
+        /// Mean light under white.
+        level: f64,
+    },
+    /// The photographs do not follow from the patterns.
+    #[error(
+        "photographs that the solve had not seen differ by {percent:.0} % from what it predicts of them (at most {limit:.0} % can be used); check that the patterns belong to the photographs, that nothing moved, and the exposure"
+    )]
+    Unpredictable {
+        /// Predicted error of the best way to project, per cent.
+        percent: f64,
+        /// Limit.
+        limit: f64,
     },
     /// There is less to solve from than the method needs.
     #[error(

@@ -1,17 +1,22 @@
 //! Forward transport from an inverse: the bounces one by one.
 //!
 //! `(diag(g) - K) c = p` is solved by `c <- (p + K c) / g`: each step adds one
-//! bounce. For a real scene the bounces fade, so a few dozen reach any accuracy
-//! a photograph can tell, and no `N x N` factorisation is needed.
+//! bounce. For most scenes the bounces fade, so a few dozen reach any accuracy a
+//! photograph can tell, and no `N x N` factorisation is needed. Where they fade
+//! too slowly (a deep wedge of white paper), or the operator is no reflection
+//! (it undoes a blur as well), the system is factorised once.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Bounces stop counting when one adds less than this part of the light.
 const BOUNCE_TOLERANCE: f64 = 1e-6;
 /// Bounces that are followed at most. A scene that returns 90 % of its light to
 /// itself needs 130.
 const MOST_BOUNCES: usize = 200;
+/// Bounces after which it is known how fast they fade.
+const SETTLED: usize = 20;
 /// Steps of each power iteration; the condition number is good to a few percent.
 const POWER_STEPS: usize = 30;
 
@@ -23,10 +28,32 @@ pub struct Inverse {
     pub gain: DVector<f64>,
     /// The operator `K_c`, `N x N`.
     pub operator: DMatrix<f64>,
+    /// The whole inverse, factorised when first needed.
+    factor: OnceLock<LU<f64, Dyn, Dyn>>,
 }
 
 impl Inverse {
+    /// `diag(gain) - operator`, sizes `N` and `N x N`.
+    #[must_use]
+    pub const fn new(gain: DVector<f64>, operator: DMatrix<f64>) -> Self {
+        Self {
+            gain,
+            operator,
+            factor: OnceLock::new(),
+        }
+    }
+
+    /// `diag(gain) - operator`, `N x N`.
+    #[must_use]
+    pub fn dense(&self) -> DMatrix<f64> {
+        DMatrix::from_diagonal(&self.gain) - &self.operator
+    }
+
     /// Why this cannot be the inverse of a real scene's transport, if so.
+    ///
+    /// With an operator that is nowhere negative, light fades if and only if the
+    /// light under white is positive everywhere (Berman, Plemmons, *Nonnegative
+    /// Matrices in the Mathematical Sciences*, 1979, theorem 6.2.3).
     pub(super) fn flaw(&self, live: &[bool]) -> Option<String> {
         let gains = self.gain.iter().zip(live).enumerate();
         for (cell, (gain, live)) in gains {
@@ -36,40 +63,65 @@ impl Inverse {
                 return Some(format!("the gain of cell {cell} is {gain:.3}"));
             }
         }
-        let one = DMatrix::from_element(self.gain.len(), 1, 1.0);
-        if self.light(&one).is_none() {
-            return Some(format!("light does not fade within {MOST_BOUNCES} bounces"));
+        let one = DMatrix::from_fn(live.len(), 1, |cell, _| f64::from(u8::from(live[cell])));
+        let lit = |light: DMatrix<f64>| {
+            let positive = |(light, live): (&f64, &bool)| !live || *light > 0.0;
+            light.iter().zip(live).all(positive)
+        };
+        if self.light(&one).is_some_and(lit) {
+            return None;
         }
-        None
+        Some(format!(
+            "each bounce would return {:.3} of the light of the one before",
+            self.return_of_a_bounce(&one)
+        ))
+    }
+
+    /// How much of one bounce's light the next one has, in the long run.
+    fn return_of_a_bounce(&self, start: &DMatrix<f64>) -> f64 {
+        let fade = self.fade();
+        let mut bounce = start.clone();
+        let mut ratio = 0.0;
+        for _ in 0..MOST_BOUNCES {
+            let mut next = &self.operator * &bounce;
+            scale_rows(&mut next, &fade);
+            ratio = next.norm() / bounce.norm();
+            if !ratio.is_normal() {
+                break;
+            }
+            bounce = next / (bounce.norm() * ratio);
+        }
+        ratio
+    }
+
+    fn fade(&self) -> DVector<f64> {
+        self.gain
+            .map(|gain| if gain > 0.0 { gain.recip() } else { 0.0 })
     }
 
     /// Light `T p` of each column of `patterns`, `N x n` from `N x n`, without
-    /// ambient, to 1e-6 of its norm; `None` if the bounces do not fade.
+    /// ambient, to 1e-6 of its norm; `None` if the inverse is singular.
     #[must_use]
     pub fn light(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        self.sum_bounces(&self.operator, patterns)
+        if self.factor.get().is_none()
+            && let Some(light) = self.sum_bounces(patterns)
+        {
+            return Some(light);
+        }
+        self.solved(patterns)
     }
 
-    /// `T^T p`: with `D = diag(g)`, `T^T = (D - K^T)^-1`.
-    fn transposed_light(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        self.sum_bounces(&self.operator.transpose(), patterns)
-    }
-
-    fn sum_bounces(
-        &self,
-        operator: &DMatrix<f64>,
-        patterns: &DMatrix<f64>,
-    ) -> Option<DMatrix<f64>> {
-        let fade = self
-            .gain
-            .map(|gain| if gain > 0.0 { gain.recip() } else { 0.0 });
+    /// `None` if the bounces fade too slowly or not at all.
+    fn sum_bounces(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let fade = self.fade();
         let mut bounce = patterns.clone();
         scale_rows(&mut bounce, &fade);
         let mut light = bounce.clone();
-        for _ in 0..MOST_BOUNCES {
-            let mut next = product(operator, &bounce);
+        for step in 0..MOST_BOUNCES {
+            let mut next = product(&self.operator, &bounce);
             scale_rows(&mut next, &fade);
             light += &next;
+            let before = bounce.norm();
             bounce = next;
             let (added, total) = (bounce.norm(), light.norm());
             if !total.is_finite() {
@@ -78,12 +130,40 @@ impl Inverse {
             if added <= BOUNCE_TOLERANCE * total {
                 return Some(light);
             }
+            let missing = (BOUNCE_TOLERANCE * total / added).ln() / (added / before).ln();
+            // Written so that light which grows is too slow as well.
+            let soon = added < before && missing < (MOST_BOUNCES - step) as f64;
+            if step >= SETTLED && !soon {
+                return None;
+            }
         }
         None
     }
 
-    /// Largest over smallest singular value of `T`; infinite if the bounces do
-    /// not fade.
+    /// By factorising the inverse.
+    fn solved(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let factor = self.factor.get_or_init(|| {
+            let mut whole = -&self.operator;
+            for (cell, gain) in self.gain.iter().enumerate() {
+                // A cell that is not live is dark whatever is projected.
+                whole[(cell, cell)] += if *gain > 0.0 { *gain } else { 1.0 };
+            }
+            whole.lu()
+        });
+        let mut lit = patterns.clone();
+        for (mut row, gain) in lit.row_iter_mut().zip(self.gain.iter()) {
+            // Not a number is not live either.
+            let live = *gain > 0.0;
+            if !live {
+                row.fill(0.0);
+            }
+        }
+        let light = factor.solve(&lit)?;
+        light.iter().all(|light| light.is_finite()).then_some(light)
+    }
+
+    /// Largest over smallest singular value of `T`; infinite if the inverse is
+    /// singular.
     pub(super) fn condition(&self, live: &[bool]) -> f64 {
         let start = DMatrix::from_fn(live.len(), 1, |cell, _| {
             // Not orthogonal to any singular vector that matters.
@@ -102,7 +182,9 @@ impl Inverse {
             let y = inverse(x) - &self.operator * x;
             Some(inverse(&y) - self.operator.tr_mul(&y))
         });
-        let largest_of_forward = power(&start, |x| self.transposed_light(&self.light(x)?));
+        // With `D = diag(g)`, `T^T = (D - K^T)^-1`.
+        let transposed = Self::new(self.gain.clone(), self.operator.transpose());
+        let largest_of_forward = power(&start, |x| transposed.light(&self.light(x)?));
         match (largest_of_inverse, largest_of_forward) {
             (Some(a), Some(b)) => (a * b).sqrt(),
             _ => f64::INFINITY,
@@ -152,4 +234,54 @@ fn power(
         x = y / value;
     }
     Some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Inside of a sphere every cell sees every other alike: with `F = 1/N` and an
+    /// albedo `r` the light under white is `r / (1 - r)` everywhere.
+    fn sphere(cells: usize, albedo: f64) -> Inverse {
+        let operator = DMatrix::from_element(cells, cells, 1.0 / cells as f64);
+        Inverse::new(DVector::from_element(cells, albedo.recip()), operator)
+    }
+
+    #[test]
+    fn light_that_fades_too_slowly_to_follow_is_solved_for() {
+        let white = DMatrix::from_element(10, 1, 1.0);
+        for albedo in [0.5, 0.9, 0.99, 0.9999] {
+            let light = sphere(10, albedo).light(&white).unwrap();
+            let wanted = albedo / (1.0 - albedo);
+            for light in light.iter() {
+                assert!((light / wanted - 1.0).abs() < 1e-5, "{albedo}: {light}");
+            }
+        }
+    }
+
+    #[test]
+    fn light_that_grows_is_a_flaw_and_its_growth_is_said() {
+        assert_eq!(sphere(10, 0.999).flaw(&[true; 10]), None);
+        let why = sphere(10, 1.25).flaw(&[true; 10]).unwrap();
+        assert!(why.contains("1.250 of the light"), "{why}");
+    }
+
+    #[test]
+    fn the_condition_of_a_sphere_is_that_of_its_closed_form() {
+        // Largest singular value of T: r / (1 - r), smallest: r.
+        let condition = sphere(10, 0.995).condition(&[true; 10]);
+        assert!((condition / 200.0 - 1.0).abs() < 0.02, "{condition}");
+    }
+
+    #[test]
+    fn a_cell_that_is_not_live_stays_dark_either_way() {
+        for albedo in [0.5, 0.999] {
+            let mut inverse = sphere(10, albedo);
+            inverse.gain[3] = 0.0;
+            inverse.operator.row_mut(3).fill(0.0);
+            inverse.operator.column_mut(3).fill(0.0);
+            let light = inverse.light(&DMatrix::from_element(10, 2, 1.0)).unwrap();
+            assert!(light.row(3).amax() < 1e-300);
+        }
+    }
 }

@@ -16,8 +16,9 @@ pub struct InverseTransport {
     /// Whether the cell took part in the solve, length `N`. A cell that did not
     /// has a zero row and column in every operator.
     pub live: Vec<bool>,
-    /// The interreflection operator that all channels share, `N x N`, with a
-    /// zero diagonal, projector white per camera unit.
+    /// The interreflection operator that all channels share, `N x N`, projector
+    /// white per camera unit. Its diagonal is zero unless it undoes the
+    /// projector's blur as well.
     pub shared: DMatrix<f64>,
     /// One entry (grey) or three (red, green, blue).
     pub channels: Vec<ChannelInverse>,
@@ -46,12 +47,10 @@ impl InverseTransport {
     pub fn channel(&self, index: usize) -> Inverse {
         let channel = &self.channels[index];
         let shared = &self.shared * channel.scale;
-        Inverse {
-            gain: DVector::from_column_slice(&channel.gain),
-            operator: match &channel.deviation {
-                Some(deviation) => shared + deviation,
-                None => shared,
-            },
-        }
+        let operator = match &channel.deviation {
+            Some(deviation) => shared + deviation,
+            None => shared,
+        };
+        Inverse::new(DVector::from_column_slice(&channel.gain), operator)
     }
 }

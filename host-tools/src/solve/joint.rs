@@ -11,12 +11,12 @@
 use super::admm::Consensus;
 use super::convergence::{Convergence, Stop};
 use super::data_term::DataTerm;
-use super::forward::{Inverse, product};
+use super::forward::product;
 use super::haar::Haar;
-use super::held_out::{Split, misfit};
+use super::held_out::{Judged, Split, squared_light, squared_misfit};
 use super::prepare::Prepared;
 use super::report::LambdaTrial;
-use super::solution::{Channel, Solution, drop_dead};
+use super::solution::{Channel, Solution, drop_dead_rows};
 use crate::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
@@ -26,8 +26,8 @@ const WEIGHT_BASE: f64 = 1.3;
 const STRONGEST: f64 = 0.032;
 /// Most weights tried.
 const MOST_TRIALS: i32 = 8;
-/// What `lambda` is when no photographs can be held out.
-pub(super) const FALLBACK_LAMBDA: f64 = 0.008;
+/// `lambda` while the channels' scales are looked for.
+const FALLBACK_LAMBDA: f64 = 0.008;
 /// Solves on the way to `lambda` need not be closer than this.
 const TRIAL: Stop = Stop {
     tolerance: 4e-3,
@@ -56,12 +56,21 @@ pub(super) struct Solver<'p> {
 }
 
 /// What the search for `lambda` found.
-#[derive(Debug)]
-pub(super) struct Choice {
+pub(super) struct Choice<'s> {
     pub(super) lambda: f64,
     pub(super) trials: Vec<LambdaTrial>,
-    /// The best inverses found without the held-out photographs.
-    pub(super) inverses: Vec<Inverse>,
+    /// The best inverses found without held-out photographs, one entry a split;
+    /// none if no solve gave any.
+    pub(super) judged: Vec<Judged<'s>>,
+}
+
+/// The search with one part of the photographs held out.
+struct Fold<'h, 's> {
+    split: &'s Split,
+    photographs: Photographs,
+    data: DataTerm,
+    consensus: Consensus<'h>,
+    best: Option<Solution>,
 }
 
 impl<'p> Solver<'p> {
@@ -79,47 +88,89 @@ impl<'p> Solver<'p> {
         }
     }
 
-    /// Finds `lambda` by the held-out photographs of `split`, or judges the one
-    /// that is given.
-    pub(super) fn choose(
+    /// Finds `lambda` by the held-out photographs of all `splits`, or judges the
+    /// one that is given.
+    pub(super) fn choose<'s>(
         &mut self,
-        split: &Split,
+        splits: &'s [Split],
         given: Option<f64>,
         progress: &dyn Progress,
-    ) -> Choice {
-        let photographs = self.photographs(&split.solved);
+    ) -> Choice<'s> {
         progress.begin("choosing lambda", 0);
-        self.settle_scales(&photographs, progress);
-        let data = self.data(&photographs);
+        let mut folds: Vec<Fold<'_, 's>> = Vec::new();
+        for split in splits {
+            let photographs = self.photographs(&split.solved);
+            if folds.is_empty() {
+                self.settle_scales(&photographs, progress);
+            }
+            folds.push(Fold {
+                split,
+                data: self.data(&photographs),
+                photographs,
+                consensus: Consensus::new(self.haar, &self.weights, &self.prepared.live, None),
+                best: None,
+            });
+        }
+        if let Some(first) = folds.first_mut() {
+            std::mem::swap(&mut first.consensus, &mut self.consensus);
+        }
         let path = match given {
             Some(lambda) => vec![lambda],
             None => (0..MOST_TRIALS)
                 .map(|k| STRONGEST / f64::from(1 << k))
                 .collect(),
         };
+        let total: f64 = splits
+            .iter()
+            .map(|s| squared_light(self.prepared, &s.held_out))
+            .sum();
         let mut choice = Choice {
             lambda: path[0],
             trials: Vec::new(),
-            inverses: Vec::new(),
+            judged: Vec::new(),
         };
         let mut least = f64::INFINITY;
-        let mut best = None;
         for lambda in path {
-            self.run(&data, lambda, TRIAL, progress);
-            let found = self.found(&photographs);
-            let misfit = misfit(self.prepared, &found.inverses(), &split.held_out);
+            let mut squared = 0.0;
+            let mut found = Vec::new();
+            for fold in &mut folds {
+                std::mem::swap(&mut fold.consensus, &mut self.consensus);
+                self.run(&fold.data, lambda, TRIAL, progress);
+                let solution = self.found(&fold.photographs);
+                std::mem::swap(&mut fold.consensus, &mut self.consensus);
+                squared += squared_misfit(
+                    self.prepared,
+                    &solution.candidates(&self.prepared.live),
+                    &fold.split.held_out,
+                );
+                found.push(solution);
+            }
+            // Without light to predict, or without forward transport, nothing is told.
+            let misfit = Some((squared / total).sqrt()).filter(|misfit| misfit.is_finite());
+            let misfit = misfit.unwrap_or(f64::INFINITY);
             choice.trials.push(LambdaTrial { lambda, misfit });
-            if misfit < least {
+            if misfit < least || choice.trials.len() == 1 {
                 least = misfit;
                 choice.lambda = lambda;
-                best = Some(found);
+                for (fold, solution) in folds.iter_mut().zip(found) {
+                    fold.best = Some(solution);
+                }
             } else if misfit > ENOUGH * least {
                 break;
             }
         }
-        if let Some(mut best) = best {
-            self.add_deviations(&mut best, &photographs, choice.lambda, TRIAL, progress);
-            choice.inverses = best.inverses();
+        for fold in &mut folds {
+            if let Some(mut best) = fold.best.take() {
+                self.add_deviations(&mut best, &fold.photographs, choice.lambda, TRIAL, progress);
+                choice.judged.push(Judged {
+                    split: fold.split,
+                    candidates: best.candidates(&self.prepared.live),
+                });
+            }
+        }
+        // The solve of all photographs starts from here.
+        if let Some(first) = folds.first_mut() {
+            std::mem::swap(&mut first.consensus, &mut self.consensus);
         }
         progress.end();
         choice
@@ -146,8 +197,10 @@ impl<'p> Solver<'p> {
     }
 
     fn photographs(&self, chosen: &[usize]) -> Photographs {
+        let channels = 0..self.prepared.light.len();
         let light = self.prepared.light.iter();
         Photographs {
+            sources: channels.map(|c| self.prepared.sources(c, chosen)).collect(),
             patterns: self.prepared.patterns.select_columns(chosen),
             weights: self.prepared.weights.select_columns(chosen),
             light: light.map(|c| c.select_columns(chosen)).collect(),
@@ -157,7 +210,7 @@ impl<'p> Solver<'p> {
     /// The data term of the joint solve: light scaled so that all channels have
     /// the same operator.
     fn data(&self, photographs: &Photographs) -> DataTerm {
-        let light = photographs.light.iter().zip(&self.scales);
+        let light = photographs.sources.iter().zip(&self.scales);
         DataTerm::new(
             light.map(|(c, scale)| c * *scale).collect(),
             vec![photographs.patterns.clone(); self.scales.len()],
@@ -185,11 +238,11 @@ impl<'p> Solver<'p> {
         let mut shared = self.consensus.operator();
         shared.apply(|value| *value = value.max(0.0));
         shared.fill_diagonal(0.0);
-        drop_dead(&mut shared, &self.prepared.live);
-        let channels = photographs.light.iter().zip(&self.scales);
+        drop_dead_rows(&mut shared, &self.prepared.live);
+        let channels = photographs.channels().zip(&self.scales);
         let channels = channels
-            .map(|(light, scale)| Channel {
-                gain: photographs.fitted_gain(light, &(product(&shared, light) * *scale)),
+            .map(|((light, sources), scale)| Channel {
+                gain: photographs.fitted_gain(light, &(product(&shared, sources) * *scale)),
                 scale: *scale,
                 deviation: None,
             })
@@ -212,9 +265,11 @@ impl<'p> Solver<'p> {
             let data = self.data(photographs);
             self.run(&data, FALLBACK_LAMBDA, TRIAL, progress);
             let shared = self.found(photographs).shared;
-            let light = photographs.light.iter();
-            let fitted: Vec<f64> = light
-                .map(|light| fitted_scale(light, &product(&shared, light), &photographs.patterns))
+            let fitted: Vec<f64> = photographs
+                .channels()
+                .map(|(light, sources)| {
+                    fitted_scale(light, &product(&shared, sources), &photographs.patterns)
+                })
                 .collect();
             // Where the light tells nothing (no interreflection) nothing is told.
             if fitted
@@ -248,10 +303,10 @@ impl<'p> Solver<'p> {
         if found.channels.len() < 2 {
             return;
         }
-        for (channel, light) in found.channels.iter_mut().zip(&photographs.light) {
+        for (channel, (light, sources)) in found.channels.iter_mut().zip(photographs.channels()) {
             let own = &found.shared * channel.scale;
-            let target = &photographs.patterns + product(&own, light);
-            let data = DataTerm::new(vec![light.clone()], vec![target], &photographs.weights);
+            let target = &photographs.patterns + product(&own, sources);
+            let data = DataTerm::new(vec![sources.clone()], vec![target], &photographs.weights);
             let floor = -&own;
             let mut consensus =
                 Consensus::new(self.haar, &self.weights, &self.prepared.live, Some(&floor));
@@ -261,8 +316,8 @@ impl<'p> Solver<'p> {
             self.iterations += end.iterations;
             let mut deviation = consensus.operator().zip_map(&floor, f64::max);
             deviation.fill_diagonal(0.0);
-            drop_dead(&mut deviation, &self.prepared.live);
-            let reflected = product(&(&own + &deviation), light);
+            drop_dead_rows(&mut deviation, &self.prepared.live);
+            let reflected = product(&(&own + &deviation), sources);
             channel.gain = photographs.fitted_gain(light, &reflected);
             channel.deviation = Some(deviation);
         }
@@ -275,9 +330,16 @@ struct Photographs {
     patterns: DMatrix<f64>,
     weights: DMatrix<f64>,
     light: Vec<DMatrix<f64>>,
+    /// [`Prepared::sources`].
+    sources: Vec<DMatrix<f64>>,
 }
 
 impl Photographs {
+    /// Light and sources of each channel.
+    fn channels(&self) -> impl Iterator<Item = (&DMatrix<f64>, &DMatrix<f64>)> {
+        self.light.iter().zip(&self.sources)
+    }
+
     /// Gains that explain a channel's light best, given the light that the
     /// operator takes away; zero for a cell without light.
     fn fitted_gain(&self, light: &DMatrix<f64>, reflected: &DMatrix<f64>) -> DVector<f64> {

@@ -9,11 +9,16 @@
 //!
 //! ```text
 //! observed, prepare     what is solved from, checked and scaled
+//! own_light             which cells can be solved for
+//! blur                  where a projector out of focus throws its light
 //! haar, lane            the sparse basis, sixteen images at a time
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
 //! direct                the paper's method, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
+//! content_loop          what clipping makes of natural images
+//! sharpen               undoes the projector's blur as well
+//! gain_only             what it is judged against, and what remains if it loses
 //! ```
 //!
 //! # Cost
@@ -35,12 +40,15 @@
 
 mod admm;
 mod basis_pursuit;
+mod blur;
 mod column_block;
+mod content_loop;
 mod convergence;
 mod data_term;
 mod direct;
 mod error;
 mod forward;
+mod gain_only;
 mod haar;
 mod held_out;
 mod inverse;
@@ -48,9 +56,11 @@ mod joint;
 mod lane;
 mod observed;
 mod options;
+mod own_light;
 mod prepare;
 mod report;
 mod row_block;
+mod sharpen;
 mod solution;
 #[cfg(test)]
 mod test_linear_program;
@@ -62,26 +72,37 @@ mod test_scene;
 #[cfg(test)]
 mod tests;
 
+pub use blur::blur;
 pub use convergence::Convergence;
 pub use error::SolveError;
 pub use forward::Inverse;
+pub use gain_only::{GainOnly, gain_only};
 pub use haar::{Basis, Haar};
 pub use inverse::{ChannelInverse, InverseTransport};
 pub use observed::{CellNoise, Observed, ObservedChannel};
 pub use options::{Method, SolveOptions, UnknownMethod};
-pub use report::{LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport};
+pub use own_light::{LeftOut, WhyLeftOut};
+pub use report::{
+    Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
+};
 
 use crate::capture::{Measurements, Role};
 use crate::progress::Progress;
+use content_loop::ContentLoop;
 use convergence::Stop;
-use held_out::{Split, predict};
-use joint::{FALLBACK_LAMBDA, Solver};
+use held_out::{Judged, Split, predict};
+use joint::Solver;
 use prepare::Prepared;
-use solution::Solution;
+use sharpen::sharpen;
+use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
 
 /// A solve that ends with a residual above this is no answer.
 const HOPELESS: f64 = 0.05;
+/// A predicted error above this means that patterns and photographs do not belong
+/// together: random patterns that have nothing to do with the light are off by
+/// 0.5 to 0.7.
+const UNPREDICTABLE: f64 = 0.4;
 /// Photographs below which no scene of more cells can be told.
 const LEAST_PHOTOGRAPHS: usize = 8;
 
@@ -116,7 +137,7 @@ pub fn solve_observed(
     let prepared = Prepared::new(observed)?;
     check_count(&prepared, options.method)?;
     let haar = Haar::new(observed.grid, options.basis);
-    let split = Split::new(&prepared);
+    let splits = Split::all(&prepared);
     let mut seconds = Seconds {
         prepare: clock.lap(),
         ..Seconds::default()
@@ -128,7 +149,7 @@ pub fn solve_observed(
     let task = Task {
         prepared: &prepared,
         haar: &haar,
-        split: split.as_ref(),
+        splits: &splits,
         stop,
         progress,
     };
@@ -136,18 +157,37 @@ pub fn solve_observed(
         Method::Joint => task.joint(options.lambda, &mut seconds, &mut clock),
         Method::Direct => task.direct(&mut seconds, &mut clock),
     };
-    let inverses = outcome.solution.inverses();
-    check_answer(&outcome.solution, &inverses, &prepared, options)?;
-    let condition = |inverse: &Inverse| inverse.condition(&prepared.live);
-    let condition = inverses.iter().map(condition).fold(1.0, f64::max);
-    let prediction = split
+    let candidates = outcome.solution.candidates(&prepared.live);
+    check_answer(&outcome.solution, &candidates, &prepared, options)?;
+    let condition = |candidate: &Candidate| candidate.inverse.condition(&prepared.live);
+    let condition = candidates.iter().map(condition).fold(1.0, f64::max);
+    let prediction = predict(&prepared, &outcome.judged);
+    check_prediction(&prediction)?;
+    let blur = prepared.blur.clone().map(|mut blur| {
+        drop_dead(&mut blur, &prepared.live);
+        blur
+    });
+    let content = ContentLoop::new(observed.grid, &prepared, &candidates, blur.as_ref());
+    let sharpened = blur
         .as_ref()
-        .zip(outcome.without_held_out.as_ref())
-        .map(|(split, inverses)| predict(&prepared, inverses, &split.held_out));
+        .and_then(|blur| sharpen(blur, &prepared.live, &candidates, &content));
+    let with_operator = sharpened.as_ref().map_or_else(
+        || {
+            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
+            content.operator(&inverses).0
+        },
+        |sharpened| sharpened.error,
+    );
+    let clipped = Clipped {
+        uncompensated: content.nothing(),
+        gain_only: content.gain_only(&prediction),
+        compensated: with_operator,
+    };
     seconds.finish = clock.lap();
     let report = SolveReport {
         method: options.method,
-        photographs: count(&prepared, options.method, split.as_ref()),
+        photographs: count(&prepared, options.method, &splits),
+        left_out: prepared.left_out.clone(),
         live_cells: prepared.live_cells(),
         cells: prepared.cells(),
         lambda: outcome.lambda,
@@ -156,11 +196,15 @@ pub fn solve_observed(
         iterations: outcome.iterations,
         coefficients: outcome.solution.coefficients,
         condition,
+        compensation: prediction.best(clipped),
         prediction,
+        clipped,
         seconds,
     };
     Ok((
-        outcome.solution.in_camera_units(observed, &prepared),
+        outcome
+            .solution
+            .in_camera_units(observed, &prepared, sharpened.map(|s| s.parts)),
         report,
     ))
 }
@@ -169,47 +213,40 @@ pub fn solve_observed(
 struct Task<'t> {
     prepared: &'t Prepared,
     haar: &'t Haar,
-    split: Option<&'t Split>,
+    splits: &'t [Split],
     stop: Stop,
     progress: &'t dyn Progress,
 }
 
 /// What a method returns beside its answer.
-struct Outcome {
+struct Outcome<'t> {
     solution: Solution,
     lambda: f64,
     trials: Vec<LambdaTrial>,
     iterations: u32,
     /// Inverses that have not seen the held-out photographs.
-    without_held_out: Option<Vec<Inverse>>,
+    judged: Vec<Judged<'t>>,
 }
 
-impl Task<'_> {
-    fn joint(&self, lambda: Option<f64>, seconds: &mut Seconds, clock: &mut Clock) -> Outcome {
+impl<'t> Task<'t> {
+    fn joint(&self, lambda: Option<f64>, seconds: &mut Seconds, clock: &mut Clock) -> Outcome<'t> {
         let mut solver = Solver::new(self.prepared, self.haar, self.stop);
-        let choice = self
-            .split
-            .map(|split| solver.choose(split, lambda, self.progress));
+        let choice = solver.choose(self.splits, lambda, self.progress);
         seconds.choose = clock.lap();
-        let chosen = choice.as_ref().map(|choice| choice.lambda);
-        let lambda = lambda.or(chosen).unwrap_or(FALLBACK_LAMBDA);
+        let lambda = choice.lambda;
         let solution = solver.solve(lambda, self.progress);
         seconds.solve = clock.lap();
         let iterations = solver.iterations();
-        let (trials, without_held_out) = match choice {
-            Some(choice) => (choice.trials, Some(choice.inverses)),
-            None => (Vec::new(), None),
-        };
         Outcome {
             solution,
             lambda,
-            trials,
+            trials: choice.trials,
             iterations,
-            without_held_out,
+            judged: choice.judged,
         }
     }
 
-    fn direct(&self, seconds: &mut Seconds, clock: &mut Clock) -> Outcome {
+    fn direct(&self, seconds: &mut Seconds, clock: &mut Clock) -> Outcome<'t> {
         let usable = self.prepared.with_role(direct::uses);
         let solve = |chosen: &[usize], what| {
             self.progress.begin(what, 0);
@@ -217,20 +254,26 @@ impl Task<'_> {
             self.progress.end();
             found
         };
-        let trial = self.split.map(|split| {
+        let mut iterations = 0;
+        let mut judged = Vec::new();
+        for split in self.splits {
             let kept = |k: &usize| !split.held_out.contains(k);
             let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
-            solve(&chosen, "solving without the held-out photographs")
-        });
+            let trial = solve(&chosen, "solving without the held-out photographs");
+            iterations += trial.convergence.iterations;
+            judged.push(Judged {
+                split,
+                candidates: trial.candidates(&self.prepared.live),
+            });
+        }
         seconds.choose = clock.lap();
         let solution = solve(&usable, "solving");
         seconds.solve = clock.lap();
-        let trial_iterations = trial.as_ref().map_or(0, |t| t.convergence.iterations);
         Outcome {
             lambda: 0.0,
             trials: Vec::new(),
-            iterations: trial_iterations + solution.convergence.iterations,
-            without_held_out: trial.map(|trial| trial.inverses()),
+            iterations: iterations + solution.convergence.iterations,
+            judged,
             solution,
         }
     }
@@ -241,7 +284,8 @@ fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
         Method::Joint => prepared.roles.len(),
         Method::Direct => prepared.with_role(direct::uses).len(),
     };
-    let least = prepared.live_cells().min(LEAST_PHOTOGRAPHS);
+    // One cell needs a second photograph too: the first one's judge.
+    let least = (prepared.live_cells() + 1).min(LEAST_PHOTOGRAPHS);
     if given < least {
         return Err(SolveError::TooFewPhotographs {
             method: method.name(),
@@ -254,7 +298,7 @@ fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
 
 fn check_answer(
     solution: &Solution,
-    inverses: &[Inverse],
+    candidates: &[Candidate],
     prepared: &Prepared,
     options: &SolveOptions,
 ) -> Result<(), SolveError> {
@@ -268,15 +312,29 @@ fn check_answer(
             tolerance: options.tolerance,
         });
     }
-    for (channel, inverse) in inverses.iter().enumerate() {
-        if let Some(why) = inverse.flaw(&prepared.live) {
+    for (channel, candidate) in candidates.iter().enumerate() {
+        if let Some(why) = candidate.inverse.flaw(&prepared.live) {
             return Err(SolveError::NotPhysical { channel, why });
         }
     }
     Ok(())
 }
 
-fn count(prepared: &Prepared, method: Method, split: Option<&Split>) -> PhotographCounts {
+/// Refuses photographs that do not follow from their patterns.
+fn check_prediction(prediction: &Prediction) -> Result<(), SolveError> {
+    let least = prediction.compensated.min(prediction.gain_only);
+    // Written so that what is not a number is refused too.
+    let usable = least <= UNPREDICTABLE;
+    if usable {
+        return Ok(());
+    }
+    Err(SolveError::Unpredictable {
+        percent: 100.0 * least,
+        limit: 100.0 * UNPREDICTABLE,
+    })
+}
+
+fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCounts {
     let gray = |role| matches!(role, Role::Column { .. } | Role::Row { .. });
     PhotographCounts {
         white: prepared.with_role(|role| role == Role::White).len(),
@@ -285,7 +343,7 @@ fn count(prepared: &Prepared, method: Method, split: Option<&Split>) -> Photogra
             Method::Direct => 0,
         },
         bernoulli: prepared.with_role(|role| role == Role::Bernoulli).len(),
-        held_out: split.map_or(0, |split| split.held_out.len()),
+        held_out: splits.iter().map(|split| split.held_out.len()).sum(),
     }
 }
 

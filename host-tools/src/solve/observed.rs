@@ -21,6 +21,8 @@ pub struct Observed<'a> {
     pub live: &'a [bool],
     /// One entry (grey) or three (red, green, blue).
     pub channels: Vec<ObservedChannel<'a>>,
+    /// Standard deviation of the projector's blur in cells; 0 for none.
+    pub blur: f64,
 }
 
 /// One colour channel of [`Observed`].
@@ -60,6 +62,7 @@ impl<'a> From<&'a Measurements> for Observed<'a> {
                         .collect(),
                 })
                 .collect(),
+            blur: measurements.settings.projector.blur,
         }
     }
 }

@@ -1,25 +1,51 @@
 //! Checks what was observed and brings them to the solver's units.
 
+use super::blur::blur;
 use super::error::SolveError;
-use super::observed::{CellNoise, Observed, ObservedChannel, is_lit};
+use super::forward::product;
+use super::observed::{CellNoise, Observed, is_lit};
+use super::own_light::{self, LeftOut};
 use crate::capture::Role;
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Weight of a photograph in which a cell is dark, at most: below that noise the
 /// model's own error rules.
 const MOST_WEIGHT: f64 = 10.0;
 
+/// Cells over which a projector may spread a cell's light.
+const MOST_BLUR: f64 = 4.0;
+
+/// Mean light under white, of full scale, that can come from a camera; squares and
+/// reciprocals of others leave the range of numbers.
+const LEVELS: Range<f64> = 1e-12..1e12;
+
 /// Observations that a solve can rely on: sizes agree, everything is finite,
 /// at least one cell is live.
 #[derive(Debug)]
 pub(super) struct Prepared {
-    /// Cells that are seen and that some light reaches in every channel.
+    /// Cells that are seen and give back light of their own in every channel.
     pub(super) live: Vec<bool>,
-    /// `L`, `N x m`; rows of cells that are not live are zero.
+    /// The others.
+    pub(super) left_out: Vec<LeftOut>,
+    /// What the projector showed, `N x m`.
+    pub(super) shown: DMatrix<f64>,
+    /// `L`, `N x m`, after the projector's blur; rows of cells that are not live
+    /// are zero.
     pub(super) patterns: DMatrix<f64>,
     /// `C_c` with the mean flood light of all channels scaled to 1, `N x m`;
     /// rows of cells that are not live are zero.
     pub(super) light: Vec<DMatrix<f64>>,
+    /// What cells that are not live throw on the others is explained by: the
+    /// light that falls on them, `N x m`, rows of live cells zero. `None` if all
+    /// are live.
+    ///
+    /// A cell at the border of a scene may be too small for the camera, or out of
+    /// its sight, and still light the rest. Its light is not known, but what is
+    /// projected there is, and its column of `K` is as sparse and non-negative as
+    /// any other's. Light that it only passes on needs no column: eliminating it
+    /// leaves an operator of the same kind between the live cells.
+    pub(super) unseen: Option<DMatrix<f64>>,
     /// Standard deviation of an element of `light` by channel and cell.
     pub(super) noise: Vec<Vec<CellNoise>>,
     /// Weight of each squared residual, `N x m`, mean 1 in each row.
@@ -27,6 +53,8 @@ pub(super) struct Prepared {
     pub(super) roles: Vec<Role>,
     /// Camera units of one unit of `light`.
     pub(super) unit: f64,
+    /// `B`, `N x N`, already applied to `patterns`; `None` if in focus.
+    pub(super) blur: Option<DMatrix<f64>>,
 }
 
 impl Prepared {
@@ -36,13 +64,16 @@ impl Prepared {
     pub(super) fn new(observed: &Observed<'_>) -> Result<Self, SolveError> {
         check_sizes(observed)?;
         check_finite(observed)?;
-        let live: Vec<bool> = (0..observed.grid.cells())
-            .map(|cell| {
-                let reached =
-                    |c: &ObservedChannel<'_>| c.light.row(cell).iter().any(|light| *light > 0.0);
-                observed.live[cell] && observed.channels.iter().all(reached)
-            })
-            .collect();
+        let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
+        let landed = match &blur {
+            Some(blur) => product(blur, observed.patterns),
+            None => observed.patterns.clone(),
+        };
+        let left_out = own_light::left_out(observed, &landed);
+        let mut live = vec![true; observed.grid.cells()];
+        for out in &left_out {
+            live[out.cell] = false;
+        }
         if !live.contains(&true) {
             return Err(SolveError::NoLiveCells { cells: live.len() });
         }
@@ -51,13 +82,17 @@ impl Prepared {
                 if live[cell] { matrix[(cell, k)] } else { 0.0 }
             })
         };
-        let patterns = keep(observed.patterns);
+        let patterns = keep(&landed);
+        let unseen = live.contains(&false).then(|| &landed - &patterns);
         let mut light: Vec<_> = observed
             .channels
             .iter()
             .map(|channel| keep(channel.light))
             .collect();
         let unit = flood_level(&light, &patterns);
+        if !LEVELS.contains(&unit) {
+            return Err(SolveError::Level { level: unit });
+        }
         for light in &mut light {
             *light /= unit;
         }
@@ -73,13 +108,17 @@ impl Prepared {
             })
             .collect();
         Ok(Self {
-            weights: weights(&patterns, &noise),
+            weights: weights(observed.patterns, &noise),
+            unseen,
             live,
+            left_out,
+            shown: observed.patterns.clone(),
             patterns,
             light,
             noise,
             roles: observed.roles.to_vec(),
             unit,
+            blur,
         })
     }
 
@@ -89,6 +128,16 @@ impl Prepared {
 
     pub(super) fn live_cells(&self) -> usize {
         self.live.iter().filter(|live| **live).count()
+    }
+
+    /// Light of one channel with that of [`Self::unseen`], of the photographs
+    /// `chosen`: what the columns of `K` belong to.
+    pub(super) fn sources(&self, channel: usize, chosen: &[usize]) -> DMatrix<f64> {
+        let light = self.light[channel].select_columns(chosen);
+        match &self.unseen {
+            Some(unseen) => light + unseen.select_columns(chosen),
+            None => light,
+        }
     }
 
     /// The photographs whose role passes `filter`, by index.
@@ -130,14 +179,7 @@ fn weights(patterns: &DMatrix<f64>, noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
 /// total projected share.
 fn flood_level(light: &[DMatrix<f64>], patterns: &DMatrix<f64>) -> f64 {
     let total: f64 = light.iter().map(DMatrix::sum).sum();
-    let level = total / light.len() as f64 / patterns.sum();
-    // Neither can be zero in a capture that is worth solving; an odd one must not
-    // become a division by zero.
-    if level.is_finite() && level > 0.0 {
-        level
-    } else {
-        1.0
-    }
+    total / light.len() as f64 / patterns.sum()
 }
 
 fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {
@@ -187,8 +229,23 @@ fn check_finite(observed: &Observed<'_>) -> Result<(), SolveError> {
         }),
     };
     check("pattern", 0, observed.patterns)?;
+    if !(0.0..=MOST_BLUR).contains(&observed.blur) {
+        return Err(SolveError::Option {
+            option: "the projector's blur",
+            value: observed.blur,
+            must: "from 0 to 4 cells",
+        });
+    }
     for (index, channel) in observed.channels.iter().enumerate() {
         check("light", index, channel.light)?;
+        let cells = channel.ambient.len();
+        check(
+            "ambient light",
+            index,
+            &DMatrix::from_column_slice(cells, 1, channel.ambient),
+        )?;
+        let noise = |cell: usize, _| channel.noise[cell].lit + channel.noise[cell].unlit;
+        check("noise", index, &DMatrix::from_fn(cells, 1, noise))?;
     }
     Ok(())
 }

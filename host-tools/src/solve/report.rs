@@ -1,7 +1,9 @@
 //! What a solve did, for people and for the table's provenance.
 
 use super::convergence::Convergence;
+use super::gain_only::GainOnly;
 use super::options::Method;
+use super::own_light::LeftOut;
 
 /// How an inverse came about and how good it is.
 ///
@@ -13,15 +15,16 @@ pub struct SolveReport {
     pub method: Method,
     /// Photographs it was found from.
     pub photographs: PhotographCounts,
-    /// Cells that took part, and cells of the grid.
+    /// Cells that took no part, in order.
+    pub left_out: Vec<LeftOut>,
+    /// Cells that took part.
     pub live_cells: usize,
     /// Cells of the grid.
     pub cells: usize,
     /// Weight of the l1 term, light scaled so that a mean flood photograph is 1.
     /// 0 for [`Method::Direct`], which has no such weight.
     pub lambda: f64,
-    /// Every weight tried, largest first; empty if none was chosen by held-out
-    /// photographs.
+    /// Every weight tried, largest first; empty for [`Method::Direct`].
     pub lambda_path: Vec<LambdaTrial>,
     /// How the last solve ended.
     pub convergence: Convergence,
@@ -32,9 +35,12 @@ pub struct SolveReport {
     /// Largest over smallest singular value of the forward transport, worst
     /// channel.
     pub condition: f64,
-    /// What held-out photographs say; `None` if there were too few to hold any
-    /// out.
-    pub prediction: Option<Prediction>,
+    /// What held-out photographs say.
+    pub prediction: Prediction,
+    /// What clipping makes of natural images.
+    pub clipped: Clipped,
+    /// Which way to project is best, [`Prediction::best`].
+    pub compensation: Compensation,
     /// Wall-clock time.
     pub seconds: Seconds,
 }
@@ -71,10 +77,103 @@ pub struct LambdaTrial {
 pub struct Prediction {
     /// Projecting the wanted image as it is.
     pub uncompensated: f64,
-    /// Dividing by the flood photograph.
+    /// Correcting each cell's brightness alone.
     pub gain_only: f64,
-    /// This inverse, found without the held-out photographs.
+    /// This inverse, found without the held-out photographs; infinite if it has
+    /// no forward transport.
     pub compensated: f64,
+    /// By how many standard errors, photograph by photograph, `compensated` is
+    /// better than `gain_only`.
+    pub confidence: f64,
+    /// Held-out photographs.
+    pub photographs: usize,
+    /// Which gains without an operator predict best.
+    pub gain_only_kind: GainOnly,
+}
+
+/// Standard errors by which an operator must be better than gain alone. Below
+/// that the difference may well be chance, and a table without an operator is
+/// safe, small and fast.
+const CONFIDENT: f64 = 2.0;
+
+/// An operator that cancels less than this is not called for: half a step of an
+/// 8-bit code. What one photograph of black leaves in all others looks like as much.
+const LEAST_CANCELLED: f64 = 0.5 / 255.0;
+
+impl Prediction {
+    /// The part of the light that only the operator cancels, relative: what is
+    /// left of gain alone's error without what is noise in both.
+    #[must_use]
+    pub fn cancelled(&self) -> f64 {
+        (self.gain_only.powi(2) - self.compensated.powi(2))
+            .max(0.0)
+            .sqrt()
+    }
+
+    /// Which way to project errs least: by held-out photographs, and on natural
+    /// images that the projector has to clip.
+    #[must_use]
+    pub fn best(&self, clipped: Clipped) -> Compensation {
+        let other = self.gain_only.min(self.uncompensated);
+        let proven = self.compensated < other && self.confidence > CONFIDENT;
+        let proven = proven && self.cancelled() > LEAST_CANCELLED;
+        // Written so that what is not a number loses.
+        if proven && clipped.compensated < clipped.gain_only.min(clipped.uncompensated) {
+            return Compensation::Operator;
+        }
+        if self.gain_only <= self.uncompensated && clipped.gain_only <= clipped.uncompensated {
+            Compensation::GainOnly
+        } else {
+            Compensation::Nothing
+        }
+    }
+}
+
+/// Errors of natural images in the scene as it was found, inputs clipped to what a
+/// projector can show: what no knowledge of the scene can avoid.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Clipped {
+    /// As they are.
+    pub uncompensated: f64,
+    /// With gains alone.
+    pub gain_only: f64,
+    /// With the operator.
+    pub compensated: f64,
+}
+
+/// A way to project.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Compensation {
+    /// With the whole inverse.
+    Operator,
+    /// With gains and no operator.
+    GainOnly,
+    /// As it is.
+    Nothing,
+}
+
+impl Compensation {
+    /// Its name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Operator => "operator",
+            Self::GainOnly => "gain-only",
+            Self::Nothing => "nothing",
+        }
+    }
+}
+
+impl SolveReport {
+    /// Predicted error of the way to project that was chosen.
+    #[must_use]
+    pub const fn predicted_error(&self) -> f64 {
+        match self.compensation {
+            Compensation::Operator => self.prediction.compensated,
+            Compensation::GainOnly => self.prediction.gain_only,
+            Compensation::Nothing => self.prediction.uncompensated,
+        }
+    }
 }
 
 /// Where the time went.

@@ -1,7 +1,7 @@
 //! What a method found, in units of [`Prepared`](super::prepare::Prepared).
 
 use super::convergence::Convergence;
-use super::forward::Inverse;
+use super::forward::{Inverse, product};
 use super::inverse::{ChannelInverse, InverseTransport};
 use super::observed::Observed;
 use super::prepare::Prepared;
@@ -9,7 +9,10 @@ use nalgebra::{DMatrix, DVector};
 
 #[derive(Debug)]
 pub(super) struct Solution {
-    /// The operator that all channels share, zero diagonal.
+    /// The operator that all channels share, zero diagonal. Columns of cells that
+    /// are not live belong to the light that falls on them
+    /// ([`Prepared::unseen`](super::prepare::Prepared::unseen)), their rows are
+    /// zero.
     pub(super) shared: DMatrix<f64>,
     pub(super) channels: Vec<Channel>,
     /// Non-zero Haar coefficients of the operators as solved for.
@@ -25,27 +28,68 @@ pub(super) struct Channel {
     pub(super) deviation: Option<DMatrix<f64>>,
 }
 
+/// An inverse together with what cells that are not live throw on the others.
+#[derive(Debug)]
+pub(super) struct Candidate {
+    pub(super) inverse: Inverse,
+    /// Columns of the operator that belong to cells that are not live; `None` if
+    /// all are.
+    thrown: Option<DMatrix<f64>>,
+}
+
+impl Candidate {
+    /// Light in the photographs `chosen`.
+    pub(super) fn light(&self, prepared: &Prepared, chosen: &[usize]) -> Option<DMatrix<f64>> {
+        let mut projected = prepared.patterns.select_columns(chosen);
+        if let (Some(thrown), Some(unseen)) = (&self.thrown, &prepared.unseen) {
+            projected += product(thrown, &unseen.select_columns(chosen));
+        }
+        self.inverse.light(&projected)
+    }
+}
+
 impl Solution {
-    pub(super) fn inverses(&self) -> Vec<Inverse> {
-        let inverse = |channel: &Channel| {
+    pub(super) fn candidates(&self, live: &[bool]) -> Vec<Candidate> {
+        let candidate = |channel: &Channel| {
             let mut operator = &self.shared * channel.scale;
             if let Some(deviation) = &channel.deviation {
                 operator += deviation;
             }
-            Inverse {
-                gain: channel.gain.clone(),
-                operator,
+            let thrown = live.contains(&false).then(|| {
+                let mut thrown = operator.clone();
+                for (cell, _) in live.iter().enumerate().filter(|(_, live)| **live) {
+                    thrown.column_mut(cell).fill(0.0);
+                }
+                thrown
+            });
+            drop_dead(&mut operator, live);
+            Candidate {
+                inverse: Inverse::new(channel.gain.clone(), operator),
+                thrown,
             }
         };
-        self.channels.iter().map(inverse).collect()
+        self.channels.iter().map(candidate).collect()
     }
 
-    /// The inverse for light in camera units.
+    /// The inverse for light in camera units; `sharpened` is what stands for the
+    /// operators and channels if it undoes the projector's blur.
     pub(super) fn in_camera_units(
-        self,
+        mut self,
         observed: &Observed<'_>,
         prepared: &Prepared,
+        sharpened: Option<(DMatrix<f64>, Vec<Channel>)>,
     ) -> InverseTransport {
+        drop_dead(&mut self.shared, &prepared.live);
+        for deviation in self
+            .channels
+            .iter_mut()
+            .filter_map(|c| c.deviation.as_mut())
+        {
+            drop_dead(deviation, &prepared.live);
+        }
+        if let Some(sharpened) = sharpened {
+            (self.shared, self.channels) = sharpened;
+        }
         let channels = self.channels.into_iter().zip(&observed.channels);
         InverseTransport {
             grid: observed.grid,
@@ -60,6 +104,13 @@ impl Solution {
                 })
                 .collect(),
         }
+    }
+}
+
+/// Zeroes the rows of cells that did not take part.
+pub(super) fn drop_dead_rows(operator: &mut DMatrix<f64>, live: &[bool]) {
+    for (cell, _) in live.iter().enumerate().filter(|(_, live)| !**live) {
+        operator.row_mut(cell).fill(0.0);
     }
 }
 

@@ -112,8 +112,8 @@ impl Check<'_> {
             blur: self.within(
                 "[projector] blur",
                 table.blur,
-                0.0..=8.0,
-                "from 0 to 8 cells",
+                0.0..=4.0,
+                "from 0 to 4 cells",
             )?,
             black: self.within(
                 "[projector] black",

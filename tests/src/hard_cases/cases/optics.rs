@@ -1,0 +1,136 @@
+//! What projector, camera and surface do to light besides Lambert's law.
+
+use super::super::capture::Capture;
+use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::scene::{Panels, Scene};
+use super::super::{GRID, grid};
+use nalgebra::DMatrix;
+
+const REACHABLE: &str = "T0^-1 as sharp; wanted are images that a blurred projector can make";
+const NO_HARM: &str = "outside the model: the held-out prediction must keep it from harm";
+
+pub(super) const CASES: [Case; 10] = [
+    Case {
+        name: "texture",
+        reason: "another albedo in every cell, .25 to .95",
+        theory: "texture is in the gains alone; K is as sparse as without",
+        run: |seeds| noiseless(&uniform().textured(0.25, 0.95, 1), seeds, Some(1.0 / 255.0)),
+    },
+    Case {
+        name: "texture at cell frequency",
+        reason: "albedos .25 and .95 in turn: as rough as can be",
+        theory: "texture is in the gains alone; K is as sparse as without",
+        run: |seeds| noiseless(&uniform().checkered(0.25, 0.95), seeds, Some(1.0 / 255.0)),
+    },
+    Case {
+        name: "vignetting",
+        reason: "corners get 40 % of the light: K is no longer symmetric",
+        theory: "diag(flux) K is symmetric; sign and sparsity stay",
+        run: |seeds| noiseless(&uniform().vignetted(0.4), seeds, Some(1.0 / 255.0)),
+    },
+    Case {
+        name: "projector blur of half a cell",
+        reason: "B^-1 destroys the sign of K",
+        theory: REACHABLE,
+        run: |seeds| blurred(seeds, 0.5, Some(0.002)),
+    },
+    Case {
+        name: "projector blur of one cell",
+        reason: "condition of B about 2,000: fine detail is gone",
+        theory: NO_HARM,
+        run: |seeds| blurred(seeds, 1.0, None),
+    },
+    Case {
+        name: "projector blur of two cells",
+        reason: "B is singular to working precision",
+        theory: NO_HARM,
+        run: |seeds| blurred(seeds, 2.0, None),
+    },
+    Case {
+        name: "blur of half a cell that nobody stated",
+        reason: "K needs negative elements, which the solve forbids",
+        theory: NO_HARM,
+        run: |seeds| {
+            let scene = uniform().blurred(0.5);
+            no_harm(&scene, seeds)
+        },
+    },
+    Case {
+        name: "blur of half a cell, stated as .55",
+        reason: "nobody measures blur to better than a tenth",
+        theory: NO_HARM,
+        run: |seeds| {
+            let scene = uniform().blurred(0.5);
+            let demand = Demand {
+                no_harm_only: true,
+                ..Demand::default()
+            };
+            closed_loop(&scene, seeds, demand, |seed| {
+                Capture::new(&scene, 60, seed).with_blur(0.55)
+            })
+        },
+    },
+    Case {
+        name: "glossy panels",
+        reason: "the camera sees a tenth of the panel opposite mirrored: no sign, no symmetry",
+        theory: NO_HARM,
+        run: |seeds| no_harm(&mirrored(0.1), seeds),
+    },
+    Case {
+        name: "mirror panels",
+        reason: "the camera sees as much mirrored as its own",
+        theory: NO_HARM,
+        run: |seeds| no_harm(&mirrored(0.9), seeds),
+    },
+];
+
+fn uniform() -> Scene {
+    let grid = grid(GRID);
+    Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7)
+}
+
+fn noiseless(scene: &Scene, seeds: u64, required: Option<f64>) -> Outcome {
+    let demand = Demand {
+        required,
+        ..Demand::default()
+    };
+    closed_loop(scene, seeds, demand, |seed| Capture::new(scene, 60, seed))
+}
+
+fn no_harm(scene: &Scene, seeds: u64) -> Outcome {
+    let demand = Demand {
+        no_harm_only: true,
+        ..Demand::default()
+    };
+    closed_loop(scene, seeds, demand, |seed| {
+        Capture::new(scene, 60, seed).noisy(50.0, seed)
+    })
+}
+
+fn blurred(seeds: u64, deviation: f64, required: Option<f64>) -> Outcome {
+    let scene = uniform().blurred(deviation);
+    let demand = Demand {
+        required,
+        no_harm_only: required.is_none(),
+        ..Demand::default()
+    };
+    closed_loop(&scene, seeds, demand, |seed| {
+        Capture::new(&scene, 60, seed).with_blur(deviation)
+    })
+}
+
+/// Each cell shows `part` of the cell that stands opposite in the same valley.
+fn mirrored(part: f64) -> Scene {
+    let mut scene = uniform();
+    let cells = scene.grid.cells();
+    let mut mirror = DMatrix::zeros(cells, cells);
+    for i in 0..cells {
+        let row = scene.form_factors.row(i);
+        let opposite = (0..cells).max_by(|a, b| row[*a].total_cmp(&row[*b]));
+        if let Some(j) = opposite.filter(|j| row[*j] > 0.0) {
+            mirror[(i, j)] = part;
+        }
+    }
+    scene.mirror = Some(mirror);
+    scene
+}

@@ -1,0 +1,86 @@
+//! The page of all cases.
+
+use super::case::{Case, Outcome};
+use crate::hard_frames::page::Row;
+use std::fmt::Write as _;
+
+/// What the page says before its tables.
+const HEAD: &str = "# Hard cases
+
+Where the light or the mathematics is unkind: what is hard, what must hold and from
+which theory, what was found. Made by
+
+    cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md
+
+and held, case by case, by `cargo test -p iltm-tests --test hard_cases`.
+
+Errors are those of the closed loop, `min_s |s T p - d| / |d|`, mean over 16 natural
+images `d` (dead leaves, darkest parts a fifth of white), `p` the projector's input
+clipped to what it can show; the scene's transport `T` is known exactly. Seeds change
+patterns and noise; the worst one counts. Whatever is chosen, operator, gains alone or
+nothing, may never be worse than gains alone or nothing by more than a tenth.
+
+Unless a case says otherwise the scene is 13 x 21 cells on M-shaped panels at 75 degrees,
+photographed under white, Gray code with inverses and random patterns. The bound is
+
+    perfect + min over s of (2 tail(s) + cond sigma sqrt(s ln N / m)) + cond tolerance,   s <= m / (2 ln(N / m)) <= N
+
+with `perfect` the error of the true inverse (clipping), `tail(s)` that of its best `s`
+Haar coefficients a row, `cond` the condition number, `sigma` the noise, `m` photographs,
+`N` cells and `tolerance` = 0.0005 the solver's own
+(`tests/src/hard_cases/theory.rs` says where it is from).
+";
+
+/// What the page says of the device's arithmetic.
+const FRAMES: &str = "
+## Frames on the device
+
+The same integers on every device and on the host, beside an exact reference. A step is
+2^-15 of the projector's white, an eighth of an 8-bit code and less.
+
+| case | why it is hard | must hold | measured | verdict |
+|---|---|---|---|---|
+";
+
+/// The page, and how many cases fail.
+#[must_use]
+pub fn render(groups: &[(&str, Vec<(Case, Outcome)>)], frames: &[Row]) -> (String, usize) {
+    let mut page = HEAD.to_owned();
+    let mut failures = 0;
+    let cell = |text: &str| text.replace('|', "\\|").replace('\n', " ");
+    for (title, cases) in groups {
+        let _ = write!(
+            page,
+            "\n## {title}\n\n| case | why it is hard | must hold | theory | measured | verdict |\n|---|---|---|---|---|---|\n"
+        );
+        for (case, outcome) in cases {
+            failures += usize::from(!outcome.holds);
+            let _ = writeln!(
+                page,
+                "| {} | {} | {} | {} | {} | {} |",
+                cell(case.name),
+                cell(case.reason),
+                cell(&outcome.bound),
+                cell(case.theory),
+                cell(&outcome.measured),
+                outcome.verdict()
+            );
+        }
+    }
+    if !frames.is_empty() {
+        page.push_str(FRAMES);
+    }
+    for row in frames {
+        failures += usize::from(!row.holds);
+        let _ = writeln!(
+            page,
+            "| {} | {} | {} | {} | {} |",
+            cell(row.case),
+            cell(row.reason),
+            cell(&row.bound),
+            cell(&row.measured),
+            if row.holds { "within bound" } else { "FAILS" }
+        );
+    }
+    (page, failures)
+}
