@@ -15,7 +15,7 @@ fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/scenes")
 }
 
-fn simulated<'s>(scene: &'s Scene, forced: Forced) -> Simulation<'s> {
+fn simulated(scene: &Scene, forced: Forced) -> Simulation<'_> {
     let options = SimulationOptions {
         forced,
         threshold: None,

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
-    let scene = Scene::read(&arguments.scene).map_err(unreadable)?;
+    let scene = Scene::read(&arguments.scene).map_err(|error| unreadable(&error))?;
     // A folder that is in the way is known before the work, not after it.
     if let Some(out) = &arguments.output {
         folder::check_free(out).map_err(unwritten)?;
@@ -58,9 +58,10 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
         );
         written = Some(done.map_err(unwritten)?);
     }
-    let ablated = match arguments.ablate {
-        true => ablate(&scene, &options, bars.as_ref()).map_err(|error| unsimulated(&error))?,
-        false => Vec::new(),
+    let ablated = if arguments.ablate {
+        ablate(&scene, &options, bars.as_ref()).map_err(|error| unsimulated(&error))?
+    } else {
+        Vec::new()
     };
     bars.end();
     let seconds = start.elapsed().as_secs_f64();
@@ -145,7 +146,13 @@ fn explain(simulation: &Simulation<'_>, decisions: &[Decision], text: &mut Strin
             decision.effect, decision.reason
         );
     }
-    text.push('\n');
+    let _ = writeln!(
+        text,
+        "{:16} {:14} {:>6.2} s  what each pixel sees, whatever the effects\n",
+        "camera's rays",
+        "",
+        simulation.rays_seconds()
+    );
 }
 
 fn difference(ablated: &Ablated) -> Value {
@@ -179,12 +186,12 @@ fn differences(ablated: &[Ablated], text: &mut String) {
     text.push('\n');
 }
 
-fn unreadable(error: SceneError) -> Failure {
+fn unreadable(error: &SceneError) -> Failure {
     let kind = match error {
         SceneError::Io { .. } => Kind::Read,
         _ => Kind::Scene,
     };
-    Failure::new(kind, &error, error.next_step())
+    Failure::new(kind, error, error.next_step())
 }
 
 fn unsimulated(error: &SimulationError) -> Failure {

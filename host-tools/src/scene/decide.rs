@@ -2,7 +2,7 @@
 
 use super::description::{Albedo, Scene};
 use super::effects::{Decisions, Effect};
-use super::estimate::Estimate;
+use super::estimate::{self, Estimate};
 use super::facets::Facets;
 use super::sensor::Sensor;
 use crate::capture::Response;
@@ -25,7 +25,8 @@ pub(super) fn threshold(scene: &Scene) -> f64 {
 }
 
 /// Effects that need nothing but the scene's own words.
-pub(super) fn named(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
+pub(super) fn named(facets: &Facets<'_>, threshold: f64, decisions: &mut Decisions) {
+    let scene = facets.scene();
     colour(scene, threshold, decisions);
     gloss(scene, threshold, decisions);
     let projector = &scene.projector;
@@ -62,12 +63,12 @@ pub(super) fn named(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
         "the projector's black is dark",
         decisions,
     );
-    let ambient = scene.ambient.into_iter().fold(0.0, f64::max);
+    let ambient = scene.ambient.into_iter().fold(0.0, f64::max) / estimate::level(facets);
     share(
         Effect::Ambient,
         ambient,
-        "of white comes from elsewhere",
-        "no light comes from elsewhere",
+        "of white comes from all around",
+        "no light comes from all around",
         decisions,
     );
     sensor(scene, decisions);
@@ -115,9 +116,7 @@ fn colour(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
     for panel in &scene.panels {
         let of_panel = match &panel.albedo {
             Albedo::Uniform(channels) => spread(*channels),
-            // The texture's own pixels differ; by how much, its largest values tell.
-            Albedo::Texture(texture) if texture.has_colour() => texture.widest_spread(),
-            Albedo::Texture(_) => 0.0,
+            Albedo::Texture(texture) => texture.widest_spread(),
         };
         if of_panel > widest.0 {
             widest = (of_panel, format!("`{}`", panel.name));
@@ -202,41 +201,34 @@ pub(super) fn between_surfaces(
     decisions: &mut Decisions,
 ) -> Taking {
     let scene = facets.scene();
-    let ambient = match decisions.on(Effect::Ambient) {
-        true => scene.ambient.into_iter().fold(0.0, f64::max),
-        false => 0.0,
+    let ambient = if decisions.on(Effect::Ambient) {
+        scene.ambient.into_iter().fold(0.0, f64::max)
+    } else {
+        0.0
     };
     let estimate = Estimate::new(facets, ambient);
-    let interreflection = match estimate.bounce {
-        Some(pair) => {
-            let (facing, pairs) = estimate.facing;
-            let reason = format!(
-                "{facing} of {pairs} pairs of surfaces face each other; `{}` gets up to {} of white from `{}`",
-                facets.name(pair.to),
-                percent(pair.light),
-                facets.name(pair.from)
-            );
-            decisions.decide(Effect::Interreflection, pair.light >= threshold, reason)
-        }
-        None => {
-            let reason = "no two surfaces face each other";
-            decisions.rule_out(Effect::Interreflection, reason);
-            false
-        }
+    let interreflection = if let Some(pair) = estimate.bounce {
+        let (facing, pairs) = estimate.facing;
+        let reason = format!(
+            "{facing} of {pairs} pairs of surfaces face each other; `{}` sends on up to {} of white from `{}`",
+            facets.name(pair.to),
+            percent(pair.light),
+            facets.name(pair.from)
+        );
+        decisions.decide(Effect::Interreflection, pair.light >= threshold, reason)
+    } else {
+        let reason = "no two surfaces face each other";
+        decisions.rule_out(Effect::Interreflection, reason);
+        false
     };
-    let side =
-        |effect, light: Option<f64>, what: &str, nothing: &str, decisions: &mut Decisions| {
-            match light {
-                Some(light) => {
-                    let reason = format!("{what} send back up to {} of white", percent(light));
-                    decisions.decide(effect, light >= threshold, reason)
-                }
-                None => {
-                    decisions.rule_out(effect, nothing);
-                    false
-                }
-            }
+    let mut side = |effect, light: Option<f64>, what: &str, nothing: &str| {
+        let Some(light) = light else {
+            decisions.rule_out(effect, nothing);
+            return false;
         };
+        let reason = format!("{what} send back up to {} of white", percent(light));
+        decisions.decide(effect, light >= threshold, reason)
+    };
     Taking {
         interreflection,
         surroundings: side(
@@ -244,14 +236,12 @@ pub(super) fn between_surfaces(
             estimate.surroundings,
             "surfaces beside the frame",
             "nothing beside the frame gets any light",
-            decisions,
         ),
         backs: side(
             Effect::Backs,
             estimate.backs,
             "back sides",
-            "no back side gets any light",
-            decisions,
+            "no back side gets light and is seen",
         ),
     }
 }

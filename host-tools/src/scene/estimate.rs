@@ -1,11 +1,11 @@
 //! How much an effect could change a photograph, from the scene alone: what
 //! decisions are made by.
 //!
-//! Every estimate is a share of the brightest light that the projector's white
-//! makes on a surface, and is meant to be too large rather than too small.
+//! Every estimate is a share of the light that the projector's white makes on the
+//! surfaces, their mean, and is meant to be too large rather than too small.
 
 use super::facets::Facets;
-use super::form_factor::from_point;
+use super::form_factor::{facing, from_point};
 use super::geometry::{Obstacles, Polygon};
 use super::patches::split_by_frame;
 use super::view::View;
@@ -52,15 +52,12 @@ impl Estimate {
         let count = facets.count();
         let pairs = count * count.saturating_sub(1) / 2;
         let projector = &facets.scene().projector.view;
-        let brightest = (0..count)
-            .map(|f| irradiance(facets.polygon(f), projector))
-            .fold(0.0, f64::max)
-            .max(f64::MIN_POSITIVE);
+        let level = level(facets);
         let side = |facet: usize, polygon, lit: f64| Side {
             polygon,
             facet,
             reflectance: reflectance(facets, facet),
-            lit: lit / brightest + ambient,
+            lit: (lit + ambient) / level,
         };
         let fronts: Vec<_> = (0..count)
             .map(|f| {
@@ -91,6 +88,13 @@ impl Estimate {
             .enumerate()
             .map(|(f, p)| side(f, p, 0.0))
             .collect();
+        // A back side matters if the camera sees it, or a front side.
+        let camera = facets.scene().camera.view.position();
+        let matters = |back: &Side<'_>| {
+            back.polygon.plane().distance(&camera) > 0.0
+                || fronts.iter().any(|to| faces(back, to, facets.obstacles()))
+        };
+        let seen: Vec<_> = backs.into_iter().filter(matters).collect();
         let beside: Vec<_> = (0..count)
             .flat_map(|f| {
                 split_by_frame(facets.polygon(f), projector)
@@ -104,9 +108,10 @@ impl Estimate {
         let mut bounce: Option<Pair> = None;
         for to in &fronts {
             for from in &fronts {
-                let Some(light) = bounced(from, to, facets.obstacles()) else {
+                let Some(arriving) = bounced(from, to, facets.obstacles()) else {
                     continue;
                 };
+                let light = arriving * to.reflectance;
                 facing += 1;
                 if bounce.is_none_or(|pair| light > pair.light) {
                     bounce = Some(Pair {
@@ -120,7 +125,7 @@ impl Estimate {
         Self {
             bounce,
             surroundings: largest_on(&beside, &fronts, facets.obstacles()),
-            backs: largest_on(&backs, &fronts, facets.obstacles()),
+            backs: largest_on(&seen, &fronts, facets.obstacles()),
             facing: (facing / 2, pairs),
         }
     }
@@ -140,29 +145,42 @@ fn largest_on(sides: &[Side<'_>], fronts: &[Side<'_>], obstacles: &Obstacles) ->
 }
 
 /// Light that comes to one side from another after a bounce there: largest over the
-/// places looked at. `None` if the two do not face each other.
+/// places looked at. `None` if the two do not face each other, or nothing is sent.
 fn bounced(from: &Side<'_>, to: &Side<'_>, obstacles: &Obstacles) -> Option<f64> {
-    if from.facet == to.facet || from.lit == 0.0 || from.reflectance == 0.0 {
+    if from.lit == 0.0 || from.reflectance == 0.0 || !faces(from, to, obstacles) {
         return None;
     }
     let seen = to.polygon.clipped(from.polygon.plane())?;
     let visible = from.polygon.clipped(to.polygon.plane())?;
     let normal = to.polygon.normal();
     let factor = |place: &Vector3<f64>| from_point(place, &normal, &visible);
-    // Just inside the corners: there, form factors are largest and still defined.
-    let inside = |polygon: &Polygon| {
-        let centre = polygon.centroid();
-        let corners = polygon.corners().iter().map(|c| c + 0.01 * (centre - c));
-        corners.chain([centre]).collect::<Vec<_>>()
-    };
-    let (places, others) = (inside(&seen), inside(&visible));
-    // Only what is hidden from every place looked at counts as hidden.
-    let open = |a: &Vector3<f64>| others.iter().any(|b| !obstacles.blocked(a, b));
-    if !places.iter().any(open) {
-        return None;
-    }
-    let largest = places.iter().map(factor).fold(0.0, f64::max);
+    let largest = places(&seen).iter().map(factor).fold(0.0, f64::max);
     Some(largest * from.reflectance * from.lit)
+}
+
+/// Whether light goes between two sides: parts of them are in front of each other,
+/// and not all is hidden.
+fn faces(from: &Side<'_>, to: &Side<'_>, obstacles: &Obstacles) -> bool {
+    if from.facet == to.facet || !facing(from.polygon, to.polygon) {
+        return false;
+    }
+    let seen = to.polygon.clipped(from.polygon.plane());
+    let visible = from.polygon.clipped(to.polygon.plane());
+    let (Some(seen), Some(visible)) = (seen, visible) else {
+        return false;
+    };
+    // Only what is hidden from every place looked at counts as hidden.
+    let others = places(&visible);
+    let open = |a: &Vector3<f64>| others.iter().any(|b| !obstacles.blocked(a, b));
+    places(&seen).iter().any(open)
+}
+
+/// Just inside the corners, where form factors are largest and still defined, and the
+/// centre.
+fn places(polygon: &Polygon) -> Vec<Vector3<f64>> {
+    let centre = polygon.centroid();
+    let corners = polygon.corners().iter().map(|c| c + 0.01 * (centre - c));
+    corners.chain([centre]).collect()
 }
 
 fn reflectance(facets: &Facets<'_>, facet: usize) -> f64 {
@@ -177,10 +195,34 @@ fn irradiance(polygon: &Polygon, view: &View) -> f64 {
         return 0.0;
     };
     let normal = part.normal();
-    let at = |world: &Vector3<f64>| {
-        let way = world - view.position();
-        let depth = way.dot(&view.forward());
-        (-normal.dot(&way) * view.focus().powi(2) / depth.powi(3)).max(0.0)
-    };
+    let at = |world: &Vector3<f64>| irradiance_at(world, &normal, view);
     part.corners().iter().map(at).fold(0.0, f64::max)
+}
+
+/// Light that the projector's white makes on the surfaces in its frame, without
+/// bounces: the mean over their area.
+pub(super) fn level(facets: &Facets<'_>) -> f64 {
+    let projector = &facets.scene().projector.view;
+    let (mut light, mut areas) = (0.0, 0.0);
+    for facet in 0..facets.count() {
+        let Some(part) = split_by_frame(facets.polygon(facet), projector).0 else {
+            continue;
+        };
+        let lit = irradiance_at(&part.centroid(), &part.normal(), projector);
+        light += part.area() * lit * reflectance(facets, facet);
+        areas += part.area();
+    }
+    let level = light / areas;
+    if level.is_finite() && level > 0.0 {
+        level
+    } else {
+        1.0
+    }
+}
+
+/// Irradiance of a point by the projector's white.
+fn irradiance_at(world: &Vector3<f64>, normal: &Vector3<f64>, view: &View) -> f64 {
+    let way = world - view.position();
+    let depth = way.dot(&view.forward());
+    (-normal.dot(&way) * view.focus().powi(2) / depth.powi(3)).max(0.0)
 }

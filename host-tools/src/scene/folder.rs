@@ -245,9 +245,10 @@ impl Shooting<'_> {
         let mut bytes = Vec::new();
         for pixel in 0..values[0].len() {
             for plane in &values {
-                match eight {
-                    true => bytes.push(plane[pixel] as u8),
-                    false => bytes.extend(plane[pixel].to_ne_bytes()),
+                if eight {
+                    bytes.push(plane[pixel] as u8);
+                } else {
+                    bytes.extend(plane[pixel].to_ne_bytes());
                 }
             }
         }

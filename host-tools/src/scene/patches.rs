@@ -268,10 +268,9 @@ fn chop(piece: Polygon, side: f64, pieces: &mut Vec<Polygon>) {
         return;
     }
     let plane = Plane::through(piece.centroid(), widest);
-    for half in [piece.clipped(&plane), piece.clipped(&plane.flipped())] {
-        if let Some(half) = half {
-            chop(half, side, pieces);
-        }
+    let halves = [piece.clipped(&plane), piece.clipped(&plane.flipped())];
+    for half in halves.into_iter().flatten() {
+        chop(half, side, pieces);
     }
 }
 

@@ -130,9 +130,9 @@ impl<'s> Simulation<'s> {
             .threshold
             .unwrap_or_else(|| decide::threshold(scene));
         let mut decisions = Decisions::new(options.forced.clone());
-        decide::named(scene, threshold, &mut decisions);
-        let channels = if decisions.on(Effect::Colour) { 3 } else { 1 };
         let facets = Facets::new(scene);
+        decide::named(&facets, threshold, &mut decisions);
+        let channels = if decisions.on(Effect::Colour) { 3 } else { 1 };
         let beam = Beam {
             vignetting: decisions.on(Effect::Vignetting),
             blur: decisions.on(Effect::Blur),

@@ -167,7 +167,7 @@ impl Surfaces<'_> {
             let light =
                 flux * kept * self.light.vignette(place) / self.patches.all()[patch].polygon.area();
             self.light.cells(place, |cell, share| {
-                entries[patch].push((cell, share * light))
+                entries[patch].push((cell, share * light));
             });
         }
         entries
@@ -296,7 +296,7 @@ impl Lobe {
     /// Part of the light from one place that goes on to another. A lobe narrower than
     /// the patches is widened to them: it is their mean that is wanted.
     fn send(&self, towards: &Towards, from: Vector3<f64>, spread: f64) -> f64 {
-        let exponent = 1.0 / (1.0 / self.gloss.exponent + (towards.spread + spread) / 2.0);
+        let exponent = 1.0 / (1.0 / self.gloss.exponent + f64::midpoint(towards.spread, spread));
         let widened = Gloss {
             exponent,
             ..self.gloss

@@ -133,7 +133,7 @@ impl Check<'_> {
                 "1 to 16,000,000 pixels together",
             ));
         }
-        let bits = table.bits.map(f64::from).unwrap_or(16.0);
+        let bits = table.bits.map_or(16.0, f64::from);
         self.within("[camera] bits", bits, 4.0..=16.0, "from 4 to 16")?;
         if let Some(full_well) = table.full_well {
             self.within(

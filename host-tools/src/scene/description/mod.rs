@@ -162,15 +162,6 @@ impl Albedo {
         }
     }
 
-    /// Whether the channels differ anywhere.
-    #[must_use]
-    pub fn has_colour(&self) -> bool {
-        match self {
-            Self::Uniform([red, green, blue]) => red != green || green != blue,
-            Self::Texture(texture) => texture.has_colour(),
-        }
-    }
-
     /// The largest in any place, by channel.
     #[must_use]
     pub fn largest(&self) -> [f64; 3] {

@@ -16,7 +16,6 @@ pub struct Texture {
     width: usize,
     height: usize,
     pixels: Vec<[f32; 3]>,
-    colour: bool,
 }
 
 impl Texture {
@@ -54,11 +53,9 @@ impl Texture {
     /// A texture of these pixels, row by row from the top; there are `width *
     /// height` of them and at least one.
     pub(crate) fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Self {
-        let differ = |[red, green, blue]: &[f32; 3]| red != green || green != blue;
         Self {
             width,
             height,
-            colour: pixels.iter().any(differ),
             pixels,
         }
     }
@@ -70,12 +67,6 @@ impl Texture {
         let index = |x: f64, count: usize| ((x * count as f64).max(0.0) as usize).min(count - 1);
         let (col, row) = (index(place.x, self.width), index(place.y, self.height));
         self.pixels[row * self.width + col].map(f64::from)
-    }
-
-    /// Whether any pixel has unequal channels.
-    #[must_use]
-    pub fn has_colour(&self) -> bool {
-        self.colour
     }
 
     /// Largest difference between the channels of a pixel.
