@@ -4,7 +4,7 @@
 //! Light flows one way through the crate:
 //!
 //! ```text
-//! photographs -> capture::Measurements -> solve::InverseTransport -> compile -> .iltm image -> iltm_runtime -> frames
+//! scene::Simulation -> photographs -> capture::Measurements -> solve::InverseTransport -> compile -> .iltm image -> iltm_runtime -> frames
 //! ```
 
 pub mod capture;

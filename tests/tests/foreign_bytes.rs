@@ -58,6 +58,8 @@ proptest! {
         fuzz::frames(&bytes);
         fuzz::manifest(&bytes);
         fuzz::settings(&bytes);
+        fuzz::scene(&bytes);
+        fuzz::mesh(&bytes);
         fuzz::photograph(&bytes);
         fuzz::link(&bytes);
     }
@@ -130,4 +132,10 @@ fn a_table_with_right_checksums_and_changed_contents_is_no_trouble() {
 #[test]
 fn messages_are_read_as_they_were_written() {
     short_run("messages", 50_000);
+}
+
+#[test]
+fn changed_scenes_and_meshes_are_no_trouble() {
+    short_run("scene", 4_000);
+    short_run("mesh", 4_000);
 }

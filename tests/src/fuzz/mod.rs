@@ -20,6 +20,7 @@ use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{self, CaptureOptions, Manifest, Settings};
 use iltm::progress::Silent;
+use iltm::scene::description::{Scene, parse_mesh};
 use iltm::video::{Compensator, OperatorMemory};
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{DELIMITER, Decoder, Event, Response, Session};
@@ -89,6 +90,16 @@ pub fn manifest(bytes: &[u8]) {
 /// A `capture.toml`.
 pub fn settings(bytes: &[u8]) {
     let _ = Settings::parse(bytes, Path::new("capture.toml"));
+}
+
+/// A scene file. Meshes and textures that it names are looked for where there are none.
+pub fn scene(bytes: &[u8]) {
+    let _ = Scene::parse(bytes, Path::new("/nowhere/scene.toml"));
+}
+
+/// A mesh.
+pub fn mesh(bytes: &[u8]) {
+    let _ = parse_mesh(bytes);
 }
 
 /// A pattern and a photograph of an otherwise plain capture.

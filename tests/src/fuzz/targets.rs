@@ -19,7 +19,7 @@ pub struct Target {
 }
 
 /// All of them.
-pub const TARGETS: [Target; 11] = [
+pub const TARGETS: [Target; 13] = [
     target("session", session::session, stories, (1, session::OP)),
     target("link", super::link, lines, (0, 1)),
     target("messages", super::messages, messages, (0, 1)),
@@ -39,6 +39,13 @@ pub const TARGETS: [Target; 11] = [
         || sample("capture.toml"),
         (0, 1),
     ),
+    target(
+        "scene",
+        super::scene,
+        || scene("painted-corner.toml"),
+        (0, 1),
+    ),
+    target("mesh", super::mesh, || scene("dome.obj"), (0, 1)),
     target("frames", super::frames, streams, (0, 1)),
     target(
         "photograph",
@@ -233,5 +240,12 @@ fn sample(name: &str) -> Vec<Vec<u8>> {
         "/../host-tools/samples/m-panels/"
     );
     let bytes = std::fs::read(Path::new(samples).join(name));
+    bytes.into_iter().collect()
+}
+
+/// A file beside the scenes.
+fn scene(name: &str) -> Vec<Vec<u8>> {
+    let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/../host-tools/scenes/");
+    let bytes = std::fs::read(Path::new(scenes).join(name));
     bytes.into_iter().collect()
 }

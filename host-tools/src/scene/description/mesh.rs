@@ -16,21 +16,33 @@ const MOST_FACES: usize = 100_000;
 
 /// Why a file is not a mesh of flat surfaces.
 #[derive(Debug, Error)]
-pub(super) enum MeshError {
+pub enum MeshError {
+    /// It cannot be read.
     #[error("{0}")]
     Read(#[from] std::io::Error),
+    /// It is a pipe, a folder or a device.
     #[error("it is not a regular file")]
     NotAFile,
+    /// It is longer than any mesh.
     #[error("it is longer than {MOST_BYTES} bytes")]
     TooLong,
+    /// It is not written like one.
     #[error("it is no Wavefront OBJ file ({0})")]
     Obj(#[from] tobj::LoadError),
+    /// It has more faces than can be simulated.
     #[error("it has {0} faces; at most {MOST_FACES} can be simulated")]
     TooManyFaces(usize),
+    /// It has none.
     #[error("it has no faces")]
     Empty,
+    /// A face is not flat and convex.
     #[error("face {face}: {source}")]
-    Face { face: usize, source: PolygonError },
+    Face {
+        /// Its number, from 0.
+        face: usize,
+        /// What is wrong with it.
+        source: PolygonError,
+    },
 }
 
 /// Reads the faces of a mesh; materials are not looked at.
@@ -47,7 +59,13 @@ pub(super) fn read(path: &Path) -> Result<Vec<Facet>, MeshError> {
 }
 
 /// Faces of the contents of an OBJ file.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Facet>, MeshError> {
+///
+/// # Errors
+/// [`MeshError`] for what is no OBJ, or whose faces are no flat surfaces.
+///
+/// # Fuzzing
+/// Any bytes give a mesh or an error.
+pub fn parse(bytes: &[u8]) -> Result<Vec<Facet>, MeshError> {
     if bytes.len() as u64 > MOST_BYTES {
         return Err(MeshError::TooLong);
     }

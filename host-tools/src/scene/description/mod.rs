@@ -18,6 +18,7 @@ mod mesh;
 mod texture;
 
 pub use error::SceneError;
+pub use mesh::{MeshError, parse as parse_mesh};
 pub use texture::Texture;
 
 use super::geometry::Polygon;

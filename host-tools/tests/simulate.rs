@@ -1,0 +1,266 @@
+//! `iltm simulate` as a user meets it, the wrong ways in particular.
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+fn scenes() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_iltm"));
+    command.current_dir(folder).args(arguments);
+    command.stdin(Stdio::null());
+    command.output().expect("the binary is there")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A folder with a small scene, two walls that face each other, changed by `change`.
+fn folder(change: impl Fn(String) -> String) -> TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = "name = \"Corner\"
+[projector]
+position = [0, 0, 4]
+look_at = [0, 0, 0]
+field_of_view = 24
+rows = 4
+cols = 6
+[camera]
+position = [0.3, 0.2, 4]
+look_at = [0, 0, 0]
+field_of_view = 28
+width = 60
+height = 44
+full_well = 20000
+[[panel]]
+name = \"left\"
+corners = [[-1, 0.6, 1], [0, 0.6, 0], [0, -0.6, 0], [-1, -0.6, 1]]
+albedo = 0.8
+[[panel]]
+name = \"right\"
+corners = [[0, 0.6, 0], [1, 0.6, 1], [1, -0.6, 1], [0, -0.6, 0]]
+albedo = 0.8
+";
+    let text = change(scene.to_owned());
+    fs::write(folder.path().join("scene.toml"), text).expect("written");
+    folder
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let name = |entry: std::io::Result<fs::DirEntry>| {
+        entry
+            .expect("an entry")
+            .file_name()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let mut names: Vec<_> = entries.map(name).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_scene_becomes_a_capture_that_solve_takes() {
+    let folder = folder(|scene| scene);
+    let simulate = [
+        "simulate",
+        "scene.toml",
+        "-o",
+        "capture",
+        "--photos",
+        "40",
+        "--json",
+    ];
+    let output = run(folder.path(), &simulate);
+    assert!(output.status.success(), "{}", said(&output));
+    let data: Value = serde_json::from_slice(&output.stdout).expect("one object");
+    // White, black, 2 bits of rows and 3 of columns with inverses, and 40 more.
+    assert_eq!(data["photographs"], 52);
+    assert_eq!(data["effects"].as_array().map(Vec::len), Some(16));
+    assert_eq!(names(folder.path()), ["capture", "scene.toml"]);
+    let solve = ["solve", "capture", "-o", "t.iltm"];
+    let output = run(folder.path(), &solve);
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+#[test]
+fn explain_says_of_every_effect_whether_and_why_and_writes_nothing() {
+    let folder = folder(|scene| scene);
+    let output = run(folder.path(), &["simulate", "scene.toml", "--explain"]);
+    assert!(output.status.success());
+    let text = said(&output);
+    for words in [
+        "interreflection  on",
+        "1 of 1 pairs of surfaces face each other",
+        "shadows          off",
+        "noise            on",
+        "a full well of 20000 electrons",
+        "camera's rays",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    assert_eq!(names(folder.path()), ["scene.toml"]);
+    let asked = [
+        "simulate",
+        "scene.toml",
+        "--explain",
+        "--without",
+        "interreflection",
+    ];
+    let text = said(&run(folder.path(), &asked));
+    assert!(text.contains("interreflection  off, asked for"), "{text}");
+}
+
+#[test]
+fn ablate_says_what_each_effect_contributes() {
+    let folder = folder(|scene| scene);
+    let output = run(
+        folder.path(),
+        &["simulate", "scene.toml", "--ablate", "--json"],
+    );
+    assert!(output.status.success());
+    let data: Value = serde_json::from_slice(&output.stdout).expect("one object");
+    let ablated = data["ablated"].as_array().expect("a list");
+    let of = |name: &str| {
+        ablated
+            .iter()
+            .find(|a| a["effect"] == name)
+            .expect("listed")
+    };
+    // A right angle of albedo .8 returns some tenth of its light.
+    let error = of("interreflection")["error"].as_f64().expect("a number");
+    assert!((0.03..0.3).contains(&error), "{error}");
+    assert!(of("noise")["error"].as_f64().expect("a number") > 1e-3);
+}
+
+#[test]
+fn every_scene_that_comes_with_the_tools_is_explained() {
+    for scene in [
+        "flat-screen",
+        "m-panels",
+        "m-panels-painted",
+        "painted-corner",
+        "dome",
+        "stage",
+    ] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = scenes().join(format!("{scene}.toml"));
+        let path = path.to_str().expect("a path");
+        let output = run(folder.path(), &["simulate", path, "--explain"]);
+        assert!(output.status.success(), "{scene}: {}", said(&output));
+    }
+}
+
+/// Exit code and words of a scene that something is wrong with.
+#[track_caller]
+fn refused(change: impl Fn(String) -> String, code: i32, words: &[&str]) {
+    let folder = folder(change);
+    let output = run(folder.path(), &["simulate", "scene.toml", "-o", "capture"]);
+    let text = said(&output);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    for word in words {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    assert!(text.contains("next: "), "{text}");
+    assert_eq!(names(folder.path()), ["scene.toml"], "nothing half-written");
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
+    refused(
+        |s| s.replace("rows = 4", "rovs = 4"),
+        30,
+        &["rovs", "line 6"],
+    );
+    refused(
+        |s| s.replace("albedo = 0.8\n[[", "albedo = 1.8\n[["),
+        30,
+        &["`left`", "1.8"],
+    );
+    refused(
+        |s| s.replace("albedo = 0.8\n[[", "albedo = nan\n[["),
+        30,
+        &["`left`"],
+    );
+    refused(
+        |s| {
+            s.replace(
+                "[0, -0.6, 0], [-1, -0.6, 1]",
+                "[0, -0.6, 0.3], [-1, -0.6, 1]",
+            )
+        },
+        30,
+        &["`left`", "off the plane"],
+    );
+    refused(
+        |s| s.replace("field_of_view = 24", "field_of_view = inf"),
+        30,
+        &["field_of_view"],
+    );
+    refused(
+        |s| {
+            s.replace(
+                "look_at = [0, 0, 0]\nfield_of_view = 24",
+                "look_at = [0, 0, 9]\nfield_of_view = 24",
+            )
+        },
+        30,
+        &["lights none"],
+    );
+    refused(
+        |s| s.replace("look_at = [0, 0, 0]", "look_at = [0, 0, 4]"),
+        30,
+        &["looks nowhere"],
+    );
+    refused(
+        |s| s.replace("albedo = 0.8\n[[", "albedo = \"none.png\"\n[["),
+        30,
+        &["none.png"],
+    );
+    refused(|s| s.replace("full_well", "read_noise"), 30, &["full_well"]);
+    refused(
+        |s| s[..s.find("[[panel").unwrap_or(0)].to_owned(),
+        30,
+        &["no [[panel]]"],
+    );
+}
+
+#[test]
+fn a_folder_that_is_not_empty_is_left_alone() {
+    let folder = folder(|scene| scene);
+    fs::create_dir(folder.path().join("capture")).expect("made");
+    fs::write(folder.path().join("capture/notes.txt"), "mine").expect("written");
+    let output = run(folder.path(), &["simulate", "scene.toml", "-o", "capture"]);
+    assert_eq!(output.status.code(), Some(9), "{}", said(&output));
+    assert_eq!(names(&folder.path().join("capture")), ["notes.txt"]);
+}
+
+#[test]
+fn words_that_are_no_effect_and_scenes_that_are_not_there_have_codes_of_their_own() {
+    let folder = folder(|scene| scene);
+    let output = run(
+        folder.path(),
+        &["simulate", "scene.toml", "--explain", "--with", "fog"],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        said(&output).contains("there is no effect `fog`"),
+        "{}",
+        said(&output)
+    );
+    let output = run(folder.path(), &["simulate", "other.toml", "--explain"]);
+    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
+    let output = run(folder.path(), &["simulate", "scene.toml"]);
+    assert_eq!(
+        output.status.code(),
+        Some(2),
+        "without -o there is nothing to do"
+    );
+}
