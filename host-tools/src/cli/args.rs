@@ -73,7 +73,7 @@ pub(super) struct Simulate {
         short,
         long,
         value_name = "CAPTURE",
-        required_unless_present = "explain"
+        required_unless_present_any = ["explain", "ablate"]
     )]
     pub(super) output: Option<PathBuf>,
     /// Say which effects are simulated and why

@@ -210,7 +210,7 @@ pub(super) fn between_surfaces(
     let interreflection = if let Some(pair) = estimate.bounce {
         let (facing, pairs) = estimate.facing;
         let reason = format!(
-            "{facing} of {pairs} pairs of surfaces face each other; `{}` sends on up to {} of white from `{}`",
+            "{facing} of {pairs} pairs of surfaces face each other; `{}` sends on up to {} of white, most of it from `{}`",
             facets.name(pair.to),
             percent(pair.light),
             facets.name(pair.from)

@@ -17,8 +17,8 @@ const MOST_FACETS: usize = 400;
 /// What is known of a scene before anything is simulated.
 #[derive(Clone, Debug)]
 pub(super) struct Estimate {
-    /// Largest light that comes back from another surface after one bounce, and
-    /// whose it is: from, to. `None` if no two surfaces face each other.
+    /// Largest light that a surface sends on of what others send it, which one, and
+    /// which of them sends most. `None` if no two surfaces face each other.
     pub(super) bounce: Option<Pair>,
     /// Largest light on what is beside the frame.
     pub(super) surroundings: Option<f64>,
@@ -28,7 +28,7 @@ pub(super) struct Estimate {
     pub(super) facing: (usize, usize),
 }
 
-/// Light from one facet on another.
+/// Light that one facet sends on, most of it from another.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Pair {
     pub(super) light: f64,
@@ -107,19 +107,25 @@ impl Estimate {
         let mut facing = 0;
         let mut bounce: Option<Pair> = None;
         for to in &fronts {
+            let mut all = 0.0;
+            let mut most = (0.0, to.facet);
             for from in &fronts {
                 let Some(arriving) = bounced(from, to, facets.obstacles()) else {
                     continue;
                 };
-                let light = arriving * to.reflectance;
                 facing += 1;
-                if bounce.is_none_or(|pair| light > pair.light) {
-                    bounce = Some(Pair {
-                        light,
-                        from: from.facet,
-                        to: to.facet,
-                    });
+                all += arriving;
+                if arriving > most.0 {
+                    most = (arriving, from.facet);
                 }
+            }
+            let light = all * to.reflectance;
+            if all > 0.0 && bounce.is_none_or(|pair| light > pair.light) {
+                bounce = Some(Pair {
+                    light,
+                    from: most.1,
+                    to: to.facet,
+                });
             }
         }
         Self {
@@ -138,7 +144,7 @@ fn largest_on(sides: &[Side<'_>], fronts: &[Side<'_>], obstacles: &Obstacles) ->
         let from_fronts = fronts
             .iter()
             .filter_map(|front| bounced(front, side, obstacles));
-        side.reflectance * from_fronts.fold(side.lit, f64::max)
+        side.reflectance * (side.lit + from_fronts.sum::<f64>())
     };
     let largest = sides.iter().map(on).fold(0.0, f64::max);
     (largest > 0.0).then_some(largest)

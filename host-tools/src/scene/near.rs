@@ -111,16 +111,14 @@ impl NearLight {
     }
 }
 
-/// Whether nothing stands between two polygons, as far as their corners and centres
-/// tell.
+/// Whether nothing stands between two polygons, as far as their centres and the
+/// corners of each, seen from the other's centre, tell.
 fn open(a: &Polygon, b: &Polygon, obstacles: &Obstacles) -> bool {
-    let places = |polygon: &Polygon| {
+    let centres = (a.centroid(), b.centroid());
+    let seen = |from: &Vector3<f64>, polygon: &Polygon| {
         let centre = polygon.centroid();
-        let inside = polygon.corners().iter().map(|c| c + 0.05 * (centre - c));
-        inside.chain([centre]).collect::<Vec<_>>()
+        let mut inside = polygon.corners().iter().map(|c| c + 0.05 * (centre - c));
+        inside.all(|corner| !obstacles.blocked(from, &corner))
     };
-    let there = places(b);
-    places(a)
-        .iter()
-        .all(|a| there.iter().all(|b| !obstacles.blocked(a, b)))
+    !obstacles.blocked(&centres.0, &centres.1) && seen(&centres.0, b) && seen(&centres.1, a)
 }

@@ -455,15 +455,18 @@ fn exchange(
         .iter()
         .find_map(|p| Some((p.facets, p.between?)))
     {
-        Some(((a, b), between)) => format!(
-            "between {} of {} pairs of surfaces stands another, `{}` between `{}` and `{}`; {} pairs are hidden wholly",
-            report.occludable,
-            report.facing,
-            facets.name(between),
-            facets.name(a),
-            facets.name(b),
-            report.blocked,
-        ),
+        Some(((a, b), between)) => {
+            let [a, b, between] = [a, b, between].map(|facet| facets.name(facet));
+            let which = if a == b && a == between {
+                format!("parts of `{a}` between others of it")
+            } else {
+                format!("`{between}` between `{a}` and `{b}`")
+            };
+            format!(
+                "between {} of {} pairs of surfaces another may stand, {which}; {} pairs are hidden wholly",
+                report.occludable, report.surveyed, report.blocked,
+            )
+        }
         None => "no surface reaches between two others".to_owned(),
     };
     decisions.decide(Effect::Occlusion, report.occludable > 0, reason);

@@ -36,7 +36,7 @@ const FRAMES: &str = "
 ## Frames on the device
 
 The same integers on every device and on the host, beside an exact reference. A step is
-2^-15 of the projector's white, an eighth of an 8-bit code and less.
+2^-15 of the projector's white: 128 of them are an 8-bit code of linear light.
 
 | case | why it is hard | must hold | measured | verdict |
 |---|---|---|---|---|
