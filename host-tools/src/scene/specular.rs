@@ -220,13 +220,19 @@ impl Surfaces<'_> {
                 patches: patches.len(),
             });
         }
-        let factors = exchange.irradiance(&DMatrix::identity(patches.len(), patches.len()));
+        // What each patch gets of a glossy patch's light, patches x glossy patches; the
+        // other way round it is the same but for the areas.
+        let shining = DMatrix::from_fn(patches.len(), glossy.len(), |patch, k| {
+            f64::from(u8::from(glossy[k].0 == patch))
+        });
+        let factors = exchange.irradiance(&shining);
+        let area = |patch: usize| patches[patch].polygon.area();
         let centres: Vec<_> = patches.iter().map(|p| p.polygon.centroid()).collect();
         let projector = self.facets.scene().projector.view.position();
         let to = |to: usize| {
             let (mut by_patches, mut by_cells) = (vec![0.0; patches.len()], Vec::new());
-            for (at, gloss) in &glossy {
-                let there = factors[(to, *at)];
+            for (k, (at, gloss)) in glossy.iter().enumerate() {
+                let there = factors[(to, k)];
                 if there == 0.0 {
                     continue;
                 }
@@ -241,7 +247,7 @@ impl Surfaces<'_> {
                     by_cells.push((*cell, there * shine * f64::from(*light)));
                 }
                 for (from, sum) in by_patches.iter_mut().enumerate() {
-                    let here = factors[(*at, from)];
+                    let here = factors[(from, k)] * area(from) / area(*at);
                     if here > 0.0 {
                         let wide = lobe.spread(&patches[from]);
                         *sum +=
