@@ -3,7 +3,7 @@
 //! | step | file |
 //! |---|---|
 //! | light of the brightest uniform grey | [`white`] |
-//! | what video looks like, for choosing and predicting | [`content`](crate::content) |
+//! | what video looks like, for choosing and predicting | [`content`] |
 //! | `K` in the Haar domain, most useful entries first, cut into tiers | [`ladder`] |
 //! | `i16` entries with a power of two a row | [`quantise`] |
 //! | gains, also finer than the cells | [`gain`] |
