@@ -1,8 +1,9 @@
 //! Writes the photographs of a simulated scene as a capture folder.
 
 use super::description::Scene;
+use super::exposure::Exposed;
 use super::sensor::Sensor;
-use super::simulation::{Exposed, Simulation, SimulationError};
+use super::simulation::{Simulation, SimulationError};
 use crate::capture::{
     CameraSettings, MANIFEST_FILE, Manifest, Pattern, ProjectorSettings, Role, SETTINGS_FILE,
     SceneSettings, Settings, Shot,

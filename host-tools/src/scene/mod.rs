@@ -10,7 +10,8 @@
 //! near          what differs within a patch
 //! specular      light over mirrors and lobes
 //! sight         what each camera pixel sees              sparse
-//! simulation    all of it, ready for patterns
+//! simulation    all of it, ready for patterns            between
+//! exposure      light under patterns, what pixels see of it
 //! sensor        exposure, noise, bits, response
 //! folder        the photographs as a capture
 //! ablation      what each effect contributes
@@ -22,11 +23,13 @@
 //! interaction of light between diffuse surfaces*, 1984).
 
 pub mod ablation;
+mod between;
 mod decide;
 pub mod description;
 mod effects;
 mod estimate;
 pub mod exchange;
+mod exposure;
 mod facets;
 pub mod folder;
 pub mod form_factor;
@@ -43,13 +46,14 @@ mod view;
 
 pub(crate) use decide::percent;
 pub use effects::{Decision, Decisions, Effect, Forced, UnknownEffect};
+pub use exposure::Exposed;
 pub use facets::Facets;
 pub use near::NearLight;
 pub use patches::{Cut, Patch, Patches};
 pub use projector_light::{Beam, ProjectorLight};
 pub use sensor::{Readout, Sensor};
 pub use sight::{Looks, Sight};
-pub use simulation::{Exposed, Simulation, SimulationError, SimulationOptions, Work};
+pub use simulation::{Simulation, SimulationError, SimulationOptions, Work};
 pub use sparse::Rows;
 pub use specular::{Specular, Surfaces, TooGlossy};
 pub use view::{FramePlace, View};

@@ -1,0 +1,157 @@
+//! Light in the scene while the projector shows patterns, and what the camera's pixels
+//! see of it.
+
+use super::effects::Effect;
+use super::exchange::{Exchange, How, Stop, radiosity};
+use super::simulation::{Simulation, SimulationError};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+/// Part of the threshold that bounces may leave out.
+const OF_THRESHOLD: f64 = 0.1;
+
+/// Times that light is sent over mirrors and lobes at most: each time, what is left
+/// of it shrinks by their reflectance.
+const MOST_SPECULAR: usize = 100;
+
+/// Light in the scene under some patterns, all `patches x patterns`, one entry a
+/// channel.
+#[derive(Clone, Debug)]
+pub struct Exposed {
+    /// What the projector shows, cells x patterns, its black included.
+    shown: DMatrix<f64>,
+    /// Irradiance that is not straight from the projector.
+    indirect: Vec<DMatrix<f64>>,
+    /// Light that leaves patches.
+    pub(super) leaving: Vec<DMatrix<f64>>,
+    /// Light from elsewhere.
+    ambient: Vec<f64>,
+    /// Bounces that were followed, or steps of the solve.
+    pub bounces: usize,
+    /// How the light after all bounces was found; `None` without any.
+    pub how: Option<How>,
+}
+
+impl Simulation<'_> {
+    /// Light in the scene while the projector shows `patterns`, cells x patterns, 0
+    /// to 1.
+    ///
+    /// # Errors
+    /// [`SimulationError::Radiosity`] if there is no end to the bounces.
+    pub fn expose(&self, patterns: &DMatrix<f64>) -> Result<Exposed, SimulationError> {
+        let black = if self.decisions.on(Effect::Black) {
+            self.scene.projector.black
+        } else {
+            0.0
+        };
+        let shown = patterns.map(|light| black + (1.0 - black) * light);
+        let direct = self.on_patches.product(&shown);
+        let mut exposed = Exposed {
+            shown,
+            indirect: Vec::new(),
+            leaving: Vec::new(),
+            ambient: Vec::new(),
+            bounces: 0,
+            how: None,
+        };
+        for channel in 0..self.channels {
+            let ambient = if self.decisions.on(Effect::Ambient) {
+                self.scene.ambient[channel]
+            } else {
+                0.0
+            };
+            let albedo: Vec<f64> = self.patches.iter().map(|p| p.albedo[channel]).collect();
+            // It comes from where no other surface is in the way.
+            let open = self.exchange.as_ref().map(Exchange::row_sums);
+            let mut indirect = DMatrix::from_fn(direct.nrows(), direct.ncols(), |patch, _| {
+                ambient * (1.0 - open.as_ref().map_or(0.0, |sums| sums[patch]))
+            });
+            if let Some(specular) = &self.specular {
+                indirect += specular.from_cells.product(&exposed.shown);
+            }
+            let leaving = self.bounce(&albedo, &direct, &mut indirect, &mut exposed)?;
+            exposed.indirect.push(indirect);
+            exposed.leaving.push(leaving);
+            exposed.ambient.push(ambient);
+        }
+        Ok(exposed)
+    }
+
+    /// The light that leaves patches, from what arrives straight and otherwise; adds
+    /// to `indirect` what other patches send.
+    fn bounce(
+        &self,
+        albedo: &[f64],
+        direct: &DMatrix<f64>,
+        indirect: &mut DMatrix<f64>,
+        exposed: &mut Exposed,
+    ) -> Result<DMatrix<f64>, SimulationError> {
+        let reflected = |light: &DMatrix<f64>| {
+            let mut light = light.clone();
+            for mut column in light.column_iter_mut() {
+                column.iter_mut().zip(albedo).for_each(|(l, a)| *l *= a);
+            }
+            light
+        };
+        let stop = Stop::Share(OF_THRESHOLD * self.threshold);
+        let arriving = direct + &*indirect;
+        let mut leaving = reflected(&arriving);
+        // What mirrors and lobes add is bounced in turn, until little is added.
+        let mut fresh = arriving;
+        for round in 0..MOST_SPECULAR {
+            let sent = match &self.exchange {
+                Some(exchange) => {
+                    let all = radiosity(exchange, albedo, &fresh, stop)?;
+                    exposed.bounces = exposed.bounces.max(all.bounces);
+                    exposed.how = Some(all.how);
+                    *indirect += exchange.irradiance(&all.light);
+                    all.light
+                }
+                None => reflected(&fresh),
+            };
+            if round == 0 {
+                leaving.copy_from(&sent);
+            } else {
+                leaving += &sent;
+            }
+            let Some(specular) = &self.specular else {
+                break;
+            };
+            fresh = specular.from_patches.product(&sent);
+            *indirect += &fresh;
+            if fresh.norm() <= OF_THRESHOLD * self.threshold * leaving.norm() {
+                break;
+            }
+        }
+        Ok(leaving)
+    }
+
+    /// What the camera's pixels see of one of the patterns, one plane a channel, row
+    /// by row, before exposure and noise.
+    #[must_use]
+    pub fn photograph(&self, exposed: &Exposed, pattern: usize) -> Vec<Vec<f32>> {
+        let shown = exposed.shown.column(pattern);
+        (0..self.channels)
+            .map(|channel| {
+                let indirect = exposed.indirect[channel].column(pattern);
+                let leaving = exposed.leaving[channel].column(pattern);
+                let ambient = exposed.ambient[channel];
+                let pixel = |pixel| {
+                    let direct = self.sight.direct[channel].times(pixel, |cell| shown[cell]);
+                    let bounced = self.sight.indirect[channel].times(pixel, |at| indirect[at]);
+                    let detail = self.sight.detail[channel]
+                        // Where a surface is in view, light from elsewhere is not.
+                        .times(pixel, |at| leaving[at] - ambient);
+                    let lobes = self.sight.lobes.times(pixel, |at| leaving[at]);
+                    let elsewhere = ambient * f64::from(self.sight.open[pixel]);
+                    (direct + bounced + detail + lobes + elsewhere).max(0.0) as f32
+                };
+                let (width, height) = self.scene.camera.size;
+                (0..(width * height) as usize)
+                    .into_par_iter()
+                    .map(pixel)
+                    .collect()
+            })
+            .collect()
+    }
+}
