@@ -230,3 +230,10 @@ fn the_first_record_of_a_part_cut_in_its_last_byte_reads_the_same_at_every_start
         }
     }
 }
+
+/// The power fails in the last bytes of the device's key: at the first start the record
+/// reads as none, and a later start must not find a key after all.
+#[test]
+fn a_key_that_was_cut_does_not_appear_at_a_later_start() {
+    iltm_tests::fuzz::session(&[198, 0, 0, 0, 0, 235, 36, 177, 163, 26, 0, 0, 0]);
+}

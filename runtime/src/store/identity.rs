@@ -22,6 +22,21 @@ pub(super) fn find<F: NorFlash>(flash: &mut F, part: Part) -> Option<Identity> {
     })
 }
 
+/// Ends the doubt about a record that was cut and reads as none now: it might read as
+/// whole at another start. Only for a part without a whole record.
+pub(super) fn settle<F: NorFlash>(flash: &mut F, part: Part) -> Result<(), StoreError> {
+    let mut doubtful = |place| {
+        !matches!(
+            record::look::<F, Identity>(flash, part, place),
+            Ok(Place::Blank)
+        )
+    };
+    if (0..places(part)).any(&mut doubtful) {
+        flash::erase(flash, part, 0, part.length)?;
+    }
+    Ok(())
+}
+
 /// Writes the identity of a device that has none, twice where there is room: a record
 /// that rots must not open the device to strangers. Erases first: what looks blank may
 /// have been cut before.

@@ -15,6 +15,10 @@ impl<F: NorFlash> Updater<F> {
     #[inline(never)]
     pub fn start(mut flash: F, map: Map, shelf: &mut impl Shelf<F>) -> Self {
         let identity = identity::find(&mut flash, map.identity());
+        if identity.is_none() {
+            // A flash that fails here leaves things as they are.
+            let _ = identity::settle(&mut flash, map.identity());
+        }
         let trust = identity.map_or_else(Trust::default, |identity| Trust {
             key: Some(identity.key),
             device: identity.device,
