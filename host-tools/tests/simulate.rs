@@ -119,6 +119,17 @@ fn explain_says_of_every_effect_whether_and_why_and_writes_nothing() {
 }
 
 #[test]
+fn an_effect_that_is_asked_for_and_that_the_scene_does_not_have_is_not_passed_over() {
+    let folder = folder(|scene| scene);
+    let asked = ["simulate", "scene.toml", "--explain", "--with", "blur"];
+    let text = said(&run(folder.path(), &asked));
+    assert!(
+        text.contains("asked for, but the projector is in focus"),
+        "{text}"
+    );
+}
+
+#[test]
 fn ablate_says_what_each_effect_contributes() {
     let folder = folder(|scene| scene);
     let output = run(

@@ -193,13 +193,20 @@ impl Decisions {
     }
 
     /// An effect that the scene leaves no room for: it cannot be forced either.
-    pub fn rule_out(&mut self, effect: Effect, reason: impl Into<String>) {
+    /// Where somebody asked for it, the reason says so.
+    pub fn rule_out(&mut self, effect: Effect, reason: &str) {
+        let asked = self.forced(effect) == Some(true);
+        let reason = if asked {
+            format!("asked for, but {reason}")
+        } else {
+            reason.to_owned()
+        };
         self.made.push(Decision {
             effect,
             on: false,
             forced: false,
             possible: false,
-            reason: reason.into(),
+            reason,
             seconds: 0.0,
         });
     }

@@ -2,7 +2,7 @@
 //! see of it.
 
 use super::effects::Effect;
-use super::exchange::{Exchange, How, Stop, radiosity};
+use super::exchange::{Exchange, Stop, radiosity};
 use super::simulation::{Simulation, SimulationError};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -28,8 +28,6 @@ pub struct Exposed {
     ambient: Vec<f64>,
     /// Bounces that were followed, or steps of the solve.
     pub bounces: usize,
-    /// How the light after all bounces was found; `None` without any.
-    pub how: Option<How>,
 }
 
 impl Simulation<'_> {
@@ -52,7 +50,6 @@ impl Simulation<'_> {
             leaving: Vec::new(),
             ambient: Vec::new(),
             bounces: 0,
-            how: None,
         };
         for channel in 0..self.channels {
             let ambient = if self.decisions.on(Effect::Ambient) {
@@ -103,7 +100,6 @@ impl Simulation<'_> {
                 Some(exchange) => {
                     let all = radiosity(exchange, albedo, &fresh, stop)?;
                     exposed.bounces = exposed.bounces.max(all.bounces);
-                    exposed.how = Some(all.how);
                     *indirect += exchange.irradiance(&all.light);
                     all.light
                 }

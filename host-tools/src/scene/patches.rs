@@ -37,8 +37,6 @@ pub struct Patch {
 /// What is to be cut.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Cut {
-    /// Pieces along each side of a cell.
-    pub detail: usize,
     /// Whether what lies beside the frame is cut as well.
     pub surroundings: bool,
     /// Whether back sides are.
@@ -52,7 +50,7 @@ pub struct Patches {
     rows: usize,
     cols: usize,
     all: Vec<Patch>,
-    /// Patch of a facet in a piece of a cell.
+    /// Patch of a facet in a cell.
     in_frame: HashMap<(usize, usize), usize>,
     /// Other patches by facet and side.
     beside: HashMap<(usize, bool), Vec<usize>>,
@@ -65,8 +63,8 @@ impl Patches {
         let projector = &facets.scene().projector;
         let mut patches = Self {
             cut,
-            rows: projector.grid.rows() * cut.detail,
-            cols: projector.grid.cols() * cut.detail,
+            rows: projector.grid.rows(),
+            cols: projector.grid.cols(),
             all: Vec::new(),
             in_frame: HashMap::new(),
             beside: HashMap::new(),
@@ -140,14 +138,13 @@ impl Patches {
         }
         let col = (place.across * self.cols as f64) as usize;
         let row = (place.down * self.rows as f64) as usize;
-        let piece = row.min(self.rows - 1) * self.cols + col.min(self.cols - 1);
-        self.in_frame.get(&(facet, piece)).copied()
+        let cell = row.min(self.rows - 1) * self.cols + col.min(self.cols - 1);
+        self.in_frame.get(&(facet, cell)).copied()
     }
 
     /// Cuts the part of a facet that is in the frame along rows and columns.
     fn cut_cells(&mut self, facets: &Facets<'_>, facet: usize, part: &Polygon) {
         let view = &facets.scene().projector.view;
-        let detail = self.cut.detail;
         let columns = range(part, self.cols, |c| view.place(c).map(|p| p.across));
         for col in columns {
             let [left, right] =
@@ -162,9 +159,9 @@ impl Patches {
                 let Some(piece) = between(&strip, &top, &bottom) else {
                     continue;
                 };
-                let cell = (row / detail) * (self.cols / detail) + col / detail;
+                let cell = row * self.cols + col;
                 let index = self.push(facets, piece, facet, false, Some(cell as u32));
-                self.in_frame.insert((facet, row * self.cols + col), index);
+                self.in_frame.insert((facet, cell), index);
             }
         }
     }
@@ -197,7 +194,7 @@ impl Patches {
             let total: f64 = (0..facets.count()).map(|f| facets.polygon(f).area()).sum();
             total / (self.rows * self.cols) as f64
         };
-        COARSE * area.sqrt() * self.cut.detail as f64
+        COARSE * area.sqrt()
     }
 }
 

@@ -116,7 +116,6 @@ impl<'s> Simulation<'s> {
         let taking = decide::between_surfaces(&facets, threshold, &mut decisions);
         decisions.took(Effect::Interreflection, clock.elapsed().as_secs_f64());
         let cut = Cut {
-            detail: 1,
             surroundings: taking.surroundings,
             backs: taking.backs,
         };

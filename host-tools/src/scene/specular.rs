@@ -26,6 +26,9 @@ const LEAST: f64 = 1e-7;
 /// Products of patches that a glossy scene may ask for: about a minute's work.
 const MOST_PRODUCTS: usize = 2_000_000_000;
 
+/// For each patch, where light comes from and how much.
+type Entries = Vec<Vec<(u32, f64)>>;
+
 /// Light by mirrors and lobes.
 #[derive(Clone, Debug)]
 pub struct Specular {
@@ -98,7 +101,7 @@ impl Specular {
 
 impl Surfaces<'_> {
     /// What each patch gets from others over mirrors.
-    fn over_mirrors(&self) -> Vec<Vec<(u32, f64)>> {
+    fn over_mirrors(&self) -> Entries {
         let mirrors: Vec<usize> = (0..self.facets.count())
             .filter(|facet| self.mirror(*facet) > 0.0)
             .collect();
@@ -135,7 +138,7 @@ impl Surfaces<'_> {
     }
 
     /// What each patch gets from the projector over mirrors.
-    fn projector_over_mirrors(&self) -> Vec<Vec<(u32, f64)>> {
+    fn projector_over_mirrors(&self) -> Entries {
         let projector = &self.facets.scene().projector;
         let (view, grid) = (&projector.view, projector.grid);
         let rays = (grid.cols() * CELL_RAYS, grid.rows() * CELL_RAYS);
@@ -203,11 +206,7 @@ impl Surfaces<'_> {
     }
 
     /// What each patch gets from others, and from cells, over one lobe.
-    #[allow(clippy::type_complexity)]
-    fn over_lobes(
-        &self,
-        exchange: &Exchange,
-    ) -> Result<(Vec<Vec<(u32, f64)>>, Vec<Vec<(u32, f64)>>), TooGlossy> {
+    fn over_lobes(&self, exchange: &Exchange) -> Result<(Entries, Entries), TooGlossy> {
         let patches = self.patches.all();
         let glossy: Vec<(usize, Gloss)> = patches
             .iter()

@@ -90,10 +90,4 @@ impl Texture {
         };
         [0, 1, 2].map(|channel| f64::from(largest(channel)))
     }
-
-    /// Pixels across and down.
-    #[must_use]
-    pub fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
-    }
 }
