@@ -9,6 +9,7 @@
 
 pub mod capture;
 pub mod cli;
+pub mod compare;
 pub mod compile;
 pub mod content;
 pub mod demo;

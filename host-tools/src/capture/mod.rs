@@ -56,7 +56,7 @@ pub use response::Response;
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
-pub use shown::shown;
+pub use shown::{columns, shown};
 
 use crate::progress::Progress;
 use measure::CellPixels;

@@ -1,0 +1,41 @@
+//! Ways to photograph a scene's transport.
+//!
+//! Each takes as many photographs as it needs from a [`Rig`] and ends with the forward
+//! transport or with its inverse.
+
+mod brute_force;
+mod sparse;
+
+use super::{Found, Rig, Source, Unfit};
+use crate::progress::Progress;
+use crate::solve::Method;
+pub use brute_force::BruteForce;
+pub use sparse::Sparse;
+
+/// A way to photograph a scene.
+pub trait Acquisition {
+    /// Its name in tables.
+    fn name(&self) -> String;
+    /// Where it comes from.
+    fn source(&self) -> Source;
+    /// What it does, a sentence or two, with what it needs that others do not.
+    fn how(&self) -> &'static str;
+    /// Takes photographs and works out the transport.
+    ///
+    /// # Errors
+    /// [`Unfit`] if the scene or the grid is none for the method.
+    fn acquire(&self, rig: &mut Rig, progress: &dyn Progress) -> Result<Found, Unfit>;
+}
+
+/// Every way, with `photographs` for those that take as many as one likes, and
+/// patterns by `seed` where they are random.
+#[must_use]
+pub fn all(photographs: usize, seed: u64) -> Vec<Box<dyn Acquisition>> {
+    let sparse = |method| Box::new(Sparse::new(method, photographs, seed));
+    vec![
+        Box::new(BruteForce),
+        sparse(Method::TwoStage),
+        sparse(Method::Direct),
+        sparse(Method::Joint),
+    ]
+}
