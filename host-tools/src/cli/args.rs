@@ -33,6 +33,8 @@ pub(super) enum Command {
     Inspect(Inspect),
     /// Compensate a picture or a video with a table
     Compensate(Compensate),
+    /// Every way to photograph and to invert on the same light, or the paper's figures
+    Compare(Compare),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -140,6 +142,29 @@ pub(super) struct SealTerms {
     /// Once the table is confirmed, versions below this never run again on the device
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) revoke_below: u32,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Compare {
+    /// Capture folder or SCENE.toml whose light is compared on
+    #[arg(
+        value_name = "CAPTURE|SCENE.toml",
+        required_unless_present = "paper",
+        conflicts_with = "paper"
+    )]
+    pub(super) light: Option<PathBuf>,
+    /// Repeat the experiments of Chu, Ng, Pahwa, Quek, Huang (BMVC 2011), with intervals
+    #[arg(long)]
+    pub(super) paper: bool,
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// Photographs for the methods that take as many as one likes
+    #[arg(long, value_name = "M", default_value_t = 150)]
+    pub(super) photos: usize,
+    /// Seed of patterns and noise
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
 }
 
 #[derive(Debug, Args)]

@@ -31,6 +31,7 @@ mod summary;
 mod timing;
 
 pub use coefficient_map::{CoefficientMap, Level};
+pub(crate) use colour_scale::number;
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
 pub use comparison::Comparison;
 pub use example::{Example, Shown, Treatment, Wanted};

@@ -1,0 +1,157 @@
+//! Pictures of one value a cell, side by side with captions and one colour bar.
+
+use crate::report::canvas::{Canvas, Colour, Type};
+use crate::report::{ColourScale, LightPicture};
+use crate::video::Picture;
+use iltm_runtime::{FrameSize, Grid};
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
+
+const BACKGROUND: Colour = [18, 20, 24];
+const TITLE: Type = Type {
+    height: RasterHeight::Size16,
+    weight: FontWeight::Bold,
+    colour: [232, 234, 238],
+};
+const TEXT: Type = Type {
+    height: RasterHeight::Size16,
+    weight: FontWeight::Regular,
+    colour: [160, 166, 176],
+};
+/// Pixels around tiles.
+const GAP: usize = 14;
+/// Pixels of a line of letters, room around it included.
+const LINE: usize = 22;
+/// Width that a picture is enlarged to, about.
+const WIDTH: usize = 250;
+/// Height of a colour bar.
+const BAR: usize = 14;
+
+/// One picture.
+#[derive(Clone, Debug)]
+pub(super) struct Tile {
+    pub(super) title: String,
+    /// Second line; may be empty.
+    pub(super) caption: String,
+    pub(super) picture: Picture,
+}
+
+impl Tile {
+    /// Light as a screen shows it, `bright` as white.
+    pub(super) fn light(
+        (title, caption): (&str, &str),
+        grid: Grid,
+        values: impl IntoIterator<Item = f64>,
+        bright: f64,
+    ) -> Self {
+        let size = FrameSize::of_grid(grid);
+        let plane: Vec<f32> = values.into_iter().map(|v| (v / bright) as f32).collect();
+        let picture = LightPicture::new(size, vec![plane]).map(|light| light.for_display());
+        Self {
+            title: title.to_owned(),
+            caption: caption.to_owned(),
+            picture: enlarged(&picture.unwrap_or_else(|| blank(size))),
+        }
+    }
+
+    /// Numbers as colours.
+    pub(super) fn scaled(
+        (title, caption): (&str, &str),
+        size: FrameSize,
+        values: impl IntoIterator<Item = f64>,
+        scale: &ColourScale,
+    ) -> Self {
+        Self {
+            title: title.to_owned(),
+            caption: caption.to_owned(),
+            picture: enlarged(&scale.picture(size, values)),
+        }
+    }
+}
+
+fn blank(size: FrameSize) -> Picture {
+    Canvas::new(size, BACKGROUND).finish()
+}
+
+/// Each pixel as a square of several.
+fn enlarged(picture: &Picture) -> Picture {
+    let (width, height) = (picture.size().width(), picture.size().height());
+    let zoom = (WIDTH / width.max(1)).clamp(1, 16);
+    let size = FrameSize::new((width * zoom) as u16, (height * zoom) as u16);
+    let Some(size) = size.filter(|_| zoom > 1) else {
+        return picture.clone();
+    };
+    let mut canvas = Canvas::new(size, BACKGROUND);
+    let mut small = Canvas::new(picture.size(), BACKGROUND);
+    small.place(0, 0, picture);
+    for y in 0..height * zoom {
+        for x in 0..width * zoom {
+            canvas.set(x, y, small.get(x / zoom, y / zoom));
+        }
+    }
+    canvas.finish()
+}
+
+/// Rows of tiles, all as large as the largest; `None` if there are none or they make
+/// more than a picture can hold.
+pub(super) fn sheet(rows: &[Vec<Tile>], bar: Option<(&ColourScale, &str)>) -> Option<Picture> {
+    let tiles = || rows.iter().flatten();
+    let words = |tile: &Tile| TITLE.width(&tile.title).max(TEXT.width(&tile.caption));
+    let side = tiles()
+        .map(|tile| tile.picture.size().width().max(words(tile)))
+        .max()?;
+    let rise = tiles().map(|tile| tile.picture.size().height()).max()?;
+    let across = rows.iter().map(Vec::len).max()?;
+    let step = rise + 2 * LINE + GAP;
+    let end = GAP + rows.len() * step;
+    let legend = if bar.is_some() {
+        BAR + 2 * LINE + GAP
+    } else {
+        0
+    };
+    let size = FrameSize::new(
+        u16::try_from(GAP + across * (side + GAP)).ok()?,
+        u16::try_from(end + legend).ok()?,
+    )?;
+    let mut canvas = Canvas::new(size, BACKGROUND);
+    for (row, tiles) in rows.iter().enumerate() {
+        for (col, tile) in tiles.iter().enumerate() {
+            let (x, y) = (GAP + col * (side + GAP), GAP + row * step);
+            canvas.write(x, y, &tile.title, TITLE);
+            canvas.write(x, y + LINE - 2, &tile.caption, TEXT);
+            canvas.place(x, y + 2 * LINE, &tile.picture);
+        }
+    }
+    if let Some((scale, words)) = bar {
+        legend_at(
+            &mut canvas,
+            (GAP, end),
+            size.width() - 2 * GAP,
+            scale,
+            words,
+        );
+    }
+    Some(canvas.finish())
+}
+
+fn legend_at(
+    canvas: &mut Canvas,
+    (x, y): (usize, usize),
+    width: usize,
+    scale: &ColourScale,
+    words: &str,
+) {
+    canvas.write(x, y, words, TEXT);
+    let top = y + LINE;
+    let last = width.saturating_sub(1).max(1) as f64;
+    for col in 0..width {
+        for row in 0..BAR {
+            canvas.set(x + col, top + row, scale.colour_at(col as f64 / last));
+        }
+    }
+    for tick in scale.ticks() {
+        let wide = TEXT.width(&tick.label);
+        let centre = tick.place * width as f64 - wide as f64 / 2.0;
+        let start = (centre.max(0.0) as usize).min(width.saturating_sub(wide));
+        canvas.write(x + start, top + BAR + 3, &tick.label, TEXT);
+    }
+}
