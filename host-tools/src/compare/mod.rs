@@ -24,6 +24,7 @@ mod source;
 mod truth;
 
 pub use answer::{Answer, Found, Project, Unfit};
+pub use inversion::albedo;
 pub use meter::Meter;
 pub use rig::Rig;
 pub use source::Source;
