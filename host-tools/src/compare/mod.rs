@@ -33,6 +33,7 @@ pub mod table;
 mod truth;
 
 pub use answer::{Answer, Found, Project, Unfit};
+pub use inversion::albedo;
 pub use meter::Meter;
 pub use rig::Rig;
 pub use source::Source;

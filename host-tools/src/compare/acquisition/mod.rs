@@ -4,13 +4,33 @@
 //! transport or with its inverse.
 
 mod brute_force;
+mod clusters;
+mod compressive_dual;
+mod compressive_sensing;
+mod dual;
+mod greedy;
+mod hadamard;
+mod nystrom;
+mod sensing;
+mod separation;
 mod sparse;
+mod stripes;
+#[cfg(test)]
+mod test_scenes;
+#[cfg(test)]
+mod tests;
 
 use super::{Found, Rig, Source, Unfit};
 use crate::progress::Progress;
 use crate::solve::Method;
 pub use brute_force::BruteForce;
+pub use compressive_dual::CompressiveDual;
+pub use compressive_sensing::CompressiveSensing;
+pub use dual::DualPhotography;
+pub use hadamard::Hadamard;
+pub use nystrom::Nystrom;
 pub use sparse::Sparse;
+pub use stripes::Stripes;
 
 /// A way to photograph a scene.
 pub trait Acquisition {
@@ -34,6 +54,13 @@ pub fn all(photographs: usize, seed: u64) -> Vec<Box<dyn Acquisition>> {
     let sparse = |method| Box::new(Sparse::new(method, photographs, seed));
     vec![
         Box::new(BruteForce),
+        Box::new(Hadamard),
+        Box::new(Stripes),
+        Box::new(DualPhotography::default()),
+        Box::new(Nystrom::new(photographs, false)),
+        Box::new(Nystrom::new(photographs, true)),
+        Box::new(CompressiveSensing::new(photographs, seed)),
+        Box::new(CompressiveDual::new(photographs, seed)),
         sparse(Method::TwoStage),
         sparse(Method::Direct),
         sparse(Method::Joint),

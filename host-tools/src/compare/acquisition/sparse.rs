@@ -1,6 +1,7 @@
 //! Bernoulli patterns and sparsity: the project's own solver, by any of its methods.
 
 use super::Acquisition;
+use super::compressive_dual::SEN_DARABI;
 use crate::capture::{Role, columns, shown};
 use crate::compare::{Found, Rig, Source, Unfit};
 use crate::progress::Progress;
@@ -40,18 +41,16 @@ impl Acquisition for Sparse {
         match method {
             Method::Joint => format!("iltm, {photographs}"),
             Method::Direct => format!("the paper's direct method, {photographs}"),
-            other => format!("{other}, {photographs}"),
+            Method::TwoStage => {
+                format!("compressive dual photography by l1 (two-stage), {photographs}")
+            }
+            Method::BruteForce => format!("least squares, {photographs}"),
         }
     }
 
     fn source(&self) -> Source {
         match self.method {
-            Method::TwoStage | Method::BruteForce => Source {
-                authors: "Sen, Darabi",
-                title: "Compressive Dual Photography",
-                venue: "Computer Graphics Forum (Eurographics)",
-                year: 2009,
-            },
+            Method::TwoStage | Method::BruteForce => SEN_DARABI,
             Method::Joint | Method::Direct => Source {
                 authors: "Chu, Ng, Pahwa, Quek, Huang",
                 title: "Compressive Inverse Light Transport",
