@@ -6,6 +6,7 @@
 
 mod active;
 mod args;
+mod bounces;
 mod compensate;
 mod connect;
 mod demo;
@@ -43,6 +44,7 @@ pub fn run() -> ExitCode {
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Bounces(bounces) => bounces::run(bounces, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),

@@ -198,7 +198,7 @@ fn unsimulated(error: &SimulationError) -> Failure {
     Failure::new(Kind::Scene, error, error.next_step())
 }
 
-fn unwritten(error: FolderError) -> Failure {
+pub(super) fn unwritten(error: FolderError) -> Failure {
     match error {
         FolderError::Taken { .. } => Failure::new(
             Kind::Write,
