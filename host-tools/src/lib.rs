@@ -7,6 +7,7 @@
 //! scene::Simulation -> photographs -> capture::Measurements -> solve::InverseTransport -> compile -> .iltm image -> iltm_runtime -> frames
 //! ```
 
+pub mod bounces;
 pub mod capture;
 pub mod cli;
 pub mod compare;

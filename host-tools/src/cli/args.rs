@@ -33,6 +33,8 @@ pub(super) enum Command {
     Inspect(Inspect),
     /// Compensate a picture or a video with a table
     Compensate(Compensate),
+    /// Separate a photograph's light into direct light, second, third, ... bounce
+    Bounces(Bounces),
     /// Every way to photograph and to invert on the same light, or the paper's figures
     Compare(Compare),
     /// Sign a table, so that devices with the key take it
@@ -129,6 +131,21 @@ pub(super) struct Solve {
     pub(super) key: Option<PathBuf>,
     #[command(flatten)]
     pub(super) seal: SealTerms,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Bounces {
+    /// Folder with `capture.csv`, patterns and photographs
+    pub(super) capture: PathBuf,
+    /// Folder to make
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// `index` of the photograph in `capture.csv`; the mean of all of white if left out
+    #[arg(long, value_name = "INDEX")]
+    pub(super) photo: Option<u32>,
+    /// Learn the inverse from only the first M Bernoulli photographs beside all others
+    #[arg(long, value_name = "M")]
+    pub(super) photos: Option<usize>,
 }
 
 #[derive(Debug, Args)]

@@ -4,8 +4,10 @@ use super::args::Inspect;
 use super::failure::{Failure, Kind};
 use super::output::{Output, read_file};
 use super::slots::key_id;
+use super::solve::lines;
 use crate::compile::sign::{is_signed_by, read_public_key};
 use crate::device::cure;
+use crate::learn::recovery_in;
 use ed25519_dalek::VerifyingKey;
 use iltm_runtime::image::{Seal, Table, unseal};
 use iltm_runtime::operator::{Bounds, Operator};
@@ -199,6 +201,9 @@ fn text(path: &Path, table: &Table<'_>) -> String {
             "error            not predicted: too few photographs to hold any out"
         ),
     };
+    if let Some(recovery) = recovery_in(table.provenance()) {
+        text += &lines("recovery         ", &recovery.lines());
+    }
     if let Some(operator) = table.operator() {
         let Bounds {
             accumulator,

@@ -6,6 +6,7 @@
 
 mod active;
 mod args;
+mod bounces;
 mod compare;
 mod compensate;
 mod connect;
@@ -47,6 +48,7 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Bounces(bounces) => bounces::run(bounces, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),
