@@ -4,11 +4,11 @@
 use super::*;
 use crate::capture::{Registration, shown};
 use crate::progress::Silent;
+use crate::scene::coaxial::{Panels, Scene};
 use crate::scene::description::Scene as Described;
 use crate::scene::{Effect, Forced, Simulation, SimulationOptions, folder as simulated};
 use crate::solve::ChannelInverse;
 use iltm_runtime::Grid;
-use crate::scene::coaxial::{Panels, Scene};
 use nalgebra::DVector;
 
 /// A camera with a pixel a cell.

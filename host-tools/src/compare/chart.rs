@@ -61,6 +61,9 @@ pub(super) fn logarithmic(words: Words<'_>, series: &[Series]) -> Result<String,
             .axis_desc_style((FONT, 15))
             .x_label_formatter(&label)
             .y_label_formatter(&label)
+            .x_labels(6)
+            .x_max_light_lines(1)
+            .y_max_light_lines(1)
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;
@@ -93,8 +96,8 @@ pub(super) fn logarithmic(words: Words<'_>, series: &[Series]) -> Result<String,
 #[derive(Clone, Debug)]
 pub(super) struct Interval {
     pub(super) label: String,
-    /// Which colour.
-    pub(super) group: usize,
+    /// Which of [`COLOURS`].
+    pub(super) colour: usize,
     pub(super) low: f64,
     pub(super) middle: f64,
     pub(super) high: f64,
@@ -102,19 +105,23 @@ pub(super) struct Interval {
     pub(super) values: Vec<f64>,
 }
 
-/// Intervals one below the other over a logarithmic axis.
-pub(super) fn intervals(words: Words<'_>, rows: &[Interval]) -> Result<String, ChartError> {
-    let values = rows.iter().flat_map(|row| row.values.iter().copied());
-    let x = around(values);
-    let height = 90 + 30 * rows.len() as u32;
-    sized((SIZE.0, height), |area| {
-        let count = rows.len() as f64;
+/// Groups of intervals, each under its heading, one below the other over a logarithmic
+/// axis.
+pub(super) fn intervals(
+    words: Words<'_>,
+    groups: &[(&str, Vec<Interval>)],
+) -> Result<String, ChartError> {
+    const ROW: u32 = 21;
+    let all = || groups.iter().flat_map(|(_, rows)| rows);
+    let x = around(all().flat_map(|row| row.values.iter().copied()));
+    let lines = groups.len() + all().count();
+    sized((SIZE.0, 100 + ROW * lines as u32), |area| {
         let mut chart = ChartBuilder::on(area)
             .caption(words.title, (FONT, 19))
             .margin(14)
             .x_label_area_size(44)
-            .y_label_area_size(230)
-            .build_cartesian_2d(x.log_scale(), -count..0.0)?;
+            .y_label_area_size(160)
+            .build_cartesian_2d(x.log_scale(), -(lines as f64)..0.0)?;
         chart
             .configure_mesh()
             .x_desc(words.x)
@@ -126,24 +133,37 @@ pub(super) fn intervals(words: Words<'_>, rows: &[Interval]) -> Result<String, C
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;
-        for (index, row) in rows.iter().enumerate() {
-            let y = -(index as f64) - 0.5;
-            let colour = COLOURS[row.group % COLOURS.len()];
-            let faint = row.values.iter();
-            let faint = faint.map(|x| Circle::new((*x, y), 3, colour.mix(0.25).filled()));
-            chart.draw_series(faint)?;
-            let line = [(row.low, y), (row.high, y)];
-            chart.draw_series(LineSeries::new(line, colour.stroke_width(3)))?;
-            chart.draw_series([Circle::new((row.middle, y), 5, colour.filled())])?;
-            let place = chart.backend_coord(&(row.middle, y));
-            let style = (FONT, 14).into_font().color(&BLACK);
-            area.draw(&Text::new(row.label.clone(), (14, place.1 - 7), style))?;
+        let mut line = 0;
+        let mut next = || {
+            line += 1;
+            0.5 - f64::from(line)
+        };
+        for (heading, rows) in groups {
+            let y = next();
+            let height = chart
+                .backend_coord(&(rows.first().map_or(1.0, |r| r.middle), y))
+                .1;
+            let style = (FONT, 14, FontStyle::Bold).into_font().color(&BLACK);
+            area.draw(&Text::new((*heading).to_owned(), (14, height - 7), style))?;
+            for row in rows {
+                let y = next();
+                let colour = COLOURS[row.colour % COLOURS.len()];
+                let faint = row.values.iter();
+                let faint = faint.map(|x| Circle::new((*x, y), 3, colour.mix(0.25).filled()));
+                chart.draw_series(faint)?;
+                let interval = [(row.low, y), (row.high, y)];
+                chart.draw_series(LineSeries::new(interval, colour.stroke_width(3)))?;
+                chart.draw_series([Circle::new((row.middle, y), 4, colour.filled())])?;
+                let height = chart.backend_coord(&(row.middle, y)).1;
+                let style = (FONT, 14).into_font().color(&BLACK);
+                area.draw(&Text::new(row.label.clone(), (26, height - 7), style))?;
+            }
         }
         Ok(())
     })
 }
 
-/// The area under a curve, a few named points, and both over linear axes.
+/// The area under a curve and a few named points, over logarithmic axes.
 pub(super) fn region(
     words: Words<'_>,
     (x, y): (Range<f64>, Range<f64>),
@@ -157,7 +177,7 @@ pub(super) fn region(
             .margin(14)
             .x_label_area_size(44)
             .y_label_area_size(66)
-            .build_cartesian_2d(x.clone().log_scale(), y.clone().log_scale())?;
+            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
         chart
             .configure_mesh()
             .x_desc(words.x)
@@ -166,6 +186,9 @@ pub(super) fn region(
             .axis_desc_style((FONT, 15))
             .x_label_formatter(&label)
             .y_label_formatter(&label)
+            .x_labels(6)
+            .x_max_light_lines(1)
+            .y_max_light_lines(1)
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;

@@ -3,10 +3,9 @@
 use super::Answer;
 use super::contest::{Done, Row};
 use super::light::Light;
-use super::sheet::{Tile, sheet};
+use super::sheet::{Tile, encoded, sheet};
 use super::table::{COLUMNS, cells};
 use crate::report::{ColourScale, Palette};
-use crate::video::png;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use iltm_runtime::FrameSize;
@@ -16,8 +15,9 @@ use nalgebra::DVector;
 /// Tiles in a row of pictures.
 const ACROSS: usize = 4;
 
-/// Error of a wanted image, relative to white, at the end of the colour scale.
-const WORST: f64 = 0.1;
+/// Error of a wanted image, relative to white, at the end of the colour scale, and the
+/// powers of ten below it.
+const WORST: (f64, i32) = (0.3, 3);
 
 /// Two groups of rows and the light they were made with.
 #[derive(Debug)]
@@ -82,7 +82,9 @@ impl Contest<'_> {
                     @for row in rows {
                         tr {
                             @match &row.result {
-                                Ok(_) => @for cell in cells(row) { td { (cell) } },
+                                Ok(_) => @for (at, cell) in cells(row).into_iter().enumerate() {
+                                    td .(if at == 0 { "" } else { "formula" }) { (cell) }
+                                },
                                 Err(why) => { td { (row.name) } td colspan="7" { "no answer: " (why) } },
                             }
                         }
@@ -113,7 +115,7 @@ impl Contest<'_> {
     /// Where one image errs, by method, as a data URL.
     fn pictures(&self, rows: &[Row]) -> Option<String> {
         let truth = &self.light.truth;
-        let scale = ColourScale::linear(Palette::Magma, WORST);
+        let scale = ColourScale::logarithmic(Palette::Magma, WORST.0, WORST.1);
         let size = FrameSize::of_grid(truth.grid);
         let wanted = truth.images.column(0).into_owned();
         let wanted_tile = Tile::light(
@@ -136,9 +138,10 @@ impl Contest<'_> {
         }
         let rows: Vec<Vec<Tile>> = tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect();
         let picture = sheet(&rows, Some((&scale, "error, relative to reference white")))?;
-        let mut bytes = Vec::new();
-        png::write(&mut bytes, &picture).ok()?;
-        Some(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
+        Some(format!(
+            "data:image/png;base64,{}",
+            STANDARD.encode(encoded(&picture))
+        ))
     }
 }
 

@@ -2,9 +2,10 @@
 
 use crate::report::canvas::{Canvas, Colour, Type};
 use crate::report::{ColourScale, LightPicture};
-use crate::video::Picture;
+use crate::video::{Picture, Samples, png};
 use iltm_runtime::{FrameSize, Grid};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
+use std::collections::BTreeSet;
 
 const BACKGROUND: Colour = [18, 20, 24];
 const TITLE: Type = Type {
@@ -153,5 +154,64 @@ fn legend_at(
         let centre = tick.place * width as f64 - wide as f64 / 2.0;
         let start = (centre.max(0.0) as usize).min(width.saturating_sub(wide));
         canvas.write(x + start, top + BAR + 3, &tick.label, TEXT);
+    }
+}
+
+/// A picture as a PNG file: with a palette where that holds all its colours, which makes
+/// it a fraction as large.
+pub(super) fn encoded(picture: &Picture) -> Vec<u8> {
+    with_palette(picture).unwrap_or_else(|| {
+        let mut bytes = Vec::new();
+        // Writing to memory does not fail.
+        let _ = png::write(&mut bytes, picture);
+        bytes
+    })
+}
+
+/// `None` of a picture that is not 8-bit RGB, or has more colours than a palette.
+fn with_palette(picture: &Picture) -> Option<Vec<u8>> {
+    let (3, Samples::Eight(samples)) = (picture.channels(), picture.samples()) else {
+        return None;
+    };
+    let (pixels, _) = samples.as_chunks::<3>();
+    let colours: BTreeSet<&Colour> = pixels.iter().collect();
+    if colours.len() > 256 {
+        return None;
+    }
+    let palette: Vec<&Colour> = colours.into_iter().collect();
+    let index = |pixel: &Colour| palette.binary_search(&pixel).ok().map(|at| at as u8);
+    let indices: Vec<u8> = pixels.iter().map(index).collect::<Option<_>>()?;
+    let mut bytes = Vec::new();
+    let (width, height) = (picture.size().width(), picture.size().height());
+    let mut encoder = ::png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(::png::ColorType::Indexed);
+    encoder.set_depth(::png::BitDepth::Eight);
+    encoder.set_compression(::png::Compression::High);
+    // Indices are no light that neighbours predict.
+    encoder.set_filter(::png::Filter::NoFilter);
+    encoder.set_palette(palette.into_iter().flatten().copied().collect::<Vec<u8>>());
+    let mut writer = encoder.write_header().ok()?;
+    writer.write_image_data(&indices).ok()?;
+    writer.finish().ok()?;
+    Some(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_palette_changes_no_pixel() {
+        let grid = Grid::new(6, 9).unwrap();
+        let scale = ColourScale::linear(crate::report::Palette::Magma, 1.0);
+        let values = || (0..54).map(|at| f64::from(at) / 53.0);
+        let size = FrameSize::of_grid(grid);
+        let tiles = vec![
+            Tile::light(("one", "light"), grid, values(), 1.0),
+            Tile::scaled(("two", "scale"), size, values(), &scale),
+        ];
+        let picture = sheet(&[tiles], Some((&scale, "values"))).unwrap();
+        let bytes = with_palette(&picture).unwrap();
+        assert_eq!(png::read(bytes.as_slice()).unwrap(), picture);
     }
 }

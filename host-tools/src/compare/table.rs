@@ -126,9 +126,11 @@ pub fn text(rows: &[Row]) -> String {
         "2nd bounce",
         "comp.",
     ];
+    let longest = rows.iter().map(|row| row.name.chars().count()).max();
+    let longest = longest.unwrap_or(0);
     let mut line = |cells: &[String]| {
-        let _ = write!(text, "{:42}", cells[0]);
-        for (cell, width) in cells[1..].iter().zip([7, 9, 9, 12, 9, 11, 9]) {
+        let _ = write!(text, "{:longest$}", cells[0]);
+        for (cell, width) in cells[1..].iter().zip([8, 9, 9, 13, 10, 12, 10]) {
             let _ = write!(text, "{cell:>width$}");
         }
         text.push('\n');

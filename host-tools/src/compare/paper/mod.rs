@@ -13,11 +13,12 @@
 //! ```
 
 mod complexity;
+mod feasible;
 mod results;
 mod scenes;
 mod second_bounce;
 mod sections;
-mod seeds;
+pub mod seeds;
 mod sparsity;
 
 pub use results::{PaperError, files};

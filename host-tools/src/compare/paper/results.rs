@@ -1,15 +1,17 @@
 //! The page that shows the experiments, and every file it needs.
 
 use super::complexity::{self, Timed};
+use super::feasible::{self, Place};
 use super::scenes::Condition;
 use super::seeds::{self, Mean, SEEDS, Sample};
 use super::sparsity::{self, Counted};
 use super::{File, second_bounce, sections};
 use crate::compare::chart::{self, ChartError, Interval, Series, Words};
 use crate::compare::contest::Row;
+use crate::compare::sheet::encoded;
 use crate::progress::Progress;
 use crate::solve::Method;
-use crate::video::{Picture, png};
+use crate::video::Picture;
 use std::fmt::Write;
 use std::time::Instant;
 use thiserror::Error;
@@ -42,11 +44,14 @@ pub fn files(
     progress: &dyn Progress,
 ) -> Result<Vec<File>, PaperError> {
     let start = Instant::now();
-    let samples = seeds::run(progress);
+    let samples = seeds::run(SEEDS, &seeds::ENTRIES, progress);
     let timed = complexity::run(progress);
     progress.begin("drawing", 0);
     let (lit, bounces) = second_bounce::panels().ok_or(PaperError::Picture { what: "Fig. 3" })?;
+    let places = feasible::places();
     let mut files = vec![
+        chart("fig2.svg", "Fig. 2", feasible::chart(&places))?,
+        file("fig2.csv", places_csv(&places)),
         picture("fig1.png", "Fig. 1", sparsity::picture())?,
         picture("fig3.png", "Fig. 3", Some(lit))?,
         picture(
@@ -74,6 +79,7 @@ pub fn files(
     let text = page(&Experiments {
         samples: &samples,
         counts: &sparsity::counts(),
+        places: &places,
         bounces: &bounces,
         timed: &timed,
         contests,
@@ -92,12 +98,9 @@ fn file(name: &str, text: String) -> File {
 
 fn picture(name: &str, what: &'static str, picture: Option<Picture>) -> Result<File, PaperError> {
     let picture = picture.ok_or(PaperError::Picture { what })?;
-    let mut bytes = Vec::new();
-    // Writing to memory does not fail.
-    let _ = png::write(&mut bytes, &picture);
     Ok(File {
         name: name.to_owned(),
-        bytes,
+        bytes: encoded(&picture),
     })
 }
 
@@ -114,40 +117,38 @@ fn chart(
 }
 
 fn seeds_chart(samples: &[Sample]) -> Result<String, ChartError> {
-    let rows: Vec<Interval> = samples
-        .iter()
-        .filter(|sample| !sample.errors.is_empty())
-        .map(|sample| {
-            let values = sample.second_bounce();
-            let mean = Mean::of(&values);
-            Interval {
-                label: format!(
-                    "{}: {}",
-                    sample.condition.name(),
-                    sections::words(sample.method, sample.photographs)
-                ),
-                group: match sample.method {
-                    Method::TwoStage => 1,
-                    Method::Direct => 0,
-                    _ => 2,
-                },
-                low: (mean.mean - mean.half).max(mean.mean / 10.0),
-                middle: mean.mean,
-                high: mean.mean + mean.half,
-                values,
-            }
-        })
-        .collect();
-    let title =
-        format!("Error of the second bounce: {SEEDS} draws, their mean and its 95 % interval");
+    let of = |condition: Condition| {
+        let own = samples.iter().filter(move |s| s.condition == condition);
+        let rows = own.filter(|s| !s.errors.is_empty()).map(interval);
+        (condition.name(), rows.collect::<Vec<Interval>>())
+    };
+    let groups = Condition::ALL.map(of);
+    let title = format!("{SEEDS} draws, their mean and its 95 % interval");
     chart::intervals(
         Words {
             title: &title,
             x: "error of the second bounce under white",
             y: "",
         },
-        &rows,
+        &groups,
     )
+}
+
+fn interval(sample: &Sample) -> Interval {
+    let values = sample.second_bounce();
+    let mean = Mean::of(&values);
+    Interval {
+        label: sections::words(sample.method, sample.photographs),
+        colour: match sample.method {
+            Method::TwoStage => 1,
+            Method::Direct => 0,
+            _ => 2,
+        },
+        low: (mean.mean - mean.half).max(mean.mean / 10.0),
+        middle: mean.mean,
+        high: mean.mean + mean.half,
+        values,
+    }
 }
 
 fn by_cells(timed: &[Timed]) -> Result<String, ChartError> {
@@ -222,6 +223,25 @@ fn sparsity_csv(counts: &[Counted]) -> String {
     text
 }
 
+fn places_csv(places: &[Place]) -> String {
+    let mut text =
+        "scene,photographs,k,kappa_at_least,gamma_at_least,product_at_least,product_at_most\n"
+            .to_owned();
+    for place in places {
+        let scene = if place.textured {
+            "textured"
+        } else {
+            "uniform"
+        };
+        let _ = writeln!(
+            text,
+            "{scene},{},{},{:.4},{:.4},{:.4},{:.4}",
+            place.photographs, place.k, place.kappa, place.gamma, place.product.0, place.product.1
+        );
+    }
+    text
+}
+
 fn seeds_csv(samples: &[Sample]) -> String {
     let mut text =
         "condition,method,photographs,seed,second_bounce_error,compensation_error\n".to_owned();
@@ -255,6 +275,7 @@ fn complexity_csv(timed: &[Timed]) -> String {
 struct Experiments<'e> {
     samples: &'e [Sample],
     counts: &'e [Counted],
+    places: &'e [Place],
     bounces: &'e [second_bounce::Lit],
     timed: &'e [Timed],
     contests: &'e [(&'e str, Vec<Row>, Vec<Row>)],
@@ -267,6 +288,7 @@ fn page(all: &Experiments<'_>) -> String {
     sections::claims(&mut text, all.samples);
     sections::fourth(&mut text, all.samples);
     sections::sparse(&mut text, all.counts);
+    sections::second(&mut text, all.places);
     sections::third(&mut text, all.bounces);
     sections::cost(&mut text, all.timed);
     sections::every(&mut text, all.contests);

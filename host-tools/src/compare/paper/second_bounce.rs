@@ -19,7 +19,7 @@ pub(super) const COMPARED: [usize; 2] = [120, 150];
 const PANELS: usize = 4;
 
 /// Error of a second bounce relative to the true one's brightest cell.
-const WORST: f64 = 0.2;
+const WORST: f64 = 0.1;
 
 /// Second-bounce error of each picture of Fig. 3.
 #[derive(Clone, PartialEq, Debug)]

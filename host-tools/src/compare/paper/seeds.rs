@@ -8,13 +8,13 @@ use crate::progress::{Progress, Silent};
 use crate::solve::{Method, inverted};
 
 /// Draws of everything that is random.
-pub(super) const SEEDS: u64 = 20;
+pub const SEEDS: u64 = 20;
 
 /// Student's t for a 95 % interval of a mean of [`SEEDS`] values.
 const STUDENT: f64 = 2.093;
 
 /// A method and how many photographs it gets, white among them, black not.
-pub(super) const ENTRIES: [(Method, usize); 8] = [
+pub const ENTRIES: [(Method, usize); 8] = [
     (Method::TwoStage, 120),
     (Method::Direct, 120),
     (Method::TwoStage, 150),
@@ -28,32 +28,32 @@ pub(super) const ENTRIES: [(Method, usize); 8] = [
 /// Errors of one method in one condition, by seed; those that were refused are left
 /// out and counted.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Sample {
+pub struct Sample {
     /// Light and camera.
-    pub(super) condition: Condition,
+    pub condition: Condition,
     /// The method.
-    pub(super) method: Method,
+    pub method: Method,
     /// Photographs.
-    pub(super) photographs: usize,
+    pub photographs: usize,
     /// Seed, error of the second bounce under white, error of compensation.
-    pub(super) errors: Vec<(u64, f64, f64)>,
+    pub errors: Vec<(u64, f64, f64)>,
     /// Seeds whose answer no scene can have.
-    pub(super) refused: usize,
+    pub refused: usize,
 }
 
 /// Mean and its 95 % interval.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Mean {
+pub struct Mean {
     /// The mean.
-    pub(super) mean: f64,
+    pub mean: f64,
     /// Half the width of the interval.
-    pub(super) half: f64,
+    pub half: f64,
 }
 
 impl Mean {
     /// Of values that are drawn independently.
     #[must_use]
-    pub(super) fn of(values: &[f64]) -> Self {
+    pub fn of(values: &[f64]) -> Self {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
@@ -67,20 +67,20 @@ impl Mean {
 impl Sample {
     /// Second-bounce errors.
     #[must_use]
-    pub(super) fn second_bounce(&self) -> Vec<f64> {
+    pub fn second_bounce(&self) -> Vec<f64> {
         self.errors.iter().map(|(_, error, _)| *error).collect()
     }
 
     /// Compensation errors.
     #[must_use]
-    pub(super) fn compensation(&self) -> Vec<f64> {
+    pub fn compensation(&self) -> Vec<f64> {
         self.errors.iter().map(|(.., error)| *error).collect()
     }
 
     /// Seeds in which this one's second bounce is better than another's, of those that
     /// both answered.
     #[must_use]
-    pub(super) fn wins(&self, other: &Self) -> (usize, usize) {
+    pub fn wins(&self, other: &Self) -> (usize, usize) {
         let pairs = self.errors.iter().filter_map(|(seed, error, _)| {
             let other = other.errors.iter().find(|(s, ..)| s == seed)?;
             Some(*error < other.1)
@@ -91,25 +91,25 @@ impl Sample {
     }
 }
 
-/// Runs all methods in all conditions.
+/// Runs methods, with so many photographs each, in all conditions over `seeds` draws.
 #[must_use]
-pub(super) fn run(progress: &dyn Progress) -> Vec<Sample> {
-    let total = Condition::ALL.len() as u64 * SEEDS;
+pub fn run(seeds: u64, entries: &[(Method, usize)], progress: &dyn Progress) -> Vec<Sample> {
+    let total = Condition::ALL.len() as u64 * seeds;
     progress.begin("the paper's comparison", total);
     let mut samples: Vec<Sample> = Condition::ALL
         .iter()
         .flat_map(|condition| {
-            ENTRIES.map(|(method, photographs)| Sample {
+            entries.iter().map(|(method, photographs)| Sample {
                 condition: *condition,
-                method,
-                photographs,
+                method: *method,
+                photographs: *photographs,
                 errors: Vec::new(),
                 refused: 0,
             })
         })
         .collect();
     for condition in Condition::ALL {
-        for seed in 1..=SEEDS {
+        for seed in 1..=seeds {
             let mut own = samples.iter_mut().filter(|s| s.condition == condition);
             one(condition, seed, &mut own);
             progress.advance(1);
