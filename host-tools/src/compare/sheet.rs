@@ -96,13 +96,14 @@ fn enlarged(picture: &Picture) -> Picture {
 /// more than a picture can hold.
 pub(super) fn sheet(rows: &[Vec<Tile>], bar: Option<(&ColourScale, &str)>) -> Option<Picture> {
     let tiles = || rows.iter().flatten();
-    let words = |tile: &Tile| TITLE.width(&tile.title).max(TEXT.width(&tile.caption));
     let side = tiles()
-        .map(|tile| tile.picture.size().width().max(words(tile)))
+        .map(|tile| tile.picture.size().width().max(TEXT.width(&tile.caption)))
         .max()?;
     let rise = tiles().map(|tile| tile.picture.size().height()).max()?;
+    let titles = tiles().map(|tile| lines(&tile.title, side).len()).max()?;
     let across = rows.iter().map(Vec::len).max()?;
-    let step = rise + 2 * LINE + GAP;
+    let above = (titles + 1) * LINE;
+    let step = rise + above + GAP;
     let end = GAP + rows.len() * step;
     let legend = if bar.is_some() {
         BAR + 2 * LINE + GAP
@@ -117,9 +118,11 @@ pub(super) fn sheet(rows: &[Vec<Tile>], bar: Option<(&ColourScale, &str)>) -> Op
     for (row, tiles) in rows.iter().enumerate() {
         for (col, tile) in tiles.iter().enumerate() {
             let (x, y) = (GAP + col * (side + GAP), GAP + row * step);
-            canvas.write(x, y, &tile.title, TITLE);
-            canvas.write(x, y + LINE - 2, &tile.caption, TEXT);
-            canvas.place(x, y + 2 * LINE, &tile.picture);
+            for (line, words) in lines(&tile.title, side).iter().enumerate() {
+                canvas.write(x, y + line * LINE, words, TITLE);
+            }
+            canvas.write(x, y + titles * LINE - 2, &tile.caption, TEXT);
+            canvas.place(x, y + above, &tile.picture);
         }
     }
     if let Some((scale, words)) = bar {
@@ -132,6 +135,25 @@ pub(super) fn sheet(rows: &[Vec<Tile>], bar: Option<(&ColourScale, &str)>) -> Op
         );
     }
     Some(canvas.finish())
+}
+
+/// A title in lines of at most `width` pixels, words kept whole.
+fn lines(title: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in title.split(' ') {
+        let last = lines.last_mut().filter(|last| {
+            last.is_empty() || TITLE.width(last) + TITLE.width(" ") + TITLE.width(word) <= width
+        });
+        match last {
+            Some(last) if last.is_empty() => last.push_str(word),
+            Some(last) => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 fn legend_at(
@@ -199,6 +221,20 @@ fn with_palette(picture: &Picture) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_titles_break_between_words() {
+        let width = TITLE.width("a long title");
+        assert_eq!(
+            lines("a long title indeed", width),
+            ["a long title", "indeed"]
+        );
+        assert_eq!(lines("", width), [""]);
+        assert_eq!(
+            lines("incomprehensibilities", width),
+            ["incomprehensibilities"]
+        );
+    }
 
     #[test]
     fn a_palette_changes_no_pixel() {
