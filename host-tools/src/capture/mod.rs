@@ -10,6 +10,7 @@
 //!                              sharing                pixels that see two cells are left out
 //!                              measure                one observation a cell and pattern, noise
 //!                              fine_flood             the flood photograph on a finer grid
+//! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
 //!
 //! A capture may come from a stranger: paths stay inside the folder, sizes are
@@ -29,6 +30,7 @@ mod pattern;
 mod photo;
 mod photographs;
 mod picture;
+mod reference;
 #[cfg(test)]
 mod refusal_tests;
 mod registration;
@@ -51,6 +53,7 @@ pub use manifest::{MANIFEST_FILE, Manifest, Shot};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
+pub use reference::{REFERENCE_FILE, ReferenceError, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
 pub use response::Response;
 pub use role::Role;
