@@ -25,6 +25,7 @@ mod simulate;
 mod slots;
 mod solve;
 mod status;
+mod tradeoff;
 mod trial;
 
 use args::{Arguments, Command};
@@ -43,6 +44,7 @@ pub fn run() -> ExitCode {
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),
