@@ -20,5 +20,6 @@ pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod solve;
+pub mod tradeoff;
 pub mod user;
 pub mod video;

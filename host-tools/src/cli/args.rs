@@ -37,6 +37,8 @@ pub(super) enum Command {
     Bounces(Bounces),
     /// Every way to photograph and to invert on the same light, or the paper's figures
     Compare(Compare),
+    /// Show what accuracy costs in time, for a scene or a table
+    Tradeoff(Tradeoff),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -281,6 +283,16 @@ pub(super) struct Inspect {
     /// Key to verify its signature with
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Tradeoff {
+    /// Folder with `capture.csv`, patterns and photographs, or a table
+    #[arg(value_name = "CAPTURE|TABLE.iltm")]
+    pub(super) input: PathBuf,
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -27,6 +27,7 @@ mod simulate;
 mod slots;
 mod solve;
 mod status;
+mod tradeoff;
 mod trial;
 
 use crate::compare::Meter;
@@ -49,6 +50,7 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Compare(compare) => compare::run(compare, meter, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
         Command::Bounces(bounces) => bounces::run(bounces, &output),
+        Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),
