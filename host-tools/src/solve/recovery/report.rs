@@ -2,10 +2,11 @@
 
 use super::super::forward::Inverse;
 use super::super::haar::Haar;
+use super::sensing::Transported;
 use super::{LIMIT, RecoveryBounds, Sampling, Sensing, signed};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::fmt::Write;
 
 /// Part of a row's energy that its effective coefficients hold.
 const ENERGY: f64 = 0.99;
@@ -82,44 +83,42 @@ impl Recovery {
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let (k, m) = (self.k, self.photographs);
+        let rows = match k {
+            1 => "1 coefficient holds 99 % of a row's energy".to_owned(),
+            k => format!("k = {k} coefficients hold 99 % of a row's energy"),
+        };
         let asks = format!("the theorem asks for less than {LIMIT:.2}");
-        let mut first = format!("k = {k} coefficients a row: ");
-        let _ = match self.verdict() {
-            Verdict::Holds => write!(
-                first,
-                "kappa^2 gamma is at most {} (Gershgorin), {asks}:",
-                number(self.product_at_most)
-            ),
-            _ if 2 * k > m => write!(
-                first,
-                "the theorem needs 2 k photographs at least, and there are {m}:"
-            ),
-            _ => write!(
-                first,
-                "kappa^2 gamma is at least {} (sampled), {asks}:",
-                number(self.product_at_least)
-            ),
-        };
-        let second = match self.verdict() {
+        let verdict = self.verdict();
+        let why = match verdict {
             Verdict::Holds => {
-                "without noise, plain l1 recovers rows this sparse exactly".to_owned()
+                let most = number(self.product_at_most);
+                format!("kappa^2 gamma is at most {most} (Gershgorin), {asks}:")
             }
-            Verdict::Open => "neither bound decides; held-out photographs judge instead".to_owned(),
-            Verdict::Fails => {
-                let up_to = match self.k_may_hold {
-                    0 => "for any k".to_owned(),
-                    most => format!("for more than k = {most}"),
-                };
-                format!("it promises nothing here, nor {up_to}; held-out photographs judge instead")
+            _ if 2 * k > m => format!("the theorem needs 2 k photographs, and there are {m}:"),
+            _ if self.product_at_least.is_infinite() => {
+                format!("kappa^2 gamma is infinite (some are not told apart), {asks}:")
+            }
+            _ => {
+                let least = number(self.product_at_least);
+                format!("kappa^2 gamma is at least {least} (sampled), {asks}:")
             }
         };
-        vec![first, second]
+        let so = match (verdict, self.k_may_hold) {
+            (Verdict::Holds, _) => "without noise, plain l1 finds such rows exactly".to_owned(),
+            (Verdict::Open, _) => "not decided; held-out photographs judge instead".to_owned(),
+            (Verdict::Fails, 0) => {
+                "it promises nothing here, for no k; held-out photographs judge instead".to_owned()
+            }
+            (Verdict::Fails, most) => format!(
+                "it promises nothing here beyond k = {most}; held-out photographs judge instead"
+            ),
+        };
+        vec![format!("{rows};"), why, so]
     }
 }
 
 fn number(value: f64) -> String {
     match value {
-        v if !v.is_finite() => "any number".to_owned(),
         v if v < 100.0 => format!("{v:.1}"),
         v if v < 1e4 => format!("{v:.0}"),
         v => format!("{v:.0e}"),
@@ -137,20 +136,21 @@ pub(in super::super) fn of_direct(
     let combined = signed(patterns, flood);
     let found = inverses.iter().map(|inverse| {
         let k = effective_coefficients(inverse, haar);
-        let sensing = Sensing::of_inverse(inverse, haar, &combined)?;
+        let transported = Transported::new(inverse, haar)?;
+        let sensing = transported.sensing(&combined);
         let bounds = sensing.bounds(k, Sampling::default());
-        Some((*inverse, sensing, bounds))
+        Some((transported, sensing, bounds))
     });
     let mut channels = found.collect::<Option<Vec<_>>>()?;
     channels.sort_by(|a, b| a.2.product.lower.total_cmp(&b.2.product.lower));
-    let (inverse, sensing, bounds) = channels.pop()?;
+    let (transported, sensing, bounds) = channels.pop()?;
     // The mean of patterns that are 0 and 1 shows in any few supports.
     let few = Sampling {
         random: 0,
         starts: 2,
         ..Sampling::default()
     };
-    let as_shown = Sensing::of_inverse(inverse, haar, patterns)?.bounds(bounds.k, few);
+    let as_shown = transported.sensing(patterns).bounds(bounds.k, few);
     let RecoveryBounds {
         k,
         kappa,
@@ -199,21 +199,22 @@ fn largest(sensing: &Sensing) -> (usize, usize) {
 fn effective_coefficients(inverse: &Inverse, haar: &Haar) -> usize {
     // Rows as columns, which are contiguous.
     let coded = haar.analyse_operator(&inverse.dense()).transpose();
-    let count = |row: nalgebra::DVectorView<'_, f64>| {
+    let count = |row: usize| {
+        let row = coded.column(row);
         let mut squares: Vec<f64> = row.iter().map(|c| c * c).collect();
-        squares.sort_by(|a, b| b.total_cmp(a));
+        squares.sort_unstable_by(|a, b| b.total_cmp(a));
         let enough = ENERGY * squares.iter().sum::<f64>();
         let mut sum = 0.0;
-        let before = squares.iter().take_while(|square| {
-            let less = sum < enough;
-            sum += *square;
-            less
+        let last = squares.iter().position(|square| {
+            sum += square;
+            sum >= enough
         });
-        before.count()
+        last.map_or(squares.len(), |at| at + 1)
     };
-    let mut counts: Vec<usize> = coded.column_iter().map(count).collect();
-    // A row of a cell that took no part has none.
-    counts.retain(|count| *count > 0);
+    let rows = (0..coded.ncols()).into_par_iter();
+    // The row of a function on cells that took no part has no energy.
+    let live = rows.filter(|row| coded.column(*row).norm_squared() > 0.0);
+    let mut counts: Vec<usize> = live.map(count).collect();
     counts.sort_unstable();
     counts.get(counts.len() / 2).copied().unwrap_or(1)
 }

@@ -4,11 +4,13 @@ use super::super::forward::{Inverse, product};
 use super::super::haar::Haar;
 use super::search::{Extremes, Sampling, search};
 use super::{Bounds, RecoveryBounds};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
-/// Coefficients that supports are drawn from at most; on larger grids every so many-th
-/// coefficient is one of them, and no bound from above is known.
-pub(super) const POOL: usize = 400;
+/// Coefficients of a grid up to which all of them are looked at.
+pub(super) const ALL: usize = 400;
+
+/// On larger grids these many of the coarsest, and as many of the others.
+const COARSEST: usize = 100;
 
 /// A scene's transport and patterns, ready for bounds at any sparsity.
 #[derive(Clone, Debug)]
@@ -36,51 +38,18 @@ impl Sensing {
         let columns = haar.analyse_columns(transport).transpose();
         let inverse = transport.clone().try_inverse();
         let condition = inverse.map_or(f64::INFINITY, |inverse| norm(transport) * norm(&inverse));
-        Self::of_columns(&columns, patterns, condition, transport.nrows())
+        Self::of_columns(&columns, patterns, condition)
     }
 
-    /// The same from the inverse, `light` being what its transport makes of patterns.
-    /// `None` if it is singular.
-    pub(in super::super) fn of_inverse(
-        inverse: &Inverse,
-        haar: &Haar,
-        patterns: &DMatrix<f64>,
-    ) -> Option<Self> {
-        let cells = patterns.nrows();
-        // A cell that took no part lights itself: its column of T is not known.
-        let gain = inverse.gain.map(|g| if g > 0.0 { g } else { 0.0 });
-        let typical = typical(&gain);
-        let gain = gain.map(|g| if g > 0.0 { g } else { typical });
-        let step = cells.div_ceil(POOL);
-        let pool: Vec<usize> = (0..cells).step_by(step).collect();
-        let chosen = DMatrix::from_fn(cells, pool.len(), |i, j| f64::from(i == pool[j]));
-        let functions = haar.synthesise_columns(&chosen);
-        // T^T = (diag(g) - K^T)^-1.
-        let transposed = Inverse::new(gain.clone(), inverse.operator.transpose());
-        let columns = transposed.light(&functions)?;
-        let whole = DMatrix::from_diagonal(&gain) - &inverse.operator;
-        let condition = match step {
-            // W (T^T W)^T is T itself.
-            1 => norm(&haar.synthesise_columns(&columns.transpose())) * norm(&whole),
-            _ => f64::INFINITY,
-        };
-        Some(Self::of_columns(&columns, patterns, condition, cells))
-    }
-
-    fn of_columns(
-        columns: &DMatrix<f64>,
-        patterns: &DMatrix<f64>,
-        condition: f64,
-        cells: usize,
-    ) -> Self {
+    /// `columns` are of `T^T W`, all or some, `condition` is at least that of `T`.
+    fn of_columns(columns: &DMatrix<f64>, patterns: &DMatrix<f64>, condition: f64) -> Self {
         let sensed = product(&patterns.transpose(), columns);
-        let shown = |column: &DVector<f64>| column.iter().any(|light| *light != 0.0);
-        let photographs = patterns.column_iter().filter(|c| shown(&c.into_owned()));
+        let shown = |column: DVectorView<'_, f64>| column.iter().any(|light| *light != 0.0);
         Self {
-            photographs: photographs.count(),
+            photographs: patterns.column_iter().filter(|c| shown(*c)).count(),
             forward: product(&columns.transpose(), columns),
             sensed: product(&sensed.transpose(), &sensed),
-            cells,
+            cells: columns.nrows(),
             condition,
         }
     }
@@ -179,6 +148,60 @@ impl Sensing {
         }
         largest
     }
+}
+
+/// `T^T W` of an inverse, of as many coefficients as there is time for: with patterns
+/// it makes a [`Sensing`].
+#[derive(Clone, Debug)]
+pub(super) struct Transported {
+    columns: DMatrix<f64>,
+    condition: f64,
+}
+
+impl Transported {
+    /// `None` if the inverse is singular. A cell that took no part is taken to light
+    /// itself like a typical one: its column of `T` is not known.
+    pub(super) fn new(inverse: &Inverse, haar: &Haar) -> Option<Self> {
+        let typical = typical(&inverse.gain);
+        let gain = inverse.gain.map(|g| if g > 0.0 { g } else { typical });
+        let cells = gain.len();
+        let pool = pool(haar);
+        let chosen = DMatrix::from_fn(cells, pool.len(), |i, j| f64::from(i == pool[j]));
+        // T^T = (diag(g) - K^T)^-1.
+        let transposed = Inverse::new(gain.clone(), inverse.operator.transpose());
+        let columns = transposed.light(&haar.synthesise_columns(&chosen))?;
+        let condition = if pool.len() == cells {
+            // W (T^T W)^T is T itself.
+            let whole = DMatrix::from_diagonal(&gain) - &inverse.operator;
+            norm(&haar.synthesise_columns(&columns.transpose())) * norm(&whole)
+        } else {
+            f64::INFINITY
+        };
+        Some(Self { columns, condition })
+    }
+
+    pub(super) fn sensing(&self, patterns: &DMatrix<f64>) -> Sensing {
+        Sensing::of_columns(&self.columns, patterns, self.condition)
+    }
+}
+
+/// The coefficients that supports are drawn from, ascending.
+fn pool(haar: &Haar) -> Vec<usize> {
+    let fineness = haar.fineness();
+    let mut all: Vec<usize> = (0..fineness.len()).collect();
+    if all.len() <= ALL {
+        return all;
+    }
+    all.sort_by(|a, b| fineness[*a].total_cmp(&fineness[*b]));
+    let (coarse, others) = all.split_at(COARSEST);
+    let step = others.len().div_ceil(COARSEST);
+    let mut pool: Vec<usize> = coarse
+        .iter()
+        .chain(others.iter().step_by(step))
+        .copied()
+        .collect();
+    pool.sort_unstable();
+    pool
 }
 
 impl Extremes {
