@@ -188,6 +188,10 @@ fn dark(error: LightError) -> Failure {
     match error {
         LightError::Capture(error) => LearnError::Capture(error).into(),
         LightError::Solve(error) => LearnError::Solve(error).into(),
+        LightError::Reference(error) => {
+            let next_step = error.next_step();
+            Failure::new(Kind::Capture, error, next_step)
+        }
         LightError::Scene(error) => super::simulate::unreadable(&error),
         LightError::Simulation(error) => super::simulate::unsimulated(&error),
         LightError::Folder(error) => super::simulate::unwritten(error),

@@ -2,10 +2,14 @@
 //!
 //! Most methods want photographs that nobody took, so the scene's transport has to be
 //! known: for a described scene it is simulated, one cell lit at a time, as the camera
-//! sees it; for a capture it is what all its photographs together tell.
+//! sees it; for a capture it is its `reference_T.npy`, or what all its photographs
+//! together tell.
 
 use super::{Rig, Truth};
-use crate::capture::{self, CaptureError, CaptureOptions, Measurements, NoiseModel, shown};
+use crate::capture::{
+    self, CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, read_reference,
+    shown,
+};
 use crate::progress::Progress;
 use crate::scene::description::{Scene, SceneError};
 use crate::scene::folder::{self, FolderError};
@@ -46,6 +50,9 @@ pub enum LightError {
     /// The capture does not tell its scene's transport.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The capture's reference cannot be used.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
     /// The scene's description cannot be used.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -84,11 +91,19 @@ impl Light {
         let (inverse, _) = solve(&measurements, &SolveOptions::default(), progress)?;
         let cells = measurements.grid.cells();
         let channel = inverse.channels.len() / 2;
-        let transport = inverse
-            .channel(channel)
-            .light(&DMatrix::identity(cells, cells))
-            .ok_or(LightError::Singular)?;
-        let known = "found from all photographs of the capture";
+        let measured = read_reference(folder, measurements.grid, inverse.channels.len())?;
+        let measured = measured.and_then(|mut channels| channels.drain(channel..).next());
+        let (transport, known) = match measured {
+            Some(transport) => (transport, "measured: the capture\u{2019}s reference_T.npy"),
+            None => {
+                let light = inverse
+                    .channel(channel)
+                    .light(&DMatrix::identity(cells, cells));
+                let known = "what iltm finds from all photographs of the capture, which is kind \
+                             to methods that look for the same";
+                (light.ok_or(LightError::Singular)?, known)
+            }
+        };
         Self::new(&measurements, inverse.live, transport, known, seed)
     }
 
