@@ -41,7 +41,7 @@ impl Inversion for Bounded {
 
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let frames = Frames::new(&live, known.live.len())?;
+        let frames = Frames::new(&live, known.live.len());
         let images = natural_images(known.grid).select_rows(&live.chosen);
         let white = frames.flood.mean();
         let mut steps = 0;
@@ -72,17 +72,21 @@ struct Frames {
 }
 
 impl Frames {
-    fn new(live: &LiveTransport, cells: usize) -> Result<Self, Unfit> {
-        Ok(Self {
+    fn new(live: &LiveTransport, cells: usize) -> Self {
+        Self {
             chosen: live.chosen.clone(),
             cells,
-            flood: live.flood()?,
+            flood: live.transport.column_sum(),
             problem: Problem::new(&live.transport),
-        })
+        }
     }
 
+    /// Only saves steps: the answer does not depend on it.
     fn start(&self, wanted: &DVector<f64>) -> DVector<f64> {
-        wanted.component_div(&self.flood)
+        wanted.zip_map(&self.flood, |wanted, flood| {
+            let input = wanted / flood;
+            if input.is_finite() { input } else { 0.0 }
+        })
     }
 }
 

@@ -62,7 +62,7 @@ impl Inversion for PseudoInverse {
         let live = LiveTransport::new(&known)?;
         let groups = groups(&live.chosen, known.grid.cols());
         let members = membership(&groups, live.len());
-        let (matrix, chosen) = match self.fewer {
+        let (matrix, mu) = match self.fewer {
             Fewer::Lights => fewer_lights(&live, &members)?,
             Fewer::CameraCells => fewer_camera_cells(&live, &members)?,
         };
@@ -76,7 +76,7 @@ impl Inversion for PseudoInverse {
             answer: Answer::Inverse(live.whole(&finite(matrix)?)),
             multiplications: Some(stored + extra),
             photographs: 0,
-            remark: format!("{} of {} cells; mu {chosen:.4}", groups.len(), live.len()),
+            remark: format!("{} of {} cells; mu {mu:.4}", groups.len(), live.len()),
         })
     }
 }

@@ -69,10 +69,14 @@ impl Inversion for Tikhonov {
 /// Natural images in camera units between live cells, as bright as flood light allows in
 /// its darkest tenth of the cells.
 fn wanted(known: &Known<'_>, live: &LiveTransport) -> Result<DMatrix<f64>, Unfit> {
-    let flood = live.flood()?;
-    let mut sorted: Vec<f64> = flood.iter().copied().collect();
-    sorted.sort_by(f64::total_cmp);
-    let white = sorted[sorted.len() / 10];
+    let mut flood: Vec<f64> = live.transport.column_sum().iter().copied().collect();
+    flood.sort_by(f64::total_cmp);
+    let white = flood[flood.len() / 10];
+    if !white.is_normal() || white < 0.0 {
+        return Err(Unfit::Condition(
+            "a tenth of the cells shows no light under white".to_owned(),
+        ));
+    }
     let images = natural_images(known.grid).select_rows(&live.chosen);
     // Walls that light each other cannot be black beside white.
     Ok(images.map(|light| white * (0.2 + 0.8 * light)))
