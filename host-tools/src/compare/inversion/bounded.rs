@@ -48,7 +48,7 @@ impl Inversion for Bounded {
         let mut residual = 0.0_f64;
         for image in images.column_iter().take(SAMPLES) {
             let wanted = image.map(|light| white * (0.2 + 0.8 * light));
-            let solved = frames.problem.solve(&wanted, frames.start(&wanted));
+            let solved = frames.problem.solve(&wanted, &frames.start(&wanted));
             steps += solved.steps;
             residual = residual.max(solved.residual);
         }
@@ -93,7 +93,7 @@ impl Frames {
 impl Project for Frames {
     fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
         let part = DVector::from_fn(self.chosen.len(), |place, _| wanted[self.chosen[place]]);
-        let solved = self.problem.solve(&part, self.start(&part));
+        let solved = self.problem.solve(&part, &self.start(&part));
         let mut input = DVector::zeros(self.cells);
         for (cell, value) in self.chosen.iter().zip(solved.input.iter()) {
             input[*cell] = *value;
@@ -130,7 +130,7 @@ impl Problem {
         }
     }
 
-    fn solve(&self, wanted: &DVector<f64>, start: DVector<f64>) -> Solved {
+    fn solve(&self, wanted: &DVector<f64>, start: &DVector<f64>) -> Solved {
         let towards = self.transport.tr_mul(wanted);
         let scale = towards.norm();
         let mut input = start.map(|p| p.clamp(0.0, 1.0));

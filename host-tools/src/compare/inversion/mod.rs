@@ -176,6 +176,10 @@ fn hard() -> Vec<Box<dyn Inversion>> {
         blurred(boxed(Exact)),
         blurred(boxed(Neumann { order: 8 })),
         blurred(boxed(Tikhonov)),
+        blurred(boxed(Optical {
+            steps: 8,
+            scaled: false,
+        })),
         blurred(boxed(Bounded)),
     ]
 }

@@ -150,7 +150,7 @@ fn fewer_camera_cells(
 /// `mu = sigma sqrt(m)` for `m` rows whose elements have a noise of `sigma`: with
 /// `T = T0 + noise`, the expectation of `|T0 p - d|^2` is `|T p - d|^2 + m sigma^2 |p|^2`
 /// when nothing else is known of `T0`.
-pub(super) fn noise_weight(live: &LiveTransport, rows: usize) -> f64 {
+fn noise_weight(live: &LiveTransport, rows: usize) -> f64 {
     live.noise() * (rows as f64).sqrt()
 }
 

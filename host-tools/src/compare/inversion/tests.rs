@@ -31,11 +31,9 @@ fn ways_that_are_exact_find_a_spheres_inverse() {
 }
 
 /// Those that cannot be exact on cells that do not light each other, and why.
-const NOT_EXACT: [&str; 6] = [
+const NOT_EXACT: [&str; 5] = [
     // Gains that differ are not sparse in Haar.
     "wavelet",
-    // Gives up a part in 10^8.
-    "Tikhonov",
     // Has one gain for all.
     "no compensation",
     // Has half of the resolution.
