@@ -10,8 +10,8 @@ use crate::content::natural_images;
 use crate::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
-/// Weights that are tried, each three times the one before.
-const TRIALS: i32 = 11;
+/// Weights that are tried, each twice the one before.
+const TRIALS: i32 = 17;
 /// The least of them, of the root mean square singular value.
 const LEAST: f64 = 1e-4;
 
@@ -51,7 +51,7 @@ impl Inversion for Tikhonov {
         let mean = (seen.transport.norm_squared() / live.len() as f64).sqrt();
         let mut best: Option<(f64, f64)> = None;
         for trial in 0..TRIALS {
-            let mu = LEAST * mean * 3_f64.powi(trial);
+            let mu = LEAST * mean * 2_f64.powi(trial);
             let inverse = again.inverse(mu)?;
             let clipped = (inverse * &images).map(|p| p.clamp(0.0, 1.0));
             let error = (&seen.transport * clipped - &images).norm() / images.norm();
