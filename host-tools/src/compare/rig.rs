@@ -75,6 +75,16 @@ impl Rig {
         self.noise
     }
 
+    /// The same rig with its projector out of focus: `spread`, `N x N`, is the part of
+    /// each cell's light that falls on each other one.
+    #[must_use]
+    pub fn behind(&self, spread: &DMatrix<f64>) -> Self {
+        Self {
+            transport: &self.transport * spread,
+            ..self.clone()
+        }
+    }
+
     /// Light of each cell under each pattern, `N x m` from `N x m` of 0 to 1: `m`
     /// photographs.
     pub fn photograph(&mut self, patterns: &DMatrix<f64>) -> DMatrix<f64> {
@@ -131,6 +141,16 @@ mod tests {
     }
 
     #[test]
+    fn out_of_focus_a_cell_lights_what_its_light_falls_on() {
+        let half = DMatrix::from_row_slice(3, 3, &[0.5, 0.5, 0.0, 0.5, 0.5, 0.0, 0.0, 0.0, 1.0]);
+        let light = rig(NoiseModel::default())
+            .behind(&half)
+            .photograph(&DMatrix::from_row_slice(3, 1, &[1.0, 0.0, 0.0]));
+        let wanted = DMatrix::from_row_slice(3, 1, &[0.3, 0.3, 0.0]);
+        assert!((light - wanted).amax() < 1e-15);
+    }
+
+    #[test]
     fn noise_has_the_variance_of_its_model_and_spares_dead_cells() {
         let noise = NoiseModel {
             shot: 1e-3,
@@ -148,7 +168,7 @@ mod tests {
             flood
                 .row(2)
                 .iter()
-                .all(|light| *light <= 0.0 && *light >= 0.0)
+                .all(|light| light.abs() < f64::MIN_POSITIVE)
         );
     }
 }

@@ -119,11 +119,14 @@ impl Inversion for AlbedoAlone {
         });
         let darkest = live.chosen.iter().map(|cell| found.scaled[*cell]);
         let darkest = darkest.fold(f64::INFINITY, f64::min);
-        // With the irradiance at hand even, the factor is the only unknown.
-        let remark = format!(
-            "albedo {:.3} to {:.3}, divided by a factor of {:.2} to {:.2} if white is even",
-            darkest, found.least, found.least, found.most
-        );
+        let Albedo { least, most, .. } = found;
+        let factor = if least <= most {
+            format!("by a factor of {least:.2} to {most:.2}")
+        } else {
+            format!("by a factor that noise hides (at least {least:.2}, at most {most:.2})")
+        };
+        let remark =
+            format!("albedo {darkest:.3} to {least:.3} if white is even, to be divided {factor}");
         Ok(diagonal(&live, &gains, remark))
     }
 }

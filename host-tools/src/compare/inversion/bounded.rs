@@ -41,14 +41,14 @@ impl Inversion for Bounded {
 
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let frames = Frames::new(&live, known.live.len())?;
+        let frames = Frames::new(&live, known.live.len());
         let images = natural_images(known.grid).select_rows(&live.chosen);
         let white = frames.flood.mean();
         let mut steps = 0;
         let mut residual = 0.0_f64;
         for image in images.column_iter().take(SAMPLES) {
             let wanted = image.map(|light| white * (0.2 + 0.8 * light));
-            let solved = frames.problem.solve(&wanted, frames.start(&wanted));
+            let solved = frames.problem.solve(&wanted, &frames.start(&wanted));
             steps += solved.steps;
             residual = residual.max(solved.residual);
         }
@@ -72,24 +72,28 @@ struct Frames {
 }
 
 impl Frames {
-    fn new(live: &LiveTransport, cells: usize) -> Result<Self, Unfit> {
-        Ok(Self {
+    fn new(live: &LiveTransport, cells: usize) -> Self {
+        Self {
             chosen: live.chosen.clone(),
             cells,
-            flood: live.flood()?,
+            flood: live.transport.column_sum(),
             problem: Problem::new(&live.transport),
-        })
+        }
     }
 
+    /// Only saves steps: the answer does not depend on it.
     fn start(&self, wanted: &DVector<f64>) -> DVector<f64> {
-        wanted.component_div(&self.flood)
+        wanted.zip_map(&self.flood, |wanted, flood| {
+            let input = wanted / flood;
+            if input.is_finite() { input } else { 0.0 }
+        })
     }
 }
 
 impl Project for Frames {
     fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
         let part = DVector::from_fn(self.chosen.len(), |place, _| wanted[self.chosen[place]]);
-        let solved = self.problem.solve(&part, self.start(&part));
+        let solved = self.problem.solve(&part, &self.start(&part));
         let mut input = DVector::zeros(self.cells);
         for (cell, value) in self.chosen.iter().zip(solved.input.iter()) {
             input[*cell] = *value;
@@ -126,7 +130,7 @@ impl Problem {
         }
     }
 
-    fn solve(&self, wanted: &DVector<f64>, start: DVector<f64>) -> Solved {
+    fn solve(&self, wanted: &DVector<f64>, start: &DVector<f64>) -> Solved {
         let towards = self.transport.tr_mul(wanted);
         let scale = towards.norm();
         let mut input = start.map(|p| p.clamp(0.0, 1.0));

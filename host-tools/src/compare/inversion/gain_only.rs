@@ -6,7 +6,7 @@ use crate::compare::{Answer, Source, Unfit};
 use crate::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
-/// `p = d / flood`: each cell and channel for itself.
+/// `p = d / flood`: each cell and channel for itself, from one photograph of white.
 #[derive(Clone, Copy, Debug)]
 pub struct FloodGain;
 
@@ -31,15 +31,16 @@ impl Inversion for FloodGain {
     }
 
     fn how(&self) -> &'static str {
-        "Divides by the light under white, cell by cell, as if no cell lit another: right for \
-         even pictures, wrong for all others. The floor for methods that know about light \
-         between cells."
+        "Divides by the light in one photograph of white, cell by cell, as if no cell lit \
+         another: right for what white shows, wrong for all else. The floor for methods that \
+         know about light between cells."
     }
 
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let gain = live.flood()?.map(f64::recip);
-        Ok(diagonal(&live, &gain, String::new()))
+        let flood = flood(&known, &live)?;
+        let remark = "one photograph of white in all".to_owned();
+        Ok(diagonal(&live, &flood.map(f64::recip), remark))
     }
 }
 
@@ -66,6 +67,25 @@ impl Inversion for Uncompensated {
         }
         let gain = DVector::from_element(live.len(), factor);
         Ok(diagonal(&live, &gain, format!("factor {factor:.3}")))
+    }
+}
+
+/// Light of each live cell in one photograph of white. Not from the transport: a sum of
+/// its columns has the noise of them all.
+///
+/// # Errors
+/// [`Unfit::Condition`] if some cell shows none.
+pub(super) fn flood(known: &Known<'_>, live: &LiveTransport) -> Result<DVector<f64>, Unfit> {
+    let white = DMatrix::from_element(known.live.len(), 1, 1.0);
+    let white = known.rig.clone().photograph(&white);
+    let flood = white.column(0).select_rows(&live.chosen);
+    let dark = |light: &f64| !light.is_normal() || *light < 0.0;
+    match flood.iter().position(dark) {
+        None => Ok(flood),
+        Some(at) => Err(Unfit::Condition(format!(
+            "cell {} shows {:.3} under white, nothing to divide by",
+            live.chosen[at], flood[at]
+        ))),
     }
 }
 

@@ -21,8 +21,9 @@ pub struct LargestInputs {
 /// size of a coefficient in natural images; the same for all frames.
 #[derive(Clone, Copy, Debug)]
 pub struct StoredElements {
-    /// Elements for each cell, on average.
-    pub entries: usize,
+    /// As many elements as so many whole columns have: the multiplications of
+    /// [`LargestInputs`] with this count.
+    pub columns: usize,
 }
 
 /// `T^-1 = diag(g) - W K^ W^T`.
@@ -45,9 +46,16 @@ impl Coded {
         })
     }
 
-    /// Magnitude below which an element of the operator is rounding.
-    fn rounding(&self) -> f64 {
-        1e-12 * self.operator.amax()
+    /// Elements of the operator that are more than rounding.
+    fn stored(&self) -> usize {
+        let rounding = 1e-12 * self.operator.amax();
+        self.operator.iter().filter(|v| v.abs() > rounding).count()
+    }
+
+    /// Multiplications of so many whole columns.
+    fn columns(&self, count: usize) -> usize {
+        let cells = self.gain.len();
+        (count.min(cells) * self.stored()).div_ceil(cells)
     }
 }
 
@@ -74,17 +82,17 @@ impl Inversion for LargestInputs {
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let coded = Coded::new(&known)?;
-        let least = coded.rounding();
-        let stored = coded.operator.iter().filter(|v| v.abs() > least).count();
         let cells = known.live.len();
-        let count = self.count.min(cells);
-        let column = stored as f64 / cells as f64;
         let fixed = live.len() as f64 + haar_multiplications(cells);
         Ok(Inverted {
-            multiplications: Some(fixed + count as f64 * column),
-            answer: Answer::Frames(Box::new(Frames { coded, count })),
+            multiplications: Some(fixed + coded.columns(self.count) as f64),
             photographs: 0,
-            remark: format!("{stored} elements stored"),
+            remark: format!("{} elements stored", coded.stored()),
+            answer: Answer::Frames(Box::new(Frames {
+                live: DVector::from_fn(cells, |cell, _| f64::from(u8::from(known.live[cell]))),
+                count: self.count.min(cells),
+                coded,
+            })),
         })
     }
 }
@@ -92,6 +100,8 @@ impl Inversion for LargestInputs {
 struct Frames {
     coded: Coded,
     count: usize,
+    /// 1 where live.
+    live: DVector<f64>,
 }
 
 impl Project for Frames {
@@ -109,13 +119,13 @@ impl Project for Frames {
         for k in &order[..self.count] {
             light.axpy(coefficients[*k], &operator.column(*k), 1.0);
         }
-        gain.component_mul(wanted) - haar.synthesise(&light)
+        (gain.component_mul(wanted) - haar.synthesise(&light)).component_mul(&self.live)
     }
 }
 
 impl Inversion for StoredElements {
     fn name(&self) -> String {
-        format!("stored elements of the operator, {} a cell", self.entries)
+        format!("stored elements, as many as {} columns", self.columns)
     }
 
     fn source(&self) -> Source {
@@ -135,11 +145,13 @@ impl Inversion for StoredElements {
 
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
+        let coded = Coded::new(&known)?;
+        let kept = coded.columns(self.columns);
         let Coded {
             gain,
             operator,
             haar,
-        } = Coded::new(&known)?;
+        } = coded;
         let content = haar.analyse_columns(&natural_images(known.grid));
         let cells = known.live.len();
         let value = |place: usize| operator.as_slice()[place];
@@ -148,7 +160,7 @@ impl Inversion for StoredElements {
             .collect();
         let mut places: Vec<usize> = (0..cells * cells).filter(|k| worth[*k] > 0.0).collect();
         places.sort_by(|a, b| worth[*b].total_cmp(&worth[*a]).then(a.cmp(b)));
-        places.truncate(self.entries * cells);
+        places.truncate(kept);
         let mut stored = DMatrix::zeros(cells, cells);
         for place in &places {
             stored[(place % cells, place / cells)] = value(*place);
@@ -172,11 +184,12 @@ impl Inversion for StoredElements {
 mod tests {
     use super::super::test_scene::Before;
     use super::*;
+    use crate::progress::Silent;
 
     #[test]
     fn with_everything_kept_both_are_the_inverse() {
         let before = Before::textured(5, 7);
-        assert!(before.error(&StoredElements { entries: 35 }) < 1e-12);
+        assert!(before.error(&StoredElements { columns: 35 }) < 1e-12);
         let wanted = DVector::from_fn(35, |cell, _| 0.2 + 0.1 * ((cell * 7) % 5) as f64);
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
         let drive = before.drive(&LargestInputs { count: 35 }, &wanted);
@@ -197,7 +210,25 @@ mod tests {
         let before = Before::panels(8, 12);
         let truth = before.truth();
         let error = |method: &dyn Inversion| truth.judge(&before.answer(method)).compensation;
-        assert!(error(&StoredElements { entries: 4 }) < error(&StoredElements { entries: 0 }));
+        assert!(error(&StoredElements { columns: 16 }) < error(&StoredElements { columns: 0 }));
         assert!(error(&LargestInputs { count: 32 }) < error(&LargestInputs { count: 4 }));
+    }
+
+    /// What is known of images beforehand is worth more than what one image shows.
+    #[test]
+    fn at_equal_multiplications_stored_elements_show_natural_images_better() {
+        let before = Before::panels(8, 12);
+        let truth = before.truth();
+        let cost = |method: &dyn Inversion| {
+            let found = method.invert(before.known(), &Silent).unwrap();
+            let error = truth.judge(&found.answer).compensation;
+            (found.multiplications, error)
+        };
+        let (whole, few) = (
+            cost(&LargestInputs { count: 16 }),
+            cost(&StoredElements { columns: 16 }),
+        );
+        assert_eq!(whole.0, few.0);
+        assert!(few.1 < whole.1, "{few:?} {whole:?}");
     }
 }

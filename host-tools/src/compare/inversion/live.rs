@@ -83,9 +83,10 @@ impl LiveTransport {
     /// light never is; 0 for a transport that is known exactly. Elements that are not
     /// dark are seldom negative, so that this is a lower estimate.
     pub(super) fn noise(&self) -> f64 {
-        let negative = || self.transport.iter().filter(|light| **light < 0.0);
-        let count = negative().count().max(1) as f64;
-        (negative().map(|light| light * light).sum::<f64>() / count).sqrt()
+        let negative = self.transport.iter().filter(|light| **light < 0.0);
+        let add = |(sum, count), light: &f64| (sum + light * light, count + 1.0);
+        let (sum, count) = negative.fold((0.0, 0.0_f64), add);
+        (sum / count.max(1.0)).sqrt()
     }
 }
 

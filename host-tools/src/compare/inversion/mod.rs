@@ -98,9 +98,9 @@ pub fn all() -> Vec<Box<dyn Inversion>> {
     all.push(Box::new(Cancellation));
     all.extend(hard());
     all.extend([8, 32].map(|colours| boxed(Probing { colours })));
-    for (count, entries) in [(4, 4), (16, 16)] {
+    for count in [16, 64] {
         all.push(Box::new(LargestInputs { count }));
-        all.push(Box::new(StoredElements { entries }));
+        all.push(Box::new(StoredElements { columns: count }));
     }
     all.push(Box::new(AlbedoAlone));
     all.push(Box::new(FloodGain));
@@ -131,10 +131,20 @@ fn sparse() -> Vec<Box<dyn Inversion>> {
         }),
         boxed(Stratified {
             strata: 8,
-            threshold: 0.002,
+            threshold: 0.0002,
         }),
-        boxed(Clustered { limit: 16 }),
-        boxed(Clustered { limit: 64 }),
+        boxed(Clustered {
+            limit: 16,
+            lumped: false,
+        }),
+        boxed(Clustered {
+            limit: 64,
+            lumped: false,
+        }),
+        boxed(Clustered {
+            limit: 64,
+            lumped: true,
+        }),
         boxed(WaveletInverse { entries: 8 }),
         boxed(WaveletInverse { entries: 32 }),
     ]
@@ -162,9 +172,14 @@ fn hard() -> Vec<Box<dyn Inversion>> {
         boxed(PseudoInverse {
             fewer: Fewer::CameraCells,
         }),
+        boxed(Tikhonov),
         blurred(boxed(Exact)),
         blurred(boxed(Neumann { order: 8 })),
         blurred(boxed(Tikhonov)),
+        blurred(boxed(Optical {
+            steps: 8,
+            scaled: false,
+        })),
         blurred(boxed(Bounded)),
     ]
 }

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct OutOfFocus {
     /// Standard deviation of the blur `B`, cells.
     pub deviation: f64,
-    /// One that takes no photographs itself.
+    /// The method.
     pub method: Box<dyn Inversion>,
 }
 
@@ -38,9 +38,12 @@ impl Inversion for OutOfFocus {
             spread.row_mut(cell).fill(0.0);
             spread.column_mut(cell).fill(0.0);
         }
-        let transport = known.rig.clone().photograph(&spread);
+        let rig = known.rig.behind(&spread);
+        let each = DMatrix::identity(spread.nrows(), spread.nrows());
+        let transport = rig.clone().photograph(&each);
         let blurred = Known {
             transport: &transport,
+            rig: &rig,
             ..known
         };
         let live = LiveTransport::new(&blurred)?;

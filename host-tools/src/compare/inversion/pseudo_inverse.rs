@@ -62,7 +62,7 @@ impl Inversion for PseudoInverse {
         let live = LiveTransport::new(&known)?;
         let groups = groups(&live.chosen, known.grid.cols());
         let members = membership(&groups, live.len());
-        let (matrix, chosen) = match self.fewer {
+        let (matrix, mu) = match self.fewer {
             Fewer::Lights => fewer_lights(&live, &members)?,
             Fewer::CameraCells => fewer_camera_cells(&live, &members)?,
         };
@@ -76,7 +76,7 @@ impl Inversion for PseudoInverse {
             answer: Answer::Inverse(live.whole(&finite(matrix)?)),
             multiplications: Some(stored + extra),
             photographs: 0,
-            remark: format!("{} of {} cells; mu {chosen:.4}", groups.len(), live.len()),
+            remark: format!("{} of {} cells; mu {mu:.4}", groups.len(), live.len()),
         })
     }
 }
@@ -150,7 +150,7 @@ fn fewer_camera_cells(
 /// `mu = sigma sqrt(m)` for `m` rows whose elements have a noise of `sigma`: with
 /// `T = T0 + noise`, the expectation of `|T0 p - d|^2` is `|T p - d|^2 + m sigma^2 |p|^2`
 /// when nothing else is known of `T0`.
-pub(super) fn noise_weight(live: &LiveTransport, rows: usize) -> f64 {
+fn noise_weight(live: &LiveTransport, rows: usize) -> f64 {
     live.noise() * (rows as f64).sqrt()
 }
 

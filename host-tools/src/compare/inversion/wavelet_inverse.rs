@@ -1,4 +1,8 @@
 //! Wavelet sparse approximate inverses.
+//!
+//! Least squares in a wavelet basis is Chan, Tang and Wan's; the pattern from the largest
+//! elements is that of Chow, *A Priori Sparsity Patterns for Parallel Sparse Approximate
+//! Inverse Preconditioners*, SIAM Journal on Scientific Computing 2000.
 
 use super::live::{LiveTransport, finite};
 use super::{Inversion, Inverted, Known};
