@@ -117,7 +117,8 @@ pub(super) struct Solve {
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
     /// How to find the inverse: `joint` (all channels and photographs, with what
-    /// physics knows) or `direct` (the paper's plain l1)
+    /// physics knows), `direct` (the paper's plain l1), `two-stage` (plain l1 for the
+    /// transport, then its inverse) or `brute-force` (least squares for the transport)
     #[arg(long, default_value_t = Method::default())]
     pub(super) method: Method,
     /// Weight of sparsity, relative to a flood photograph of mean 1; chosen by
