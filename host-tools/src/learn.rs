@@ -64,6 +64,20 @@ pub fn learn(
     progress: &dyn Progress,
 ) -> Result<Learned, LearnError> {
     let measurements = capture::read(capture, photographs, progress)?;
+    learn_measured(measurements, capture, options, reference_white, progress)
+}
+
+/// The same from photographs that have been read before; `capture` is where.
+///
+/// # Errors
+/// Those of [`learn`], but for [`LearnError::Capture`].
+pub fn learn_measured(
+    measurements: Measurements,
+    capture: &Path,
+    options: &SolveOptions,
+    reference_white: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<Learned, LearnError> {
     let (inverse, report) = solve::solve(&measurements, options, progress)?;
     let inverse = match report.compensation {
         Compensation::Operator => inverse,

@@ -10,6 +10,7 @@
 pub mod bounces;
 pub mod capture;
 pub mod cli;
+pub mod compare;
 pub mod compile;
 pub mod content;
 pub mod demo;
@@ -19,5 +20,6 @@ pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod solve;
+pub mod tradeoff;
 pub mod user;
 pub mod video;

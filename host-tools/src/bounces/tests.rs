@@ -4,11 +4,11 @@
 use super::*;
 use crate::capture::{Registration, Role, shown};
 use crate::progress::Silent;
+use crate::scene::coaxial::{Panels, Scene};
 use crate::scene::description::Scene as Described;
 use crate::scene::{Effect, Forced, Simulation, SimulationOptions, folder as simulated};
 use crate::solve::ChannelInverse;
 use iltm_runtime::Grid;
-use iltm_tests::hard_cases::scene::{Panels, Scene};
 use nalgebra::DVector;
 
 /// A camera with a pixel a cell.
@@ -43,7 +43,7 @@ pub(super) fn known_wall(rows: u16, cols: u16) -> Wall {
     Wall::new(&registration(grid), &[vec![1.0; cells]], &dark)
 }
 
-pub(super) use iltm_tests::hard_cases::capture::normal;
+pub(super) use crate::scene::coaxial::normal;
 
 /// `T^-1 = E^-1 (R^-1 - F)`, exactly.
 fn inverse(scene: &Scene) -> InverseTransport {

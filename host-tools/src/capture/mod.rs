@@ -12,6 +12,7 @@
 //!                              place                  where between the cells a pixel lies
 //!                              fine_flood             the flood photograph on a finer grid
 //!                              shot_light             one photograph to look at
+//! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
 //!
 //! A capture may come from a stranger: paths stay inside the folder, sizes are
@@ -32,6 +33,7 @@ mod photo;
 mod photographs;
 mod picture;
 mod place;
+mod reference;
 #[cfg(test)]
 mod refusal_tests;
 mod registration;
@@ -55,13 +57,14 @@ pub use manifest::{MANIFEST_FILE, Manifest, Shot};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
+pub use reference::{REFERENCE_FILE, ReferenceError, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
 pub use response::Response;
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
 pub use shot_light::ShotLight;
-pub use shown::shown;
+pub use shown::{columns, shown};
 
 use crate::progress::Progress;
 use measure::CellPixels;

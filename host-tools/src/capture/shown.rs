@@ -2,6 +2,7 @@
 
 use super::{Pattern, Role};
 use iltm_runtime::Grid;
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -46,6 +47,15 @@ pub fn shown(grid: Grid, bernoulli: usize, seed: u64) -> Vec<(Role, Pattern)> {
         (Role::Bernoulli, pattern)
     });
     coded.chain(chance).collect()
+}
+
+/// Projected light of each pattern as a column of 0 and 1, `N x m`.
+#[must_use]
+pub fn columns(patterns: &[(Role, Pattern)]) -> DMatrix<f64> {
+    let cells = patterns.first().map_or(0, |(_, pattern)| pattern.lit.len());
+    DMatrix::from_fn(cells, patterns.len(), |cell, k| {
+        f64::from(u8::from(patterns[k].1.lit[cell]))
+    })
 }
 
 #[cfg(test)]

@@ -35,6 +35,10 @@ pub(super) enum Command {
     Compensate(Compensate),
     /// Separate a photograph's light into direct light, second, third, ... bounce
     Bounces(Bounces),
+    /// Every way to photograph and to invert on the same light, or the paper's figures
+    Compare(Compare),
+    /// Show what accuracy costs in time, for a scene or a table
+    Tradeoff(Tradeoff),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -160,6 +164,29 @@ pub(super) struct SealTerms {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct Compare {
+    /// Capture folder or SCENE.toml whose light is compared on
+    #[arg(
+        value_name = "CAPTURE|SCENE.toml",
+        required_unless_present = "paper",
+        conflicts_with = "paper"
+    )]
+    pub(super) light: Option<PathBuf>,
+    /// Repeat the experiments of Chu, Ng, Pahwa, Quek, Huang (BMVC 2011), with intervals
+    #[arg(long)]
+    pub(super) paper: bool,
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// Photographs for the methods that take as many as one likes
+    #[arg(long, value_name = "M", default_value_t = 150)]
+    pub(super) photos: usize,
+    /// Seed of patterns and noise
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct Sign {
     /// Table to sign
     pub(super) table: PathBuf,
@@ -256,6 +283,16 @@ pub(super) struct Inspect {
     /// Key to verify its signature with
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Tradeoff {
+    /// Folder with `capture.csv`, patterns and photographs, or a table
+    #[arg(value_name = "CAPTURE|TABLE.iltm")]
+    pub(super) input: PathBuf,
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -2,8 +2,8 @@
 
 use super::description::Scene;
 use super::effects::Effect;
-use super::folder::columns;
 use super::simulation::{Simulation, SimulationError, SimulationOptions};
+use crate::capture::columns;
 use crate::capture::shown;
 use crate::progress::Progress;
 use std::time::Instant;

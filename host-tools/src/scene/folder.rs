@@ -6,7 +6,7 @@ use super::sensor::Sensor;
 use super::simulation::{Simulation, SimulationError};
 use crate::capture::{
     CameraSettings, MANIFEST_FILE, Manifest, Pattern, ProjectorSettings, Role, SETTINGS_FILE,
-    SceneSettings, Settings, Shot,
+    SceneSettings, Settings, Shot, columns,
 };
 use crate::progress::Progress;
 use image::{ColorType, ImageFormat};
@@ -220,14 +220,6 @@ fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
     };
     // Numbers and strings always have a TOML form.
     toml::to_string(&settings).unwrap_or_default()
-}
-
-/// Patterns as light, cells x patterns.
-pub(super) fn columns(patterns: &[(Role, Pattern)]) -> DMatrix<f64> {
-    let cells = patterns.first().map_or(0, |(_, pattern)| pattern.lit.len());
-    DMatrix::from_fn(cells, patterns.len(), |cell, k| {
-        f64::from(u8::from(patterns[k].1.lit[cell]))
-    })
 }
 
 struct Shooting<'s> {

@@ -15,6 +15,7 @@
 //! sensor        exposure, noise, bits, response
 //! folder        the photographs as a capture
 //! ablation      what each effect contributes
+//! coaxial       scenes whose transport is known exactly, cell by cell
 //! ```
 //!
 //! Surfaces are Lambertian unless they say otherwise; each patch has one radiosity
@@ -24,6 +25,7 @@
 
 pub mod ablation;
 mod between;
+pub mod coaxial;
 mod decide;
 pub mod description;
 mod effects;

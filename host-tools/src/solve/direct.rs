@@ -10,18 +10,11 @@ use super::convergence::{Convergence, Stop};
 use super::haar::Haar;
 use super::observed::CellNoise;
 use super::prepare::Prepared;
-use super::solution::{Channel, Solution, drop_dead};
-use crate::capture::Role;
+use super::solution::Solution;
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 
-/// Whether the method uses a photograph.
-pub(super) fn uses(role: Role) -> bool {
-    matches!(role, Role::White | Role::Bernoulli)
-}
-
-/// Solves from the photographs `chosen`, which [`uses`] has passed. The
-/// convergence is that of the worst channel.
+/// Solves from the photographs `chosen`. The convergence is that of the worst channel.
 pub(super) fn solve(
     prepared: &Prepared,
     haar: &Haar,
@@ -32,7 +25,7 @@ pub(super) fn solve(
     let patterns = prepared.patterns.select_columns(chosen);
     let right = haar.analyse_columns(&patterns).transpose();
     let mut end = Convergence::best();
-    let (mut operators, mut gains, mut coefficients) = (Vec::new(), Vec::new(), 0);
+    let (mut inverses, mut coefficients) = (Vec::new(), 0);
     for (light, noise) in prepared.light.iter().zip(&prepared.noise) {
         let light = light.select_columns(chosen);
         let radii = radii(haar, &light, &patterns, noise);
@@ -40,30 +33,9 @@ pub(super) fn solve(
         let (rows, channel_end) = problem.solve(&right, &radii, stop, &|| progress.advance(1));
         end = end.and(channel_end);
         coefficients += rows.iter().filter(|value| **value != 0.0).count();
-        let mut inverse = haar.synthesise_operator(&rows.transpose());
-        drop_dead(&mut inverse, &prepared.live);
-        gains.push(inverse.diagonal());
-        inverse.fill_diagonal(0.0);
-        operators.push(-inverse);
+        inverses.push(haar.synthesise_operator(&rows.transpose()));
     }
-    let mut shared = DMatrix::zeros(prepared.cells(), prepared.cells());
-    for operator in &operators {
-        shared += operator / operators.len() as f64;
-    }
-    let alone = operators.len() == 1;
-    let channels = operators.into_iter().zip(gains);
-    Solution {
-        channels: channels
-            .map(|(operator, gain)| Channel {
-                gain,
-                scale: 1.0,
-                deviation: (!alone).then(|| operator - &shared),
-            })
-            .collect(),
-        shared,
-        coefficients,
-        convergence: end,
-    }
+    Solution::from_inverses(inverses, &prepared.live, coefficients, end)
 }
 
 /// How far each row may be from its photographs: the noise that `T^-1` makes of

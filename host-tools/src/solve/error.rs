@@ -90,6 +90,26 @@ pub enum SolveError {
         /// Photographs it needs.
         least: usize,
     },
+    /// The patterns do not tell cells apart that a method has to tell apart.
+    #[error(
+        "the patterns that are not held out have rank {rank}, and `{method}` needs {cells}, one for each cell that is lit; take more photographs, or use `joint`"
+    )]
+    Dependent {
+        /// The method asked for.
+        method: &'static str,
+        /// Independent patterns.
+        rank: usize,
+        /// Cells lit.
+        cells: usize,
+    },
+    /// The forward transport that was found cannot be inverted.
+    #[error(
+        "the forward transport found in channel {channel} has no inverse; take more photographs, or use `joint`"
+    )]
+    Singular {
+        /// Channel index.
+        channel: usize,
+    },
     /// The iteration ended far from an answer.
     #[error(
         "after {iterations} iterations the solve still moves by {residual:.1e} of its operator (wanted {tolerance:.1e}); the photographs contradict each other: check that the patterns belong to the photographs and that nothing moved or changed exposure"

@@ -15,6 +15,7 @@
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
 //! direct                the paper's method, over basis_pursuit
+//! two_stage, brute_force    forward transport first, then its inverse
 //! forward, held_out     light from an inverse; the photographs it is judged by
 //! content_loop          what clipping makes of natural images
 //! sharpen               undoes the projector's blur as well
@@ -42,6 +43,7 @@
 mod admm;
 mod basis_pursuit;
 mod blur;
+mod brute_force;
 mod column_block;
 mod content_loop;
 mod convergence;
@@ -73,6 +75,7 @@ mod test_reference;
 mod test_scene;
 #[cfg(test)]
 mod tests;
+mod two_stage;
 
 pub use blur::blur;
 pub use convergence::Convergence;
@@ -88,6 +91,7 @@ pub use recovery::Recovery;
 pub use report::{
     Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };
+pub use two_stage::inverted;
 
 use crate::capture::{Measurements, Role};
 use crate::progress::Progress;
@@ -158,7 +162,7 @@ pub fn solve_observed(
     };
     let outcome = match options.method {
         Method::Joint => task.joint(options.lambda, &mut seconds, &mut clock),
-        Method::Direct => task.direct(&mut seconds, &mut clock),
+        other => task.by_rows(other, &mut seconds, &mut clock)?,
     };
     let candidates = outcome.solution.candidates(&prepared.live);
     check_answer(&outcome.solution, &candidates, &prepared, options)?;
@@ -252,11 +256,24 @@ impl<'t> Task<'t> {
         }
     }
 
-    fn direct(&self, seconds: &mut Seconds, clock: &mut Clock) -> Outcome<'t> {
-        let usable = self.prepared.with_role(direct::uses);
+    /// Any method that takes each row for itself.
+    fn by_rows(
+        &self,
+        method: Method,
+        seconds: &mut Seconds,
+        clock: &mut Clock,
+    ) -> Result<Outcome<'t>, SolveError> {
+        let usable = self.prepared.with_role(|role| uses(method, role));
         let solve = |chosen: &[usize], what| {
             self.progress.begin(what, 0);
-            let found = direct::solve(self.prepared, self.haar, chosen, self.stop, self.progress);
+            let (prepared, haar, stop) = (self.prepared, self.haar, self.stop);
+            let found = match method {
+                Method::TwoStage => two_stage::solve(prepared, haar, chosen, stop, self.progress),
+                Method::BruteForce => brute_force::solve(prepared, chosen),
+                Method::Direct | Method::Joint => {
+                    Ok(direct::solve(prepared, haar, chosen, stop, self.progress))
+                }
+            };
             self.progress.end();
             found
         };
@@ -265,7 +282,7 @@ impl<'t> Task<'t> {
         for split in self.splits {
             let kept = |k: &usize| !split.held_out.contains(k);
             let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
-            let trial = solve(&chosen, "solving without the held-out photographs");
+            let trial = solve(&chosen, "solving without the held-out photographs")?;
             iterations += trial.convergence.iterations;
             judged.push(Judged {
                 split,
@@ -273,23 +290,29 @@ impl<'t> Task<'t> {
             });
         }
         seconds.choose = clock.lap();
-        let solution = solve(&usable, "solving");
+        let solution = solve(&usable, "solving")?;
         seconds.solve = clock.lap();
-        Outcome {
+        Ok(Outcome {
             lambda: 0.0,
             trials: Vec::new(),
             iterations: iterations + solution.convergence.iterations,
             judged,
             solution,
-        }
+        })
+    }
+}
+
+/// Whether a method uses a photograph.
+fn uses(method: Method, role: Role) -> bool {
+    match method {
+        Method::Joint | Method::BruteForce => true,
+        // As the paper does.
+        Method::Direct | Method::TwoStage => matches!(role, Role::White | Role::Bernoulli),
     }
 }
 
 fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
-    let given = match method {
-        Method::Joint => prepared.roles.len(),
-        Method::Direct => prepared.with_role(direct::uses).len(),
-    };
+    let given = prepared.with_role(|role| uses(method, role)).len();
     // One cell needs a second photograph too: the first one's judge.
     let least = (prepared.live_cells() + 1).min(LEAST_PHOTOGRAPHS);
     if given < least {
@@ -346,7 +369,7 @@ fn recovery(prepared: &Prepared, haar: &Haar, candidates: &[Candidate]) -> Optio
     let white = *prepared.with_role(|role| role == Role::White).first()?;
     let patterns = prepared
         .patterns
-        .select_columns(&prepared.with_role(direct::uses));
+        .select_columns(&prepared.with_role(|role| uses(Method::Direct, role)));
     let inverses: Vec<&Inverse> = candidates.iter().map(|c| &c.inverse).collect();
     let flood = prepared.patterns.column(white).into_owned();
     recovery::of_direct(&inverses, haar, &patterns, &flood)
@@ -356,10 +379,9 @@ fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCou
     let gray = |role| matches!(role, Role::Column { .. } | Role::Row { .. });
     PhotographCounts {
         white: prepared.with_role(|role| role == Role::White).len(),
-        gray_code: match method {
-            Method::Joint => prepared.with_role(gray).len(),
-            Method::Direct => 0,
-        },
+        gray_code: prepared
+            .with_role(|role| gray(role) && uses(method, role))
+            .len(),
         bernoulli: prepared.with_role(|role| role == Role::Bernoulli).len(),
         held_out: splits.iter().map(|split| split.held_out.len()).sum(),
     }

@@ -16,11 +16,19 @@ pub enum Method {
     /// among those that explain the flood and Bernoulli photographs to within
     /// their noise. No knowledge of physics; channel by channel.
     Direct,
+    /// Forward transport first: each row of the Haar-coded `T` has the least l1 norm
+    /// among those that explain the flood and Bernoulli photographs to within their
+    /// noise (Sen, Darabi, *Compressive Dual Photography*, 2009). Then it is inverted.
+    TwoStage,
+    /// Forward transport by least squares from all photographs, nothing assumed;
+    /// then it is inverted. Needs more independent patterns than cells, whatever they
+    /// are: one light at a time, Hadamard, random.
+    BruteForce,
 }
 
 impl Method {
     /// Every method, the default first.
-    pub const ALL: [Self; 2] = [Self::Joint, Self::Direct];
+    pub const ALL: [Self; 4] = [Self::Joint, Self::Direct, Self::TwoStage, Self::BruteForce];
 
     /// Its name on the command line and in reports.
     #[must_use]
@@ -28,6 +36,8 @@ impl Method {
         match self {
             Self::Joint => "joint",
             Self::Direct => "direct",
+            Self::TwoStage => "two-stage",
+            Self::BruteForce => "brute-force",
         }
     }
 }
@@ -51,7 +61,7 @@ impl FromStr for Method {
 
 /// A name that no [`Method`] has.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("there is no method `{0}`; there are `joint` and `direct`")]
+#[error("there is no method `{0}`; there are `joint`, `direct`, `two-stage` and `brute-force`")]
 pub struct UnknownMethod(String);
 
 /// Settings of [`solve`](super::solve). The defaults are the recipe that was

@@ -140,6 +140,15 @@ impl Prepared {
         }
     }
 
+    /// The light that falls on every cell, live or not, in the photographs `chosen`.
+    pub(super) fn landed(&self, chosen: &[usize]) -> DMatrix<f64> {
+        let patterns = self.patterns.select_columns(chosen);
+        match &self.unseen {
+            Some(unseen) => patterns + unseen.select_columns(chosen),
+            None => patterns,
+        }
+    }
+
     /// The photographs whose role passes `filter`, by index.
     pub(super) fn with_role(&self, filter: impl Fn(Role) -> bool) -> Vec<usize> {
         let roles = self.roles.iter().enumerate();

@@ -49,6 +49,41 @@ impl Candidate {
 }
 
 impl Solution {
+    /// From whole inverses `T_c^-1`, `N x N`, one a channel; what channels have in
+    /// common becomes the shared operator.
+    pub(super) fn from_inverses(
+        inverses: Vec<DMatrix<f64>>,
+        live: &[bool],
+        coefficients: usize,
+        convergence: Convergence,
+    ) -> Self {
+        let cells = live.len();
+        let (mut operators, mut gains) = (Vec::new(), Vec::new());
+        for mut inverse in inverses {
+            drop_dead(&mut inverse, live);
+            gains.push(inverse.diagonal());
+            inverse.fill_diagonal(0.0);
+            operators.push(-inverse);
+        }
+        let mut shared = DMatrix::zeros(cells, cells);
+        for operator in &operators {
+            shared += operator / operators.len() as f64;
+        }
+        let alone = operators.len() == 1;
+        let channel = |(operator, gain)| Channel {
+            gain,
+            scale: 1.0,
+            deviation: (!alone).then(|| operator - &shared),
+        };
+        let channels = operators.into_iter().zip(gains).map(channel).collect();
+        Self {
+            shared,
+            channels,
+            coefficients,
+            convergence,
+        }
+    }
+
     pub(super) fn candidates(&self, live: &[bool]) -> Vec<Candidate> {
         let candidate = |channel: &Channel| {
             let mut operator = &self.shared * channel.scale;

@@ -1,9 +1,9 @@
 //! A hard case: what is hard about it, what must hold, and whether it does.
 
-use super::capture::Capture;
 use super::closed_loop::{LoopErrors, errors};
-use super::scene::Scene;
 use super::theory;
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::Scene;
 use iltm::solve::{Compensation, SolveError, gain_only};
 
 /// One hard case.

@@ -1,8 +1,8 @@
 //! How far the picture on the wall is from the wanted one.
 
-use super::scene::Scene;
 use iltm::compile::white::reference_white;
 use iltm::content::natural_images;
+use iltm::scene::coaxial::Scene;
 use iltm::solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
 

@@ -1,20 +1,16 @@
 //! Hard cases: what must hold where the light or the mathematics is unkind.
 //!
 //! ```text
-//! form_factors, scene    scenes whose transport is known exactly
-//! capture, photographs   what solver and camera see of them
+//! photographs            what a camera sees of a scene (`iltm::scene::coaxial`)
 //! closed_loop, theory    the error on the wall, and the one that theory allows
 //! case, cases, page      the cases and the page that lists them
 //! ```
 
-pub mod capture;
 pub mod case;
 pub mod cases;
 pub mod closed_loop;
-pub mod form_factors;
 pub mod page;
 pub mod photographs;
-pub mod scene;
 pub mod theory;
 
 use iltm_runtime::Grid;

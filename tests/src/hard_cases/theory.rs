@@ -18,8 +18,8 @@
 //! inverse to the wall. `tolerance` is the relative residual at which the solver
 //! stops.
 
-use super::scene::Scene;
 use iltm::content::natural_images;
+use iltm::scene::coaxial::Scene;
 use iltm::solve::{Basis, Haar, SolveOptions};
 use nalgebra::DMatrix;
 

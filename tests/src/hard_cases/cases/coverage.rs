@@ -1,10 +1,10 @@
 //! Cells that no light reaches, that reflect none, that the camera does not see,
 //! or that the surface covers in part.
 
-use super::super::capture::Capture;
 use super::super::case::{Case, Demand, Outcome, closed_loop};
-use super::super::scene::{Panels, Scene};
 use super::super::{GRID, grid};
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::WhyLeftOut;
 
 pub(super) const CASES: [Case; 7] = [

@@ -1,9 +1,9 @@
 //! Grids of odd sizes.
 
-use super::super::capture::Capture;
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::grid;
-use super::super::scene::{Panels, Scene};
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::{Panels, Scene};
 
 const THEORY: &str = "Haar functions exist on any grid: the bound of any other scene";
 

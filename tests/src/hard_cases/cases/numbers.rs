@@ -1,12 +1,12 @@
 //! Not a number, infinity and denormals wherever a number may come in.
 
-use super::super::capture::Capture;
 use super::super::case::{Case, Outcome};
 use super::super::grid;
-use super::super::scene::{Panels, Scene};
 use iltm::capture::Settings;
 use iltm::compile::{CompileOptions, compile};
 use iltm::progress::Silent;
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::{InverseTransport, SolveOptions, solve_observed};
 use std::path::Path;
 

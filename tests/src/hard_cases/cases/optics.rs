@@ -1,9 +1,9 @@
 //! What projector, camera and surface do to light besides Lambert's law.
 
-use super::super::capture::Capture;
 use super::super::case::{Case, Demand, Outcome, closed_loop};
-use super::super::scene::{Panels, Scene};
 use super::super::{GRID, grid};
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::{Panels, Scene};
 use nalgebra::DMatrix;
 
 const REACHABLE: &str = "T0^-1 as sharp; wanted are images that a blurred projector can make";

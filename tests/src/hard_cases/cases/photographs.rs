@@ -4,10 +4,10 @@ use super::super::case::{Case, Outcome};
 use super::super::closed_loop::errors;
 use super::super::grid;
 use super::super::photographs::Camera;
-use super::super::scene::{Panels, Scene};
 use iltm::capture::CaptureOptions;
 use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
+use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::{InverseTransport, SolveOptions};
 
 pub(super) const CASES: [Case; 8] = [

@@ -1,9 +1,9 @@
 //! Noise, and photographs that say less than they should.
 
-use super::super::capture::Capture;
 use super::super::case::{Case, Demand, Outcome, closed_loop};
-use super::super::scene::{Panels, Scene};
 use super::super::{GRID, grid};
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::{Panels, Scene};
 use nalgebra::DMatrix;
 
 const LASSO: &str = "cond sigma sqrt(s ln N / m) and the tail of K";

@@ -1,9 +1,9 @@
 //! Transport that is strong, ill-conditioned or singular.
 
-use super::super::capture::Capture;
 use super::super::case::{Case, Demand, Outcome, closed_loop};
-use super::super::scene::{Panels, Scene};
 use super::super::{GRID, grid, theory};
+use iltm::scene::coaxial::Capture;
+use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::Compensation;
 
 pub(super) const CASES: [Case; 7] = [

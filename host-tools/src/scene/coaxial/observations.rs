@@ -1,10 +1,10 @@
 //! What a solver is given of a [`Scene`]: patterns as a real capture has them,
 //! and what a noisy camera makes of them.
 
-use super::scene::Scene;
-use iltm::capture::{Pattern, Role};
-use iltm::progress::Silent;
-use iltm::solve::{
+use super::Scene;
+use crate::capture::{Pattern, Role};
+use crate::progress::Silent;
+use crate::solve::{
     CellNoise, InverseTransport, Observed, ObservedChannel, SolveError, SolveOptions, SolveReport,
     solve_observed,
 };

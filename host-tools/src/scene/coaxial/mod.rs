@@ -13,9 +13,14 @@
 //! `R` albedo, `F` form factors, `E` irradiance, `B` the projector's blur, `M`
 //! what the camera sees mirrored in glossy panels.
 
-use super::form_factors::{Rectangle, exchange};
+mod form_factors;
+mod observations;
+
+use form_factors::{Rectangle, exchange};
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
+
+pub use observations::{Capture, normal, sequence};
 
 /// What light meets.
 #[derive(Clone, Debug)]
@@ -148,7 +153,7 @@ impl Scene {
     /// each cell; what falls beside the frame is lost.
     #[must_use]
     pub fn blurred(mut self, deviation: f64) -> Self {
-        self.blur = Some(iltm::solve::blur(self.grid, deviation));
+        self.blur = Some(crate::solve::blur(self.grid, deviation));
         self
     }
 

@@ -5,23 +5,23 @@
 //! rectangle on it reaches from `u.0` to `u.1` away from the hinge and from `y.0`
 //! to `y.1` along it.
 
-use iltm::scene::form_factor::{Tolerance, exchange_area};
-use iltm::scene::geometry::Polygon;
+use crate::scene::form_factor::{Tolerance, exchange_area};
+use crate::scene::geometry::Polygon;
 use nalgebra::Vector3;
 
 /// A rectangle on a wall of a wedge.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Rectangle {
+pub(super) struct Rectangle {
     /// Distance from the hinge, from and to.
-    pub u: (f64, f64),
+    pub(super) u: (f64, f64),
     /// Place along the hinge, from and to.
-    pub y: (f64, f64),
+    pub(super) y: (f64, f64),
 }
 
 impl Rectangle {
     /// Its area.
     #[must_use]
-    pub fn area(&self) -> f64 {
+    pub(super) fn area(&self) -> f64 {
         (self.u.1 - self.u.0) * (self.y.1 - self.y.0)
     }
 }
@@ -29,7 +29,7 @@ impl Rectangle {
 /// `A1 F12 = A2 F21` of rectangles on either wall of a wedge of `angle` radians; 0 for
 /// one without area.
 #[must_use]
-pub fn exchange(a: &Rectangle, b: &Rectangle, angle: f64) -> f64 {
+pub(super) fn exchange(a: &Rectangle, b: &Rectangle, angle: f64) -> f64 {
     // The walls' fronts face each other.
     let first = [
         (a.u.0, a.y.0),

@@ -1,0 +1,125 @@
+//! What every way to photograph has in common, and a table of all.
+
+use super::test_scenes::m_scene;
+use super::*;
+use crate::capture::NoiseModel;
+use crate::compare::{Truth, contest};
+use crate::progress::Silent;
+use crate::scene::coaxial::{Panels, Scene};
+use iltm_runtime::Grid;
+
+fn found(method: &dyn Acquisition, rig: &mut Rig) -> nalgebra::DMatrix<f64> {
+    match method.acquire(rig, &Silent) {
+        Ok(Found::Forward(found) | Found::Inverse(found)) => found,
+        Err(why) => panic!("{}: {why}", method.name()),
+    }
+}
+
+#[test]
+fn cells_that_are_not_live_stay_dark_in_every_answer() {
+    let grid = Grid::new(5, 7).unwrap();
+    let (mut transport, mut live) = m_scene(grid);
+    for dead in [0, 9, 34] {
+        live[dead] = false;
+        transport.row_mut(dead).fill(0.0);
+        transport.column_mut(dead).fill(0.0);
+    }
+    for noise in [0.0, 1e-6] {
+        let noise = NoiseModel {
+            shot: 0.0,
+            floor: noise,
+        };
+        for method in all(40, 1) {
+            let mut rig = Rig::new(grid, transport.clone(), live.clone(), noise, 1);
+            let found = found(method.as_ref(), &mut rig);
+            assert!(found.iter().all(|value| value.is_finite()));
+            for dead in [0, 9, 34] {
+                let most = found.row(dead).amax().max(found.column(dead).amax());
+                assert!(most < 1e-12, "{}: {most}", method.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_grid_of_one_cell_is_found_by_every_way() {
+    let grid = Grid::new(1, 1).unwrap();
+    let (transport, live) = m_scene(grid);
+    for method in all(40, 1) {
+        let mut rig = Rig::new(
+            grid,
+            transport.clone(),
+            live.clone(),
+            NoiseModel::default(),
+            1,
+        );
+        let answer = method.acquire(&mut rig, &Silent);
+        let value = match answer {
+            Ok(Found::Forward(found)) => found[(0, 0)],
+            Ok(Found::Inverse(found)) => found[(0, 0)].recip(),
+            Err(why) => panic!("{}: {why}", method.name()),
+        };
+        let off = (value / transport[(0, 0)] - 1.0).abs();
+        assert!(off < 1e-3, "{}: {off}", method.name());
+    }
+}
+
+#[test]
+fn ways_that_take_so_many_photographs_take_no_more() {
+    let grid = Grid::new(5, 7).unwrap();
+    let (transport, live) = m_scene(grid);
+    for method in all(33, 1).iter().skip(4) {
+        let mut rig = Rig::new(
+            grid,
+            transport.clone(),
+            live.clone(),
+            NoiseModel::default(),
+            1,
+        );
+        found(method.as_ref(), &mut rig);
+        assert!(rig.photographs() <= 33, "{}", method.name());
+    }
+}
+
+/// `cargo test --release -p iltm --lib compare::acquisition::tests::the_table -- --ignored --nocapture`
+#[test]
+#[ignore = "prints a table: photographs, seconds and errors of every way on two scenes"]
+fn the_table_of_all_ways() {
+    let grid = Grid::new(13, 21).unwrap();
+    let plain = || Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7);
+    for (name, scene) in [
+        ("uniform", plain()),
+        ("textured", plain().textured(0.25, 0.95, 1)),
+    ] {
+        let live = scene.covered();
+        let truth = Truth::new(grid, scene.transport(), live.clone()).unwrap();
+        let level = truth.flood().mean();
+        for decibel in [None, Some(40.0)] {
+            let deviation: f64 =
+                decibel.map_or(0.0, |decibel: f64| level * 10_f64.powf(-decibel / 20.0));
+            let noise = NoiseModel {
+                shot: 0.0,
+                floor: deviation * deviation,
+            };
+            let rig = Rig::new(grid, scene.transport(), live.clone(), noise, 1);
+            println!(
+                "\n{name}, {decibel:?} dB: photographs, seconds, inverse, second bounce, compensation"
+            );
+            for method in all(150, 1) {
+                let row = contest::photograph(method.as_ref(), &rig, &truth, None, &Silent);
+                match row.result {
+                    Ok(done) => println!(
+                        "{:58} {:4} {:6.2} {:8.4} {:8.4} {:8.4}",
+                        row.name,
+                        done.photographs,
+                        done.seconds,
+                        done.errors.inverse.unwrap_or(f64::NAN),
+                        done.errors.second_bounce.unwrap_or(f64::NAN),
+                        done.errors.compensation,
+                    ),
+                    Err(why) => println!("{:58} {why}", row.name),
+                }
+            }
+        }
+    }
+}
