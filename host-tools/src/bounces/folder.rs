@@ -17,6 +17,7 @@ use crate::video::{Picture, Samples, png};
 use iltm_runtime::FrameSize;
 use npyz::WriterBuilder;
 use rayon::prelude::*;
+use std::fmt::Write;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -186,8 +187,9 @@ fn csv(bounces: &Bounces) -> String {
         } = layer;
         let (name, noise) = (layer.kind.name(), bounces.noise);
         let (cell, pixel) = (noise.cell, noise.pixel);
-        text += &format!(
-            "{name},{light_share:.9},{energy_share:.9},{rms:.9},{brightest:.9},{darkest:.9},{cell:.9},{pixel:.9}\n"
+        let _ = writeln!(
+            text,
+            "{name},{light_share:.9},{energy_share:.9},{rms:.9},{brightest:.9},{darkest:.9},{cell:.9},{pixel:.9}"
         );
     }
     text

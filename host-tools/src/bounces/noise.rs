@@ -122,7 +122,7 @@ mod tests {
             .map(|at| {
                 let (x, y) = (at % 60, at / 60);
                 let step = if x < 33 { 0.3 } else { 0.7 };
-                (step + 0.004 * y as f64 + 0.01 * normal(&mut random)) as f32
+                (step + 0.004 * f64::from(y) + 0.01 * normal(&mut random)) as f32
             })
             .collect();
         let found = by_curvature(&wall, &[plane]).unwrap();

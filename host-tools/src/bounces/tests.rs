@@ -183,7 +183,11 @@ fn layers_add_up_to_the_photograph_even_with_a_wrong_inverse() {
     inverse.shared *= 0.5;
     inverse.live[17] = false;
     inverse.channels[0].gain.rotate_left(3);
-    let wall = Wall::new(&registration(scene.grid), &[flood.clone()], &inverse);
+    let wall = Wall::new(
+        &registration(scene.grid),
+        std::slice::from_ref(&flood),
+        &inverse,
+    );
     let separated = Separated::new(&wall, &[flood], 1e-4).unwrap();
     assert!(
         separated.largest_gap() < 1e-6,
@@ -205,7 +209,11 @@ fn light_that_does_not_fade_is_refused() {
     let flood = plane(&(scene.transport() * DVector::from_element(cells, 1.0)));
     let mut inverse = inverse(&scene);
     inverse.shared *= 10.0;
-    let wall = Wall::new(&registration(scene.grid), &[flood.clone()], &inverse);
+    let wall = Wall::new(
+        &registration(scene.grid),
+        std::slice::from_ref(&flood),
+        &inverse,
+    );
     let error = Separated::new(&wall, &[flood], 1e-4).unwrap_err();
     assert!(matches!(error, BouncesError::DoesNotFade { .. }), "{error}");
 }

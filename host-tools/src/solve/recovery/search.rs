@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// Coefficients of the supports that are looked at, at most: eigenvalues of larger ones
 /// take too long.
-const LARGEST: usize = 48;
+const LARGEST: usize = 32;
 
 /// How supports are looked for.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -33,7 +33,7 @@ impl Default for Sampling {
             random: 300,
             starts: 6,
             seed: 1,
-            work: 3e7,
+            work: 1.5e7,
         }
     }
 }
