@@ -288,7 +288,7 @@ fn page(all: &Experiments<'_>) -> String {
     sections::claims(&mut text, all.samples);
     sections::fourth(&mut text, all.samples);
     sections::sparse(&mut text, all.counts);
-    sections::second(&mut text, all.places);
+    sections::second(&mut text, all.places, all.counts);
     sections::third(&mut text, all.bounces);
     sections::cost(&mut text, all.timed);
     sections::every(&mut text, all.contests);

@@ -5,7 +5,7 @@ use super::feasible::Place;
 use super::scenes::Condition;
 use super::second_bounce::Lit;
 use super::seeds::{ENTRIES, Mean, SEEDS, Sample};
-use super::sparsity::{Counted, PARTS};
+use super::sparsity::{Counted, INVERSE_IN_HAAR, PARTS};
 use crate::compare::contest::Row;
 use crate::compare::table;
 use crate::solve::Method;
@@ -182,7 +182,7 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
 }
 
 /// Fig. 2.
-pub(super) fn second(text: &mut String, places: &[Place]) {
+pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
     let _ = writeln!(
         text,
         "\n## Fig. 2: what the theorem promises\n\n\
@@ -219,12 +219,20 @@ pub(super) fn second(text: &mut String, places: &[Place]) {
         .filter(|place| place.product.0 < LIMIT)
         .count()
         - inside;
+    let a_row = |textured: bool| {
+        let own = |c: &&Counted| c.textured == textured && c.name == INVERSE_IN_HAAR;
+        let counted = counts.iter().find(own);
+        counted.map_or(0.0, |c| c.counts[2] as f64 / (c.all as f64).sqrt())
+    };
     let _ = writeln!(
         text,
-        "\nOf {} places {inside} are proven to lie in the region and {open} may; rows of the \
-         inverse have tens of coefficients (Fig. 1). The theorem does not explain why the \
-         method works here: it works far outside the region, as l1 methods do.",
-        places.len()
+        "\nOf {} places {inside} are proven to lie in the region and {open} may. Rows of the \
+         inverse have {:.0} coefficients (uniform) and {:.0} (textured) for 99.99 % of the energy \
+         (Fig. 1). The theorem does not say why the method works here: it works far outside the \
+         region, as l1 methods do.",
+        places.len(),
+        a_row(false),
+        a_row(true),
     );
 }
 

@@ -11,6 +11,9 @@ use nalgebra::DMatrix;
 /// Parts of the energy that are counted for.
 pub(super) const PARTS: [f64; 3] = [0.99, 0.999, 0.9999];
 
+/// Name of the matrix whose rows the direct method looks for.
+pub(super) const INVERSE_IN_HAAR: &str = "T^-1 in Haar";
+
 /// Powers of ten below the largest coefficient that have colours of their own.
 const DECADES: i32 = 4;
 
@@ -44,7 +47,7 @@ fn matrices(condition: Condition) -> Option<Matrices> {
             ("T", truth.transport.clone()),
             ("T^-1", truth.inverse.clone()),
             ("T in Haar", haar.analyse_operator(&truth.transport)),
-            ("T^-1 in Haar", haar.analyse_operator(&truth.inverse)),
+            (INVERSE_IN_HAAR, haar.analyse_operator(&truth.inverse)),
             ("K in Haar", haar.analyse_operator(&operator)),
         ],
     })
