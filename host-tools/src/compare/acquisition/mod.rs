@@ -4,7 +4,6 @@
 //! transport or with its inverse.
 
 mod brute_force;
-mod clusters;
 mod compressive_dual;
 mod compressive_sensing;
 mod dual;
@@ -12,7 +11,6 @@ mod greedy;
 mod hadamard;
 mod nystrom;
 mod sensing;
-mod separation;
 mod sparse;
 mod stripes;
 #[cfg(test)]

@@ -1,24 +1,24 @@
 //! Kernel Nystrom: a transport of low rank from some of its columns and rows.
 
+mod clusters;
+mod fit;
+mod samples;
+mod separation;
+
 use super::Acquisition;
-use super::clusters::Clusters;
-use super::separation::{PHOTOGRAPHS, Separation};
 use crate::compare::{Found, Rig, Source, Unfit};
 use crate::progress::Progress;
-use nalgebra::{DMatrix, DVector};
+use fit::{Fit, Model};
+use nalgebra::DMatrix;
+use samples::Samples;
+use separation::{PHOTOGRAPHS, Separation};
 
-/// Exponents of the element-wise kernel that are tried.
-const EXPONENTS: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
-/// Singular values below which part of the largest are dropped, tried one by one.
-const CUTS: [f64; 9] = [0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-6, 1e-10];
 /// More samples have to lower the predicted error by this factor, or they are in vain;
 const SETTLED: f64 = 0.9;
 /// after so many doublings in vain the error has settled, and they are left out.
 const PATIENCE: usize = 2;
 /// Photographs of the least number of samples.
 const LEAST: usize = 2;
-/// Times that direct light and all other are found each from what the other leaves.
-const TURNS: usize = 2;
 
 /// The generalised Nystrom method in the space of a power kernel.
 ///
@@ -83,8 +83,11 @@ impl Acquisition for Nystrom {
     }
 
     fn acquire(&self, rig: &mut Rig, _progress: &dyn Progress) -> Result<Found, Unfit> {
-        let (transport, error) = self.sample(rig)?;
         let live = rig.live_cells();
+        if live.is_empty() {
+            return Err(Unfit::Condition("0 cells are live".to_owned()));
+        }
+        let (transport, error) = self.sample(rig)?;
         let part = transport.select_rows(&live).select_columns(&live);
         let values = part.singular_values();
         let least = values.min() / values.max();
@@ -92,9 +95,9 @@ impl Acquisition for Nystrom {
         let invertible = least > error;
         if !invertible {
             return Err(Unfit::Condition(format!(
-                "{} photographs predict more to within {:.0} %, but the smallest singular value \
-                 of what they make up is {least:.1e} of the largest: that it has an inverse \
-                 cannot be told",
+                "what {} photographs make up predicts further ones to within {:.0} %, and its \
+                 smallest singular value is {least:.1e} of its largest: whether there is an \
+                 inverse cannot be told",
                 rig.photographs(),
                 100.0 * error,
             )));
@@ -118,7 +121,7 @@ impl Nystrom {
         let mut samples = Samples::first(rig);
         let mut best = (
             None,
-            Answer::fitted(&samples, Model::default(), separation.as_ref()),
+            Fit::new(&samples, Model::default(), separation.as_ref()),
         );
         let mut in_vain = 0;
         while samples.clusters.splits() > 0
@@ -126,190 +129,17 @@ impl Nystrom {
             && in_vain < PATIENCE
         {
             let next = samples.halved(rig);
-            let (error, model) = Model::best(|model| {
-                Answer::fitted(&samples, *model, separation.as_ref()).error(&next)
-            });
+            let (error, model) =
+                Model::best(|model| Fit::new(&samples, *model, separation.as_ref()).error(&next));
             samples = next;
             if best.0.is_none_or(|before| error < SETTLED * before) {
-                best = (
-                    Some(error),
-                    Answer::fitted(&samples, model, separation.as_ref()),
-                );
+                best = (Some(error), Fit::new(&samples, model, separation.as_ref()));
                 in_vain = 0;
             } else {
                 in_vain += 1;
             }
         }
         Ok((best.1.transport(rig.live()), best.0.unwrap_or(0.0)))
-    }
-}
-
-/// Whole clusters lit alone.
-struct Samples {
-    clusters: Clusters,
-    /// `N x k`.
-    columns: DMatrix<f64>,
-    /// With projector and camera exchanged, `N x k`.
-    rows: DMatrix<f64>,
-}
-
-impl Samples {
-    /// All live cells as one cluster.
-    fn first(rig: &mut Rig) -> Self {
-        let clusters = Clusters::whole(rig.grid(), rig.live());
-        let lights = clusters.lights();
-        Self {
-            columns: rig.photograph(&lights),
-            rows: rig.photograph_exchanged(&lights),
-            clusters,
-        }
-    }
-
-    /// Every cluster in two: one half photographed, the other is what remains.
-    fn halved(&self, rig: &mut Rig) -> Self {
-        let (clusters, parents) = self.clusters.halved();
-        let second: Vec<usize> = (1..parents.len())
-            .filter(|child| parents[*child] == parents[*child - 1])
-            .collect();
-        let shown = clusters.lights().select_columns(&second);
-        let divide = |whole: &DMatrix<f64>, seen: &DMatrix<f64>| {
-            let mut light = whole.select_columns(&parents);
-            for (photograph, child) in seen.column_iter().zip(&second) {
-                let first = light.column(*child - 1) - photograph;
-                light.set_column(*child - 1, &first);
-                light.set_column(*child, &photograph);
-            }
-            light
-        };
-        Self {
-            columns: divide(&self.columns, &rig.photograph(&shown)),
-            rows: divide(&self.rows, &rig.photograph_exchanged(&shown)),
-            clusters,
-        }
-    }
-}
-
-/// Kernel and rank.
-#[derive(Clone, Copy, Debug)]
-struct Model {
-    exponent: f64,
-    cut: f64,
-}
-
-impl Default for Model {
-    fn default() -> Self {
-        Self {
-            exponent: 1.0,
-            cut: 1e-10,
-        }
-    }
-}
-
-impl Model {
-    /// The model of least `error`, and that error.
-    fn best(error: impl Fn(&Self) -> f64) -> (f64, Self) {
-        let mut best = (f64::INFINITY, Self::default());
-        for exponent in EXPONENTS {
-            for cut in CUTS {
-                let model = Self { exponent, cut };
-                let error = error(&model);
-                if error < best.0 {
-                    best = (error, model);
-                }
-            }
-        }
-        best
-    }
-
-    /// `f^-1(f(C) f(A)^+ f(R))`, `N x N`, of samples less `direct` light.
-    fn transport(self, samples: &Samples, direct: &DVector<f64>) -> DMatrix<f64> {
-        let (lights, means) = (samples.clusters.lights(), samples.clusters.means());
-        let own = DMatrix::from_diagonal(direct) * &lights;
-        let sizes = lights.row_sum();
-        let mean = |light: &DMatrix<f64>| {
-            let mut light = light - &own;
-            for (mut column, size) in light.column_iter_mut().zip(sizes.iter()) {
-                column /= *size;
-            }
-            light
-        };
-        let (columns, rows) = (mean(&samples.columns), mean(&samples.rows));
-        // Means between clusters, seen from both sides.
-        let crossing = (means.tr_mul(&columns) + rows.tr_mul(&means)) * 0.5;
-        let factors = self.kernel(&crossing, self.exponent).svd(true, true);
-        let least = self.cut * factors.singular_values.amax();
-        let Ok(inverse) = factors.pseudo_inverse(least) else {
-            return DMatrix::zeros(columns.nrows(), columns.nrows());
-        };
-        let (columns, rows) = (
-            self.kernel(&columns, self.exponent),
-            self.kernel(&rows, self.exponent),
-        );
-        let product = columns * inverse * rows.transpose();
-        self.kernel(&product, self.exponent.recip())
-    }
-
-    /// Element by element; light below zero is noise and becomes none, unless the kernel
-    /// is linear.
-    fn kernel(self, matrix: &DMatrix<f64>, exponent: f64) -> DMatrix<f64> {
-        if self.exponent >= 1.0 {
-            matrix.clone()
-        } else {
-            matrix.map(|value| value.max(0.0).powf(exponent))
-        }
-    }
-}
-
-/// Direct light and all other.
-struct Answer {
-    direct: DVector<f64>,
-    other: DMatrix<f64>,
-}
-
-impl Answer {
-    /// Each in turn from what the other leaves.
-    fn fitted(samples: &Samples, model: Model, separation: Option<&Separation>) -> Self {
-        let cells = samples.columns.nrows();
-        let mut answer = Self {
-            direct: DVector::zeros(cells),
-            other: DMatrix::zeros(cells, cells),
-        };
-        let Some(separation) = separation else {
-            answer.other = model.transport(samples, &answer.direct);
-            return answer;
-        };
-        for _ in 0..TURNS {
-            answer.direct = separation.direct_light(&answer.other);
-            answer.other = model.transport(samples, &answer.direct);
-        }
-        answer
-    }
-
-    /// Relative error of samples it was not made of.
-    fn error(&self, next: &Samples) -> f64 {
-        let lights = next.clusters.lights();
-        let own = DMatrix::from_diagonal(&self.direct) * &lights;
-        let columns = &self.other * &lights + &own - &next.columns;
-        let rows = self.other.tr_mul(&lights) + &own - &next.rows;
-        let total = next.columns.norm_squared() + next.rows.norm_squared();
-        if total > 0.0 {
-            ((columns.norm_squared() + rows.norm_squared()) / total).sqrt()
-        } else {
-            0.0
-        }
-    }
-
-    /// `T`, `N x N`; rows and columns of cells that are not `live` are zero.
-    fn transport(self, live: &[bool]) -> DMatrix<f64> {
-        let mut transport = self.other;
-        for (cell, live) in live.iter().enumerate() {
-            transport[(cell, cell)] += self.direct[cell];
-            if !live {
-                transport.row_mut(cell).fill(0.0);
-                transport.column_mut(cell).fill(0.0);
-            }
-        }
-        transport
     }
 }
 

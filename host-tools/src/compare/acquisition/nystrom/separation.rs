@@ -68,7 +68,7 @@ impl Separation {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scenes::{m_scene, rig};
+    use super::super::super::test_scenes::{m_scene, rig};
     use super::*;
     use crate::capture::NoiseModel;
     use iltm_runtime::Grid;
