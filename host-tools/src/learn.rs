@@ -3,8 +3,10 @@
 use crate::capture::{self, CaptureError, CaptureOptions, FineFlood, Measurements};
 use crate::compile::{self, CompileError, CompileOptions, Compiled};
 use crate::progress::Progress;
-use crate::solve::{self, Compensation, InverseTransport, SolveError, SolveOptions, SolveReport};
-use serde::Serialize;
+use crate::solve::{
+    self, Compensation, InverseTransport, Recovery, SolveError, SolveOptions, SolveReport,
+};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use thiserror::Error;
 
@@ -62,6 +64,20 @@ pub fn learn(
     progress: &dyn Progress,
 ) -> Result<Learned, LearnError> {
     let measurements = capture::read(capture, photographs, progress)?;
+    learn_measured(measurements, capture, options, reference_white, progress)
+}
+
+/// The same from photographs that have been read before; `capture` is where.
+///
+/// # Errors
+/// Those of [`learn`], but for [`LearnError::Capture`].
+pub fn learn_measured(
+    measurements: Measurements,
+    capture: &Path,
+    options: &SolveOptions,
+    reference_white: Option<f64>,
+    progress: &dyn Progress,
+) -> Result<Learned, LearnError> {
     let (inverse, report) = solve::solve(&measurements, options, progress)?;
     let inverse = match report.compensation {
         Compensation::Operator => inverse,
@@ -93,6 +109,19 @@ pub fn learn(
     })
 }
 
+/// What a table's provenance says of the theorem's constants; `None` if the table is
+/// older than that, or was not made from photographs.
+#[must_use]
+pub fn recovery_in(provenance: &str) -> Option<Recovery> {
+    #[derive(Deserialize)]
+    struct Stored {
+        recovery: Recovery,
+    }
+    toml::from_str(provenance)
+        .ok()
+        .map(|stored: Stored| stored.recovery)
+}
+
 /// What a table says about where it comes from.
 #[derive(Serialize)]
 struct Provenance<'a> {
@@ -106,6 +135,8 @@ struct Provenance<'a> {
     condition: f64,
     compensation: &'static str,
     predicted_error: PredictedError,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recovery: Option<Recovery>,
 }
 
 #[derive(Serialize)]
@@ -150,6 +181,7 @@ fn provenance(capture: &Path, measurements: &Measurements, report: &SolveReport)
             gain_only: report.prediction.gain_only,
             compensated: report.prediction.compensated,
         },
+        recovery: report.recovery,
     };
     // A struct of numbers and strings always has a TOML form.
     toml::to_string(&provenance).unwrap_or_default()

@@ -7,6 +7,7 @@
 //! scene::Simulation -> photographs -> capture::Measurements -> solve::InverseTransport -> compile -> .iltm image -> iltm_runtime -> frames
 //! ```
 
+pub mod bounces;
 pub mod capture;
 pub mod cli;
 pub mod compare;
@@ -19,5 +20,6 @@ pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod solve;
+pub mod tradeoff;
 pub mod user;
 pub mod video;

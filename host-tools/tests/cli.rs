@@ -424,6 +424,102 @@ fn a_signed_table_compensates_as_the_same_one_unsigned() {
     assert_ne!(plain, wanted);
 }
 
+/// What `iltm bounces` says where it has to refuse; nothing may be left behind.
+fn bounces_refused(arguments: &[&str]) -> String {
+    let folder = capture();
+    let before = files(folder.path());
+    let mut all = vec!["bounces"];
+    all.extend(arguments);
+    let output = run(folder.path(), &all);
+    assert!(output.stdout.is_empty());
+    assert_eq!(files(folder.path()), before, "nothing half-written");
+    said(&output)
+}
+
+#[test]
+fn bounces_of_what_is_no_photograph_of_the_projection_are_refused() {
+    let said = bounces_refused(&["capture", "-o", "b", "--photo", "1"]);
+    assert!(said.starts_with("exit 2\n"), "{said}");
+    assert!(said.contains("line 3: the photograph with the index 1 is of black"));
+    assert!(said.contains("next: Choose another index"), "{said}");
+    let said = bounces_refused(&["capture", "-o", "b", "--photo", "999"]);
+    assert!(said.starts_with("exit 2\n"), "{said}");
+    assert!(
+        said.contains("no photograph with the index 999; the last one is 59"),
+        "{said}"
+    );
+    let said = bounces_refused(&["nowhere", "-o", "b"]);
+    assert!(said.starts_with("exit 3\n"), "{said}");
+    let said = bounces_refused(&["capture", "-o", "capture/photos"]);
+    assert!(said.starts_with("exit 9\n"), "{said}");
+    assert!(
+        said.contains("it is there already, and not empty"),
+        "{said}"
+    );
+}
+
+#[test]
+fn bounces_add_up_to_the_photograph_in_files_too() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = run(folder.path(), &["--json", "bounces", SAMPLE, "-o", "b"]);
+    assert!(output.status.success(), "{}", said(&output));
+    let data: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one object");
+    let layers = data["layers"].as_array().expect("a list");
+    let shares = layers
+        .iter()
+        .filter_map(|layer| layer["light_share"].as_f64());
+    assert!((shares.sum::<f64>() - 1.0).abs() < 1e-6, "{data}");
+    assert!(
+        data["largest_gap"].as_f64().expect("a number") < 1e-6,
+        "{data}"
+    );
+    let bytes = fs::read(folder.path().join("b/bounces.npy")).expect("written");
+    let array = npyz::NpyFile::new(&bytes[..]).expect("an array");
+    let shape = array.shape().to_vec();
+    assert_eq!(shape, [132, 192, 1, layers.len() as u64]);
+    let values: Vec<f32> = array.into_vec().expect("float32");
+    let picture = |name: &str| {
+        let reader = ImageReader::open(folder.path().join("b").join(name)).expect("written");
+        reader.decode().expect("a picture").into_luma16()
+    };
+    let photograph = picture("photograph.png");
+    let first = picture("bounce-1.png");
+    let samples = values.chunks_exact(layers.len());
+    for ((parts, whole), first) in samples.zip(photograph.pixels()).zip(first.pixels()) {
+        let sum: f64 = parts.iter().map(|part| f64::from(*part)).sum();
+        let (whole, first) = (f64::from(whole.0[0]), f64::from(first.0[0]));
+        // Half a code of rounding; negative light is black.
+        assert!((65_535.0 * sum.max(0.0) - whole).abs() < 0.6);
+        assert!((65_535.0 * f64::from(parts[0].max(0.0)) - first).abs() < 0.6);
+    }
+    for layer in layers {
+        let name = format!("{}.png", layer["layer"].as_str().expect("a name"));
+        picture(&name);
+    }
+    let lines = fs::read_to_string(folder.path().join("b/bounces.csv")).expect("written");
+    assert_eq!(lines.lines().count(), layers.len() + 1);
+}
+
+#[test]
+fn inspect_says_of_the_theorem_what_solve_said() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let solved = said(&run(folder.path(), &["solve", SAMPLE, "-o", "t.iltm"]));
+    let inspected = said(&run(folder.path(), &["inspect", "t.iltm"]));
+    let sentence = |said: &str| -> Vec<String> {
+        let lines = said
+            .lines()
+            .skip_while(|line| !line.starts_with("recovery "));
+        let words = |line: &str| line.trim_start_matches("recovery").trim().to_owned();
+        lines.take(3).map(words).collect()
+    };
+    assert_eq!(sentence(&solved).len(), 3);
+    assert_eq!(sentence(&solved), sentence(&inspected));
+    assert!(
+        sentence(&solved)[1].contains("the theorem asks for less than 2.41"),
+        "{solved}"
+    );
+}
+
 #[test]
 fn help_lists_commands_and_exit_codes() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -26,8 +26,10 @@ use std::process::Stdio;
 pub struct Case {
     /// Its name in the lists.
     pub name: &'static str,
-    image: Vec<u8>,
-    size: FrameSize,
+    /// The table's image.
+    pub image: Vec<u8>,
+    /// Size of its frames.
+    pub size: FrameSize,
 }
 
 /// What one tier takes.

@@ -1,6 +1,7 @@
 //! What the tests across crates share: a scene whose inverse is known exactly, and
 //! a device that is none.
 
+pub mod costs;
 pub mod executed;
 pub mod fake_device;
 pub mod fake_tables;

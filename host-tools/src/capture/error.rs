@@ -230,6 +230,27 @@ pub enum CaptureError {
         /// In the capture.
         found: usize,
     },
+    /// A photograph was asked for that the capture does not have.
+    #[error("{}: there is no photograph with the index {index}; the last one is {last}", path.display())]
+    UnknownIndex {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Asked for.
+        index: u32,
+        /// The largest index there is.
+        last: u32,
+    },
+    /// The photograph that was asked for shows what is subtracted from all others.
+    #[error("{}, line {line}: the photograph with the index {index} is of black: it shows the ambient \
+        light, which is subtracted from every other, and nothing of the projector's", path.display())]
+    BlackIndex {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Asked for.
+        index: u32,
+        /// Its line.
+        line: u64,
+    },
     /// Too few Bernoulli photographs to learn an inverse from.
     #[error("{}: {used} Bernoulli photographs used, a solve needs at least {needed}: \
         the Gray code's stripes alone cannot tell which cell of a row or column the light came from",
@@ -336,6 +357,9 @@ impl CaptureError {
                 "Photograph the missing Gray code patterns, or check the roles in capture.csv."
             }
             Self::MorePhotographsThanTaken { .. } => "Ask for fewer, or leave --photos away.",
+            Self::UnknownIndex { .. } | Self::BlackIndex { .. } => {
+                "Choose another index from the first column of capture.csv, or leave it out for white."
+            }
             Self::TooFewPhotographs { .. } => {
                 "Photograph more Bernoulli patterns, or ask for more; 40 are a good start."
             }

@@ -16,10 +16,6 @@ const PIXELS_A_SAMPLE: f64 = 4.0;
 /// Finest subdivision of a cell's side.
 const MAX_FACTOR: usize = 8;
 
-/// Ratio of a cell's distances to its two neighbours from which the farther one
-/// is on another surface.
-const EDGE: f64 = 2.0;
-
 /// Least weight of usable camera pixels in a fine sample, of a full footprint.
 const LEAST_COVER: f32 = 0.1;
 
@@ -135,36 +131,6 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// Centre of the cell `rows` down and `cols` right of `cell`.
-    fn centre(&self, cell: usize, rows: isize, cols: isize) -> Option<[f64; 2]> {
-        let row = (cell / self.grid.cols()).checked_add_signed(rows)?;
-        let col = (cell % self.grid.cols()).checked_add_signed(cols)?;
-        if row >= self.grid.rows() || col >= self.grid.cols() {
-            return None;
-        }
-        self.registration.centre[row * self.grid.cols() + col]
-    }
-
-    /// Camera steps of one cell towards lower and towards higher index along an
-    /// axis (`[0, 1]`: columns), both pointing to higher index.
-    fn steps(&self, cell: usize, axis: [isize; 2]) -> [[f64; 2]; 2] {
-        let here = self.registration.centre[cell];
-        let difference = |from: Option<[f64; 2]>, to: Option<[f64; 2]>| {
-            let (from, to) = (from?, to?);
-            Some([to[0] - from[0], to[1] - from[1]])
-        };
-        let length = |[x, y]: [f64; 2]| x.hypot(y);
-        let before = difference(self.centre(cell, -axis[0], -axis[1]), here);
-        let after = difference(here, self.centre(cell, axis[0], axis[1]));
-        match (before, after) {
-            (Some(b), Some(a)) if length(b) > EDGE * length(a) => [a, a],
-            (Some(b), Some(a)) if length(a) > EDGE * length(b) => [b, b],
-            (Some(b), Some(a)) => [b, a],
-            (Some(only), None) | (None, Some(only)) => [only, only],
-            (None, None) => [[0.0; 2]; 2],
-        }
-    }
-
     /// Samples of each plane in one cell, `factor * factor` a plane, row by row;
     /// `None` where no usable pixel is near.
     fn samples(&self, cell: usize, factor: usize, planes: &[Vec<f32>]) -> Vec<Vec<Option<f32>>> {
@@ -172,7 +138,7 @@ impl<'a> Surface<'a> {
         let Some(centre) = self.registration.centre[cell] else {
             return empty;
         };
-        let (across, down) = (self.steps(cell, [0, 1]), self.steps(cell, [1, 0]));
+        let [across, down] = self.registration.steps(self.grid, cell);
         let longest = across.iter().chain(&down).map(|[x, y]| x.hypot(*y));
         // A point a camera pixel, so that the footprint has no gaps.
         let points = (longest.fold(0.0, f64::max) / factor as f64)

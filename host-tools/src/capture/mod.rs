@@ -9,7 +9,10 @@
 //!                              regression             fitting each pixel's series
 //!                              sharing                pixels that see two cells are left out
 //!                              measure                one observation a cell and pattern, noise
+//!                              place                  where between the cells a pixel lies
 //!                              fine_flood             the flood photograph on a finer grid
+//!                              shot_light             one photograph to look at
+//! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
 //!
 //! A capture may come from a stranger: paths stay inside the folder, sizes are
@@ -29,6 +32,8 @@ mod pattern;
 mod photo;
 mod photographs;
 mod picture;
+mod place;
+mod reference;
 #[cfg(test)]
 mod refusal_tests;
 mod registration;
@@ -38,6 +43,7 @@ mod role;
 mod sequence;
 mod settings;
 mod sharing;
+mod shot_light;
 mod shown;
 #[cfg(test)]
 mod test_capture;
@@ -51,11 +57,13 @@ pub use manifest::{MANIFEST_FILE, Manifest, Shot};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
+pub use reference::{REFERENCE_FILE, ReferenceError, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
 pub use response::Response;
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
+pub use shot_light::ShotLight;
 pub use shown::{columns, shown};
 
 use crate::progress::Progress;

@@ -33,6 +33,12 @@ pub(super) enum Command {
     Inspect(Inspect),
     /// Compensate a picture or a video with a table
     Compensate(Compensate),
+    /// Separate a photograph's light into direct light, second, third, ... bounce
+    Bounces(Bounces),
+    /// Every way to photograph and to invert on the same light, or the paper's figures
+    Compare(Compare),
+    /// Show what accuracy costs in time, for a scene or a table
+    Tradeoff(Tradeoff),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -130,6 +136,21 @@ pub(super) struct Solve {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct Bounces {
+    /// Folder with `capture.csv`, patterns and photographs
+    pub(super) capture: PathBuf,
+    /// Folder to make
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// `index` of the photograph in `capture.csv`; the mean of all of white if left out
+    #[arg(long, value_name = "INDEX")]
+    pub(super) photo: Option<u32>,
+    /// Learn the inverse from only the first M Bernoulli photographs beside all others
+    #[arg(long, value_name = "M")]
+    pub(super) photos: Option<usize>,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct SealTerms {
     /// Version of the table; a device does not go back to a lower one by itself
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -140,6 +161,29 @@ pub(super) struct SealTerms {
     /// Once the table is confirmed, versions below this never run again on the device
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) revoke_below: u32,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Compare {
+    /// Capture folder or SCENE.toml whose light is compared on
+    #[arg(
+        value_name = "CAPTURE|SCENE.toml",
+        required_unless_present = "paper",
+        conflicts_with = "paper"
+    )]
+    pub(super) light: Option<PathBuf>,
+    /// Repeat the experiments of Chu, Ng, Pahwa, Quek, Huang (BMVC 2011), with intervals
+    #[arg(long)]
+    pub(super) paper: bool,
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// Photographs for the methods that take as many as one likes
+    #[arg(long, value_name = "M", default_value_t = 150)]
+    pub(super) photos: usize,
+    /// Seed of patterns and noise
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
 }
 
 #[derive(Debug, Args)]
@@ -239,6 +283,16 @@ pub(super) struct Inspect {
     /// Key to verify its signature with
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Tradeoff {
+    /// Folder with `capture.csv`, patterns and photographs, or a table
+    #[arg(value_name = "CAPTURE|TABLE.iltm")]
+    pub(super) input: PathBuf,
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
 }
 
 #[derive(Debug, Args)]

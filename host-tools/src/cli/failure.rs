@@ -361,7 +361,9 @@ fn compile_failure(error: &CompileError) -> Failure {
 const fn kind_of(error: &CaptureError) -> Kind {
     match error {
         CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
-        CaptureError::MorePhotographsThanTaken { .. } => Kind::Usage,
+        CaptureError::MorePhotographsThanTaken { .. }
+        | CaptureError::UnknownIndex { .. }
+        | CaptureError::BlackIndex { .. } => Kind::Usage,
         CaptureError::TooFewPhotographs { .. }
         | CaptureError::NoLight { .. }
         | CaptureError::Overexposed { .. }

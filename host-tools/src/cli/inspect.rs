@@ -4,8 +4,12 @@ use super::args::Inspect;
 use super::failure::{Failure, Kind};
 use super::output::{Output, read_file};
 use super::slots::key_id;
+use super::solve::lines;
+use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
 use crate::device::cure;
+use crate::learn::recovery_in;
+use crate::report::steps;
 use ed25519_dalek::VerifyingKey;
 use iltm_runtime::image::{Seal, Table, unseal};
 use iltm_runtime::operator::{Bounds, Operator};
@@ -137,11 +141,15 @@ fn inverse_error(table: &Table<'_>) -> Option<f64> {
 }
 
 fn data(table: &Table<'_>) -> Value {
-    let tiers = table.tiers().iter().map(|tier| {
+    let tiers = steps(table).into_iter().map(|step| {
         json!({
-            "error": tier.predicted_error.to_num::<f64>(),
-            "entries": tier.entries,
-            "multiplications": tier.multiplications,
+            "error": step.left_out,
+            "total_error": step.total,
+            "entries": step.entries,
+            "multiplications": step.multiplications,
+            "instructions": step.instructions,
+            "share": step.share(),
+            "bytes": step.table_bytes,
         })
     });
     let bounds = table.operator().map(Operator::bounds);
@@ -199,6 +207,9 @@ fn text(path: &Path, table: &Table<'_>) -> String {
             "error            not predicted: too few photographs to hold any out"
         ),
     };
+    if let Some(recovery) = recovery_in(table.provenance()) {
+        text += &lines("recovery         ", &recovery.lines());
+    }
     if let Some(operator) = table.operator() {
         let Bounds {
             accumulator,
@@ -213,17 +224,29 @@ fn text(path: &Path, table: &Table<'_>) -> String {
     }
     let _ = writeln!(
         text,
-        "\ntier   left out   entries   multiplications a frame"
+        "\ntier   left out   error in all   entries   multiplications   instructions   of a frame     bytes"
     );
-    for (index, tier) in table.tiers().iter().enumerate() {
+    for step in steps(table) {
         let _ = writeln!(
             text,
-            "{index:>4}   {:>8.5}   {:>7}   {:>15}",
-            tier.predicted_error.to_num::<f64>(),
-            tier.entries,
-            tier.multiplications
+            "{:>4}   {:>8.5}   {:>12.5}   {:>7}   {:>15}   {:>12}   {:>8.2} %   {:>7}",
+            step.tier,
+            step.left_out,
+            step.total,
+            step.entries,
+            step.multiplications,
+            step.instructions,
+            100.0 * step.share(),
+            step.table_bytes
         );
     }
+    let _ = writeln!(
+        text,
+        "\nInstructions are those of a frame of one pixel a cell on the reference board, counted and not\n\
+         timed; of a frame: of {RATE} a second on a part of {} MHz, if it did one instruction a cycle.\n\
+         Bytes: of a table with that tier and gain only.",
+        CLOCK / 1_000_000
+    );
     if !table.provenance().is_empty() {
         let _ = writeln!(text, "\n{}", table.provenance().trim_end());
     }

@@ -6,6 +6,8 @@
 
 mod active;
 mod args;
+mod bounces;
+mod compare;
 mod compensate;
 mod connect;
 mod demo;
@@ -25,16 +27,19 @@ mod simulate;
 mod slots;
 mod solve;
 mod status;
+mod tradeoff;
 mod trial;
 
+use crate::compare::Meter;
 use args::{Arguments, Command};
 use clap::Parser;
 use output::Output;
 use std::process::ExitCode;
 
-/// Runs the command that the process was started with.
+/// Runs the command that the process was started with; `meter` reads the program's
+/// memory.
 #[must_use]
-pub fn run() -> ExitCode {
+pub fn run(meter: Meter) -> ExitCode {
     let arguments = Arguments::parse();
     let output = Output::new(arguments.json);
     let result = match &arguments.command {
@@ -42,7 +47,10 @@ pub fn run() -> ExitCode {
         Command::Simulate(simulate) => simulate::run(simulate, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
+        Command::Compare(compare) => compare::run(compare, meter, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Bounces(bounces) => bounces::run(bounces, &output),
+        Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),

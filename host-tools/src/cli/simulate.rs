@@ -186,7 +186,7 @@ fn differences(ablated: &[Ablated], text: &mut String) {
     text.push('\n');
 }
 
-fn unreadable(error: &SceneError) -> Failure {
+pub(super) fn unreadable(error: &SceneError) -> Failure {
     let kind = match error {
         SceneError::Io { .. } => Kind::Read,
         _ => Kind::Scene,
@@ -194,11 +194,11 @@ fn unreadable(error: &SceneError) -> Failure {
     Failure::new(kind, error, error.next_step())
 }
 
-fn unsimulated(error: &SimulationError) -> Failure {
+pub(super) fn unsimulated(error: &SimulationError) -> Failure {
     Failure::new(Kind::Scene, error, error.next_step())
 }
 
-fn unwritten(error: FolderError) -> Failure {
+pub(super) fn unwritten(error: FolderError) -> Failure {
     match error {
         FolderError::Taken { .. } => Failure::new(
             Kind::Write,

@@ -81,6 +81,7 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "lambda": report.lambda,
         "iterations": report.iterations,
         "condition": report.condition,
+        "recovery": report.recovery,
         "compensation": report.compensation.name(),
         "predicted_error": {
             "uncompensated": report.prediction.uncompensated,
@@ -203,6 +204,9 @@ pub(super) fn text(learned: &Learned) -> String {
         "scene       condition {:.2}, reference white {:.4} of the camera's full scale",
         report.condition, learned.compiled.white.light
     );
+    if let Some(recovery) = &report.recovery {
+        text += &lines("recovery    ", &recovery.lines());
+    }
     let prediction = report.prediction;
     let _ = writeln!(
         text,
@@ -233,6 +237,17 @@ pub(super) fn text(learned: &Learned) -> String {
             text,
             "            the table has gains and no operator: {why}"
         );
+    }
+    text
+}
+
+/// Lines under a heading, the following ones indented as far.
+pub(super) fn lines(heading: &str, lines: &[String]) -> String {
+    let indent = " ".repeat(heading.len());
+    let mut text = String::new();
+    for (at, line) in lines.iter().enumerate() {
+        let start = if at == 0 { heading } else { &indent };
+        let _ = writeln!(text, "{start}{line}");
     }
     text
 }

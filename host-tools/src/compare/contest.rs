@@ -1,9 +1,9 @@
 //! Every method once, on the same light.
 
-use super::acquisition::Acquisition;
-use super::inversion::{Inversion, Known};
+use super::acquisition::{self, Acquisition};
+use super::inversion::{self, Inversion, Known};
 use super::{Answer, Errors, Found, Meter, Rig, Source, Truth, Unfit};
-use crate::progress::Progress;
+use crate::progress::{Progress, Silent};
 use crate::solve::inverted;
 use std::time::Instant;
 
@@ -111,6 +111,40 @@ pub fn invert(
     }
 }
 
+/// All ways to photograph (with `photographs` where one likes) and all ways to invert,
+/// in that order.
+pub fn every(
+    (truth, rig): (&Truth, &Rig),
+    photographs: usize,
+    seed: u64,
+    meter: Option<Meter>,
+    progress: &dyn Progress,
+) -> (Vec<Row>, Vec<Row>) {
+    let (acquisitions, inversions) = (acquisition::all(photographs, seed), inversion::all());
+    let total = acquisitions.len() + inversions.len();
+    progress.begin("methods, one after the other", total as u64);
+    let photographed = acquisitions.iter().map(|method| {
+        let row = photograph(method.as_ref(), rig, truth, meter, &Silent);
+        progress.advance(1);
+        row
+    });
+    let photographed = photographed.collect();
+    let known = Known {
+        grid: truth.grid,
+        live: &truth.live,
+        transport: &truth.transport,
+        rig,
+    };
+    let inverted = inversions.iter().map(|method| {
+        let row = invert(method.as_ref(), known, truth, meter, &Silent);
+        progress.advance(1);
+        row
+    });
+    let inverted = inverted.collect();
+    progress.end();
+    (photographed, inverted)
+}
+
 fn measured<T>(meter: Option<Meter>, work: impl FnOnce() -> T) -> (T, Option<usize>) {
     match meter {
         Some(meter) => {
@@ -125,8 +159,6 @@ fn measured<T>(meter: Option<Meter>, work: impl FnOnce() -> T) -> (T, Option<usi
 mod tests {
     use super::*;
     use crate::capture::NoiseModel;
-    use crate::compare::{acquisition, inversion};
-    use crate::progress::Silent;
     use crate::scene::coaxial::{Panels, Scene};
     use crate::solve::Method;
     use iltm_runtime::Grid;

@@ -9,6 +9,9 @@
 //! inversion     ways to invert or to solve frame by frame           one file a method
 //! contest       every method once: photographs, time, memory, errors
 //! meter         memory that a method held
+//! light         the light that a capture or a described scene gives to compare on
+//! paper         the paper's experiments
+//! table, page   rows for people and programs                        chart, sheet
 //! ```
 //!
 //! Light is cell by cell, in camera units, ambient light removed: `c = T p`. Every
@@ -16,14 +19,21 @@
 
 pub mod acquisition;
 mod answer;
+mod chart;
 pub mod contest;
 pub mod inversion;
+pub mod light;
 mod meter;
+pub mod page;
+pub mod paper;
 mod rig;
+mod sheet;
 mod source;
+pub mod table;
 mod truth;
 
 pub use answer::{Answer, Found, Project, Unfit};
+pub use inversion::albedo;
 pub use meter::Meter;
 pub use rig::Rig;
 pub use source::Source;

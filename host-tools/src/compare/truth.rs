@@ -71,6 +71,12 @@ impl Truth {
         Some(truth)
     }
 
+    /// How many cells are lit and seen.
+    #[must_use]
+    pub fn live_cells(&self) -> usize {
+        self.live.iter().filter(|live| **live).count()
+    }
+
     /// Light under white, length `N`.
     #[must_use]
     pub fn flood(&self) -> DVector<f64> {

@@ -9,11 +9,13 @@
 //! | gains, also finer than the cells | [`gain`] |
 //! | projector codes by drive | [`response`] |
 //! | bytes | [`image`] |
+//! | what a frame takes on the board | [`cost`] |
 //! | the seal behind them | [`sign`] |
 //!
 //! The image is checked by the runtime's own reader before it is returned, so
 //! what leaves here is known to load.
 
+pub mod cost;
 pub mod gain;
 pub mod image;
 pub mod ladder;

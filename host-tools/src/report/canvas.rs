@@ -61,6 +61,14 @@ impl Canvas {
         pixels.get_mut(y * self.size.width() + x)
     }
 
+    /// The colour at a place; black outside.
+    pub(crate) fn get(&self, x: usize, y: usize) -> Colour {
+        let (pixels, _) = self.samples.as_chunks::<3>();
+        let inside = x < self.size.width() && y < self.size.height();
+        let pixel = inside.then(|| pixels.get(y * self.size.width() + x));
+        pixel.flatten().copied().unwrap_or_default()
+    }
+
     pub(crate) fn set(&mut self, x: usize, y: usize, colour: Colour) {
         if let Some(pixel) = self.pixel(x, y) {
             *pixel = colour;

@@ -154,7 +154,7 @@ pub(super) fn decades(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// A number of about three digits, without zeros at its end.
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

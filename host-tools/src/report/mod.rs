@@ -17,30 +17,31 @@
 pub(crate) mod canvas;
 mod chart;
 mod coefficient_map;
-mod colour_scale;
+pub(crate) mod colour_scale;
 mod comparison;
 mod example;
 mod facts;
 mod files;
 mod ladder;
 mod light_picture;
-mod page;
+pub(crate) mod page;
 mod predict;
-mod resample;
+pub(crate) mod resample;
 mod summary;
 mod timing;
 
 pub use coefficient_map::{CoefficientMap, Level};
+pub(crate) use colour_scale::number;
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
 pub use comparison::Comparison;
 pub use example::{Example, Shown, Treatment, Wanted};
 pub use files::PictureFile;
-pub use ladder::{Rung, ladder};
+pub use ladder::{Rung, Step, ladder, steps};
 pub use light_picture::LightPicture;
 pub use page::{Command, Words};
 pub use predict::Projection;
 pub use summary::summary;
-pub use timing::microseconds;
+pub use timing::{microseconds, microseconds_at};
 
 use crate::learn::Learned;
 use crate::progress::Progress;

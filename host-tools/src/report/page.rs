@@ -211,7 +211,7 @@ impl Report<'_> {
     fn operator(&self) -> Markup {
         let map = &self.coefficients;
         let all = map.coefficients as u64;
-        let entries = |rung: Option<&Rung>| u64::from(rung.map_or(0, |rung| rung.entries));
+        let entries = |rung: Option<&Rung>| u64::from(rung.map_or(0, |rung| rung.step.entries));
         let (first, last) = (entries(self.ladder.get(1)), entries(self.ladder.last()));
         html! {
             section .half {
@@ -280,7 +280,7 @@ impl Report<'_> {
         let own = self.learned.report.predicted_error();
         let point = |(tier, rung): (usize, &Rung)| Point {
             x: rung.microseconds,
-            y: rung.left_out,
+            y: rung.step.left_out,
             label: format!("tier {tier}"),
         };
         let chart = Chart {
@@ -311,9 +311,9 @@ impl Report<'_> {
                             th { "tier" } th { "left out" } th { "error in all" } th { "entries" } th { "multipli\u{ad}cations" } th { "bytes" } th { "\u{b5}s" }
                         } }
                         tbody { @for (tier, rung) in self.ladder.iter().enumerate() { tr {
-                            td { (tier) } td { (percent(rung.left_out)) } td { (percent(rung.total)) }
-                            td { (grouped(rung.entries.into())) } td { (grouped(rung.multiplications.into())) }
-                            td { (grouped(rung.bytes)) } td { (format!("{:.0}", rung.microseconds)) }
+                            td { (tier) } td { (percent(rung.step.left_out)) } td { (percent(rung.step.total)) }
+                            td { (grouped(rung.step.entries.into())) } td { (grouped(rung.step.multiplications.into())) }
+                            td { (grouped(rung.step.bytes)) } td { (format!("{:.0}", rung.microseconds)) }
                         } } }
                     } }
                     (chart.render())
@@ -441,7 +441,7 @@ fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
 
 /// A share as a percentage: tenths from 10 up, hundredths from 1 up, two digits
 /// below.
-pub(super) fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     let places = match percent {
         10.0.. => 1,
@@ -453,7 +453,7 @@ pub(super) fn percent(share: f64) -> String {
 }
 
 /// A whole number with its thousands apart.
-pub(super) fn grouped(value: u64) -> String {
+pub(crate) fn grouped(value: u64) -> String {
     let digits = value.to_string();
     let first = digits.len() % 3;
     let mut groups: Vec<&str> = Vec::new();

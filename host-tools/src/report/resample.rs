@@ -13,7 +13,7 @@ struct Share {
 
 /// The grid laid over a frame.
 #[derive(Clone, Debug)]
-pub(super) struct Lattice {
+pub(crate) struct Lattice {
     grid: Grid,
     frame: FrameSize,
     /// Interpolation along rows and columns of pixels.
@@ -24,7 +24,7 @@ pub(super) struct Lattice {
 
 impl Lattice {
     /// `None` if some cell would cover no pixel.
-    pub(super) fn new(grid: Grid, frame: FrameSize) -> Option<Self> {
+    pub(crate) fn new(grid: Grid, frame: FrameSize) -> Option<Self> {
         Some(Self {
             grid,
             frame,
@@ -40,12 +40,12 @@ impl Lattice {
     }
 
     /// Cells of the grid.
-    pub(super) const fn cells(&self) -> usize {
+    pub(crate) const fn cells(&self) -> usize {
         self.grid.cells()
     }
 
     /// `A`: means over the cells.
-    pub(super) fn average(&self, pixels: &[f32]) -> Vec<f64> {
+    pub(crate) fn average(&self, pixels: &[f32]) -> Vec<f64> {
         let (width, cols) = (self.frame.width(), self.grid.cols());
         let mut cells = vec![0.0; self.grid.cells()];
         let mut line = vec![0.0; cols];
@@ -66,7 +66,7 @@ impl Lattice {
     }
 
     /// `U`: linear interpolation between the cells' centres.
-    pub(super) fn expand(&self, cells: &[f64]) -> Vec<f32> {
+    pub(crate) fn expand(&self, cells: &[f64]) -> Vec<f32> {
         let cols = self.grid.cols();
         let mut pixels = Vec::with_capacity(self.frame.pixels());
         for share in &self.spread[0] {

@@ -69,17 +69,7 @@ pub fn write(
         let path = path.to_owned();
         move |source| FolderError::Io { path, source }
     };
-    check_free(out)?;
-    let parent = match out.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    let mut prefix = OsString::from(".");
-    prefix.push(out.file_name().unwrap_or_default());
-    let beside = tempfile::Builder::new()
-        .prefix(&prefix)
-        .tempdir_in(parent)
-        .map_err(at(parent))?;
+    let beside = beside(out)?;
     let folder = beside.path();
     for name in ["patterns", "photos"] {
         let path = folder.join(name);
@@ -146,7 +136,30 @@ pub fn check_free(out: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
-fn put_in_place(beside: tempfile::TempDir, out: &Path) -> Result<(), FolderError> {
+/// A new folder beside a free place, to be written and then [put there](put_in_place).
+///
+/// # Errors
+/// Those of [`check_free`], or what making it gives.
+pub(crate) fn beside(out: &Path) -> Result<tempfile::TempDir, FolderError> {
+    check_free(out)?;
+    let parent = match out.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    let mut prefix = OsString::from(".");
+    prefix.push(out.file_name().unwrap_or_default());
+    let made = tempfile::Builder::new().prefix(&prefix).tempdir_in(parent);
+    made.map_err(|source| FolderError::Io {
+        path: parent.to_owned(),
+        source,
+    })
+}
+
+/// Gives a folder that was written beside its place that place.
+///
+/// # Errors
+/// [`FolderError::Io`]; nothing is left behind then.
+pub(crate) fn put_in_place(beside: tempfile::TempDir, out: &Path) -> Result<(), FolderError> {
     let io = |source| FolderError::Io {
         path: out.to_owned(),
         source,

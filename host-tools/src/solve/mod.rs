@@ -19,6 +19,7 @@
 //! forward, held_out     light from an inverse; the photographs it is judged by
 //! content_loop          what clipping makes of natural images
 //! sharpen               undoes the projector's blur as well
+//! recovery              whether the paper's theorem promises anything here
 //! gain_only             what it is judged against, and what remains if it loses
 //! ```
 //!
@@ -60,6 +61,7 @@ mod observed;
 mod options;
 mod own_light;
 mod prepare;
+pub mod recovery;
 mod report;
 mod row_block;
 mod sharpen;
@@ -85,6 +87,7 @@ pub use inverse::{ChannelInverse, InverseTransport};
 pub use observed::{CellNoise, Observed, ObservedChannel};
 pub use options::{Method, SolveOptions, UnknownMethod};
 pub use own_light::{LeftOut, WhyLeftOut};
+pub use recovery::Recovery;
 pub use report::{
     Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };
@@ -188,6 +191,8 @@ pub fn solve_observed(
         compensated: with_operator,
     };
     seconds.finish = clock.lap();
+    let recovery = recovery(&prepared, &haar, &candidates);
+    seconds.recovery = clock.lap();
     let report = SolveReport {
         method: options.method,
         photographs: count(&prepared, options.method, &splits),
@@ -203,6 +208,7 @@ pub fn solve_observed(
         compensation: prediction.best(clipped),
         prediction,
         clipped,
+        recovery,
         seconds,
     };
     Ok((
@@ -355,6 +361,18 @@ fn check_prediction(prediction: &Prediction) -> Result<(), SolveError> {
         percent: 100.0 * least,
         limit: 100.0 * UNPREDICTABLE,
     })
+}
+
+/// What the paper's theorem says of its method on these photographs; `None` without a
+/// photograph of white, or if the inverse has no transport.
+fn recovery(prepared: &Prepared, haar: &Haar, candidates: &[Candidate]) -> Option<Recovery> {
+    let white = *prepared.with_role(|role| role == Role::White).first()?;
+    let patterns = prepared
+        .patterns
+        .select_columns(&prepared.with_role(|role| uses(Method::Direct, role)));
+    let inverses: Vec<&Inverse> = candidates.iter().map(|c| &c.inverse).collect();
+    let flood = prepared.patterns.column(white).into_owned();
+    recovery::of_direct(&inverses, haar, &patterns, &flood)
 }
 
 fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCounts {

@@ -4,6 +4,7 @@ use super::convergence::Convergence;
 use super::gain_only::GainOnly;
 use super::options::Method;
 use super::own_light::LeftOut;
+use super::recovery::Recovery;
 
 /// How an inverse came about and how good it is.
 ///
@@ -41,6 +42,9 @@ pub struct SolveReport {
     pub clipped: Clipped,
     /// Which way to project is best, [`Prediction::best`].
     pub compensation: Compensation,
+    /// Whether the paper's theorem promises anything for this capture; `None` without a
+    /// photograph of white.
+    pub recovery: Option<Recovery>,
     /// Wall-clock time.
     pub seconds: Seconds,
 }
@@ -187,4 +191,6 @@ pub struct Seconds {
     pub solve: f64,
     /// Deviations, condition and prediction.
     pub finish: f64,
+    /// Bounds of the theorem's constants.
+    pub recovery: f64,
 }

@@ -111,6 +111,12 @@ impl<'a> Operator<'a> {
         self.bounds
     }
 
+    /// What multiplies the result of each channel.
+    #[must_use]
+    pub const fn channel_scales(&self) -> [U1F15; 3] {
+        self.channel_scales
+    }
+
     /// Its segments, in the order in which they are applied.
     #[must_use]
     pub fn segments(&self) -> &[Segment<'a>] {

@@ -1,0 +1,210 @@
+//! `iltm compare`
+
+use super::args::Compare;
+use super::failure::{Failure, Kind};
+use super::output::{Output, cannot_write, write_file};
+use super::progress::progress;
+use crate::compare::contest::{self, Row};
+use crate::compare::light::{Light, LightError};
+use crate::compare::page::Contest;
+use crate::compare::paper::{self, Condition, File};
+use crate::compare::{Meter, table};
+use crate::learn::LearnError;
+use crate::progress::Progress;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+pub(super) fn run(arguments: &Compare, meter: Meter, output: &Output) -> Result<(), Failure> {
+    let start = Instant::now();
+    // A folder that cannot be made is known before the work, not after it.
+    let folder = &arguments.output;
+    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    let bars = progress(output);
+    let compared = match &arguments.light {
+        Some(light) => of_light(light, arguments, meter, bars.as_ref()),
+        None => of_paper(arguments, meter, bars.as_ref()),
+    };
+    bars.end();
+    let Compared {
+        files,
+        mut text,
+        mut data,
+    } = compared?;
+    for file in &files {
+        write_file(&folder.join(&file.name), &file.bytes)?;
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    data["output"] = json!(folder.display().to_string());
+    data["files"] = json!(names);
+    data["seconds"] = json!(seconds);
+    let _ = writeln!(
+        text,
+        "{}: {}, in {seconds:.0} s",
+        folder.display(),
+        names.join(", ")
+    );
+    output.result(&data, &text);
+    Ok(())
+}
+
+/// What is written and said.
+struct Compared {
+    files: Vec<File>,
+    text: String,
+    data: Value,
+}
+
+fn of_light(
+    path: &Path,
+    arguments: &Compare,
+    meter: Meter,
+    progress: &dyn Progress,
+) -> Result<Compared, Failure> {
+    let light = if path.is_dir() {
+        Light::of_capture(path, arguments.seed, progress)
+    } else {
+        Light::of_scene(path, arguments.seed, progress)
+    };
+    let light = light.map_err(dark)?;
+    let (photographed, inverted) = contest::every(
+        (&light.truth, &light.rig),
+        arguments.photos,
+        arguments.seed,
+        Some(meter),
+        progress,
+    );
+    let contest = Contest {
+        name: &path.display().to_string(),
+        light: &light,
+        photographed: &photographed,
+        inverted: &inverted,
+    };
+    let groups = [
+        ("photograph", photographed.as_slice()),
+        ("invert", inverted.as_slice()),
+    ];
+    let files = vec![
+        File {
+            name: "index.html".to_owned(),
+            bytes: contest.html().into_bytes(),
+        },
+        File {
+            name: "compare.csv".to_owned(),
+            bytes: table::csv(&groups).into_bytes(),
+        },
+    ];
+    let truth = &light.truth;
+    let text = format!(
+        "{} cells, {} lit and seen; the transport is {}\n\nways to photograph\n{}\nways to invert, given the transport\n{}\n",
+        truth.grid,
+        truth.live_cells(),
+        light.known,
+        table::text(&photographed),
+        table::text(&inverted),
+    );
+    let data = json!({
+        "light": path.display().to_string(),
+        "known": light.known,
+        "rows": truth.grid.rows(),
+        "cols": truth.grid.cols(),
+        "photographed": photographed.iter().map(row).collect::<Vec<_>>(),
+        "inverted": inverted.iter().map(row).collect::<Vec<_>>(),
+    });
+    Ok(Compared { files, text, data })
+}
+
+fn of_paper(
+    arguments: &Compare,
+    meter: Meter,
+    progress: &dyn Progress,
+) -> Result<Compared, Failure> {
+    let mut contests = Vec::new();
+    for condition in Condition::ALL
+        .into_iter()
+        .filter(|condition| condition.noisy)
+    {
+        if let Some((truth, rig)) = condition.world(arguments.seed) {
+            let light = (&truth, &rig);
+            let (photographed, inverted) = contest::every(
+                light,
+                arguments.photos,
+                arguments.seed,
+                Some(meter),
+                progress,
+            );
+            contests.push((condition.name(), photographed, inverted));
+        }
+    }
+    let mut files = paper::files(&contests, progress).map_err(|error| {
+        Failure::new(
+            Kind::Write,
+            error,
+            "Please report this: it needs nothing from outside.",
+        )
+    })?;
+    let groups: Vec<(&str, &[Row])> = contests
+        .iter()
+        .flat_map(|(name, photographed, inverted)| {
+            [
+                (*name, photographed.as_slice()),
+                (*name, inverted.as_slice()),
+            ]
+        })
+        .collect();
+    files.push(File {
+        name: "methods.csv".to_owned(),
+        bytes: table::csv(&groups).into_bytes(),
+    });
+    Ok(Compared {
+        files,
+        text: String::new(),
+        data: json!({}),
+    })
+}
+
+fn row(row: &Row) -> Value {
+    let done = row.result.as_ref().ok();
+    json!({
+        "method": row.name,
+        "source": row.source.to_string(),
+        "photographs": done.map(|done| done.photographs),
+        "seconds": done.map(|done| done.seconds),
+        "bytes": done.and_then(|done| done.memory),
+        "multiplications_a_frame": done.and_then(|done| done.multiplications),
+        "inverse_error": done.and_then(|done| done.errors.inverse),
+        "second_bounce_error": done.and_then(|done| done.errors.second_bounce),
+        "compensation_error": done.map(|done| done.errors.compensation),
+        "remark": done.map(|done| &done.remark),
+        "no_answer": row.result.as_ref().err().map(ToString::to_string),
+    })
+}
+
+/// Why there is nothing to compare on.
+fn dark(error: LightError) -> Failure {
+    match error {
+        LightError::Capture(error) => LearnError::Capture(error).into(),
+        LightError::Solve(error) => LearnError::Solve(error).into(),
+        LightError::Reference(error) => {
+            let next_step = error.next_step();
+            Failure::new(Kind::Capture, error, next_step)
+        }
+        LightError::Scene(error) => super::simulate::unreadable(&error),
+        LightError::Simulation(error) => super::simulate::unsimulated(&error),
+        LightError::Folder(error) => super::simulate::unwritten(error),
+        LightError::Room(error) => cannot_write(&std::env::temp_dir(), &error),
+        LightError::TooLarge { .. } => Failure::new(
+            Kind::Usage,
+            error,
+            "Compare on a coarser grid of the same scene.",
+        ),
+        LightError::Singular => Failure::new(
+            Kind::Solve,
+            error,
+            "Look at `iltm solve`: it says which cells cannot be solved for.",
+        ),
+    }
+}

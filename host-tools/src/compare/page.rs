@@ -1,0 +1,155 @@
+//! The page of a contest: pictures first, numbers beside them.
+
+use super::Answer;
+use super::contest::{Done, Row};
+use super::light::Light;
+use super::sheet::{Tile, encoded, sheet};
+use super::table::{COLUMNS, cells};
+use crate::report::{ColourScale, Palette};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use iltm_runtime::FrameSize;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use nalgebra::DVector;
+
+/// Tiles in a row of pictures.
+const ACROSS: usize = 4;
+
+/// Error of a wanted image, relative to white, at the end of the colour scale, and the
+/// powers of ten below it.
+const WORST: (f64, i32) = (0.3, 3);
+
+/// Two groups of rows and the light they were made with.
+#[derive(Debug)]
+pub struct Contest<'c> {
+    /// What was compared on, for the heading.
+    pub name: &'c str,
+    /// The light.
+    pub light: &'c Light,
+    /// Ways to photograph.
+    pub photographed: &'c [Row],
+    /// Ways to invert, given the transport itself.
+    pub inverted: &'c [Row],
+}
+
+impl Contest<'_> {
+    /// The page as HTML, complete in itself.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let truth = &self.light.truth;
+        let style = PreEscaped(include_str!("../report/style.css"));
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    title { "Methods compared: " (self.name) }
+                    style { (style) }
+                }
+                body { main {
+                    header {
+                        p .over { "iltm compare" }
+                        h1 { (self.name) }
+                        p .lead {
+                            (truth.grid.rows()) " \u{d7} " (truth.grid.cols()) " cells, " (truth.live_cells())
+                            " of them lit and seen. The transport is " (self.light.known)
+                            "; every method gets the same light, with this camera\u{2019}s noise, and is judged by the same images."
+                        }
+                    }
+                    (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))
+                    (self.group("Ways to invert, or to do without an inverse", "Each is given the transport itself.", self.inverted))
+                    (self.sources())
+                } }
+            }
+        };
+        page.into_string()
+    }
+
+    fn group(&self, title: &str, words: &str, rows: &[Row]) -> Markup {
+        html! {
+            section {
+                h2 { (title) }
+                p { (words) " Errors are relative: of the inverse (Frobenius), of the second bounce\u{2019}s picture under white, and of what compensated images look like, clipping included." }
+                @if let Some(picture) = self.pictures(rows) {
+                    figure {
+                        img src=(picture) alt=(format!("{title}: where a compensated image errs"));
+                        figcaption { "One natural image on the wall, and where it errs by each method." }
+                    }
+                }
+                div .scroll { table {
+                    tr { @for head in COLUMNS { th { (head) } } }
+                    @for row in rows {
+                        tr {
+                            @match &row.result {
+                                Ok(_) => @for (at, cell) in cells(row).into_iter().enumerate() {
+                                    td .(if at == 0 { "" } else { "formula" }) { (cell) }
+                                },
+                                Err(why) => { td { (row.name) } td colspan="7" { "no answer: " (why) } },
+                            }
+                        }
+                    }
+                } }
+            }
+        }
+    }
+
+    fn sources(&self) -> Markup {
+        let rows = self.photographed.iter().chain(self.inverted);
+        html! {
+            section {
+                h2 { "What they are, and where they come from" }
+                dl .facts {
+                    @for row in rows {
+                        dt { strong { (row.name) } }
+                        dd {
+                            (row.how) " " em { (row.source) "." }
+                            @if let Ok(Done { remark, .. }) = &row.result { @if !remark.is_empty() { " Here: " (remark) "." } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where one image errs, by method, as a data URL.
+    fn pictures(&self, rows: &[Row]) -> Option<String> {
+        let truth = &self.light.truth;
+        let scale = ColourScale::logarithmic(Palette::Magma, WORST.0, WORST.1);
+        let size = FrameSize::of_grid(truth.grid);
+        let wanted = truth.images.column(0).into_owned();
+        let wanted_tile = Tile::light(
+            ("wanted", ""),
+            truth.grid,
+            wanted.iter().copied(),
+            truth.white,
+        );
+        let mut tiles = vec![wanted_tile];
+        for row in rows {
+            let Ok(done) = &row.result else { continue };
+            let shown = &truth.transport * drive(&done.answer, &wanted);
+            let off = (shown - &wanted) / truth.white;
+            let caption = format!(
+                "compensation {}",
+                super::table::error(done.errors.compensation)
+            );
+            let values = off.iter().map(|value| value.abs());
+            tiles.push(Tile::scaled((&row.name, &caption), size, values, &scale));
+        }
+        let rows: Vec<Vec<Tile>> = tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect();
+        let picture = sheet(&rows, Some((&scale, "error, relative to reference white")))?;
+        Some(format!(
+            "data:image/png;base64,{}",
+            STANDARD.encode(encoded(&picture))
+        ))
+    }
+}
+
+/// What a projector shows for wanted light.
+fn drive(answer: &Answer, wanted: &DVector<f64>) -> DVector<f64> {
+    let drive = match answer {
+        Answer::Inverse(matrix) => matrix * wanted,
+        Answer::Frames(frames) => frames.project(wanted),
+    };
+    drive.map(|p| if p > 0.0 { p.min(1.0) } else { 0.0 })
+}

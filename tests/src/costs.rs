@@ -1,0 +1,169 @@
+//! Frames of many shapes on the reference board, for the model of what a frame takes.
+//!
+//! Tables are made up as in [`stages`](crate::stages): what a frame takes depends on
+//! grid, channels, ambient light, size of the frame and numbers of pairs in the rows,
+//! and on nothing else but clipped samples. `docs/costs.csv` holds the counts, and a
+//! test compares the model (`iltm::compile::cost`) with every one of them.
+
+use crate::firmware::elf;
+use crate::instructions::bench;
+use crate::made_up::MadeUp;
+use iltm::compile::image::StoredRow;
+use iltm::device::emulator::Board;
+use iltm_runtime::{FrameSize, Grid};
+use std::fmt::Write as _;
+
+/// A made-up table and the size of the frames it is counted with.
+pub struct Case {
+    /// What it is, as the list has it.
+    pub name: String,
+    /// The table's image.
+    pub image: Vec<u8>,
+    /// Size of its frames.
+    pub size: FrameSize,
+}
+
+/// Instructions of a frame with the operator, and without.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Count {
+    /// The case's name.
+    pub case: String,
+    /// The tier.
+    pub tier: u8,
+    /// Instructions of the three stages.
+    pub stages: [u64; 3],
+}
+
+/// See [`SHAPES`].
+type Shape = (u16, u16, usize, bool, usize, u16, u16);
+
+/// Rows, columns, channels, whether there is ambient light, pairs of a row, width and
+/// height of the frames (0: the grid's).
+const SHAPES: [Shape; 33] = [
+    (8, 8, 1, false, 2, 0, 0),
+    (8, 8, 3, true, 2, 0, 0),
+    (13, 21, 1, false, 3, 0, 0),
+    (13, 21, 1, true, 3, 0, 0),
+    (13, 21, 3, true, 3, 0, 0),
+    (16, 24, 1, true, 5, 0, 0),
+    (16, 24, 3, false, 5, 0, 0),
+    (17, 17, 1, true, 8, 0, 0),
+    (20, 12, 3, true, 1, 0, 0),
+    (7, 50, 1, false, 4, 0, 0),
+    (24, 40, 1, true, 6, 0, 0),
+    (24, 40, 3, true, 6, 0, 0),
+    (27, 48, 3, true, 7, 0, 0),
+    (30, 30, 1, true, 12, 0, 0),
+    (31, 33, 3, false, 12, 0, 0),
+    (32, 32, 1, false, 20, 0, 0),
+    (32, 32, 3, true, 20, 0, 0),
+    (45, 80, 1, true, 4, 0, 0),
+    (45, 80, 3, true, 4, 0, 0),
+    (48, 64, 1, false, 2, 0, 0),
+    (64, 64, 3, true, 1, 0, 0),
+    (63, 95, 3, true, 4, 0, 0),
+    (13, 21, 1, true, 3, 64, 40),
+    (13, 21, 3, true, 3, 128, 96),
+    (7, 11, 1, false, 3, 21, 13),
+    (16, 24, 1, true, 5, 160, 120),
+    (16, 24, 3, false, 5, 320, 240),
+    (32, 32, 1, false, 4, 256, 256),
+    (32, 32, 1, true, 4, 256, 256),
+    (32, 32, 3, true, 4, 256, 256),
+    (27, 48, 3, true, 7, 320, 180),
+    (24, 40, 1, true, 6, 320, 200),
+    (45, 80, 3, false, 4, 160, 90),
+];
+
+/// The cases of the list.
+///
+/// # Panics
+/// If one cannot be made: then whoever asked for them has failed.
+#[must_use]
+pub fn cases() -> Vec<Case> {
+    let case = |&(rows, cols, channels, ambient, pairs, width, height): &Shape| {
+        let grid = Grid::new(rows, cols).expect("a small grid");
+        let mut table = MadeUp::new(grid, channels);
+        // Just under one, so that natural frames are not clipped more than usual.
+        table.gains.fill(7_800);
+        table.ambient = ambient.then(|| vec![330; table.gains.len()]);
+        table.response = true;
+        table.rows = self::rows(grid, pairs);
+        let own = FrameSize::of_grid(grid);
+        let size = FrameSize::new(width, height).unwrap_or(own);
+        let (colour, light) = (
+            if channels == 3 { "colour" } else { "grey" },
+            if ambient { "ambient" } else { "dark" },
+        );
+        Case {
+            name: format!("{size} over {rows}x{cols} {colour} {light} {pairs}"),
+            image: table.image(),
+            size,
+        }
+    };
+    SHAPES.iter().map(case).collect()
+}
+
+/// Three of four rows, each with so many pairs at places of their own, two more or two
+/// fewer.
+fn rows(grid: Grid, pairs: usize) -> Vec<StoredRow> {
+    let mut random = fastrand::Rng::with_seed(0xC057);
+    let cells = grid.cells() as u16;
+    let mut row = |index| {
+        let pairs = (pairs + random.usize(..5)).saturating_sub(2).max(1);
+        let mut places = std::collections::BTreeSet::new();
+        while places.len() < pairs.min(usize::from(cells) / 4) {
+            places.insert(2 * random.u16(..cells / 2));
+        }
+        let pair = |at: u16| [(at, random.i16(1..20)), (at + 1, -random.i16(1..20))];
+        StoredRow {
+            index,
+            shift: 9,
+            entries: places
+                .into_iter()
+                .flat_map(pair)
+                .filter(|(at, _)| *at < cells)
+                .collect(),
+        }
+    };
+    (0..cells)
+        .filter(|index| index % 4 != 1)
+        .map(&mut row)
+        .collect()
+}
+
+/// Counts all cases.
+///
+/// # Panics
+/// If the bench cannot be built or run.
+#[must_use]
+pub fn counts() -> Vec<Count> {
+    let elf = elf(Board::An500, "bench");
+    let of_case = |case: Case| {
+        let lines = bench(&elf, &case.image, case.size, None);
+        lines
+            .into_iter()
+            .map(move |[tier, first, second, last, ..]| Count {
+                case: case.name.clone(),
+                tier: tier as u8,
+                stages: [first, second, last],
+            })
+    };
+    cases().into_iter().flat_map(of_case).collect()
+}
+
+/// The list as `docs/costs.csv` holds it.
+#[must_use]
+pub fn csv(counts: &[Count]) -> String {
+    let mut text = String::from("frame,tier,first,operator,last\n");
+    for count in counts {
+        let [first, operator, last] = count.stages;
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{},{},{first},{operator},{last}",
+            count.case, count.tier
+        );
+    }
+    text
+}
