@@ -99,7 +99,7 @@ impl DualPhotography {
     /// Photographs blocks together and writes what each follower got into `transport`.
     /// Returns every block with those who go on to its parts.
     fn light<'b>(
-        &self,
+        self,
         rig: &mut Rig,
         blocks: &[&'b Block],
         transport: &mut DMatrix<f64>,

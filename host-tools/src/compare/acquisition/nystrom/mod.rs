@@ -129,8 +129,12 @@ impl Nystrom {
             && in_vain < PATIENCE
         {
             let next = samples.halved(rig);
-            let (error, model) =
-                Model::best(|model| Fit::new(&samples, *model, separation.as_ref()).error(&next));
+            let (error, model) = if next.clusters.splits() == 0 {
+                // Every cell alone: nothing is left to predict.
+                (0.0, Model::default())
+            } else {
+                Model::best(|model| Fit::new(&samples, *model, separation.as_ref()).error(&next))
+            };
             samples = next;
             if best.0.is_none_or(|before| error < SETTLED * before) {
                 best = (Some(error), Fit::new(&samples, model, separation.as_ref()));
