@@ -17,10 +17,9 @@ const PREDICTED: usize = 8;
 /// Cells that lie together are lit alike: what the camera's coarse coefficients answer to
 /// says where to look for those of the finer ones in the same place. From the paper: the
 /// hierarchy over camera pixels, a parent's solution as prediction of its children's, a
-/// greedy solver. Ours: the prediction is the parents' largest coefficients and their
-/// children in the projector's Haar tree at the same place; number of coefficients and
-/// use of the prediction are chosen by photographs held out; plain Bernoulli patterns in
-/// place of the paper's, which are made for its projector's dynamic range.
+/// greedy solver. Ours: a row of the doubly transformed transport in place of what a pixel
+/// differs by from its parent; the prediction is the largest coefficients of all parents,
+/// the number of coefficients chosen by photographs held out; plain Bernoulli patterns.
 #[derive(Clone, Copy, Debug)]
 pub struct CompressiveSensing {
     photographs: usize,
@@ -145,5 +144,44 @@ impl Tree {
         let deepest = self.depth.iter().max().map_or(0, |depth| depth + 1);
         let at = |level| (0..self.depth.len()).filter(move |k| self.depth[*k] == level);
         (0..deepest).map(|level| at(level).collect()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::Basis;
+    use iltm_runtime::Grid;
+
+    #[test]
+    fn every_coefficient_but_the_constant_has_a_coarser_one_at_its_place() {
+        for (rows, cols) in [(1, 1), (1, 6), (5, 7), (13, 21)] {
+            let grid = Grid::new(rows, cols).unwrap();
+            let tree = Tree::new(&Haar::new(grid, Basis::QuadTree));
+            let last = grid.cells() - 1;
+            for child in 0..last {
+                assert!(!tree.parents[child].is_empty());
+                for parent in &tree.parents[child] {
+                    assert!(tree.depth[*parent] < tree.depth[child]);
+                }
+            }
+            assert!(tree.parents[last].is_empty());
+            let levels = tree.levels();
+            assert_eq!(levels[0], [last]);
+            assert_eq!(levels.concat().len(), grid.cells());
+        }
+    }
+
+    #[test]
+    fn a_prediction_is_the_parents_largest_coefficients_each_once() {
+        let parent = |support: &[usize], values: &[f64]| Estimate {
+            support: support.to_vec(),
+            values: values.to_vec(),
+        };
+        let parents = [
+            parent(&[3, 5], &[0.1, -4.0]),
+            parent(&[5, 7, 9], &[1.0, 2.0, 0.05]),
+        ];
+        assert_eq!(predict(parents.iter(), 3), [5, 7, 3]);
     }
 }

@@ -69,10 +69,6 @@ impl Greedy {
         }
     }
 
-    pub(super) const fn matrix(&self) -> &DMatrix<f64> {
-        &self.matrix
-    }
-
     /// Answers to `A x = right` with growing support, from that of `first` on (which may
     /// be empty), until the residual is within `radius` or the support is too large to
     /// tell; at most `at_once` columns a step. At least one answer.
@@ -190,7 +186,7 @@ mod tests {
                     wanted[random.usize(9..100)] = random.f64() - 0.5;
                 }
                 wanted[7] = 1.0;
-                let right = greedy.matrix() * &wanted;
+                let right = &greedy.matrix * &wanted;
                 let found = greedy.pursue(&right, &[], at_once, 0.0).pop().unwrap();
                 let mut dense = DVector::zeros(100);
                 for (column, value) in found.support.iter().zip(&found.values) {
@@ -204,7 +200,7 @@ mod tests {
     #[test]
     fn a_right_first_support_is_all_that_is_needed() {
         let greedy = Greedy::new(signs(10, 100));
-        let right = greedy.matrix().column(3) * 2.0 - greedy.matrix().column(50);
+        let right = greedy.matrix.column(3) * 2.0 - greedy.matrix.column(50);
         let answers = greedy.pursue(&right, &[3, 50], 4, 0.0);
         assert_eq!(answers.len(), 1);
         assert!((answers[0].values[0] - 2.0).abs() < 1e-12);
@@ -214,7 +210,7 @@ mod tests {
     #[test]
     fn within_noise_it_stops_and_takes_no_more_columns() {
         let greedy = Greedy::new(signs(40, 100));
-        let right = greedy.matrix().column(3) + greedy.matrix().column(5) * 0.01;
+        let right = greedy.matrix.column(3) + greedy.matrix.column(5) * 0.01;
         let radius = 0.02 * 40_f64.sqrt();
         let found = greedy.pursue(&right, &[], 1, radius).pop().unwrap();
         assert_eq!(found.support, [3]);

@@ -76,7 +76,7 @@ fn spread(
 /// The smallest prime of the form `4 k + 3` that is no smaller than `lights`.
 fn order(lights: usize) -> usize {
     let prime = |number: usize| {
-        (2..)
+        (2..number)
             .take_while(|divisor| divisor * divisor <= number)
             .all(|divisor| !number.is_multiple_of(divisor))
     };

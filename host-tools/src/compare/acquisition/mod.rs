@@ -2,9 +2,19 @@
 //!
 //! Each takes as many photographs as it needs from a [`Rig`] and ends with the forward
 //! transport or with its inverse.
+//!
+//! ```text
+//! brute_force          one light at a time
+//! hadamard             half of the lights at a time
+//! stripes              rows and columns
+//! dual                 blocks, divided where they are seen
+//! nystrom              clusters of columns and rows, of low rank
+//! compressive_sensing  random patterns, decoded coarse to fine    } sensing, greedy:
+//! compressive_dual     random patterns, decoded row by row        } what they share
+//! sparse               random patterns, the project's own solver: two-stage, direct, iltm
+//! ```
 
 mod brute_force;
-mod clusters;
 mod compressive_dual;
 mod compressive_sensing;
 mod dual;
@@ -12,7 +22,6 @@ mod greedy;
 mod hadamard;
 mod nystrom;
 mod sensing;
-mod separation;
 mod sparse;
 mod stripes;
 #[cfg(test)]

