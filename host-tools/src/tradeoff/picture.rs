@@ -127,7 +127,7 @@ impl Tradeoff {
                 PathElement::new([(x, y), (x + 18, y)], INK.mix(0.18).stroke_width(9))
             });
         for sweep in Sweep::ALL.into_iter().rev() {
-            self.draw_sweep(&mut chart, sweep, drawn)?;
+            Self::draw_sweep(&mut chart, sweep, drawn)?;
         }
         chart
             .configure_series_labels()
@@ -140,7 +140,6 @@ impl Tradeoff {
     }
 
     fn draw_sweep<'b>(
-        &self,
         chart: &mut Plot<'_, 'b>,
         sweep: Sweep,
         drawn: &[&Point],
