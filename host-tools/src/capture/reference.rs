@@ -1,6 +1,6 @@
 //! The transport itself, where somebody measured it: `reference_T.npy`.
 //!
-//! A capture folder may hold `T` measured one light at a time, or rendered: a NumPy
+//! A capture folder may hold `T` measured one light at a time, or rendered: a `NumPy`
 //! array of 32- or 64-bit floats, `N x N` for a grey capture, `3 x N x N` for one in
 //! colour, camera units, ambient light removed. Nothing is solved from it; it only says
 //! how far a solve is off.
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Its name in a capture folder.
 pub const REFERENCE_FILE: &str = "reference_T.npy";
 
-/// Bytes of a header that are read; NumPy writes 118 for an array of two axes.
+/// Bytes of a header that are read; `NumPy` writes 118 for an array of two axes.
 const MOST_HEADER: u64 = 4_096;
 
 /// Why a reference cannot be used.
@@ -29,7 +29,7 @@ pub enum ReferenceError {
         /// What the operating system says.
         source: std::io::Error,
     },
-    /// The bytes are not a NumPy array of floats, or end before it does.
+    /// The bytes are not a `NumPy` array of floats, or end before it does.
     #[error("{}: not a NumPy array of 32- or 64-bit floats: {reason}", path.display())]
     Format {
         /// The file.

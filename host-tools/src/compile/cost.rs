@@ -302,7 +302,7 @@ fn levels(grid: Grid) -> Vec<Level> {
         let plain = down.equal * along.equal;
         let halves =
             all(down) * all(along) - (down.equal + down.unequal) * (along.equal + along.unequal);
-        let whole = plain == all(down) * all(along);
+        let whole = all(down) * all(along) - plain < 0.5;
         levels.push(Level {
             plain,
             halves,

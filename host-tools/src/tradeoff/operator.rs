@@ -8,7 +8,7 @@ use crate::report::resample::Lattice;
 use crate::solve::{Basis, Haar};
 use iltm_runtime::haar::Function;
 use iltm_runtime::image::Table;
-use iltm_runtime::operator::{Channels, Row, Segment};
+use iltm_runtime::operator::{Channels, Operator, Row, Segment};
 use iltm_runtime::units::CORRECTION_GUARD_BITS;
 use iltm_runtime::{FrameSize, Grid};
 use nalgebra::DMatrix;
@@ -109,7 +109,7 @@ impl<'t> Numbers<'t> {
 
     /// The entries of segments by channel, scales of the channels included.
     pub(super) fn entries(&self, segments: &[Segment<'_>]) -> Vec<Entries> {
-        let scales = self.table.operator().map(|o| o.channel_scales());
+        let scales = self.table.operator().map(Operator::channel_scales);
         let of_channel = |channel: usize| {
             let scale = scales.map_or(1.0, |scales| scales[channel].to_num::<f64>());
             let own = segments.iter().filter(|segment| match segment.channels {

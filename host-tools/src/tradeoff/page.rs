@@ -91,7 +91,7 @@ impl Tradeoff {
                 noscript { @if let Some(svg) = self.svg() { (PreEscaped(svg)) } }
                 p .quiet {
                     "Each dot is a way to compensate; lines join the tiers of one table. The wide band is the Pareto "
-                    "front of what is shown: nothing else errs as little for as much. Filled dark dots are the "
+                    "front of what is shown: nothing else errs as little for as much. Large dots are the "
                     "table\u{2019}s own tiers, the points between which a device\u{2019}s governor moves. Dots of fewer "
                     "bits are hollow: no device has such a format, so they are on no front."
                 }
@@ -117,7 +117,7 @@ impl Tradeoff {
                     } }
                     tbody { @for point in own() { tr {
                         td { (point.tier) }
-                        td { (percent(point.predicted)) " (" (fraction(point.predicted)) ")" }
+                        td { (percent(point.predicted)) @if point.predicted < 0.1 { " (" (fraction(point.predicted)) ")" } }
                         @if truth { td { @if let Some(error) = point.truth { (percent(error)) } } }
                         td { (percent(point.left_out)) } td { (grouped(point.instructions)) } td { (share(point.share())) }
                         td { (micros(point).unwrap_or_default()) } td { (grouped(point.bytes)) }

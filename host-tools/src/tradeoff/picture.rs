@@ -87,7 +87,8 @@ impl Tradeoff {
             .margin_top(92)
             .margin_right(28)
             .x_label_area_size(52)
-            .y_label_area_size(76)
+            .y_label_area_size(72)
+            .margin_left(22)
             .build_cartesian_2d(x.clone().log_scale(), y.clone().log_scale())?;
         let share = |x: &f64| format!("{:.0} k", x / 1e3);
         chart
@@ -96,9 +97,9 @@ impl Tradeoff {
             .bold_line_style(FAINT)
             .axis_style(INK)
             .x_labels(10)
-            .y_labels(12)
+            .y_labels(8)
             .x_label_formatter(&share)
-            .y_label_formatter(&|error| format!("{error:.2e}"))
+            .y_label_formatter(&|error| percent(*error))
             .x_desc(format!(
                 "instructions a frame on the reference board (a {RATE} Hz frame on a {} MHz part has {:.1} million)",
                 CLOCK / 1_000_000,
@@ -126,7 +127,7 @@ impl Tradeoff {
                 PathElement::new([(x, y), (x + 18, y)], INK.mix(0.18).stroke_width(9))
             });
         for sweep in Sweep::ALL.into_iter().rev() {
-            self.draw_sweep(&mut chart, sweep, drawn)?;
+            Self::draw_sweep(&mut chart, sweep, drawn)?;
         }
         chart
             .configure_series_labels()
@@ -139,7 +140,6 @@ impl Tradeoff {
     }
 
     fn draw_sweep<'b>(
-        &self,
         chart: &mut Plot<'_, 'b>,
         sweep: Sweep,
         drawn: &[&Point],
@@ -196,6 +196,12 @@ fn place(point: &Point) -> (f64, f64) {
     (point.instructions as f64, point.predicted)
 }
 
+/// A tick's error, without digits that say nothing.
+fn percent(error: f64) -> String {
+    let text = format!("{:.4}", 100.0 * error);
+    format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
 /// Both axes with some room; `None` of no points.
 fn ranges(drawn: &[&Point]) -> Option<(Range<f64>, Range<f64>)> {
     let range = |of: fn(&Point) -> f64| {
@@ -238,4 +244,53 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
         }
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tradeoff::advice::tests::point;
+    use iltm_runtime::Grid;
+
+    fn tradeoff(points: Vec<Point>) -> Tradeoff {
+        Tradeoff {
+            name: "a capture".to_owned(),
+            scene: "a <scene>".to_owned(),
+            grid: Grid::new(2, 2).unwrap(),
+            channels: 1,
+            points,
+            missing: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_point_that_has_a_place_is_drawn() {
+        let points = vec![
+            point(Sweep::Table, 0, 0.1, 0.1),
+            point(Sweep::Table, 1, 0.01, 0.2),
+            point(Sweep::Grid, 1, 0.02, 0.2),
+            point(Sweep::Bits, 1, f64::INFINITY, 0.2),
+        ];
+        let svg = tradeoff(points).svg().unwrap();
+        // A dot each, and one for each sweep in the legend.
+        assert_eq!(svg.matches("<circle").count(), 3 + 2);
+        assert!(svg.contains("a &lt;scene&gt;"));
+    }
+
+    #[test]
+    fn no_points_make_no_picture() {
+        assert_eq!(tradeoff(Vec::new()).svg(), None);
+    }
+
+    #[test]
+    fn between_two_points_of_the_front_the_cheaper_one_can_be_had() {
+        let mut points = [
+            point(Sweep::Table, 0, 0.5, 0.25),
+            point(Sweep::Table, 1, 0.25, 0.5),
+        ];
+        points.iter_mut().for_each(|point| point.front = true);
+        let drawn: Vec<&Point> = points.iter().collect();
+        let (near, far) = (900_000.0, 1_800_000.0);
+        assert_eq!(front_line(&drawn), [(near, 0.5), (far, 0.5), (far, 0.25)]);
+    }
 }
