@@ -222,7 +222,7 @@ mod tests {
         let by_columns = npy(&[2, 2], Order::Fortran, vec![1.0_f32, 3.0, 2.0, 4.0]);
         let expected = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 3.0, 4.0]);
         for bytes in [by_rows, by_columns] {
-            assert_eq!(parse(&bytes, 2, 1).unwrap(), [expected.clone()]);
+            assert_eq!(parse(&bytes, 2, 1).unwrap()[0], expected);
         }
     }
 

@@ -93,16 +93,15 @@ impl Light {
         let channel = inverse.channels.len() / 2;
         let measured = read_reference(folder, measurements.grid, inverse.channels.len())?;
         let measured = measured.and_then(|mut channels| channels.drain(channel..).next());
-        let (transport, known) = match measured {
-            Some(transport) => (transport, "measured: the capture\u{2019}s reference_T.npy"),
-            None => {
-                let light = inverse
-                    .channel(channel)
-                    .light(&DMatrix::identity(cells, cells));
-                let known = "what iltm finds from all photographs of the capture, which is kind \
-                             to methods that look for the same";
-                (light.ok_or(LightError::Singular)?, known)
-            }
+        let (transport, known) = if let Some(transport) = measured {
+            (transport, "measured: the capture\u{2019}s reference_T.npy")
+        } else {
+            let light = inverse
+                .channel(channel)
+                .light(&DMatrix::identity(cells, cells));
+            let known = "what iltm finds from all photographs of the capture, which is kind \
+                         to methods that look for the same";
+            (light.ok_or(LightError::Singular)?, known)
         };
         Self::new(&measurements, inverse.live, transport, known, seed)
     }

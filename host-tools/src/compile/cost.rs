@@ -342,6 +342,7 @@ fn row_instructions(pairs: u16, channels: Channels, of_table: u8) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // Small whole numbers are exact.
 mod tests {
     use super::*;
 

@@ -160,7 +160,9 @@ pub(super) mod tests {
             point(Sweep::Table, 3, 0.0078, 0.012),
             point(Sweep::Table, 6, 0.0076, 0.03),
         ];
-        points.iter_mut().for_each(|point| point.inverse = 0.0075);
+        for point in &mut points {
+            point.inverse = 0.0075;
+        }
         assert_eq!(
             advice(&points),
             "tier 3 errs by 1/128, within 5 % of the best tier, at 1.2 % of a 60 Hz frame on a \

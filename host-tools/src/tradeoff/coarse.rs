@@ -88,6 +88,7 @@ fn average_operator(operator: &DMatrix<f64>, lattice: &Lattice) -> DMatrix<f64> 
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)] // Small whole numbers are exact.
 mod tests {
     use super::*;
 

@@ -288,7 +288,9 @@ mod tests {
             point(Sweep::Table, 0, 0.5, 0.25),
             point(Sweep::Table, 1, 0.25, 0.5),
         ];
-        points.iter_mut().for_each(|point| point.front = true);
+        for point in &mut points {
+            point.front = true;
+        }
         let drawn: Vec<&Point> = points.iter().collect();
         let (near, far) = (900_000.0, 1_800_000.0);
         assert_eq!(front_line(&drawn), [(near, 0.5), (far, 0.5), (far, 0.25)]);

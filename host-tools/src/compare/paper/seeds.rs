@@ -14,13 +14,14 @@ pub const SEEDS: u64 = 20;
 const STUDENT: f64 = 2.093;
 
 /// A method and how many photographs it gets, white among them, black not.
-pub const ENTRIES: [(Method, usize); 8] = [
+pub const ENTRIES: [(Method, usize); 9] = [
     (Method::TwoStage, 120),
     (Method::Direct, 120),
     (Method::TwoStage, 150),
     (Method::Direct, 150),
     (Method::Joint, 40),
     (Method::Joint, 50),
+    (Method::Joint, 70),
     (Method::Joint, 120),
     (Method::Joint, 150),
 ];
