@@ -1,6 +1,8 @@
 //! Charts as SVG files.
 
+use crate::report::decades;
 use plotters::coord::Shift;
+use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::prelude::*;
 use std::ops::Range;
 
@@ -52,7 +54,7 @@ pub(super) fn logarithmic(words: Words<'_>, series: &[Series]) -> Result<String,
             .margin(14)
             .x_label_area_size(44)
             .y_label_area_size(66)
-            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+            .build_cartesian_2d(logarithmic_axis(x), logarithmic_axis(y))?;
         chart
             .configure_mesh()
             .x_desc(words.x)
@@ -61,9 +63,6 @@ pub(super) fn logarithmic(words: Words<'_>, series: &[Series]) -> Result<String,
             .axis_desc_style((FONT, 15))
             .x_label_formatter(&label)
             .y_label_formatter(&label)
-            .x_labels(6)
-            .x_max_light_lines(1)
-            .y_max_light_lines(1)
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;
@@ -121,7 +120,7 @@ pub(super) fn intervals(
             .margin(14)
             .x_label_area_size(44)
             .y_label_area_size(160)
-            .build_cartesian_2d(x.log_scale(), -(lines as f64)..0.0)?;
+            .build_cartesian_2d(logarithmic_axis(x), -(lines as f64)..0.0)?;
         chart
             .configure_mesh()
             .x_desc(words.x)
@@ -177,7 +176,7 @@ pub(super) fn region(
             .margin(14)
             .x_label_area_size(44)
             .y_label_area_size(66)
-            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+            .build_cartesian_2d(logarithmic_axis(x), logarithmic_axis(y))?;
         chart
             .configure_mesh()
             .x_desc(words.x)
@@ -186,9 +185,6 @@ pub(super) fn region(
             .axis_desc_style((FONT, 15))
             .x_label_formatter(&label)
             .y_label_formatter(&label)
-            .x_labels(6)
-            .x_max_light_lines(1)
-            .y_max_light_lines(1)
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;
@@ -212,13 +208,27 @@ pub(super) fn region(
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(SeriesLabelPosition::UpperMiddle)
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.2))
             .label_font((FONT, 14))
             .draw()?;
         Ok(())
     })
+}
+
+/// A logarithmic axis with ticks at powers of ten, or at 1, 2 and 5 times those where
+/// there are few.
+fn logarithmic_axis(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
+    let mut ticks = decades(range.start, range.end);
+    if ticks.len() < 3 {
+        let below = decades(range.start / 10.0, range.end);
+        let finer = below
+            .into_iter()
+            .flat_map(|power| [1.0, 2.0, 5.0].map(|f| f * power));
+        ticks = finer.filter(|value| range.contains(value)).collect();
+    }
+    range.log_scale().with_key_points(ticks)
 }
 
 fn drawn(draw: impl FnOnce(&Area<'_>) -> Result<(), ChartError>) -> Result<String, ChartError> {

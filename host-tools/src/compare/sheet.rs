@@ -1,7 +1,7 @@
 //! Pictures of one value a cell, side by side with captions and one colour bar.
 
 use crate::report::canvas::{Canvas, Colour, Type};
-use crate::report::{ColourScale, LightPicture};
+use crate::report::{ColourScale, LightPicture, SHADES};
 use crate::video::{Picture, Samples, png};
 use iltm_runtime::{FrameSize, Grid};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
@@ -165,10 +165,13 @@ fn legend_at(
 ) {
     canvas.write(x, y, words, TEXT);
     let top = y + LINE;
-    let last = width.saturating_sub(1).max(1) as f64;
+    // The same shades as the pictures', so that one palette holds both.
+    let shades = SHADES as usize;
     for col in 0..width {
+        let shade = col * shades / width.max(1);
+        let colour = scale.colour_at(shade as f64 / (shades - 1) as f64);
         for row in 0..BAR {
-            canvas.set(x + col, top + row, scale.colour_at(col as f64 / last));
+            canvas.set(x + col, top + row, colour);
         }
     }
     for tick in scale.ticks() {

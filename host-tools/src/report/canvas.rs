@@ -110,6 +110,8 @@ impl Canvas {
 }
 
 fn blend(pixel: &mut Colour, colour: Colour, cover: u8) {
+    // Sixteen shades look like all of them, and leave room in a picture's palette.
+    let cover = cover / 17 * 17;
     for (below, above) in pixel.iter_mut().zip(colour) {
         let mix = u32::from(*below) * u32::from(255 - cover) + u32::from(above) * u32::from(cover);
         *below = ((mix + 127) / 255) as u8;

@@ -147,7 +147,7 @@ pub(super) fn steps(low: f64, high: f64, most: usize) -> Vec<f64> {
 }
 
 /// Powers of ten in a range.
-pub(super) fn decades(low: f64, high: f64) -> Vec<f64> {
+pub(crate) fn decades(low: f64, high: f64) -> Vec<f64> {
     let first = (low.log10() - 1e-9).ceil() as i32;
     let last = (high.log10() + 1e-9).floor() as i32;
     (first..=last).map(|power| 10_f64.powi(power)).collect()

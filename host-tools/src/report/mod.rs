@@ -31,8 +31,8 @@ mod summary;
 mod timing;
 
 pub use coefficient_map::{CoefficientMap, Level};
-pub(crate) use colour_scale::number;
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
+pub(crate) use colour_scale::{decades, number};
 pub use comparison::Comparison;
 pub use example::{Example, Shown, Treatment, Wanted};
 pub use files::PictureFile;

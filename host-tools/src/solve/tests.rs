@@ -228,7 +228,8 @@ fn a_longer_exposure_scales_the_inverse_and_nothing_else() {
 
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {
-    let mut capture = Capture::new(&corner(9, 11), (9, 11), 30);
+    // Enough for every method, with a fifth held out.
+    let mut capture = Capture::new(&corner(9, 11), (9, 11), 160);
     capture.light = vec![capture.light[0].clone(); 3];
     add_noise(&mut capture.light[1], 1e-2);
     capture.noise.unlit = 5e-4;
@@ -305,7 +306,17 @@ fn patterns_that_repeat_and_contradict_no_one_are_welcome() {
     capture.patterns = patterns;
     capture.light = vec![scene.photograph(&capture.patterns)];
     capture.roles = vec![Role::Bernoulli; 82];
-    for method_name in Method::ALL {
+    // As many patterns as say something are not enough for least squares.
+    let error = capture.solve(&method(Method::BruteForce)).unwrap_err();
+    assert!(matches!(
+        error,
+        SolveError::Dependent {
+            rank: 33,
+            cells: 48,
+            ..
+        }
+    ));
+    for method_name in [Method::Joint, Method::Direct, Method::TwoStage] {
         let (found, _) = capture.solve(&method(method_name)).unwrap();
         let error = closed_loop(&found, &scene, (6, 8));
         assert!(error < 0.03, "{method_name} {error}");
@@ -650,5 +661,44 @@ fn every_method_is_read_back_from_its_name() {
     for method in Method::ALL {
         assert_eq!(method.name().parse(), Ok(method));
     }
-    assert!("two-stage".parse::<Method>().is_err());
+    let error = "three-stage".parse::<Method>().unwrap_err().to_string();
+    for method in Method::ALL {
+        assert!(error.contains(method.name()), "{error}");
+    }
+}
+
+#[test]
+fn least_squares_from_more_patterns_than_cells_is_exact() {
+    let scene = corner(6, 8);
+    let mut capture = Capture::new(&scene, (6, 8), 80);
+    capture.noise = CellNoise {
+        lit: 0.0,
+        unlit: 0.0,
+    };
+    let (found, report) = capture.solve(&method(Method::BruteForce)).unwrap();
+    let exact = scene.inverse();
+    assert!((found.channel(0).dense() - &exact).amax() < 1e-9);
+    // Light is followed to 1e-6.
+    assert!(report.prediction.compensated < 1e-5);
+}
+
+#[test]
+fn forward_transport_first_ends_at_the_same_inverse_given_photographs_enough() {
+    let scene = corner(6, 8);
+    let mut capture = Capture::new(&scene, (6, 8), 80);
+    capture.noise = CellNoise {
+        lit: 0.0,
+        unlit: 0.0,
+    };
+    let options = SolveOptions {
+        tolerance: 1e-6,
+        iterations: 20_000,
+        ..method(Method::TwoStage)
+    };
+    let (found, report) = capture.solve(&options).unwrap();
+    let exact = scene.inverse();
+    let error = (found.channel(0).dense() - &exact).norm() / exact.norm();
+    assert!(error < 1e-4, "{error}");
+    // Gray code is not among what the paper compares from.
+    assert_eq!(report.photographs.gray_code, 0);
 }

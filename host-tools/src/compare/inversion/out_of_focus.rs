@@ -54,10 +54,14 @@ impl Inversion for OutOfFocus {
                 answer: inverted.answer,
                 spread,
             })),
-            remark: format!(
-                "up to {others:.1} times a cell's own light from others; {}",
-                inverted.remark
-            ),
+            remark: [
+                &format!("up to {others:.1} times a cell's own light from others"),
+                inverted.remark.as_str(),
+            ]
+            .into_iter()
+            .filter(|words| !words.is_empty())
+            .collect::<Vec<_>>()
+            .join(", "),
             ..inverted
         })
     }

@@ -76,7 +76,7 @@ impl Inversion for PseudoInverse {
             answer: Answer::Inverse(live.whole(&finite(matrix)?)),
             multiplications: Some(stored + extra),
             photographs: 0,
-            remark: format!("{} of {} cells; mu {mu:.4}", groups.len(), live.len()),
+            remark: format!("{} of {} cells; mu {mu:.1e}", groups.len(), live.len()),
         })
     }
 }

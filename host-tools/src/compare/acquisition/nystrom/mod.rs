@@ -96,7 +96,7 @@ impl Acquisition for Nystrom {
         if !invertible {
             return Err(Unfit::Condition(format!(
                 "what {} photographs make up predicts further ones to within {:.0} %, and its \
-                 smallest singular value is {least:.1e} of its largest: whether there is an \
+                 smallest singular value is {least:.3} of its largest: whether there is an \
                  inverse cannot be told",
                 rig.photographs(),
                 100.0 * error,
