@@ -7,15 +7,14 @@
 //! The peak is that of building. The error is that of the irradiance of 24 patches, against form factors asked
 //! to 1e-9 one by one.
 
-#![allow(missing_docs, unsafe_code)]
+#![allow(missing_docs)]
 
 use iltm::progress::Silent;
 use iltm::scene::exchange::{Exchange, ExchangeOptions, Patch, Stop, radiosity};
 use iltm::scene::form_factor::{Tolerance, visible_exchange_area};
 use iltm::scene::geometry::{Obstacles, Polygon};
 use nalgebra::{DMatrix, Vector3};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use peak_alloc::PeakAlloc;
 use std::time::Instant;
 
 /// Rows and columns of cells on all four panels together.
@@ -86,8 +85,8 @@ fn panels(rows: usize, columns: usize, vane: bool) -> (Vec<Patch>, Obstacles) {
 }
 
 fn measure((patches, obstacles): &(Vec<Patch>, Obstacles)) {
-    let before = HELD.load(Relaxed);
-    PEAK.store(before, Relaxed);
+    let before = MEMORY.current_usage();
+    MEMORY.reset_peak_usage();
     let options = ExchangeOptions {
         dense_limit: 0,
         ..ExchangeOptions::default()
@@ -96,7 +95,7 @@ fn measure((patches, obstacles): &(Vec<Patch>, Obstacles)) {
         Ok(exchange) => exchange,
         Err(error) => return println!("{:7}  {error}", patches.len()),
     };
-    let peak = PEAK.load(Relaxed) - before;
+    let peak = MEMORY.peak_usage() - before;
     let light = DMatrix::from_fn(patches.len(), COLUMNS, |p, c| {
         1.0 + f64::from(u8::from((p * 7919 + c * 104_729) % 13 < 6))
     });
@@ -185,28 +184,5 @@ fn cholesky() {
     }
 }
 
-/// Bytes held now and at most, as the allocator sees them.
-static HELD: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
 #[global_allocator]
-static COUNTING: Counting = Counting;
-
-// SAFETY: every call goes to the system allocator unchanged; only sizes are
-// counted.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let held = HELD.fetch_add(layout.size(), Relaxed) + layout.size();
-        PEAK.fetch_max(held, Relaxed);
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size(), Relaxed);
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+static MEMORY: PeakAlloc = PeakAlloc;

@@ -52,7 +52,10 @@ fn the_page_of_results_names_every_method_with_its_source() {
     let inverted = inversion::all();
     let inverted = inverted.iter().map(|m| (m.name(), m.source()));
     for (name, source) in photographed.chain(inverted) {
-        let line = format!("- **{name}**: {source}.");
-        assert!(page.contains(&line), "{line}");
+        let (name, source) = (format!("**{name}**"), format!(": {source}."));
+        let told = page
+            .lines()
+            .any(|line| line.contains(&name) && line.contains(&source));
+        assert!(told, "{name}{source}");
     }
 }

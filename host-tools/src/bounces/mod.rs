@@ -27,7 +27,7 @@ mod wall;
 pub use folder::{FileOf, Written, write};
 pub use noise::Noise;
 pub use separate::{Layer, LayerKind, MOST_BOUNCES, Separated};
-pub(crate) use sheet::{percent, times};
+pub(crate) use sheet::{percent, sheet, times};
 pub use wall::Wall;
 
 use crate::capture::{self, CaptureError, CaptureOptions, Measurements, Shot, ShotLight};

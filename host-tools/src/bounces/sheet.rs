@@ -48,7 +48,7 @@ struct Column {
 }
 
 /// Composes the sheet; `None` if it would be larger than a frame can be.
-pub(super) fn sheet(bounces: &Bounces) -> Option<Picture> {
+pub(crate) fn sheet(bounces: &Bounces) -> Option<Picture> {
     let columns = columns(bounces)?;
     let picture = columns.first()?.light.size();
     let wide = picture.width().max(COLUMN);

@@ -24,6 +24,9 @@ pub(super) const COLOURS: [RGBColor; 7] = [
     RGBColor(90, 90, 90),
 ];
 
+/// Colour of a region.
+const SHADE: RGBColor = COLOURS[2];
+
 /// A line, dots or intervals with a name.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
@@ -46,9 +49,31 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// Points and lines over two logarithmic axes.
 pub(super) fn logarithmic(words: Words<'_>, series: &[Series]) -> Result<String, ChartError> {
     let all = || series.iter().flat_map(|series| series.points.iter());
-    let x = around(all().map(|point| point.0));
-    let y = around(all().map(|point| point.1));
-    drawn(|area| {
+    let axes = (
+        around(all().map(|point| point.0)),
+        around(all().map(|point| point.1)),
+    );
+    lines(words, axes, None, series)
+}
+
+/// The same with the area under a curve shaded, over axes that are given.
+pub(super) fn region(
+    words: Words<'_>,
+    axes: (Range<f64>, Range<f64>),
+    border: &[(f64, f64)],
+    series: &[Series],
+) -> Result<String, ChartError> {
+    lines(words, axes, Some(border), series)
+}
+
+fn lines(
+    words: Words<'_>,
+    (x, y): (Range<f64>, Range<f64>),
+    shaded: Option<&[(f64, f64)]>,
+    series: &[Series],
+) -> Result<String, ChartError> {
+    sized(SIZE, |area| {
+        let base = y.start;
         let mut chart = ChartBuilder::on(area)
             .caption(words.title, (FONT, 19))
             .margin(14)
@@ -66,23 +91,31 @@ pub(super) fn logarithmic(words: Words<'_>, series: &[Series]) -> Result<String,
             .light_line_style(BLACK.mix(0.04))
             .bold_line_style(BLACK.mix(0.12))
             .draw()?;
+        if let Some(border) = shaded {
+            let border = border.iter().copied();
+            chart.draw_series(AreaSeries::new(border, base, SHADE.mix(0.22)))?;
+        }
         for (index, series) in series.iter().enumerate() {
             let colour = COLOURS[index % COLOURS.len()];
-            let dots = series
-                .points
-                .iter()
-                .map(|p| Circle::new(*p, 4, colour.filled()));
-            let dots = chart.draw_series(dots)?;
-            dots.label(series.name.clone())
+            let dots = series.points.iter();
+            let dots = dots.map(|point| Circle::new(*point, 4, colour.filled()));
+            chart
+                .draw_series(dots)?
+                .label(series.name.clone())
                 .legend(move |(x, y)| Circle::new((x + 9, y), 4, colour.filled()));
             if series.joined {
                 let points = series.points.iter().copied();
                 chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
             }
         }
+        // Where there is a region it is at the left, and what is outside it at the right.
+        let place = match shaded {
+            Some(_) => SeriesLabelPosition::Coordinate(243, 6),
+            None => SeriesLabelPosition::UpperLeft,
+        };
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
+            .position(place)
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.2))
             .label_font((FONT, 14))
@@ -162,61 +195,6 @@ pub(super) fn intervals(
     })
 }
 
-/// The area under a curve and a few named points, over logarithmic axes.
-pub(super) fn region(
-    words: Words<'_>,
-    (x, y): (Range<f64>, Range<f64>),
-    border: &[(f64, f64)],
-    series: &[Series],
-) -> Result<String, ChartError> {
-    drawn(|area| {
-        let base = y.start;
-        let mut chart = ChartBuilder::on(area)
-            .caption(words.title, (FONT, 19))
-            .margin(14)
-            .x_label_area_size(44)
-            .y_label_area_size(66)
-            .build_cartesian_2d(logarithmic_axis(x), logarithmic_axis(y))?;
-        chart
-            .configure_mesh()
-            .x_desc(words.x)
-            .y_desc(words.y)
-            .label_style((FONT, 14))
-            .axis_desc_style((FONT, 15))
-            .x_label_formatter(&label)
-            .y_label_formatter(&label)
-            .light_line_style(BLACK.mix(0.04))
-            .bold_line_style(BLACK.mix(0.12))
-            .draw()?;
-        let green = COLOURS[2];
-        let shaded = AreaSeries::new(border.iter().copied(), base, green.mix(0.22));
-        chart.draw_series(shaded)?;
-        for (index, series) in series.iter().enumerate() {
-            let colour = COLOURS[[0, 1, 3, 4, 5, 6][index % 6]];
-            let dots = series
-                .points
-                .iter()
-                .map(|p| Circle::new(*p, 5, colour.filled()));
-            chart
-                .draw_series(dots)?
-                .label(series.name.clone())
-                .legend(move |(x, y)| Circle::new((x + 9, y), 5, colour.filled()));
-            if series.joined {
-                let points = series.points.iter().copied();
-                chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
-            }
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperMiddle)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.2))
-            .label_font((FONT, 14))
-            .draw()?;
-        Ok(())
-    })
-}
-
 /// A logarithmic axis with ticks at powers of ten, or at 1, 2 and 5 times those where
 /// there are few.
 fn logarithmic_axis(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
@@ -229,10 +207,6 @@ fn logarithmic_axis(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
         ticks = finer.filter(|value| range.contains(value)).collect();
     }
     range.log_scale().with_key_points(ticks)
-}
-
-fn drawn(draw: impl FnOnce(&Area<'_>) -> Result<(), ChartError>) -> Result<String, ChartError> {
-    sized(SIZE, draw)
 }
 
 fn sized(

@@ -5,11 +5,11 @@ use super::contest::{Done, Row};
 use super::light::Light;
 use super::sheet::{Tile, encoded, sheet};
 use super::table::{COLUMNS, cells};
-use crate::report::{ColourScale, Palette};
+use crate::report::{ColourScale, Palette, document};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use iltm_runtime::FrameSize;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use nalgebra::DVector;
 
 /// Tiles in a row of pictures.
@@ -37,33 +37,23 @@ impl Contest<'_> {
     #[must_use]
     pub fn html(&self) -> String {
         let truth = &self.light.truth;
-        let style = PreEscaped(include_str!("../report/style.css"));
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    title { "Methods compared: " (self.name) }
-                    style { (style) }
-                }
-                body { main {
-                    header {
-                        p .over { "iltm compare" }
-                        h1 { (self.name) }
-                        p .lead {
-                            (truth.grid.rows()) " \u{d7} " (truth.grid.cols()) " cells, " (truth.live_cells())
-                            " of them lit and seen. The transport is " (self.light.known)
-                            "; every method gets the same light, with this camera\u{2019}s noise, and is judged by the same images."
-                        }
+        let body = html! {
+            main {
+                header {
+                    p .over { "iltm compare" }
+                    h1 { (self.name) }
+                    p .lead {
+                        (truth.grid.rows()) " \u{d7} " (truth.grid.cols()) " cells, " (truth.live_cells())
+                        " of them lit and seen. The transport is " (self.light.known)
+                        "; every method gets the same light, with this camera\u{2019}s noise, and is judged by the same images."
                     }
-                    (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))
-                    (self.group("Ways to invert, or to do without an inverse", "Each is given the transport itself.", self.inverted))
-                    (self.sources())
-                } }
+                }
+                (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))
+                (self.group("Ways to invert, or to do without an inverse", "Each is given the transport itself.", self.inverted))
+                (self.sources())
             }
         };
-        page.into_string()
+        document(&format!("Methods compared: {}", self.name), "", &body)
     }
 
     fn group(&self, title: &str, words: &str, rows: &[Row]) -> Markup {

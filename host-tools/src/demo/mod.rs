@@ -6,7 +6,7 @@
 //! report says what came of it.
 
 mod error;
-mod sample;
+pub(crate) mod sample;
 mod stills;
 mod video;
 mod words;

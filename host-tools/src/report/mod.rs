@@ -12,13 +12,14 @@
 //! | one picture of it all | `summary.rs` |
 //! | pictures as PNG files | `files.rs` |
 //! | what the solve says about itself | `facts.rs` |
-//! | the page | `page.rs`, `style.css` |
+//! | the page | `page.rs`, `document.rs`, `style.css` |
 
 pub(crate) mod canvas;
 mod chart;
 mod coefficient_map;
 pub(crate) mod colour_scale;
 mod comparison;
+mod document;
 mod example;
 mod facts;
 mod files;
@@ -34,6 +35,7 @@ pub use coefficient_map::{CoefficientMap, Level};
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
 pub(crate) use colour_scale::{decades, number};
 pub use comparison::Comparison;
+pub(crate) use document::document;
 pub use example::{Example, Shown, Treatment, Wanted};
 pub use files::PictureFile;
 pub use ladder::{Rung, Step, ladder, steps};

@@ -2,12 +2,13 @@
 
 use super::chart::{Axis, Chart, Point};
 use super::colour_scale::number;
+use super::document::document;
 use super::facts::facts;
 use super::{ColourScale, Example, Report, Rung, Shown, Treatment};
 use crate::solve::{Compensation, Prediction};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 /// What the page says that photographs cannot.
 #[derive(Clone, Debug)]
@@ -36,30 +37,20 @@ impl Report<'_> {
     /// fetched, nothing runs.
     #[must_use]
     pub fn html(&self, words: &Words) -> String {
-        let style = PreEscaped(include_str!("style.css"));
         let prediction = self.learned.report.prediction;
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    title { (words.title) }
-                    style { (style) }
-                }
-                body { main {
-                    (self.opening(words, prediction))
-                    (self.scene())
-                    (self.pictures_section())
-                    (self.bounces())
-                    (self.operator())
-                    (self.accuracy())
-                    (self.solve(words))
-                    (self.repeat(words))
-                } }
+        let body = html! {
+            main {
+                (self.opening(words, prediction))
+                (self.scene())
+                (self.pictures_section())
+                (self.bounces())
+                (self.operator())
+                (self.accuracy())
+                (self.solve(words))
+                (self.repeat(words))
             }
         };
-        page.into_string()
+        document(&words.title, "", &body)
     }
 
     fn opening(&self, words: &Words, prediction: Prediction) -> Markup {

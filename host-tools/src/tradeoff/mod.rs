@@ -3,7 +3,8 @@
 //!
 //! | what | file |
 //! |---|---|
-//! | the ways, and what is asked of each | `sweep.rs` |
+//! | the ways, and what is asked of each | `sweep.rs`, of a table alone `of_table.rs` |
+//! | a table's tiers and bits as points | `points.rs` |
 //! | a table's numbers, read back | `operator.rs` |
 //! | errors of natural images, predicted and true | `judge.rs` |
 //! | fewer bits, a coarser grid | `bits.rs`, `coarse.rs` |
@@ -24,9 +25,11 @@ mod coarse;
 mod front;
 mod judge;
 mod list;
+mod of_table;
 mod operator;
 mod page;
 mod picture;
+mod points;
 mod sweep;
 
 use crate::capture::ReferenceError;
@@ -206,7 +209,7 @@ impl Tradeoff {
         table: &Table<'_>,
         progress: &dyn Progress,
     ) -> Result<Self, TradeoffError> {
-        sweep::of_table(name, table, progress).map(Self::with_front)
+        of_table::of_table(name, table, progress).map(Self::with_front)
     }
 
     /// One line: the cheapest tier of the table that is good enough, what it costs, and

@@ -4,17 +4,14 @@ use super::advice::{fraction, share};
 use super::picture::{colour, title};
 use super::{Point, Sweep, Tradeoff};
 use crate::compile::cost::{CLOCK, RATE};
+use crate::report::document;
 use crate::report::page::{grouped, percent};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
 impl Tradeoff {
     /// The page as HTML, complete in itself.
     #[must_use]
     pub fn html(&self) -> String {
-        let style = concat!(
-            include_str!("../report/style.css"),
-            include_str!("page.css")
-        );
         // No string within can end the script.
         let data = self.data().to_string().replace('<', "\\u003c");
         let what = if self.scene.is_empty() {
@@ -22,35 +19,26 @@ impl Tradeoff {
         } else {
             &self.scene
         };
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    title { "What accuracy costs: " (what) }
-                    style { (PreEscaped(style)) }
+        let body = html! {
+            main {
+                header {
+                    p .over { "iltm tradeoff" }
+                    h1 { (what) }
+                    p .lead .advice { (sentence(&self.advice())) }
                 }
-                body { main {
-                    header {
-                        p .over { "iltm tradeoff" }
-                        h1 { (what) }
-                        p .lead .advice { (sentence(&self.advice())) }
-                    }
-                    (self.chart())
-                    (self.tiers())
-                    (self.terms())
-                    @if !self.missing.is_empty() { (self.what_is_missing()) }
-                    footer {
-                        "Written by iltm " (env!("CARGO_PKG_VERSION")) " from " code { (self.name) } "."
-                    }
-                }
-                script type="application/json" id="data" { (PreEscaped(data)) }
-                script { (PreEscaped(include_str!("page.js"))) }
+                (self.chart())
+                (self.tiers())
+                (self.terms())
+                @if !self.missing.is_empty() { (self.what_is_missing()) }
+                footer {
+                    "Written by iltm " (env!("CARGO_PKG_VERSION")) " from " code { (self.name) } "."
                 }
             }
+            script type="application/json" id="data" { (PreEscaped(data)) }
+            script { (PreEscaped(include_str!("page.js"))) }
         };
-        page.into_string()
+        let title = format!("What accuracy costs: {what}");
+        document(&title, include_str!("page.css"), &body)
     }
 
     fn chart(&self) -> Markup {

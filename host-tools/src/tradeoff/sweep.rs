@@ -1,18 +1,19 @@
-//! The ways, and what is asked of each.
+//! The sweeps over a capture: the ways, and what is asked of each.
 
-use super::bits::{BITS, Rounded};
 use super::coarse::{averaged, coarser};
-use super::judge::{Truth, of_change, of_other_grid};
+use super::judge::{Truth, of_other_grid};
+use super::of_table::scene;
 use super::operator::Numbers;
+use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Point, Sweep, Tradeoff, TradeoffError};
 use crate::capture::{self, CaptureOptions, FineFlood, Measurements, read_reference};
-use crate::compile::cost::{self, Shape};
+use crate::compile::cost;
 use crate::compile::ladder::TARGETS;
 use crate::compile::{CompileOptions, compile, gain};
 use crate::learn::{LearnError, Learned, learn_measured};
 use crate::progress::Progress;
-use crate::report::{microseconds, microseconds_at, steps};
-use crate::solve::{Method, SolveOptions, SolveReport};
+use crate::report::{microseconds_at, steps};
+use crate::solve::{Method, SolveOptions};
 use iltm_runtime::image::Table;
 use iltm_runtime::image::layout::fine_gain;
 use iltm_runtime::{FrameSize, Grid};
@@ -39,131 +40,6 @@ const BETWEEN: [f64; 11] = [
 
 /// Cells of the original along each side of a coarser one.
 const FACTORS: [usize; 2] = [2, 4];
-
-/// What the points of one table have in common.
-struct Common {
-    sweep: Sweep,
-    setting: String,
-    method: Option<String>,
-    photographs: Option<u64>,
-    seconds: Option<f64>,
-}
-
-impl Common {
-    fn solved(sweep: Sweep, setting: String, report: &SolveReport) -> Self {
-        let counts = report.photographs;
-        let seconds = report.seconds;
-        Self {
-            sweep,
-            setting,
-            method: Some(report.method.name().to_owned()),
-            photographs: Some((counts.white + counts.gray_code + counts.bernoulli) as u64),
-            seconds: Some(seconds.prepare + seconds.choose + seconds.solve + seconds.finish),
-        }
-    }
-
-    fn again(&self, sweep: Sweep, setting: String) -> Self {
-        Self {
-            sweep,
-            setting,
-            method: self.method.clone(),
-            ..*self
-        }
-    }
-}
-
-/// A point for each tier of a table.
-fn of_tiers(
-    common: &Common,
-    table: &Table<'_>,
-    truth: Option<&Truth>,
-) -> Result<Vec<Point>, TradeoffError> {
-    let numbers = Numbers::new(table);
-    let timed = microseconds(table).map_err(TradeoffError::Timing)?;
-    let white = table.reference_white().to_num::<f64>();
-    let point = |(step, microseconds): (crate::report::Step, f64)| Point {
-        sweep: common.sweep,
-        setting: common.setting.clone(),
-        tier: step.tier,
-        method: common.method.clone(),
-        photographs: common.photographs,
-        bits: 16,
-        grid: table.grid(),
-        left_out: step.left_out,
-        inverse: table.inverse_error().to_num(),
-        predicted: step.total,
-        truth: truth.map(|truth| {
-            let entries = numbers.entries(&numbers.segments(step.tier));
-            truth.error(&numbers, &entries, white)
-        }),
-        instructions: step.instructions,
-        microseconds: Some(microseconds),
-        bytes: step.table_bytes,
-        seconds: common.seconds,
-        hypothetical: false,
-        front: false,
-    };
-    Ok(steps(table).into_iter().zip(timed).map(point).collect())
-}
-
-/// Points of a table's tiers with coefficients of fewer bits; `points` are those of the
-/// table.
-fn of_bits(
-    table: &Table<'_>,
-    points: &[Point],
-    truth: Option<&Truth>,
-    progress: &dyn Progress,
-) -> Result<Vec<Point>, TradeoffError> {
-    let numbers = Numbers::new(table);
-    let white = table.reference_white().to_num::<f64>();
-    let scene = numbers.entries(&numbers.segments(table.top_tier()));
-    let shape = Shape::of(table, FrameSize::of_grid(table.grid()));
-    let cells = table.grid().cells();
-    let with_operator: Vec<&Point> = points.iter().filter(|point| point.tier > 0).collect();
-    let mut rounded_points = Vec::new();
-    progress.begin("rounding coefficients", BITS.len() as u64);
-    for bits in BITS {
-        for point in &with_operator {
-            let segments = numbers.segments(point.tier);
-            let rounded = segments
-                .iter()
-                .map(|segment| Rounded::new(segment, cells, bits));
-            let rounded: Vec<Rounded> = rounded.collect();
-            let stored = rounded
-                .iter()
-                .map(Rounded::segment)
-                .collect::<Result<Vec<_>, _>>();
-            let stored = stored.map_err(TradeoffError::Operator)?;
-            let packed = rounded
-                .iter()
-                .map(Rounded::packed_bytes)
-                .sum::<Result<u64, _>>();
-            let packed = packed.map_err(TradeoffError::Operator)?;
-            let own: usize = segments
-                .iter()
-                .map(iltm_runtime::operator::Segment::bytes)
-                .sum();
-            let entries = numbers.entries(&stored);
-            let change = of_change(&numbers, &scene, &numbers.entries(&segments), &entries);
-            rounded_points.push(Point {
-                sweep: Sweep::Bits,
-                setting: format!("{bits} bits"),
-                bits,
-                left_out: point.left_out.hypot(change),
-                predicted: point.predicted.hypot(change),
-                truth: truth.map(|truth| truth.error(&numbers, &entries, white)),
-                instructions: shape.stages(&stored).total(),
-                microseconds: None,
-                bytes: point.bytes - own as u64 + packed,
-                hypothetical: true,
-                ..(*point).clone()
-            });
-        }
-        progress.advance(1);
-    }
-    progress.end();
-    Ok(rounded_points)
-}
 
 /// What is known of the scene by the table that it has now.
 struct Base<'b> {
@@ -410,74 +286,4 @@ fn fine_bytes(table: &Table<'_>) -> u64 {
         let samples = fine.size().pixels() * usize::from(table.channels());
         (fine_gain::SIZE + 2 * samples).next_multiple_of(4) as u64
     })
-}
-
-/// See [`Tradeoff::of_table`].
-pub(super) fn of_table(
-    name: &str,
-    table: &Table<'_>,
-    progress: &dyn Progress,
-) -> Result<Tradeoff, TradeoffError> {
-    let provenance = provenance(table);
-    let text = |key: &str| Some(provenance.as_ref()?.get(key)?.as_str()?.to_owned());
-    let count = |key: &str| {
-        let counts = provenance.as_ref()?.get("photographs")?;
-        u64::try_from(counts.get(key)?.as_integer()?).ok()
-    };
-    let photographs = ["white", "gray_code", "bernoulli"].map(count);
-    let common = Common {
-        sweep: Sweep::Table,
-        setting: "the table".to_owned(),
-        method: text("method"),
-        photographs: photographs.into_iter().sum(),
-        seconds: None,
-    };
-    let mut points = of_tiers(&common, table, None)?;
-    let own = points.clone();
-    points.extend(of_bits(table, &own, None, progress)?);
-    let because = |what: &str, why: &str| Missing {
-        what: what.to_owned(),
-        why: why.to_owned(),
-    };
-    let mut missing = vec![
-        because(
-            "true errors",
-            "a table holds no reference; give the capture folder that it came from",
-        ),
-        because(
-            "solvers, fewer photographs, seconds of the solve",
-            "a table holds no photographs; give the capture folder that it came from",
-        ),
-        because(
-            "tiers between and coarser operators",
-            "a table holds only the entries that its tiers use; give the capture folder",
-        ),
-    ];
-    if table.inverse_error() == 0 {
-        missing.push(because(
-            "the error of the inverse itself",
-            "the table has none: too few photographs to hold any out",
-        ));
-    }
-    Ok(Tradeoff {
-        name: name.to_owned(),
-        scene: scene(table),
-        grid: table.grid(),
-        channels: table.channels(),
-        points,
-        missing,
-    })
-}
-
-fn provenance(table: &Table<'_>) -> Option<toml::Table> {
-    table.provenance().parse().ok()
-}
-
-/// The scene's name in a table; empty if it has none.
-fn scene(table: &Table<'_>) -> String {
-    let provenance = provenance(table);
-    let name = provenance
-        .as_ref()
-        .and_then(|text| text.get("scene")?.as_str());
-    name.unwrap_or_default().to_owned()
 }

@@ -15,12 +15,7 @@ impl Acquisition for BruteForce {
     }
 
     fn source(&self) -> Source {
-        Source {
-            authors: "Seitz, Matsushita, Kutulakos",
-            title: "A Theory of Inverse Light Transport",
-            venue: "ICCV",
-            year: 2005,
-        }
+        Source::INVERSE_LIGHT_TRANSPORT
     }
 
     fn how(&self) -> &'static str {

@@ -51,12 +51,7 @@ impl Acquisition for Sparse {
     fn source(&self) -> Source {
         match self.method {
             Method::TwoStage | Method::BruteForce => SEN_DARABI,
-            Method::Joint | Method::Direct => Source {
-                authors: "Chu, Ng, Pahwa, Quek, Huang",
-                title: "Compressive Inverse Light Transport",
-                venue: "BMVC",
-                year: 2011,
-            },
+            Method::Joint | Method::Direct => Source::THE_PAPER,
         }
     }
 

@@ -18,12 +18,7 @@ impl Inversion for Cancellation {
     }
 
     fn source(&self) -> Source {
-        Source {
-            authors: "Seitz, Matsushita, Kutulakos",
-            title: "A Theory of Inverse Light Transport",
-            venue: "ICCV",
-            year: 2005,
-        }
+        Source::INVERSE_LIGHT_TRANSPORT
     }
 
     fn how(&self) -> &'static str {

@@ -20,12 +20,7 @@ impl Inversion for Neumann {
     }
 
     fn source(&self) -> Source {
-        Source {
-            authors: "Chu, Ng, Pahwa, Quek, Huang",
-            title: "Compressive Inverse Light Transport",
-            venue: "BMVC",
-            year: 2011,
-        }
+        Source::THE_PAPER
     }
 
     fn how(&self) -> &'static str {

@@ -9,12 +9,15 @@
 //! second_bounce Figs. 3 and 4: pictures
 //! seeds         Fig. 4's comparison over many patterns, with intervals
 //! complexity    time against cells and photographs
-//! results       the page that shows all of it                    sections
+//! sample        what accuracy costs in time, and bounces, of the carried photographs
+//! results       the page that shows all of it                    claims, sections
 //! ```
 
+mod claims;
 mod complexity;
 mod feasible;
 mod results;
+mod sample;
 mod scenes;
 mod second_bounce;
 mod sections;

@@ -2,10 +2,11 @@
 
 use super::complexity::{self, Timed};
 use super::feasible::{self, Place};
+use super::sample::{self, Sample as Pictures};
 use super::scenes::Condition;
 use super::seeds::{self, Mean, SEEDS, Sample};
 use super::sparsity::{self, Counted};
-use super::{File, second_bounce, sections};
+use super::{File, claims, second_bounce, sections};
 use crate::compare::chart::{self, ChartError, Interval, Series, Words};
 use crate::compare::contest::Row;
 use crate::compare::sheet::encoded;
@@ -24,6 +25,12 @@ pub enum PaperError {
     Picture {
         /// Which.
         what: &'static str,
+    },
+    /// The photographs that the program carries gave nothing.
+    #[error("the photographs that the program carries cannot be used: {why}")]
+    Sample {
+        /// What went wrong.
+        why: String,
     },
     /// A chart cannot be drawn.
     #[error("the chart of {what} cannot be drawn: {why}")]
@@ -46,6 +53,7 @@ pub fn files(
     let start = Instant::now();
     let samples = seeds::run(SEEDS, &seeds::ENTRIES, progress);
     let timed = complexity::run(progress);
+    let sample = sample::pictures(progress)?;
     progress.begin("drawing", 0);
     let (lit, bounces) = second_bounce::panels().ok_or(PaperError::Picture { what: "Fig. 3" })?;
     let places = feasible::places();
@@ -82,10 +90,12 @@ pub fn files(
         places: &places,
         bounces: &bounces,
         timed: &timed,
+        sample: &sample,
         contests,
         seconds: start.elapsed().as_secs_f64(),
     });
     files.push(file("README.md", text));
+    files.extend(sample.files);
     Ok(files)
 }
 
@@ -281,6 +291,7 @@ struct Experiments<'e> {
     places: &'e [Place],
     bounces: &'e [second_bounce::Lit],
     timed: &'e [Timed],
+    sample: &'e Pictures,
     contests: &'e [(&'e str, Vec<Row>, Vec<Row>)],
     seconds: f64,
 }
@@ -288,12 +299,13 @@ struct Experiments<'e> {
 fn page(all: &Experiments<'_>) -> String {
     let mut text = String::new();
     let _ = write!(text, "{}", include_str!("opening.md"));
-    sections::claims(&mut text, all.samples);
+    claims::claims(&mut text, all.samples);
     sections::fourth(&mut text, all.samples);
     sections::sparse(&mut text, all.counts);
     sections::second(&mut text, all.places, all.counts);
     sections::third(&mut text, all.bounces);
     sections::cost(&mut text, all.timed);
+    sections::time(&mut text, all.sample);
     sections::every(&mut text, all.contests);
     let _ = writeln!(
         text,
