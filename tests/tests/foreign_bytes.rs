@@ -60,6 +60,7 @@ proptest! {
         fuzz::settings(&bytes);
         fuzz::scene(&bytes);
         fuzz::mesh(&bytes);
+        fuzz::reference(&bytes);
         fuzz::photograph(&bytes);
         fuzz::link(&bytes);
     }
@@ -138,4 +139,9 @@ fn messages_are_read_as_they_were_written() {
 fn changed_scenes_and_meshes_are_no_trouble() {
     short_run("scene", 4_000);
     short_run("mesh", 4_000);
+}
+
+#[test]
+fn changed_reference_transports_are_no_trouble() {
+    short_run("reference", 20_000);
 }

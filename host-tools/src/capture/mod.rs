@@ -57,7 +57,7 @@ pub use manifest::{MANIFEST_FILE, Manifest, Shot};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
-pub use reference::{REFERENCE_FILE, ReferenceError, read_reference};
+pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
 pub use response::Response;
 pub use role::Role;

@@ -106,9 +106,20 @@ pub fn read_reference(
     file.take(most + 1)
         .read_to_end(&mut bytes)
         .map_err(failed)?;
-    parse(&bytes, grid.cells(), channels)
-        .map(Some)
-        .map_err(|flaw| flaw.at(path))
+    parse_reference(&bytes, grid, channels, &path).map(Some)
+}
+
+/// The same from the bytes of a file called `path`.
+///
+/// # Errors
+/// [`ReferenceError`] if they are not such an array.
+pub fn parse_reference(
+    bytes: &[u8],
+    grid: Grid,
+    channels: usize,
+    path: &Path,
+) -> Result<Vec<DMatrix<f64>>, ReferenceError> {
+    parse(bytes, grid.cells(), channels).map_err(|flaw| flaw.at(path.to_owned()))
 }
 
 /// What is wrong with bytes.

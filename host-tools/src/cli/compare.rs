@@ -99,9 +99,10 @@ fn of_light(
     ];
     let truth = &light.truth;
     let text = format!(
-        "{} cells, {} lit and seen; the transport is {}\n\nways to photograph\n{}\nways to invert, given the transport\n{}\n",
+        "{} cells, {} lit and seen{}; the transport is {}\n\nways to photograph\n{}\nways to invert, given the transport\n{}\n",
         truth.grid,
         truth.live_cells(),
+        if light.colour { ", green channel" } else { "" },
         light.known,
         table::text(&photographed),
         table::text(&inverted),
@@ -109,6 +110,7 @@ fn of_light(
     let data = json!({
         "light": path.display().to_string(),
         "known": light.known,
+        "channel": if light.colour { "green" } else { "grey" },
         "rows": truth.grid.rows(),
         "cols": truth.grid.cols(),
         "photographed": photographed.iter().map(row).collect::<Vec<_>>(),

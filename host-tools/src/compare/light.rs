@@ -35,6 +35,8 @@ const REGISTRATION: usize = 60;
 pub struct Light {
     /// How the transport is known.
     pub known: &'static str,
+    /// Whether there are three channels, of which it is the green one.
+    pub colour: bool,
     /// What answers are judged by.
     pub truth: Truth,
     /// What photographs are taken with; its noise is the camera's.
@@ -140,7 +142,12 @@ impl Light {
         let grid = measurements.grid;
         let rig = Rig::new(grid, transport.clone(), live.clone(), noise, seed);
         let truth = Truth::new(grid, transport, live).ok_or(LightError::Singular)?;
-        Ok(Self { known, truth, rig })
+        Ok(Self {
+            known,
+            colour: measurements.channels.len() > 1,
+            truth,
+            rig,
+        })
     }
 }
 

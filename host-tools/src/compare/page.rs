@@ -46,6 +46,7 @@ impl Contest<'_> {
                         (truth.grid.rows()) " \u{d7} " (truth.grid.cols()) " cells, " (truth.live_cells())
                         " of them lit and seen. The transport is " (self.light.known)
                         "; every method gets the same light, with this camera\u{2019}s noise, and is judged by the same images."
+                        @if self.light.colour { " Of the three channels it is the green one." }
                     }
                 }
                 (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))

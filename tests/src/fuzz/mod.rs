@@ -18,10 +18,11 @@ pub use targets::{TARGETS, Target};
 
 use crate::fake_device::FakeDevice;
 use crate::wedge_table;
-use iltm::capture::{self, CaptureOptions, Manifest, Settings};
+use iltm::capture::{self, CaptureOptions, Manifest, Settings, parse_reference};
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};
 use iltm::video::{Compensator, OperatorMemory};
+use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{DELIMITER, Decoder, Event, Response, Session};
 use iltm_runtime::pipeline::{Encoding, GridPipeline};
@@ -95,6 +96,14 @@ pub fn settings(bytes: &[u8]) {
 /// A scene file. Meshes and textures that it names are looked for where there are none.
 pub fn scene(bytes: &[u8]) {
     let _ = Scene::parse(bytes, Path::new("/nowhere/scene.toml"));
+}
+
+/// A reference transport of 2 x 2 cells, grey or in colour.
+pub fn reference(bytes: &[u8]) {
+    let Ok(grid) = Grid::new(2, 2) else { return };
+    for channels in [1, 3] {
+        let _ = parse_reference(bytes, grid, channels, Path::new("reference_T.npy"));
+    }
 }
 
 /// A mesh.

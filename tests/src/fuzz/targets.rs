@@ -19,7 +19,7 @@ pub struct Target {
 }
 
 /// All of them.
-pub const TARGETS: [Target; 13] = [
+pub const TARGETS: [Target; 14] = [
     target("session", session::session, stories, (1, session::OP)),
     target("link", super::link, lines, (0, 1)),
     target("messages", super::messages, messages, (0, 1)),
@@ -46,6 +46,7 @@ pub const TARGETS: [Target; 13] = [
         (0, 1),
     ),
     target("mesh", super::mesh, || scene("dome.obj"), (0, 1)),
+    target("reference", super::reference, arrays, (0, 1)),
     target("frames", super::frames, streams, (0, 1)),
     target(
         "photograph",
@@ -241,6 +242,30 @@ fn sample(name: &str) -> Vec<Vec<u8>> {
     );
     let bytes = std::fs::read(Path::new(samples).join(name));
     bytes.into_iter().collect()
+}
+
+/// `NumPy` arrays of a transport between four cells, 32 and 64 bits, in both orders, and
+/// of three channels.
+fn arrays() -> Vec<Vec<u8>> {
+    let array = |kind: &str, fortran: &str, shape: &str, bytes: usize| {
+        let mut header =
+            format!("{{'descr': '{kind}', 'fortran_order': {fortran}, 'shape': ({shape}), }}");
+        // The data begin at a multiple of 64 bytes, after a line break.
+        while (10 + header.len() + 1) % 64 > 0 {
+            header.push(' ');
+        }
+        header.push('\n');
+        let mut file = b"\x93NUMPY\x01\x00".to_vec();
+        file.extend((header.len() as u16).to_le_bytes());
+        file.extend(header.bytes());
+        file.resize(file.len() + bytes, 0);
+        file
+    };
+    vec![
+        array("<f4", "False", "4, 4", 64),
+        array("<f8", "True", "4, 4", 128),
+        array(">f4", "False", "3, 4, 4", 192),
+    ]
 }
 
 /// A file beside the scenes.

@@ -80,6 +80,7 @@ pub fn files(
             by_photographs(&timed),
         )?,
         file("fig1.csv", sparsity_csv(&sparsity::counts())),
+        file("fig3.csv", bounces_csv(&bounces)),
         file("fig4.csv", seeds_csv(&samples)),
         file("complexity.csv", complexity_csv(&timed)),
     ];
@@ -251,6 +252,14 @@ fn places_csv(places: &[Place]) -> String {
             "{scene},{},{},{:.4},{:.4},{:.4},{:.4}",
             place.photographs, place.k, place.kappa, place.gamma, place.product.0, place.product.1
         );
+    }
+    text
+}
+
+fn bounces_csv(bounces: &[second_bounce::Lit]) -> String {
+    let mut text = "lit,second_bounce_error\n".to_owned();
+    for lit in bounces {
+        let _ = writeln!(text, "{},{:.6}", lit.name, lit.error);
     }
     text
 }

@@ -239,7 +239,7 @@ pub(super) fn time(text: &mut String, pictures: &Pictures) {
          On the 60 photographs of coloured panels that the program carries. For a scene of your \
          own: `iltm tradeoff CAPTURE -o DIR`.\n\n\
          ![Error against instructions a frame](tradeoff.svg)\n\n\
-         {}. `tradeoff.html` is the same to point at, `tradeoff.csv` has every number.\n\n\
+         In one line: {}. `tradeoff.html` is the same to point at, `tradeoff.csv` has every number.\n\n\
          ## Bounce by bounce\n\n\
          The same scene under white; {:.0} % of the light comes straight, {:.0} % in the second \
          bounce. Of your own: `iltm bounces CAPTURE -o DIR`.\n\n\

@@ -3,7 +3,7 @@
 //! Folded panels stand along the columns; the projector and the camera look at
 //! them from far away along the same direction, so that every cell of the frame
 //! is as wide as any other. Two panels that form a valley exchange light by
-//! [exact form factors](super::form_factors); ridges shield valleys from each
+//! exact form factors; ridges shield valleys from each
 //! other. What the surface covers of a cell has one albedo and one brightness:
 //!
 //! ```text

@@ -22,7 +22,7 @@
 //! The exact constants are NP-hard (Tillmann, Pfetsch, *The Computational Complexity of
 //! the Restricted Isometry Property, the Nullspace Property, and Related Concepts in
 //! Compressed Sensing*, 2014), so there are bounds here: from below by supports that
-//! were looked at ([`search`]), from above by Gershgorin's discs ([`sensing`]).
+//! were looked at (`search.rs`), from above by Gershgorin's discs (`sensing.rs`).
 //!
 //! # Which patterns
 //!
