@@ -150,7 +150,7 @@ pub(super) fn error(value: f64) -> String {
     match value {
         v if !v.is_finite() || v >= 1e4 => "diverges".to_owned(),
         v if v >= 10.0 => format!("{v:.0}"),
-        v if v >= 1.0 => format!("{v:.1}"),
+        v if v >= 0.9995 => format!("{v:.1}"),
         v if v >= 0.1 => format!("{v:.3}").trim_start_matches('0').to_owned(),
         v if v >= 0.000_05 => format!("{v:.4}").trim_start_matches('0').to_owned(),
         _ => "0".to_owned(),
@@ -192,10 +192,22 @@ mod tests {
 
     #[test]
     fn errors_have_the_digits_that_mean_something() {
-        let shown = [0.0, 0.000_12, 0.0123, 0.25, 1.25, 120.0, f64::INFINITY].map(error);
+        let shown = [
+            0.0,
+            0.000_12,
+            0.0123,
+            0.25,
+            0.9999,
+            1.25,
+            120.0,
+            f64::INFINITY,
+        ]
+        .map(error);
         assert_eq!(
             shown,
-            ["0", ".0001", ".0123", ".250", "1.2", "120", "diverges"]
+            [
+                "0", ".0001", ".0123", ".250", "1.0", "1.2", "120", "diverges"
+            ]
         );
     }
 
