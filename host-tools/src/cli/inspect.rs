@@ -242,8 +242,8 @@ fn text(path: &Path, table: &Table<'_>) -> String {
     }
     let _ = writeln!(
         text,
-        "\nInstructions are those of a frame of one pixel a cell on the reference board, counted and not\n\
-         timed; of a frame: of {RATE} a second on a part of {} MHz, if it did one instruction a cycle.\n\
+        "\nInstructions are those of a frame of one pixel a cell on the reference board, by a model\n\
+         within 2 % of those counted, not timed; of a frame: of {RATE} a second on a part of {} MHz, if it did one instruction a cycle.\n\
          Bytes: of a table with that tier and gain only.",
         CLOCK / 1_000_000
     );

@@ -30,6 +30,19 @@ impl fmt::Debug for Answer {
     }
 }
 
+impl Answer {
+    /// What a projector shows for wanted light, both length `N`: clipped to 0 to 1, and
+    /// no light where the answer is not a number.
+    #[must_use]
+    pub fn shown(&self, wanted: &DVector<f64>) -> DVector<f64> {
+        let input = match self {
+            Self::Inverse(matrix) => matrix * wanted,
+            Self::Frames(frames) => frames.project(wanted),
+        };
+        input.map(|p| if p > 0.0 { p.min(1.0) } else { 0.0 })
+    }
+}
+
 /// A way to project that is no fixed matrix.
 pub trait Project {
     /// The projector's input, length `N`, relative to its white, for wanted light in

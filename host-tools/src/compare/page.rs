@@ -1,6 +1,5 @@
 //! The page of a contest: pictures first, numbers beside them.
 
-use super::Answer;
 use super::contest::{Done, Row};
 use super::light::Light;
 use super::sheet::{Tile, encoded, sheet};
@@ -10,7 +9,6 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
-use nalgebra::DVector;
 
 /// Tiles in a row of pictures.
 const ACROSS: usize = 4;
@@ -118,7 +116,7 @@ impl Contest<'_> {
         let mut tiles = vec![wanted_tile];
         for row in rows {
             let Ok(done) = &row.result else { continue };
-            let shown = &truth.transport * drive(&done.answer, &wanted);
+            let shown = &truth.transport * done.answer.shown(&wanted);
             let off = (shown - &wanted) / truth.white;
             let caption = format!(
                 "compensation {}",
@@ -134,13 +132,4 @@ impl Contest<'_> {
             STANDARD.encode(encoded(&picture))
         ))
     }
-}
-
-/// What a projector shows for wanted light.
-fn drive(answer: &Answer, wanted: &DVector<f64>) -> DVector<f64> {
-    let drive = match answer {
-        Answer::Inverse(matrix) => matrix * wanted,
-        Answer::Frames(frames) => frames.project(wanted),
-    };
-    drive.map(|p| if p > 0.0 { p.min(1.0) } else { 0.0 })
 }

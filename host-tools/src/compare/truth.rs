@@ -106,14 +106,8 @@ impl Truth {
     /// How far an answer is off.
     #[must_use]
     pub fn judge(&self, answer: &Answer) -> Errors {
-        let drive = |wanted: &DVector<f64>| match answer {
-            Answer::Inverse(matrix) => matrix * wanted,
-            Answer::Frames(frames) => frames.project(wanted),
-        };
         let error = |wanted: DVector<f64>| {
-            // Not a number is no light.
-            let projected = drive(&wanted).map(|p| if p > 0.0 { p.min(1.0) } else { 0.0 });
-            (&self.transport * projected - &wanted).norm() / wanted.norm()
+            (&self.transport * answer.shown(&wanted) - &wanted).norm() / wanted.norm()
         };
         let images = self.images.column_iter();
         let sum: f64 = images.map(|image| error(image.into_owned())).sum();

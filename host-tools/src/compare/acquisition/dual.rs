@@ -55,7 +55,7 @@ impl Acquisition for DualPhotography {
     fn how(&self) -> &'static str {
         "Blocks of cells, divided in four as long as somebody sees them; blocks that no camera \
          cell sees both of are lit together. Needs the photographs so far to choose the next, \
-         and light that stays local: interreflection makes all blocks conflict."
+         and light that stays local: where every surface lights every other, all blocks conflict."
     }
 
     fn acquire(&self, rig: &mut Rig, _progress: &dyn Progress) -> Result<Found, Unfit> {

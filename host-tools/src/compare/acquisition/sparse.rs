@@ -146,13 +146,9 @@ impl Taken {
 /// Root mean square noise of a cell where it is lit and where it is not.
 fn cell_noise(rig: &Rig, patterns: &DMatrix<f64>, light: &DMatrix<f64>, cell: usize) -> CellNoise {
     let of = |lit: bool| {
-        let own = patterns.row(cell);
-        let own = own
-            .iter()
-            .zip(light.row(cell).iter().copied().collect::<Vec<_>>());
-        let variances: Vec<f64> = own
-            .filter(|(share, _)| (**share > 0.5) == lit)
-            .map(|(_, light)| rig.noise().variance(light))
+        let variances: Vec<f64> = (0..patterns.ncols())
+            .filter(|photograph| (patterns[(cell, *photograph)] > 0.5) == lit)
+            .map(|photograph| rig.noise().variance(light[(cell, photograph)]))
             .collect();
         (variances.iter().sum::<f64>() / variances.len().max(1) as f64).sqrt()
     };

@@ -3,9 +3,7 @@
 use super::test_scenes::m_scene;
 use super::*;
 use crate::capture::NoiseModel;
-use crate::compare::{Truth, contest};
 use crate::progress::Silent;
-use crate::scene::coaxial::{Panels, Scene};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
@@ -93,48 +91,5 @@ fn ways_that_take_so_many_photographs_take_no_more() {
         );
         found(method.as_ref(), &mut rig);
         assert!(rig.photographs() <= 33, "{}", method.name());
-    }
-}
-
-/// `cargo test --release -p iltm --lib compare::acquisition::tests::the_table -- --ignored --nocapture`
-#[test]
-#[ignore = "prints a table: photographs, seconds and errors of every way on two scenes"]
-fn the_table_of_all_ways() {
-    let grid = Grid::new(13, 21).unwrap();
-    let plain = || Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7);
-    for (name, scene) in [
-        ("uniform", plain()),
-        ("textured", plain().textured(0.25, 0.95, 1)),
-    ] {
-        let live = scene.covered();
-        let truth = Truth::new(grid, scene.transport(), live.clone()).unwrap();
-        let level = truth.flood().mean();
-        for decibel in [None, Some(40.0)] {
-            let deviation: f64 =
-                decibel.map_or(0.0, |decibel: f64| level * 10_f64.powf(-decibel / 20.0));
-            let noise = NoiseModel {
-                shot: 0.0,
-                floor: deviation * deviation,
-            };
-            let rig = Rig::new(grid, scene.transport(), live.clone(), noise, 1);
-            println!(
-                "\n{name}, {decibel:?} dB: photographs, seconds, inverse, second bounce, compensation"
-            );
-            for method in all(150, 1) {
-                let row = contest::photograph(method.as_ref(), &rig, &truth, None, &Silent);
-                match row.result {
-                    Ok(done) => println!(
-                        "{:58} {:4} {:6.2} {:8.4} {:8.4} {:8.4}",
-                        row.name,
-                        done.photographs,
-                        done.seconds,
-                        done.errors.inverse.unwrap_or(f64::NAN),
-                        done.errors.second_bounce.unwrap_or(f64::NAN),
-                        done.errors.compensation,
-                    ),
-                    Err(why) => println!("{:58} {why}", row.name),
-                }
-            }
-        }
     }
 }

@@ -83,12 +83,7 @@ struct Frames {
 impl Project for Frames {
     /// What a sharp projector would have to show for the same light.
     fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
-        let input = match &self.answer {
-            Answer::Inverse(matrix) => matrix * wanted,
-            Answer::Frames(frames) => frames.project(wanted),
-        };
-        // Not a number is no light.
-        &self.spread * input.map(|p| if p > 0.0 { p.min(1.0) } else { 0.0 })
+        &self.spread * self.answer.shown(wanted)
     }
 }
 

@@ -100,7 +100,12 @@ impl Recovery {
             }
             _ => {
                 let least = number(self.product_at_least);
-                format!("kappa^2 gamma is at least {least} (sampled), {asks}:")
+                let most = if self.product_at_most.is_finite() {
+                    format!("at most {} (Gershgorin)", number(self.product_at_most))
+                } else {
+                    "no bound from above is known".to_owned()
+                };
+                format!("kappa^2 gamma is at least {least} (sampled), {most};\n{asks}:")
             }
         };
         let so = match (verdict, self.k_may_hold) {
@@ -113,7 +118,10 @@ impl Recovery {
                 "it promises nothing here beyond k = {most}; held-out photographs judge instead"
             ),
         };
-        vec![format!("{rows};"), why, so]
+        let mut lines = vec![format!("{rows};")];
+        lines.extend(why.lines().map(str::to_owned));
+        lines.push(so);
+        lines
     }
 }
 

@@ -3,10 +3,7 @@
 use super::super::forward::Inverse;
 use super::super::haar::{Basis, Haar};
 use super::super::test_scene::{Corner, patterns};
-use super::super::{CellNoise, Observed, ObservedChannel, SolveOptions, solve_observed};
 use super::*;
-use crate::capture::Role;
-use crate::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::DVector;
 
@@ -207,12 +204,12 @@ fn a_capture_reports_what_its_transport_and_patterns_give() {
     assert!(report.coherence > 0.2 && report.coherence < 1.0);
     assert_eq!(report.verdict(), Verdict::Fails);
     assert_eq!((report.k_may_hold, report.k_holds), (0, 0));
-    assert!(
-        report
-            .lines()
-            .concat()
-            .contains("promises nothing here, for no k")
-    );
+    let said = report.lines().concat();
+    assert!(said.contains("promises nothing here, for no k"), "{said}");
+    // Both bounds are said, or that there is but one.
+    let both = said.contains("(sampled)")
+        && (said.contains("(Gershgorin)") || said.contains("no bound from above"));
+    assert!(both || report.product_at_least.is_infinite(), "{said}");
 }
 
 #[test]
@@ -255,41 +252,4 @@ fn large_grids_are_bounded_by_some_of_their_coefficients() {
     assert!(report.kappa_at_most.is_infinite());
     assert!(report.product_at_least >= LIMIT);
     assert_eq!(report.verdict(), Verdict::Fails);
-}
-
-#[test]
-#[ignore = "measures: cargo test -p iltm --lib recovery::tests::cost -- --ignored --nocapture"]
-fn cost() {
-    for cells in [(13, 21), (18, 24), (32, 32)] {
-        let haar = haar(cells.0, cells.1);
-        let corner = Corner::new(cells.0.into(), cells.1.into(), |_| 0.7);
-        let shown = patterns(corner.gain.len(), 150);
-        let flood = DVector::from_element(shown.nrows(), 1.0);
-        let inverse = Inverse::new(corner.gain.clone(), corner.operator.clone());
-        let start = std::time::Instant::now();
-        let report = of_direct(&[&inverse], &haar, &shown, &flood).unwrap();
-        let bounds = start.elapsed().as_secs_f64();
-        let light = corner.photograph(&shown);
-        let mut roles = vec![Role::White];
-        roles.resize(shown.ncols(), Role::Bernoulli);
-        let (live, dark) = (vec![true; shown.nrows()], vec![0.0; shown.nrows()]);
-        let noise = CellNoise {
-            lit: 1e-3,
-            unlit: 1e-3,
-        };
-        let observed = Observed {
-            grid: haar.grid(),
-            patterns: &shown,
-            roles: &roles,
-            live: &live,
-            channels: vec![ObservedChannel {
-                light: &light,
-                ambient: &dark,
-                noise: vec![noise; shown.nrows()],
-            }],
-            blur: 0.0,
-        };
-        let (_, solved) = solve_observed(&observed, &SolveOptions::default(), &Silent).unwrap();
-        println!("{cells:?}: {bounds:.3} s, {:?}\n{report:?}", solved.seconds);
-    }
 }
