@@ -40,6 +40,17 @@ pub fn natural_images(grid: Grid) -> DMatrix<f64> {
     images
 }
 
+/// Darkest light of [`wanted_images`], of white: walls that light each other cannot be
+/// black beside white.
+pub const DARKEST: f64 = 0.2;
+
+/// Natural images that a scene with interreflection can show, `N x IMAGES`, linear light
+/// from [`DARKEST`] to 1.
+#[must_use]
+pub fn wanted_images(grid: Grid) -> DMatrix<f64> {
+    natural_images(grid).map(|light| DARKEST + (1.0 - DARKEST) * light)
+}
+
 /// One image, row by row, `SUPERSAMPLING` times finer than the grid.
 fn dead_leaves(grid: Grid, random: &mut fastrand::Rng) -> Vec<f64> {
     let (height, width) = (grid.rows() * SUPERSAMPLING, grid.cols() * SUPERSAMPLING);

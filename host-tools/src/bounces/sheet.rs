@@ -5,13 +5,9 @@ use super::Bounces;
 use super::folder::frame_size;
 use super::separate::LayerKind;
 use crate::report::LightPicture;
-use crate::report::canvas::{Canvas, Colour, Type};
+use crate::report::canvas::{BACKGROUND, Canvas, INK, QUIET, Type};
 use crate::video::Picture;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
-
-const BACKGROUND: Colour = [18, 20, 24];
-const INK: Colour = [232, 234, 238];
-const QUIET: Colour = [160, 166, 176];
 
 /// Pixels between pictures and around them.
 const GAP: usize = 16;

@@ -1,22 +1,21 @@
 //! Pictures of one value a cell, side by side with captions and one colour bar.
 
-use crate::report::canvas::{Canvas, Colour, Type};
+use crate::report::canvas::{BACKGROUND, Canvas, Colour, INK, QUIET, Type};
 use crate::report::{ColourScale, LightPicture, SHADES};
 use crate::video::{Picture, Samples, png};
 use iltm_runtime::{FrameSize, Grid};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 use std::collections::BTreeSet;
 
-const BACKGROUND: Colour = [18, 20, 24];
 const TITLE: Type = Type {
     height: RasterHeight::Size16,
     weight: FontWeight::Bold,
-    colour: [232, 234, 238],
+    colour: INK,
 };
 const TEXT: Type = Type {
     height: RasterHeight::Size16,
     weight: FontWeight::Regular,
-    colour: [160, 166, 176],
+    colour: QUIET,
 };
 /// Pixels around tiles.
 const GAP: usize = 14;

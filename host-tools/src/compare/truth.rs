@@ -1,14 +1,10 @@
 //! What answers are judged by: the scene itself.
 
 use super::Answer;
-use crate::content::natural_images;
+use crate::content::wanted_images;
 use crate::solve::inverted;
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
-
-/// Darkest light of wanted images, of white: walls that light each other cannot be
-/// black beside white.
-const DARKEST: f64 = 0.2;
 
 /// A scene's transport, its inverse, and images to show in it.
 #[derive(Clone, Debug)]
@@ -51,7 +47,7 @@ impl Truth {
             return None;
         }
         let white = drive.recip();
-        let mut images = natural_images(grid).map(|light| DARKEST + (1.0 - DARKEST) * light);
+        let mut images = wanted_images(grid);
         images *= white;
         for (mut row, live) in images.row_iter_mut().zip(&live) {
             if !live {

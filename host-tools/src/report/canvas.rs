@@ -8,6 +8,12 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_wid
 /// An sRGB colour.
 pub(crate) type Colour = [u8; 3];
 
+/// Background of composed pictures, and letters on it that are to be read first and
+/// next.
+pub(crate) const BACKGROUND: Colour = [18, 20, 24];
+pub(crate) const INK: Colour = [232, 234, 238];
+pub(crate) const QUIET: Colour = [160, 166, 176];
+
 /// How letters look.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Type {

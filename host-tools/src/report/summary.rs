@@ -1,16 +1,12 @@
 //! One picture that tells the story: wanted, photographed without compensation,
 //! photographed with it, and both errors.
 
-use super::canvas::{Canvas, Colour, Type};
+use super::canvas::{BACKGROUND, Canvas, INK, QUIET, Type};
 use super::colour_scale::ColourScale;
 use super::{Example, Treatment};
 use crate::video::Picture;
 use iltm_runtime::FrameSize;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
-
-const BACKGROUND: Colour = [18, 20, 24];
-const INK: Colour = [232, 234, 238];
-const QUIET: Colour = [160, 166, 176];
 
 /// Pixels between pictures and around them.
 const GAP: usize = 12;

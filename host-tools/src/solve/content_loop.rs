@@ -12,13 +12,9 @@ use super::gain_only::gains;
 use super::prepare::Prepared;
 use super::report::Prediction;
 use super::solution::Candidate;
-use crate::content::natural_images;
+use crate::content::wanted_images;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
-
-/// Darkest light of the images, of white: walls that light each other cannot be
-/// black beside white.
-const DARKEST: f64 = 0.2;
 
 /// Images and the scene as it was found.
 pub(super) struct ContentLoop<'c> {
@@ -39,7 +35,7 @@ impl<'c> ContentLoop<'c> {
         candidates: &'c [Candidate],
         blur: Option<&'c DMatrix<f64>>,
     ) -> Self {
-        let mut images = natural_images(grid).map(|light| DARKEST + (1.0 - DARKEST) * light);
+        let mut images = wanted_images(grid);
         for (cell, _) in prepared.live.iter().enumerate().filter(|(_, live)| !**live) {
             images.row_mut(cell).fill(0.0);
         }

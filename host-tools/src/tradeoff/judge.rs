@@ -2,14 +2,10 @@
 
 use super::operator::{Entries, Entry, Numbers};
 use crate::compile::ladder::relative_error;
-use crate::content::natural_images;
+use crate::content::{natural_images, wanted_images};
 use crate::solve::InverseTransport;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
-
-/// Darkest light of the images that true errors are of, relative to reference white:
-/// walls that light each other cannot be black beside white.
-const DARKEST: f64 = 0.2;
 
 /// Error of too much or too little `light` of a channel, all channels together as the
 /// root of the mean of squares. Infinite where light does not fade.
@@ -94,8 +90,7 @@ impl Truth {
     /// Mean over images and channels of `||T p - d|| / ||d||`. `white` is the table's
     /// own reference white.
     pub(super) fn error(&self, numbers: &Numbers<'_>, entries: &[Entries], white: f64) -> f64 {
-        let mut wanted =
-            natural_images(self.grid).map(|light| (DARKEST + (1.0 - DARKEST) * light) * self.white);
+        let mut wanted = wanted_images(self.grid) * self.white;
         for (mut row, _) in wanted
             .row_iter_mut()
             .zip(&self.live)

@@ -1,7 +1,7 @@
 //! How far the picture on the wall is from the wanted one.
 
 use iltm::compile::white::reference_white;
-use iltm::content::natural_images;
+use iltm::content::wanted_images;
 use iltm::scene::coaxial::Scene;
 use iltm::solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
@@ -35,7 +35,7 @@ pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
     let judged: Vec<bool> = (0..scene.grid.cells())
         .map(|cell| found.live[cell] && scene.coverage[cell] > 1e-9)
         .collect();
-    let natural = natural_images(scene.grid).map(|light| 0.2 + 0.8 * light);
+    let natural = wanted_images(scene.grid);
     let white = reference_white(found).map_or(0.0, |white| white.light);
     let wanted = match scene.blur {
         Some(_) => &transport * &natural,

@@ -3,7 +3,7 @@
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Project, Source, Unfit};
-use crate::content::natural_images;
+use crate::content::wanted_images;
 use crate::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
@@ -42,12 +42,12 @@ impl Inversion for Bounded {
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let frames = Frames::new(&live, known.live.len());
-        let images = natural_images(known.grid).select_rows(&live.chosen);
+        let images = wanted_images(known.grid).select_rows(&live.chosen);
         let white = frames.flood.mean();
         let mut steps = 0;
         let mut residual = 0.0_f64;
         for image in images.column_iter().take(SAMPLES) {
-            let wanted = image.map(|light| white * (0.2 + 0.8 * light));
+            let wanted = image * white;
             let solved = frames.problem.solve(&wanted, &frames.start(&wanted));
             steps += solved.steps;
             residual = residual.max(solved.residual);

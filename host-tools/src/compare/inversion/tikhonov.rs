@@ -6,7 +6,7 @@ use super::pseudo_inverse::regularised;
 use super::{Inversion, Inverted, Known};
 use crate::capture::NoiseModel;
 use crate::compare::{Answer, Rig, Source, Unfit};
-use crate::content::natural_images;
+use crate::content::wanted_images;
 use crate::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
@@ -131,9 +131,7 @@ fn wanted(known: &Known<'_>, live: &LiveTransport, seen: &Seen) -> DMatrix<f64> 
     let mut flood: Vec<f64> = seen.flood.iter().copied().collect();
     flood.sort_by(f64::total_cmp);
     let white = flood[flood.len() / 10];
-    let images = natural_images(known.grid).select_rows(&live.chosen);
-    // Walls that light each other cannot be black beside white.
-    images.map(|light| white * (0.2 + 0.8 * light))
+    wanted_images(known.grid).select_rows(&live.chosen) * white
 }
 
 #[cfg(test)]

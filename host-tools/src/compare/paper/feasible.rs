@@ -4,7 +4,7 @@
 //! place is drawn at bounds from below ([`crate::solve::recovery`]), so that it can
 //! only be further from the region, not nearer.
 
-use super::scenes::Condition;
+use super::scenes::{Condition, surface};
 use crate::capture::{Role, columns, shown};
 use crate::compare::chart::{ChartError, Series, Words, region};
 use crate::solve::recovery::{LIMIT, Sampling, Sensing, signed};
@@ -81,7 +81,7 @@ pub(super) fn chart(places: &[Place]) -> Result<String, ChartError> {
                 (place.textured, place.photographs) == (textured, photographs)
                     && place.gamma.is_finite()
             });
-            let scene = if textured { "textured" } else { "uniform" };
+            let scene = surface(textured);
             series.push(Series {
                 name: format!("{scene}, {photographs} photographs"),
                 points: own.map(|place| (place.kappa, place.gamma)).collect(),

@@ -3,7 +3,7 @@
 use super::complexity::{self, Timed};
 use super::feasible::{self, Place};
 use super::sample::{self, Sample as Pictures};
-use super::scenes::Condition;
+use super::scenes::{Condition, surface};
 use super::seeds::{self, Mean, SEEDS, Sample};
 use super::sparsity::{self, Counted};
 use super::{File, claims, second_bounce, sections};
@@ -226,11 +226,7 @@ fn of_methods(
 fn sparsity_csv(counts: &[Counted]) -> String {
     let mut text = "scene,matrix,99 %,99.9 %,99.99 %,all\n".to_owned();
     for counted in counts {
-        let scene = if counted.textured {
-            "textured"
-        } else {
-            "uniform"
-        };
+        let scene = surface(counted.textured);
         let [a, b, c] = counted.counts;
         let _ = writeln!(text, "{scene},{},{a},{b},{c},{}", counted.name, counted.all);
     }
@@ -242,11 +238,7 @@ fn places_csv(places: &[Place]) -> String {
         "scene,photographs,k,kappa_at_least,gamma_at_least,product_at_least,product_at_most\n"
             .to_owned();
     for place in places {
-        let scene = if place.textured {
-            "textured"
-        } else {
-            "uniform"
-        };
+        let scene = surface(place.textured);
         let _ = writeln!(
             text,
             "{scene},{},{},{:.4},{:.4},{:.4},{:.4}",

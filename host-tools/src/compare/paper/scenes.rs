@@ -78,6 +78,11 @@ impl Condition {
     }
 }
 
+/// How panels are called.
+pub(super) const fn surface(textured: bool) -> &'static str {
+    if textured { "textured" } else { "uniform" }
+}
+
 /// The panels in cells of `grid`.
 pub(super) fn panels(grid: Grid) -> Scene {
     Scene::new(grid, &Panels::m_shape(grid, WEDGE), ALBEDO)

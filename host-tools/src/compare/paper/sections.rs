@@ -3,7 +3,7 @@
 use super::complexity::{self, Timed};
 use super::feasible::Place;
 use super::sample::Sample as Pictures;
-use super::scenes::Condition;
+use super::scenes::{Condition, surface};
 use super::second_bounce::Lit;
 use super::seeds::{ENTRIES, Mean, SEEDS, Sample};
 use super::sparsity::{Counted, INVERSE_IN_HAAR, PARTS};
@@ -92,11 +92,7 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
     let _ = writeln!(text, "| scene | matrix | {} |", parts.join(" | "));
     let _ = writeln!(text, "|---|---|{}", "---:|".repeat(parts.len()));
     for counted in counts {
-        let scene = if counted.textured {
-            "textured"
-        } else {
-            "uniform"
-        };
+        let scene = surface(counted.textured);
         let cells = counted.counts.map(|count| count.to_string());
         let _ = writeln!(
             text,
@@ -130,11 +126,7 @@ pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
          |---|---:|---:|---:|---:|---:|---:|"
     );
     for place in places {
-        let scene = if place.textured {
-            "textured"
-        } else {
-            "uniform"
-        };
+        let scene = surface(place.textured);
         let _ = writeln!(
             text,
             "| {scene} | {} | {} | {:.2} | {:.2} | {:.2} | {:.2} |",
@@ -219,9 +211,8 @@ pub(super) fn cost(text: &mut String, timed: &[Timed]) {
     let _ = writeln!(
         text,
         "\nThe exact inversion alone grows as `N^{:.2}`: {:.0} ms at 273 cells, {:.0} % of the \
-         two-stage solve, and {:.0} ms at {largest}, {:.0} %. So the claim holds in the \
-         exponents; at the paper's size the l1 problems take the time, not the inversion. `m` \
-         enters less than linearly: the l1 step does not depend on it.",
+         two-stage solve, and {:.0} ms at {largest}, {:.0} %; the l1 problems take the rest. Where \
+         `m` enters with less than 1, the l1 step, which does not depend on it, takes its part.",
         complexity::inversion_exponent(timed),
         paper.0,
         paper.1,
