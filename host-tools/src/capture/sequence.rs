@@ -64,25 +64,13 @@ pub(super) struct Sequence {
 }
 
 impl Sequence {
-    /// Chooses the shots that `options` ask for, reads their patterns and checks
-    /// them. `shots` are ordered by index.
+    /// Reads the patterns of `shots`, which are ordered by index, and checks them.
     ///
     /// # Errors
-    /// What [`CaptureError`] says about roles, patterns and missing files.
-    pub(super) fn read(
-        folder: &Path,
-        shots: &[Shot],
-        options: &CaptureOptions,
-    ) -> Result<Self, CaptureError> {
+    /// What [`CaptureError`] says about roles and patterns.
+    pub(super) fn read(folder: &Path, shots: Vec<Shot>) -> Result<Self, CaptureError> {
         let manifest = folder.join(MANIFEST_FILE);
-        let shots = chosen(shots, options, &manifest)?;
-        for shot in &shots {
-            let path = folder.join(&shot.photo);
-            if matches!(path.try_exists(), Ok(false)) {
-                let (what, line) = ("photograph", shot.line);
-                return Err(CaptureError::MissingFile { path, what, line });
-            }
-        }
+        check_roles(&shots, &manifest)?;
         let patterns = shots
             .par_iter()
             .map(|shot| {
@@ -175,33 +163,31 @@ impl Sequence {
     }
 }
 
-/// The shots to use: all but the Bernoulli ones beyond the number asked for.
-fn chosen(
+/// The shots that `options` ask for: all but the Bernoulli ones beyond their number.
+///
+/// # Errors
+/// [`CaptureError::NoBlack`], [`CaptureError::NoWhite`],
+/// [`CaptureError::MorePhotographsThanTaken`] or [`CaptureError::TooFewPhotographs`].
+pub(super) fn chosen(
+    folder: &Path,
     shots: &[Shot],
     options: &CaptureOptions,
-    manifest: &Path,
 ) -> Result<Vec<Shot>, CaptureError> {
-    let path = || manifest.to_owned();
-    let has = |role| shots.iter().any(|shot| shot.role == role);
-    if !has(Role::Black) {
-        return Err(CaptureError::NoBlack { path: path() });
-    }
-    if !has(Role::White) {
-        return Err(CaptureError::NoWhite { path: path() });
-    }
+    let manifest = folder.join(MANIFEST_FILE);
+    check_roles(shots, &manifest)?;
     let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
     let found = shots.iter().filter(is_bernoulli).count();
     let used = options.bernoulli.unwrap_or(found);
     if used > found {
         return Err(CaptureError::MorePhotographsThanTaken {
-            path: path(),
+            path: manifest,
             asked: used,
             found,
         });
     }
     if used < options.min_bernoulli {
         return Err(CaptureError::TooFewPhotographs {
-            path: path(),
+            path: manifest,
             used,
             needed: options.min_bernoulli,
         });
@@ -216,6 +202,19 @@ fn chosen(
         wanted
     };
     Ok(shots.iter().filter(|shot| wanted(shot)).cloned().collect())
+}
+
+/// Refuses shots without white or black.
+fn check_roles(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
+    let path = || manifest.to_owned();
+    let has = |role| shots.iter().any(|shot| shot.role == role);
+    if !has(Role::Black) {
+        return Err(CaptureError::NoBlack { path: path() });
+    }
+    if !has(Role::White) {
+        return Err(CaptureError::NoWhite { path: path() });
+    }
+    Ok(())
 }
 
 /// The grid that all patterns share.
