@@ -19,8 +19,11 @@
 //! checked before memory is taken, and whatever is wrong is a [`CaptureError`]
 //! with its place.
 
+mod curve;
 mod diagnostics;
 mod error;
+mod file_format;
+mod find;
 mod fine_flood;
 mod gray_code;
 mod manifest;
@@ -50,8 +53,11 @@ mod test_capture;
 #[cfg(test)]
 mod tests;
 
+pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
+pub use file_format::FileFormat;
+pub use find::find_photo;
 pub use fine_flood::FineFlood;
 pub use manifest::{MANIFEST_FILE, Manifest, Shot};
 pub use measurements::{ChannelMeasurements, Measurements};
@@ -59,7 +65,7 @@ pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
 pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
-pub use response::Response;
+pub use response::{Declared, Response};
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
@@ -116,7 +122,7 @@ pub fn read(
     let manifest = Manifest::read(folder)?;
     let settings = Settings::read(folder)?;
     let sequence = Sequence::read(folder, &manifest.shots, options)?;
-    let mut photographs = Photographs::new(folder, &sequence.shots, settings.camera.response)?;
+    let mut photographs = Photographs::new(folder, &sequence.shots, &settings.camera.reading())?;
     let white = &sequence.white().shots;
     let white_path = photographs.path(white[0]);
 

@@ -1,8 +1,8 @@
 //! All photographs of a capture, within a fixed amount of memory.
 
-use super::photo::{Photo, PhotoFormat};
+use super::photo::{Photo, PhotoFormat, Reading};
 use super::picture::Source;
-use super::{CaptureError, Response, Shot};
+use super::{CaptureError, Shot};
 use crate::progress::Progress;
 use rayon::prelude::*;
 use std::path::Path;
@@ -33,7 +33,7 @@ impl<'a> Photographs<'a> {
     pub(super) fn new(
         folder: &'a Path,
         shots: &'a [Shot],
-        response: Response,
+        reading: &Reading,
     ) -> Result<Self, CaptureError> {
         let Some(first) = shots.first() else {
             return Err(CaptureError::NoWhite {
@@ -41,7 +41,7 @@ impl<'a> Photographs<'a> {
             });
         };
         let path = folder.join(&first.photo);
-        let format = PhotoFormat::of_first(source(&path, first), response)?;
+        let format = PhotoFormat::of_first(source(&path, first), reading)?;
         let fits = format.bytes().saturating_mul(shots.len()) <= KEPT_BYTES;
         let batch = (BATCH_BYTES / format.decoding_bytes()).clamp(1, 16);
         Ok(Self {
@@ -161,7 +161,7 @@ fn source<'p>(path: &'p Path, shot: &Shot) -> Source<'p> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Manifest;
+    use super::super::{Manifest, Response};
     use super::super::test_capture::TestCapture;
     use super::*;
     use crate::progress::Silent;
@@ -172,7 +172,7 @@ mod tests {
         TestCapture::default().write(folder.path());
         let shots = Manifest::read(folder.path()).unwrap().shots;
         let order: Vec<usize> = (0..shots.len()).rev().collect();
-        let mut photographs = Photographs::new(folder.path(), &shots, Response::Linear).unwrap();
+        let mut photographs = Photographs::new(folder.path(), &shots, &Response::Linear.into()).unwrap();
         let collect = |photographs: &mut Photographs<'_>| {
             let mut seen = Vec::new();
             photographs
@@ -202,11 +202,11 @@ mod tests {
         for broken in [7, 4] {
             std::fs::write(folder.path().join(&shots[broken].photo), b"not a PNG").unwrap();
         }
-        let mut photographs = Photographs::new(folder.path(), &shots, Response::Linear).unwrap();
+        let mut photographs = Photographs::new(folder.path(), &shots, &Response::Linear.into()).unwrap();
         let all: Vec<usize> = (0..shots.len()).collect();
         let error = photographs.for_batches(&all, &Silent, |_| {}).unwrap_err();
         assert!(
-            error.to_string().contains("004.png: not a readable PNG"),
+            error.to_string().contains("004.png: it is not a PNG, TIFF"),
             "{error}"
         );
     }

@@ -278,7 +278,7 @@ mod tests {
         let shots = Manifest::read(folder.path()).unwrap().shots;
         let sequence = Sequence::read(folder.path(), &shots, &CaptureOptions::default()).unwrap();
         let mut photographs =
-            Photographs::new(folder.path(), &sequence.shots, Response::Linear).unwrap();
+            Photographs::new(folder.path(), &sequence.shots, &Response::Linear.into()).unwrap();
         let (width, height) = scene.camera();
         let own = |pixel: usize, cell: usize| {
             scene.overlap(pixel / width, cell / scene.cols)

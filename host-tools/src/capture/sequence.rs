@@ -1,6 +1,7 @@
 //! The patterns that were shown, checked against each other before any
 //! photograph is decoded.
 
+use super::find;
 use super::manifest::MANIFEST_FILE;
 use super::picture::Source;
 use super::{CaptureError, CaptureOptions, Pattern, Role, Shot};
@@ -75,14 +76,8 @@ impl Sequence {
         options: &CaptureOptions,
     ) -> Result<Self, CaptureError> {
         let manifest = folder.join(MANIFEST_FILE);
-        let shots = chosen(shots, options, &manifest)?;
-        for shot in &shots {
-            let path = folder.join(&shot.photo);
-            if matches!(path.try_exists(), Ok(false)) {
-                let (what, line) = ("photograph", shot.line);
-                return Err(CaptureError::MissingFile { path, what, line });
-            }
-        }
+        let mut shots = chosen(shots, options, &manifest)?;
+        find::resolve(folder, &mut shots)?;
         let patterns = shots
             .par_iter()
             .map(|shot| {
