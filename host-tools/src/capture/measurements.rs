@@ -1,7 +1,7 @@
 //! What the solver gets: projected patterns and what the camera saw of them,
 //! cell by cell.
 
-use super::{Diagnostics, NoiseModel, Registration, Role, Settings};
+use super::{Devices, Diagnostics, NoiseModel, Registration, Role, Settings};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
@@ -36,6 +36,8 @@ pub struct Measurements {
     pub flood: Vec<Vec<f32>>,
     /// The capture's `capture.toml`.
     pub settings: Settings,
+    /// Projector and camera: what `capture.toml` says and what was measured.
+    pub devices: Devices,
     /// What was left out and why, noise, linearity.
     pub diagnostics: Diagnostics,
 }

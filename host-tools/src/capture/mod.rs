@@ -12,6 +12,7 @@
 //!                              place                  where between the cells a pixel lies
 //!                              fine_flood             the flood photograph on a finer grid
 //!                              shot_light             one photograph to look at
+//! calibration.csv           -> calibration            what measures the devices
 //! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
 //!
@@ -19,6 +20,7 @@
 //! checked before memory is taken, and whatever is wrong is a [`CaptureError`]
 //! with its place.
 
+pub mod calibration;
 mod curve;
 mod diagnostics;
 mod error;
@@ -35,6 +37,8 @@ mod pattern;
 mod photo;
 mod photographs;
 mod picture;
+#[cfg(test)]
+mod picture_tests;
 mod place;
 mod reference;
 #[cfg(test)]
@@ -53,13 +57,16 @@ mod test_capture;
 #[cfg(test)]
 mod tests;
 
+pub use calibration::{
+    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, Devices, RampChannel,
+};
 pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
 pub use file_format::FileFormat;
 pub use find::find_photo;
 pub use fine_flood::FineFlood;
-pub use manifest::{MANIFEST_FILE, Manifest, Shot};
+pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
@@ -177,6 +184,8 @@ pub fn read(
     }
     let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
     let diagnostics = Diagnostics {
+        file: photographs.format.file,
+        bits: photographs.format.bits,
         photographs: sequence.shots.len(),
         bernoulli: sequence.bernoulli().len(),
         bernoulli_taken: manifest.shots.iter().filter(is_bernoulli).count(),
@@ -200,6 +209,7 @@ pub fn read(
         live: cells.live,
         registration: registered.registration,
         flood,
+        devices: Devices::declared(&settings),
         settings,
         diagnostics,
     })

@@ -107,7 +107,7 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::tests::source;
+    use super::super::picture_tests::source;
     use super::*;
     use image::{DynamicImage, GrayImage, ImageBuffer, Luma, RgbImage};
 

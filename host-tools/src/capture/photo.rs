@@ -227,7 +227,7 @@ fn light_table(response: &DeviceResponse, full_scale: u16) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::super::Response;
-    use super::super::picture::tests::source;
+    use super::super::picture_tests::source;
     use super::*;
     use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 

@@ -368,7 +368,8 @@ const fn kind_of(error: &CaptureError) -> Kind {
         | CaptureError::NoLight { .. }
         | CaptureError::Overexposed { .. }
         | CaptureError::NotLinear { .. }
-        | CaptureError::NothingRegistered { .. } => Kind::Photographs,
+        | CaptureError::NothingRegistered { .. }
+        | CaptureError::MissingPhotographs { .. } => Kind::Photographs,
         _ => Kind::Capture,
     }
 }
