@@ -82,6 +82,14 @@ pub enum CaptureError {
         /// What is wrong, with the line.
         reason: String,
     },
+    /// A response shall be measured, and the photographs do not tell it.
+    #[error("{}: {device}.response is to be measured, but the photographs do not tell it", path.display())]
+    ResponseUnknown {
+        /// The `capture.toml`.
+        path: PathBuf,
+        /// "camera" or "projector".
+        device: &'static str,
+    },
     /// A picture cannot be decoded.
     #[error("{}: {reason}", path.display())]
     Picture {
@@ -358,8 +366,17 @@ impl CaptureError {
                 "Put the file there, or remove its line if it was never taken."
             }
             Self::Settings { .. } => {
-                "Correct capture.toml; it may hold camera.response, projector.response and \
-                 scene.name."
+                "Correct capture.toml; it may hold camera.response, camera.full_scale, \
+                 projector.response, projector.blur and scene.name."
+            }
+            Self::ResponseUnknown {
+                device: "camera", ..
+            } => {
+                "Photograph a few patterns with two or three exposures, or write the camera's \
+                 response (\"srgb\" for camera JPEGs)."
+            }
+            Self::ResponseUnknown { .. } => {
+                "Photograph the pictures of calibration.csv, or write the projector's response."
             }
             Self::Picture { .. } => {
                 "Copy or export the picture again: photographs as PNG, TIFF, JPEG, OpenEXR, PGM \

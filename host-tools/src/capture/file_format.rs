@@ -44,9 +44,12 @@ impl FileFormat {
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Some(Self::Tiff),
             [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
             [0x76, 0x2f, 0x31, 0x01, ..] => Some(Self::OpenExr),
-            [b'P', b'2' | b'3' | b'5' | b'6', b' ' | b'\t' | b'\r' | b'\n' | b'#', ..] => {
-                Some(Self::Netpbm)
-            }
+            [
+                b'P',
+                b'2' | b'3' | b'5' | b'6',
+                b' ' | b'\t' | b'\r' | b'\n' | b'#',
+                ..,
+            ] => Some(Self::Netpbm),
             _ => None,
         }
     }

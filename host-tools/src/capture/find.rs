@@ -4,7 +4,7 @@
 //! then writes `photos/007.jpg` or `photos/007.TIF`. A file under the very name
 //! counts; else the one picture file of the same stem.
 
-use super::{CaptureError, FileFormat, Shot};
+use super::{CaptureError, FileFormat, ShotOf};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -55,10 +55,14 @@ fn stands_for(name: &Path, stem: Option<&OsStr>) -> bool {
 /// # Errors
 /// [`CaptureError::MissingPhotographs`] with all that are missing,
 /// [`CaptureError::Ambiguous`].
-pub(super) fn resolve(folder: &Path, shots: &mut [Shot]) -> Result<(), CaptureError> {
-    let of = shots.len();
+pub(super) fn resolve<'s, R: 's>(
+    folder: &Path,
+    shots: impl IntoIterator<Item = &'s mut ShotOf<R>>,
+) -> Result<(), CaptureError> {
+    let mut of = 0;
     let mut missing = Vec::new();
     for shot in shots {
+        of += 1;
         match find_photo(folder, &shot.photo)? {
             Some(found) => shot.photo = found,
             None => missing.push(shot.photo.display().to_string()),

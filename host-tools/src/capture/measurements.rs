@@ -20,7 +20,7 @@ pub struct Measurements {
     /// [`Role::White`], none is [`Role::Black`].
     pub roles: Vec<Role>,
     /// Photographs averaged for each column of `patterns`, length `m`: more than
-    /// one where white or a Gray code pattern was photographed again.
+    /// one where a pattern was photographed again. A bracket counts as one.
     pub repeats: Vec<u32>,
     /// One entry (grey) or three (red, green, blue).
     pub channels: Vec<ChannelMeasurements>,
@@ -52,7 +52,7 @@ impl Measurements {
 #[derive(Clone, Debug)]
 pub struct ChannelMeasurements {
     /// Observed light `C`, `N x m`, in camera units (1 is the photograph's full
-    /// scale), mean over the cell's pixels, ambient removed.
+    /// scale, at the longest exposure if there are several), mean over the cell's pixels, ambient removed.
     pub observations: DMatrix<f64>,
     /// Observed light under black, length `N`, camera units.
     pub ambient: Vec<f64>,

@@ -27,7 +27,9 @@ mod error;
 mod file_format;
 mod find;
 mod fine_flood;
+mod frame;
 mod gray_code;
+mod light;
 mod manifest;
 mod measure;
 mod measurements;
@@ -58,7 +60,8 @@ mod test_capture;
 mod tests;
 
 pub use calibration::{
-    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, Devices, RampChannel,
+    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, Devices, Probe,
+    RampChannel,
 };
 pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
@@ -80,9 +83,9 @@ pub use shot_light::ShotLight;
 pub use shown::{columns, shown};
 
 use crate::progress::Progress;
+use light::Light;
 use measure::CellPixels;
 use nalgebra::DMatrix;
-use photographs::Photographs;
 use sequence::Sequence;
 use std::path::Path;
 
@@ -129,23 +132,24 @@ pub fn read(
     let manifest = Manifest::read(folder)?;
     let settings = Settings::read(folder)?;
     let sequence = Sequence::read(folder, &manifest.shots, options)?;
-    let mut photographs = Photographs::new(folder, &sequence.shots, &settings.camera.reading())?;
-    let white = &sequence.white().shots;
-    let white_path = photographs.path(white[0]);
-
-    photographs.prefetch(progress)?;
+    let mut light = Light::read(folder, &sequence, &settings, progress)?;
+    let white_path = light.photographs.path(sequence.white().shots[0]);
+    check_exposure(&light.flood, &light.black, &light.saturated, &white_path)?;
+    let mut devices = light.measure_devices(folder, &sequence, &settings, progress)?;
+    let Light {
+        mut photographs,
+        mut flood,
+        black,
+        saturated,
+        taken,
+        ..
+    } = light;
     let count = |shots: usize| shots as u64;
     let coded: usize = sequence.views[sequence.coded()]
         .iter()
         .map(|v| v.shots.len())
         .sum();
-    progress.begin(
-        "decoding the Gray code",
-        count(white.len() + sequence.black.len() + coded),
-    );
-    let (mut flood, saturated) = photographs.mean(white, progress)?;
-    let (black, _) = photographs.mean(&sequence.black, progress)?;
-    check_exposure(&flood, &black, &saturated, &white_path)?;
+    progress.begin("decoding the Gray code", count(coded));
     let gray = gray_code::decode(&sequence, &mut photographs, &flood, &black, progress)?;
     progress.end();
 
@@ -182,11 +186,17 @@ pub fn read(
             *flood -= black;
         }
     }
+    if let Some((probe, lit)) = &taken.probe {
+        let flood = gray_code::channel_sum(&flood);
+        let registration = &registered.registration;
+        let probe = Probe::measure(sequence.grid, lit, registration, probe, &flood);
+        devices.take_probe(probe, settings.projector.blur);
+    }
     let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
     let diagnostics = Diagnostics {
         file: photographs.format.file,
         bits: photographs.format.bits,
-        photographs: sequence.shots.len(),
+        photographs: sequence.frames.iter().map(|frame| frame.shots.len()).sum(),
         bernoulli: sequence.bernoulli().len(),
         bernoulli_taken: manifest.shots.iter().filter(is_bernoulli).count(),
         method: registered.method,
@@ -209,7 +219,7 @@ pub fn read(
         live: cells.live,
         registration: registered.registration,
         flood,
-        devices: Devices::declared(&settings),
+        devices,
         settings,
         diagnostics,
     })

@@ -275,7 +275,10 @@ impl GreyFloat {
         };
         let pixels = self.size.0 as usize * self.size.1 as usize;
         if values.len() != pixels {
-            return Err(format!("it has {} values for {pixels} pixels", values.len()));
+            return Err(format!(
+                "it has {} values for {pixels} pixels",
+                values.len()
+            ));
         }
         Ok(Samples::Float(values))
     }

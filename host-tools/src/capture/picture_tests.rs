@@ -3,9 +3,9 @@
 use super::picture::*;
 use super::{CaptureError, FileFormat};
 use image::{DynamicImage, ImageFormat};
+use proptest::prelude::*;
 use std::io::Cursor;
 use std::path::Path;
-use proptest::prelude::*;
 
 pub(super) fn source(path: &Path) -> Source<'_> {
     Source {
@@ -195,8 +195,7 @@ fn a_folder_and_a_missing_file_are_told_apart() {
 
 #[test]
 fn every_truncation_of_a_picture_is_refused() {
-    let bytes =
-        png(&image::GrayImage::from_fn(9, 9, |x, y| image::Luma([(x * y) as u8])).into());
+    let bytes = png(&image::GrayImage::from_fn(9, 9, |x, y| image::Luma([(x * y) as u8])).into());
     // The last 12 bytes are the empty end chunk.
     for length in 0..bytes.len() - 12 {
         assert!(

@@ -143,7 +143,10 @@ impl fmt::Display for Name {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (low, high) = (Response::GAMMA.start(), Response::GAMMA.end());
         let measure = if self.measure { "\"measure\", " } else { "" };
-        write!(f, "\"linear\", \"srgb\", {measure}or a gamma from {low} to {high}")
+        write!(
+            f,
+            "\"linear\", \"srgb\", {measure}or a gamma from {low} to {high}"
+        )
     }
 }
 

@@ -2,6 +2,7 @@
 //! photograph is decoded.
 
 use super::find;
+use super::frame::{self, Frame};
 use super::manifest::MANIFEST_FILE;
 use super::picture::Source;
 use super::{CaptureError, CaptureOptions, Pattern, Role, Shot};
@@ -17,6 +18,11 @@ use std::path::{Path, PathBuf};
 /// patterns tell a cell's light from that of the others in its column or row;
 /// and a solve keeps some of them back to choose its sparsity with.
 pub const MIN_BERNOULLI: usize = 10;
+
+/// Cells from which on two equal Bernoulli patterns are the same one shown again:
+/// by chance, one in 16 million pairs is. On fewer cells chance draws patterns
+/// twice, and each draw counts.
+const FEWEST_FOR_REPEATS: usize = 24;
 
 /// One axis of the grid.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -41,8 +47,8 @@ impl fmt::Display for Axis {
 pub(super) struct View {
     /// What it was shown for; never black.
     pub(super) role: Role,
-    /// Photographs of it, as indices into the used shots. More than one only
-    /// where a role other than Bernoulli was photographed again.
+    /// Frames of it, as indices into the used ones. More than one where it was
+    /// photographed again.
     pub(super) shots: Vec<usize>,
     /// Whether each cell is lit, length `N`.
     pub(super) lit: Vec<bool>,
@@ -52,7 +58,11 @@ pub(super) struct View {
 #[derive(Clone, Debug)]
 pub(super) struct Sequence {
     pub(super) grid: Grid,
-    /// Used shots, in the order they were taken.
+    /// Used frames, in the order they were taken.
+    pub(super) frames: Vec<Frame>,
+    /// The longest exposure, if exposures are given.
+    pub(super) longest: Option<f64>,
+    /// The first photograph of each frame.
     pub(super) shots: Vec<Shot>,
     /// Photographs of black, as indices into `shots`, at least one.
     pub(super) black: Vec<usize>,
@@ -76,19 +86,16 @@ impl Sequence {
         options: &CaptureOptions,
     ) -> Result<Self, CaptureError> {
         let manifest = folder.join(MANIFEST_FILE);
-        let mut shots = chosen(shots, options, &manifest)?;
-        find::resolve(folder, &mut shots)?;
-        let patterns = shots
-            .par_iter()
-            .map(|shot| {
-                Pattern::read(Source {
-                    path: &folder.join(&shot.pattern),
-                    what: "pattern",
-                    line: shot.line,
-                })
-            })
-            .collect::<Vec<_>>();
-        let patterns = patterns.into_iter().collect::<Result<Vec<_>, _>>()?;
+        check_levels(shots, &manifest)?;
+        let longest = frame::longest(shots, &manifest)?;
+        let frames = match longest {
+            Some(longest) => frame::bracketed(shots, &read_patterns(folder, shots)?, longest),
+            None => Frame::of_each(shots, None),
+        };
+        let mut frames = chosen(frames, options, &manifest)?;
+        find::resolve(folder, frames.iter_mut().flat_map(|frame| &mut frame.shots))?;
+        let shots: Vec<Shot> = frames.iter().map(|frame| frame.shots[0].clone()).collect();
+        let patterns = read_patterns(folder, &shots)?;
         let grid = common_grid(folder, &shots, &patterns)?;
         let bits = [
             code_bits(Axis::Column, grid.cols(), &shots, &manifest)?,
@@ -97,14 +104,24 @@ impl Sequence {
         for (shot, pattern) in shots.iter().zip(&patterns) {
             check_role(folder, shot, pattern, grid, bits)?;
         }
-        Ok(Self::grouped(grid, bits, shots, patterns))
+        let mut sequence = Self::grouped(grid, bits, frames, shots, patterns);
+        sequence.longest = longest;
+        Ok(sequence)
     }
 
     /// Puts photographs of one pattern together.
-    fn grouped(grid: Grid, bits: [u8; 2], shots: Vec<Shot>, patterns: Vec<Pattern>) -> Self {
+    fn grouped(
+        grid: Grid,
+        bits: [u8; 2],
+        frames: Vec<Frame>,
+        shots: Vec<Shot>,
+        patterns: Vec<Pattern>,
+    ) -> Self {
         let mut black = Vec::new();
         let mut coded: Vec<View> = Vec::new();
-        let mut bernoulli = Vec::new();
+        let mut bernoulli: Vec<View> = Vec::new();
+        let again =
+            |known: &View, view: &View| grid.cells() >= FEWEST_FOR_REPEATS && known.lit == view.lit;
         for (at, (shot, pattern)) in shots.iter().zip(patterns).enumerate() {
             let role = shot.role;
             let view = View {
@@ -114,7 +131,10 @@ impl Sequence {
             };
             match role {
                 Role::Black => black.push(at),
-                Role::Bernoulli => bernoulli.push(view),
+                Role::Bernoulli => match bernoulli.iter_mut().find(|known| again(known, &view)) {
+                    Some(known) => known.shots.push(at),
+                    None => bernoulli.push(view),
+                },
                 _ => match coded.iter_mut().find(|view| view.role == role) {
                     Some(view) => view.shots.push(at),
                     None => coded.push(view),
@@ -127,6 +147,8 @@ impl Sequence {
         coded.append(&mut bernoulli);
         Self {
             grid,
+            frames,
+            longest: None,
             shots,
             black,
             views: coded,
@@ -170,12 +192,20 @@ impl Sequence {
     }
 }
 
-/// The shots to use: all but the Bernoulli ones beyond the number asked for.
-fn chosen(
-    shots: &[Shot],
-    options: &CaptureOptions,
-    manifest: &Path,
-) -> Result<Vec<Shot>, CaptureError> {
+fn read_patterns(folder: &Path, shots: &[Shot]) -> Result<Vec<Pattern>, CaptureError> {
+    let read = |shot: &Shot| {
+        Pattern::read(Source {
+            path: &folder.join(&shot.pattern),
+            what: "pattern",
+            line: shot.line,
+        })
+    };
+    let patterns: Vec<_> = shots.par_iter().map(read).collect();
+    patterns.into_iter().collect()
+}
+
+/// Refuses a capture without black or without white.
+fn check_levels(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
     let path = || manifest.to_owned();
     let has = |role| shots.iter().any(|shot| shot.role == role);
     if !has(Role::Black) {
@@ -184,8 +214,18 @@ fn chosen(
     if !has(Role::White) {
         return Err(CaptureError::NoWhite { path: path() });
     }
-    let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
-    let found = shots.iter().filter(is_bernoulli).count();
+    Ok(())
+}
+
+/// The frames to use: all but the Bernoulli ones beyond the number asked for.
+fn chosen(
+    frames: Vec<Frame>,
+    options: &CaptureOptions,
+    manifest: &Path,
+) -> Result<Vec<Frame>, CaptureError> {
+    let path = || manifest.to_owned();
+    let is_bernoulli = |frame: &Frame| frame.shots[0].role == Role::Bernoulli;
+    let found = frames.iter().filter(|frame| is_bernoulli(frame)).count();
     let used = options.bernoulli.unwrap_or(found);
     if used > found {
         return Err(CaptureError::MorePhotographsThanTaken {
@@ -202,15 +242,15 @@ fn chosen(
         });
     }
     let mut left = used;
-    let mut wanted = |shot: &&Shot| {
-        if shot.role != Role::Bernoulli {
+    let mut wanted = |frame: &Frame| {
+        if !is_bernoulli(frame) {
             return true;
         }
         let wanted = left > 0;
         left = left.saturating_sub(1);
         wanted
     };
-    Ok(shots.iter().filter(|shot| wanted(shot)).cloned().collect())
+    Ok(frames.into_iter().filter(|frame| wanted(frame)).collect())
 }
 
 /// The grid that all patterns share.

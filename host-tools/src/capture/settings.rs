@@ -49,10 +49,7 @@ pub struct CameraSettings {
     pub response: Declared,
     /// Value of a floating point photograph at the camera's full scale: 1 as raw
     /// converters write it; larger for light merged from exposures elsewhere.
-    #[serde(
-        deserialize_with = "full_scale",
-        skip_serializing_if = "is_one"
-    )]
+    #[serde(deserialize_with = "full_scale", skip_serializing_if = "is_one")]
     pub full_scale: f64,
 }
 
