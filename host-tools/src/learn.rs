@@ -93,7 +93,7 @@ pub fn learn_measured(
     progress.begin("compiling the table", 0);
     let fine = compile::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
     let options = CompileOptions {
-        projector: measurements.settings.projector.response,
+        projector: measurements.devices.projector.clone(),
         reference_white,
         inverse_error: report.predicted_error(),
         provenance: provenance(capture, &measurements, &report),

@@ -82,13 +82,51 @@ pub enum CaptureError {
         /// What is wrong, with the line.
         reason: String,
     },
+    /// A response shall be measured, and the photographs do not tell it.
+    #[error("{}: {device}.response is to be measured, but the photographs do not tell it", path.display())]
+    ResponseUnknown {
+        /// The `capture.toml`.
+        path: PathBuf,
+        /// "camera" or "projector".
+        device: &'static str,
+    },
     /// A picture cannot be decoded.
-    #[error("{}: not a readable PNG: {reason}", path.display())]
-    Png {
+    #[error("{}: {reason}", path.display())]
+    Picture {
         /// The picture.
         path: PathBuf,
-        /// What the decoder says.
+        /// What is wrong, with what the decoder says.
         reason: String,
+    },
+    /// A floating point picture has a value that is no number.
+    #[error("{}: the value at row {row}, column {col} is not a finite number", path.display())]
+    NotFinite {
+        /// The picture.
+        path: PathBuf,
+        /// Row of the first such pixel.
+        row: u32,
+        /// Column of the first such pixel.
+        col: u32,
+    },
+    /// A photograph is missing under its name, and several could stand for it.
+    #[error("{}: missing, and both {} and {} could stand for it", path.display(), first.display(), second.display())]
+    Ambiguous {
+        /// The file that the manifest names.
+        path: PathBuf,
+        /// One candidate.
+        first: PathBuf,
+        /// Another.
+        second: PathBuf,
+    },
+    /// Photographs that `capture.csv` names are not there.
+    #[error("{}: {} of {of} photographs missing: {}", folder.display(), missing.len(), missing.join(", "))]
+    MissingPhotographs {
+        /// The capture folder.
+        folder: PathBuf,
+        /// Names of all that are missing, as the manifest has them.
+        missing: Vec<String>,
+        /// Photographs that the manifest names.
+        of: usize,
     },
     /// A picture says it is larger than any camera's.
     #[error("{}: {width} x {height} pixels; at most {limit} pixels are read", path.display())]
@@ -315,10 +353,27 @@ impl CaptureError {
                 "Put the file there, or remove its line if it was never taken."
             }
             Self::Settings { .. } => {
-                "Correct capture.toml; it may hold camera.response, projector.response and \
-                 scene.name."
+                "Correct capture.toml; it may hold camera.response, camera.full_scale, \
+                 projector.response, projector.blur and scene.name."
             }
-            Self::Png { .. } => "Copy or export the picture again, as PNG with 8 or 16 bit.",
+            Self::ResponseUnknown {
+                device: "camera", ..
+            } => {
+                "Photograph a few patterns with two or three exposures, or write the camera's \
+                 response (\"srgb\" for camera JPEGs)."
+            }
+            Self::ResponseUnknown { .. } => {
+                "Photograph the pictures of calibration.csv, or write the projector's response."
+            }
+            Self::Picture { .. } => {
+                "Copy or export the picture again: photographs as PNG, TIFF, JPEG, OpenEXR, PGM \
+                 or PPM, patterns as PNG with 8 bit."
+            }
+            Self::NotFinite { .. } => "Export the picture again, without undefined pixels.",
+            Self::Ambiguous { .. } => "Name the right one in capture.csv, or remove the other.",
+            Self::MissingPhotographs { .. } => {
+                "Take the missing photographs: `iltm capture` goes on where it stopped."
+            }
             Self::TooLarge { .. } => "Scale the photographs down, all by the same factor.",
             Self::Transparent { .. } => "Export the picture without an alpha channel.",
             Self::PatternValue { .. } => {

@@ -20,14 +20,19 @@
 //! checked before memory is taken, and whatever is wrong is a [`CaptureError`]
 //! with its place.
 
-mod calibration;
+pub mod calibration;
 mod cell_model;
+mod curve;
 mod diagnostics;
 mod drift;
 mod error;
+mod file_format;
+mod find;
 mod fine_flood;
+mod frame;
 mod gates;
 mod gray_code;
+mod light;
 mod manifest;
 mod measure;
 mod measurements;
@@ -37,6 +42,8 @@ mod pattern;
 mod photo;
 mod photographs;
 mod picture;
+#[cfg(test)]
+mod picture_tests;
 mod place;
 mod reference;
 #[cfg(test)]
@@ -57,10 +64,14 @@ mod test_capture;
 mod tests;
 
 pub use calibration::{
-    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, RampChannel,
+    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, Devices, Probe,
+    RampChannel,
 };
+pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
+pub use file_format::FileFormat;
+pub use find::find_photo;
 pub use fine_flood::FineFlood;
 pub use gates::{Evidence, Gate, GateName, Verdict};
 pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
@@ -69,7 +80,7 @@ pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
 pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
-pub use response::Response;
+pub use response::{Declared, Response};
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
@@ -77,11 +88,13 @@ pub use shot_light::ShotLight;
 pub use shown::{columns, shown};
 
 use crate::progress::Progress;
+use gates::cause;
+use gates::superposition::Sums;
+use light::Light;
 use measure::CellPixels;
 use nalgebra::DMatrix;
-use photographs::Photographs;
 use sampled::Sampled;
-use sequence::Sequence;
+use sequence::{Chosen, Sequence};
 use std::path::Path;
 
 /// How to read a capture.
@@ -158,11 +171,11 @@ pub fn examine(
 ) -> Result<Examined, CaptureError> {
     let manifest = Manifest::read(folder)?;
     let settings = Settings::read(folder)?;
-    let wanted = sequence::chosen(folder, &manifest.shots, options)?;
-    let (complete, present) = gates::complete::judge(folder, &wanted);
+    let mut chosen = Chosen::new(folder, &manifest.shots, options)?;
+    let complete = gates::complete::judge(folder, &mut chosen.frames)?;
     let mut gates = vec![complete];
     // What is there says more, if it is enough to go on with.
-    let sequence = match Sequence::read(folder, present) {
+    let sequence = match Sequence::read(folder, chosen) {
         Err(_) if gates[0].fails() => {
             let measurements = None;
             return Ok(Examined {
@@ -173,15 +186,14 @@ pub fn examine(
         sequence => sequence?,
     };
     let measured = measure_all(folder, &sequence, &settings, &mut gates, progress);
-    gates.sort_by_key(|gate| gate.name);
     let mut measurements = match measured {
         Err(error @ (CaptureError::PhotoSize { .. } | CaptureError::PhotoChannels { .. })) => {
             gates.push(gates::format::refused(&error));
-            gates.sort_by_key(|gate| gate.name);
             None
         }
         measured => measured?,
     };
+    gates::settle(&mut gates, None);
     let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
     if let Some(measurements) = &mut measurements {
         let taken = manifest.shots.iter().filter(is_bernoulli).count();
@@ -201,11 +213,18 @@ fn measure_all(
     gates: &mut Vec<Gate>,
     progress: &dyn Progress,
 ) -> Result<Option<Measurements>, CaptureError> {
-    let mut photographs = Photographs::new(folder, &sequence.shots, settings.camera.response)?;
-    let white = &sequence.white().shots;
-
-    photographs.prefetch(progress)?;
-    gates.push(gates::format::judge(folder, &sequence.shots));
+    let mut light = Light::read(folder, sequence, settings, progress)?;
+    let format = &light.photographs.format;
+    gates.push(gates::format::judge(format.file, format.bits));
+    let mut devices = light.measure_devices(folder, sequence, settings, progress)?;
+    let Light {
+        mut photographs,
+        mut flood,
+        black,
+        mut saturated,
+        taken,
+        ..
+    } = light;
     let count = |shots: usize| shots as u64;
     progress.begin(
         "comparing photographs and patterns",
@@ -219,12 +238,7 @@ fn measure_all(
         .iter()
         .map(|v| v.shots.len())
         .sum();
-    progress.begin(
-        "decoding the Gray code",
-        count(white.len() + sequence.black.len() + coded),
-    );
-    let (mut flood, mut saturated) = photographs.mean(white, progress)?;
-    let (black, _) = photographs.mean(&sequence.black, progress)?;
+    progress.begin("decoding the Gray code", count(coded));
     let clipped = gates::saturation::find(
         sequence,
         &mut photographs,
@@ -270,7 +284,15 @@ fn measure_all(
     gates.push(gates::flicker::judge(sequence, registration, &steadiness));
     let superposition =
         gates::superposition::median(gates::superposition::excesses(sequence, channels));
-    gates.push(gates::superposition::judge(sequence, channels, &cells.live));
+    let sums = Sums::new(sequence, channels, &cells.live);
+    let wrong = sums.as_ref().is_some_and(Sums::fail);
+    let cause = wrong.then(|| cause::find(sequence, &cells.live, &light.channels, &sampled));
+    gates.push(gates::superposition::judge(
+        sequence,
+        sums.as_ref(),
+        cause,
+        steadiness.excess,
+    ));
     gates.push(gates::noise::judge(
         sequence.grid,
         channels,
@@ -282,8 +304,17 @@ fn measure_all(
             *flood -= black;
         }
     }
+    if let Some((probe, lit)) = &taken.probe {
+        let flood = gray_code::channel_sum(&flood);
+        let probe = Probe::measure(sequence.grid, lit, registration, probe, &flood);
+        devices.take_probe(probe, settings.projector.blur);
+    }
+    gates.push(gates::response::judge(&devices, cause));
+    gates::settle(gates, cause);
     let diagnostics = Diagnostics {
-        photographs: sequence.shots.len(),
+        file: photographs.format.file,
+        bits: photographs.format.bits,
+        photographs: sequence.frames.iter().map(|frame| frame.shots.len()).sum(),
         bernoulli: sequence.bernoulli().len(),
         bernoulli_taken: sequence.bernoulli().len(),
         method: registered.method,
@@ -307,6 +338,7 @@ fn measure_all(
         live: cells.live,
         registration: registered.registration,
         flood,
+        devices,
         settings: settings.clone(),
         diagnostics,
     }))

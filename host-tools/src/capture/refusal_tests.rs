@@ -56,11 +56,15 @@ fn missing_roles_and_bits_are_named() {
 }
 
 #[test]
-fn missing_files_are_named_with_their_line() {
-    let error = refusal(|folder, _| fs::remove_file(folder.join("photos/003.png")).unwrap());
+fn missing_files_are_all_named() {
+    let error = refusal(|folder, manifest| {
+        fs::remove_file(folder.join("photos/003.png")).unwrap();
+        fs::remove_file(folder.join("photos/011.png")).unwrap();
+        assert_eq!(manifest.shots.len(), 44);
+    });
     let text = error.to_string();
     assert!(
-        text.contains("missing: photos/003.png, named in line 5 of capture.csv"),
+        text.contains("2 of 44 photographs missing: photos/003.png, photos/011.png"),
         "{text}"
     );
     let error = refusal(|folder, _| fs::remove_file(folder.join("patterns/003.png")).unwrap());

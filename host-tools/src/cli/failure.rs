@@ -377,7 +377,8 @@ pub(super) const fn kind_of(error: &CaptureError) -> Kind {
         | CaptureError::BlackIndex { .. } => Kind::Usage,
         CaptureError::TooFewPhotographs { .. }
         | CaptureError::NoLight { .. }
-        | CaptureError::Refused { .. } => Kind::Photographs,
+        | CaptureError::Refused { .. }
+        | CaptureError::MissingPhotographs { .. } => Kind::Photographs,
         _ => Kind::Capture,
     }
 }

@@ -1,0 +1,96 @@
+//! Gate `response`: the declared responses are those of the devices, and the
+//! projector shows a colour as the sum of its primaries.
+
+use super::super::{Devices, RampChannel};
+use super::cause::Cause;
+use super::{Evidence, Gate, GateName, Verdict};
+
+/// Misfit of the declared camera response, where another one is clearly better.
+const WARN: f64 = 0.01;
+const MOST: f64 = 0.03;
+
+/// Steps of 255 that the projector's measured response may be off the declared one.
+const WARN_STEPS: f64 = 2.5;
+const MOST_STEPS: f64 = 8.0;
+
+/// Judges what was measured of the devices; `cause` is why light does not add up.
+pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
+    let name = GateName::Response;
+    // A camera that exposes for the picture looks like one with another curve.
+    let curved = matches!(cause, None | Some(Cause::Curve { .. } | Cause::Unknown));
+    let camera = devices
+        .camera_fit
+        .as_ref()
+        .filter(|fit| curved && fit.contradicts());
+    let steps = devices.projector_steps();
+    let complaints = devices
+        .ramp
+        .as_ref()
+        .map_or_else(Vec::new, |r| r.complaints());
+    let gate = |verdict, number, limit, unit, what, next_step| Gate {
+        name,
+        verdict,
+        number,
+        limit,
+        unit,
+        what,
+        next_step,
+        evidence: evidence(devices),
+    };
+    let camera_verdict = camera.map(|fit| Verdict::of(fit.declared_misfit, WARN, MOST));
+    let steps_verdict = steps.map(|steps| Verdict::of(steps, WARN_STEPS, MOST_STEPS));
+    if let Some(complaint) = complaints.first() {
+        let next_step = "Choose the projector's sRGB, film or photo mode, switch off dynamic \
+             contrast, iris, brilliant colour and eco modes, and take the capture again.";
+        let number = complaints.len() as f64;
+        let what = complaint.clone();
+        return gate(Verdict::Fail, number, 0.0, "complaints", what, next_step);
+    }
+    if let (Some(fit), Some(verdict @ (Verdict::Warn | Verdict::Fail))) = (camera, camera_verdict) {
+        let what = format!(
+            "the camera's gamma is not the declared one: {}",
+            fit.words()
+        );
+        let next_step = "Write the measured response into capture.toml ([camera] response), or \
+             \"measure\", and check again; photographs need not be taken again.";
+        let number = 100.0 * fit.declared_misfit;
+        return gate(verdict, number, 100.0 * MOST, "%", what, next_step);
+    }
+    if let (Some(steps), Some(verdict)) = (steps, steps_verdict) {
+        let what = format!(
+            "the projector's measured response is {steps:.1} steps of 255 off the declared one \
+             (its gamma)"
+        );
+        let next_step = match verdict {
+            Verdict::Pass => "",
+            _ => {
+                "Write [projector] response = \"measure\" into capture.toml, or set the projector's \
+                 gamma to the declared one."
+            }
+        };
+        return gate(verdict, steps, MOST_STEPS, "steps", what, next_step);
+    }
+    match &devices.camera_fit {
+        Some(fit) => {
+            let number = 100.0 * fit.declared_misfit;
+            gate(Verdict::Pass, number, 100.0 * MOST, "%", fit.words(), "")
+        }
+        None => Gate::not_judged(name, "there are no photographs to measure the responses by"),
+    }
+}
+
+/// The ramp of white.
+fn evidence(devices: &Devices) -> Evidence {
+    let Some(ramp) = &devices.ramp else {
+        return Evidence::None;
+    };
+    let white = (ramp.points.iter()).filter(|point| point.channel == RampChannel::White);
+    let points: Vec<(f64, f64)> = white
+        .map(|point| (f64::from(point.level), point.light.iter().sum()))
+        .collect();
+    Evidence::Curve {
+        x: "projector input, of 255",
+        y: "light of white",
+        points,
+    }
+}
