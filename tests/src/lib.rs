@@ -7,6 +7,7 @@ pub mod fake_device;
 pub mod fake_tables;
 pub mod firmware;
 pub mod fuzz;
+pub mod gates;
 pub mod hard_cases;
 pub mod hard_frames;
 pub mod instructions;

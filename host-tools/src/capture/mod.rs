@@ -30,6 +30,8 @@ mod file_format;
 mod find;
 mod fine_flood;
 mod frame;
+#[cfg(test)]
+mod gate_tests;
 mod gates;
 mod gray_code;
 mod light;

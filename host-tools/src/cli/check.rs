@@ -2,12 +2,18 @@
 
 use super::args::Check;
 use super::failure::{Failure, Kind};
-use super::output::Output;
+use super::output::{Output, cannot_write, write_file};
 use super::progress::progress;
 use crate::capture::{self, CaptureOptions, Examined, Gate, Verdict};
 use crate::learn::LearnError;
+use crate::report;
 use serde_json::{Value, json};
 use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+/// The page's name in the folder that `-o` gives.
+const PAGE_FILE: &str = "check.html";
 
 pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let options = CaptureOptions {
@@ -21,13 +27,24 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     bars.end();
     let examined = examined.map_err(LearnError::Capture)?;
     let failed = failed(&examined.gates);
+    let page = arguments.output.as_deref().map(|folder| {
+        fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+        let page = folder.join(PAGE_FILE);
+        let html = report::gates::page(&name(&arguments.capture), &examined.gates);
+        write_file(&page, html.as_bytes()).map(|()| page)
+    });
+    let page = page.transpose()?;
     let data = json!({
         "capture": arguments.capture.display().to_string(),
         "pass": failed.is_empty(),
         "gates": gates(&examined.gates),
         "cells": cells(&examined),
+        "page": page.as_ref().map(|page| page.display().to_string()),
     });
-    let text = text(&examined.gates);
+    let mut text = text(&examined.gates);
+    if let Some(page) = &page {
+        let _ = writeln!(text, "{}: what each gate saw", page.display());
+    }
     if failed.is_empty() {
         output.result(&data, &text);
         return Ok(());
@@ -36,6 +53,13 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let mut failure = refusal(&arguments.capture.display().to_string(), &failed);
     failure.data = Some(Box::new(data));
     Err(failure)
+}
+
+/// The capture's name for people.
+fn name(capture: &Path) -> String {
+    let known = capture.canonicalize().unwrap_or_else(|_| capture.to_owned());
+    let name = known.file_name().unwrap_or(known.as_os_str());
+    name.to_string_lossy().into_owned()
 }
 
 /// The gates that fail.
@@ -90,37 +114,14 @@ fn text(gates: &[Gate]) -> String {
             Verdict::Warn => "warn",
             Verdict::Fail => "FAIL",
         };
-        let number = number(gate);
+        let number = match gate.verdict {
+            Verdict::NotJudged => "not judged".to_owned(),
+            _ => gate.number_and_limit(),
+        };
         let _ = writeln!(text, "{mark} {:<13} {number:<24} {}", gate.name, gate.what);
         if !gate.next_step.is_empty() {
             let _ = writeln!(text, "{:44}-> {}", "", gate.next_step);
         }
     }
     text
-}
-
-/// A gate's number against its limit.
-fn number(gate: &Gate) -> String {
-    if gate.verdict == Verdict::NotJudged {
-        return "not judged".to_owned();
-    }
-    let digits = if gate.number.fract() == 0.0 && gate.limit.fract() == 0.0 {
-        0
-    } else {
-        2
-    };
-    let unit = if gate.unit == "photographs" {
-        ""
-    } else {
-        gate.unit
-    };
-    let space = if unit == "%" || unit.is_empty() {
-        ""
-    } else {
-        " "
-    };
-    format!(
-        "{:.digits$}{space}{unit} (limit {:.digits$})",
-        gate.number, gate.limit
-    )
 }

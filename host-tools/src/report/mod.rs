@@ -12,6 +12,7 @@
 //! | one picture of it all | `summary.rs` |
 //! | pictures as PNG files | `files.rs` |
 //! | what the solve says about itself | `facts.rs` |
+//! | what the gates say, a page of its own | `gates.rs`, `gates.css` |
 //! | the page | `page.rs`, `document.rs`, `style.css` |
 
 pub(crate) mod canvas;
@@ -23,6 +24,7 @@ mod document;
 mod example;
 mod facts;
 mod files;
+pub mod gates;
 mod ladder;
 mod light_picture;
 pub(crate) mod page;

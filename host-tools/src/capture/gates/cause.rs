@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 const EXPLAINED: f64 = 0.5;
 
 /// How many times its scatter the brightness of pairs must be off white's.
-const STEADY: f64 = 1.5;
+const STEADY: f64 = 3.0;
 
 /// Why light does not add up.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -225,6 +225,22 @@ impl Gate {
         }
     }
 
+    /// Its number against its limit, for people.
+    #[must_use]
+    pub fn number_and_limit(&self) -> String {
+        let whole = self.number.fract() == 0.0 && self.limit.fract() == 0.0;
+        let digits = if whole { 0 } else { 2 };
+        let unit = match self.unit {
+            // Nobody needs to be told what is counted where there must be none.
+            "photographs" | "complaints" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        format!(
+            "{:.digits$}{unit} (limit {:.digits$})",
+            self.number, self.limit
+        )
+    }
+
     /// Whether the capture is refused for it.
     #[must_use]
     pub fn fails(&self) -> bool {

@@ -209,10 +209,13 @@ impl Assigned {
                 (false, false) => None,
             }
         });
-        Order {
-            wrong: wrong.collect(),
-            distances,
+        let mut wrong: Vec<Wrong> = wrong.collect();
+        // One in ten may be disturbed; if more fit no pattern, the picture moved.
+        let strange = wrong.iter().filter(|wrong| wrong.shows.is_none()).count();
+        if strange > (shots / 10).max(2) {
+            wrong.retain(|wrong| wrong.shows.is_some());
         }
+        Order { wrong, distances }
     }
 }
 
