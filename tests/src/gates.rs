@@ -150,15 +150,20 @@ pub fn table(sessions: &[(&'static str, Vec<Session>)]) -> String {
             let found = sessions.iter().find(of);
             found.map_or_else(|| "-".to_owned(), |session| size(session).to_string())
         };
-        let mut names: Vec<GateName> =
-            (sessions.iter()).flat_map(|s| s.that(Verdict::Fail)).collect();
+        let mut names: Vec<GateName> = (sessions.iter())
+            .flat_map(|s| s.that(Verdict::Fail))
+            .collect();
         names.sort();
         names.dedup();
         let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
         let _ = writeln!(
             text,
             "| {what} | {} | {} | {} | {} |",
-            if silent.is_empty() { "-".to_owned() } else { silent.join(", ") },
+            if silent.is_empty() {
+                "-".to_owned()
+            } else {
+                silent.join(", ")
+            },
             first(&|session| remarks(session) && !fails(session)),
             first(&|session| fails(session)),
             names.join(", ")

@@ -117,7 +117,10 @@ fn good_captures_pass_at_every_noise() {
             .filter(|gate| gate.verdict == Verdict::Warn)
             .map(|gate| gate.name)
             .collect();
-        assert!(warned.iter().all(|name| *name == GateName::Noise), "{gates:?}");
+        assert!(
+            warned.iter().all(|name| *name == GateName::Noise),
+            "{gates:?}"
+        );
         assert_eq!(gates.len(), GateName::ALL.len());
     }
 }
@@ -147,7 +150,10 @@ fn a_slow_drift_is_measured_and_divided_out() {
     assert!((drift.number - 6.0).abs() < 0.5, "{drift:?}");
     assert!(drift.what.contains("corrected"));
     let drifted = read(folder.path(), &CaptureOptions::default(), &Silent).unwrap();
-    let (a, b) = (&truth.channels[0].observations, &drifted.channels[0].observations);
+    let (a, b) = (
+        &truth.channels[0].observations,
+        &drifted.channels[0].observations,
+    );
     let all = a.norm();
     let scale = a.dot(b) / b.norm_squared();
     let off = (b * scale - a).norm() / all;
@@ -162,7 +168,10 @@ fn a_steady_session_is_left_as_it_is() {
         .into_iter()
         .find(|gate| gate.name == GateName::Drift)
         .unwrap();
-    assert!(drift.number < 0.5 && drift.what.contains("steady"), "{drift:?}");
+    assert!(
+        drift.number < 0.5 && drift.what.contains("steady"),
+        "{drift:?}"
+    );
 }
 
 #[test]
@@ -178,9 +187,9 @@ fn an_undeclared_gamma_is_told_from_an_exposure_that_follows_the_picture() {
         let what = &superposition.unwrap_or_else(|| panic!("{failed:?}")).1;
         assert!(what.contains("gamma is not the declared one"), "{what}");
         assert!(
-            failed.iter().all(|(name, _)| {
-                matches!(name, GateName::Superposition | GateName::Response)
-            }),
+            failed
+                .iter()
+                .all(|(name, _)| { matches!(name, GateName::Superposition | GateName::Response) }),
             "{failed:?}"
         );
     }
@@ -224,7 +233,10 @@ fn a_bumped_tripod_is_named_with_the_photographs_around_it() {
         });
         assert_named(&folder, GateName::Movement, "moved by");
         let what = &failed(&folder)[0].1;
-        assert!(what.contains("037.png") && what.contains("038.png"), "{what}");
+        assert!(
+            what.contains("037.png") && what.contains("038.png"),
+            "{what}"
+        );
     }
 }
 
@@ -281,7 +293,10 @@ fn a_file_that_is_there_twice_is_named() {
     fs::copy(photos.join("031.png"), photos.join("032.png")).unwrap();
     let failed = failed(&folder);
     assert_eq!(failed[0].0, GateName::Complete, "{failed:?}");
-    assert!(failed[0].1.contains("032.png is photos/031.png"), "{failed:?}");
+    assert!(
+        failed[0].1.contains("032.png is photos/031.png"),
+        "{failed:?}"
+    );
 }
 
 #[test]

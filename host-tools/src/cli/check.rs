@@ -57,7 +57,9 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
 
 /// The capture's name for people.
 fn name(capture: &Path) -> String {
-    let known = capture.canonicalize().unwrap_or_else(|_| capture.to_owned());
+    let known = capture
+        .canonicalize()
+        .unwrap_or_else(|_| capture.to_owned());
     let name = known.file_name().unwrap_or(known.as_os_str());
     name.to_string_lossy().into_owned()
 }

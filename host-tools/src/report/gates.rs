@@ -115,13 +115,7 @@ fn range(values: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
 }
 
 /// Points over two axes, with a line at the limit.
-fn chart(
-    x: &str,
-    y: &str,
-    points: &[(f64, f64)],
-    limit: Option<f64>,
-    joined: bool,
-) -> Markup {
+fn chart(x: &str, y: &str, points: &[(f64, f64)], limit: Option<f64>, joined: bool) -> Markup {
     if points.is_empty() {
         return html! {};
     }
@@ -137,7 +131,10 @@ fn chart(
     };
     let level = |value: f64| at((*across.start(), value)).1;
     let places: Vec<(f64, f64)> = points.iter().map(|&point| at(point)).collect();
-    let line: Vec<String> = places.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+    let line: Vec<String> = places
+        .iter()
+        .map(|(x, y)| format!("{x:.1},{y:.1}"))
+        .collect();
     let mut labels = vec![*up.start(), *up.end()];
     if *up.start() < 0.0 && *up.end() > 0.0 {
         labels.push(0.0);
@@ -173,7 +170,10 @@ fn map(what: &str, rows: usize, cols: usize, values: &[f64]) -> Markup {
         return html! {};
     };
     let sizes = || values.iter().map(|value| value.abs());
-    let high = sizes().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1e-6);
+    let high = sizes()
+        .filter(|v| v.is_finite())
+        .fold(0.0, f64::max)
+        .max(1e-6);
     let scale = ColourScale::linear(Palette::Viridis, high);
     let mut canvas = super::canvas::Canvas::new(size, super::canvas::QUIET);
     for (at, value) in sizes().enumerate().filter(|(_, value)| value.is_finite()) {

@@ -12,9 +12,14 @@ fn main() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/scenes");
     let rig = Rig::new(&scenes.join("m-panels.toml"));
     let say = |session: &Session| {
-        let name = session.fault.map_or_else(|| "no fault".to_owned(), |f| f.to_string());
+        let name = session
+            .fault
+            .map_or_else(|| "no fault".to_owned(), |f| f.to_string());
         let (fail, warn) = (session.that(Verdict::Fail), session.that(Verdict::Warn));
-        eprintln!("{name:18} fail {fail:?} remark {warn:?} {}", session.first_words());
+        eprintln!(
+            "{name:18} fail {fail:?} remark {warn:?} {}",
+            session.first_words()
+        );
     };
     say(&rig.session(None));
     let mut all = Vec::new();

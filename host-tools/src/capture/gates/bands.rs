@@ -16,12 +16,14 @@ const STEP: f64 = 0.25;
 const MOST_CYCLES: f64 = 24.0;
 
 /// The bands that fit best.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Bands {
     /// Waves from the top of the photograph to its bottom.
     pub(crate) cycles: f64,
     /// Amplitude of the wave, of the light.
     pub(crate) amplitude: f64,
+    /// Amplitude of every number of waves that was tried.
+    pub(crate) tried: Vec<(f64, f64)>,
 }
 
 /// Finds the bands of a capture; `None` if cells lie on fewer than four heights.
@@ -43,12 +45,13 @@ pub(crate) fn find(registration: &Registration, models: &[CellModel]) -> Option<
         .take_while(|cycles| *cycles <= most)
         .collect();
     let residuals = residuals(&places, models);
-    let power = |&cycles: &f64| (cycles, power(&residuals, cycles));
-    let powers: Vec<(f64, f64)> = tried.par_iter().map(power).collect();
-    let (cycles, power) = powers.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let amplitude = |&cycles: &f64| (cycles, power(&residuals, cycles).max(0.0).sqrt());
+    let tried: Vec<(f64, f64)> = tried.par_iter().map(amplitude).collect();
+    let (cycles, amplitude) = (tried.iter().copied()).max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(Bands {
         cycles,
-        amplitude: power.max(0.0).sqrt(),
+        amplitude,
+        tried,
     })
 }
 

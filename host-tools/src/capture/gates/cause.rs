@@ -18,6 +18,9 @@ const EXPLAINED: f64 = 0.5;
 /// How many times its scatter the brightness of pairs must be off white's.
 const STEADY: f64 = 3.0;
 
+/// Light of lit cells, in that under white, that white itself cannot have.
+const OUTSHINE: f64 = 1.03;
+
 /// Why light does not add up.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Cause {
@@ -86,7 +89,7 @@ pub(crate) fn find(
     let middle = median(factors.clone()).unwrap_or(1.0);
     let off = median(factors.iter().map(|f| (f - middle).abs()).collect()).unwrap_or(0.0);
     let follows = followed < EXPLAINED * before && (middle - 1.0).abs() > STEADY * off;
-    if follows && followed < 1.2 * curved {
+    if pairs.outshine() || follows && followed < 1.2 * curved {
         ambient(sequence, sampled)
     } else if curved < EXPLAINED * before {
         Cause::Curve { gamma }
@@ -96,6 +99,22 @@ pub(crate) fn find(
 }
 
 impl Pairs {
+    /// Whether most photographs are brighter than white where they are lit: no curve
+    /// makes less light look like more.
+    fn outshine(&self) -> bool {
+        let ratio = |light: &[f64]| {
+            let lit = light
+                .iter()
+                .zip(&self.white)
+                .filter(|(l, w)| *l > &(0.5 * *w));
+            median(lit.map(|(light, white)| light / white).collect())
+        };
+        let each = self.pairs.iter().flat_map(|(a, b)| [ratio(a), ratio(b)]);
+        let ratios: Vec<f64> = each.flatten().collect();
+        let brighter = ratios.iter().filter(|ratio| **ratio > OUTSHINE).count();
+        2 * brighter > ratios.len()
+    }
+
     /// How far sums are off if all light is raised to a power, relative to white.
     fn misfit(&self, power: f64) -> f64 {
         let raise = |light: &f64| light.max(0.0).powf(power);

@@ -32,15 +32,22 @@ pub(crate) fn judge(
     let scatter = scatter(&offs, &steadiness.errors);
     let bands = bands::find(registration, &steadiness.models);
     // The root mean square of a sine is its amplitude over the root of 2.
-    let striped = bands.map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
+    let striped = bands
+        .as_ref()
+        .map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
     let number = scatter.max(striped);
     let verdict = Verdict::of(number, WARN, MOST);
-    let what = match (verdict, bands) {
+    let what = match (verdict, &bands) {
         (Verdict::Pass, _) => format!(
             "brightness jumps by {:.2} % from photograph to photograph",
             100.0 * scatter
         ),
-        (_, Some(Bands { cycles, amplitude })) if striped > scatter => format!(
+        (
+            _,
+            Some(Bands {
+                cycles, amplitude, ..
+            }),
+        ) if striped > scatter => format!(
             "flicker: bands of {:.1} % run across the photographs, {cycles:.1} from top to bottom: \
              lamps on 50 or 60 Hz mains or the projector's colour wheel, seen by a rolling shutter",
             100.0 * amplitude
@@ -66,12 +73,21 @@ pub(crate) fn judge(
                  the mains' (1/25 or 1/30 s and longer), switch lamps off, set the exposure by hand."
             }
         },
-        evidence: Evidence::Photographs {
-            what: "brightness against the slow curve, %",
-            values: shots
-                .map(|(&shot, off)| (sequence.shots[shot].index, 100.0 * off))
-                .collect(),
-            limit: Some(100.0 * MOST),
+        evidence: match bands {
+            Some(bands) if striped > scatter && verdict != Verdict::Pass => Evidence::Curve {
+                x: "bands from the top of the photographs to the bottom",
+                y: "amplitude, % of the light",
+                points: (bands.tried.iter())
+                    .map(|(cycles, amplitude)| (*cycles, 100.0 * amplitude))
+                    .collect(),
+            },
+            _ => Evidence::Photographs {
+                what: "brightness against the slow curve, %",
+                values: shots
+                    .map(|(&shot, off)| (sequence.shots[shot].index, 100.0 * off))
+                    .collect(),
+                limit: Some(100.0 * MOST),
+            },
         },
     }
 }

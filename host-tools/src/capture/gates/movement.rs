@@ -22,7 +22,7 @@ const MOST: f64 = 0.06;
 const FLOOR: f64 = 0.15;
 
 /// Photographs that must lie on each side of a bump.
-const LEAST_SIDE: usize = 2;
+const LEAST_SIDE: usize = 3;
 
 /// What the photographs show of movement.
 pub(crate) struct Moved {
@@ -50,7 +50,8 @@ pub(crate) fn find(
     if found == 0 || cells.iter().filter(|c| **c != NO_CELL).count() < SIDE * SIDE {
         return None;
     }
-    let shown: Vec<(usize, &[bool])> = (sequence.views.iter())
+    // White has no edge between lit and dark.
+    let shown: Vec<(usize, &[bool])> = (sequence.views[1..].iter())
         .flat_map(|view| view.shots.iter().map(|&shot| (shot, view.lit.as_slice())))
         .collect();
     let levels = Levels::new(sampled, &cells, &shown);
@@ -63,10 +64,28 @@ pub(crate) fn find(
         })
         .collect();
     shifts.sort_by_key(|(shot, _)| *shot);
+    even_pairs(sequence, &mut shifts);
     Some(Moved {
         shifts,
         cell: binning * (seen as f64 / found as f64).sqrt(),
     })
+}
+
+/// Gives a pattern and its inverse the mean of both shifts. Far light falls off from a
+/// wide stripe and tilts its border, which looks like a shift; the inverse tilts it the
+/// other way.
+fn even_pairs(sequence: &Sequence, shifts: &mut [(usize, [f64; 2])]) {
+    for (a, b) in sequence.code_pairs() {
+        let place = |view: usize| {
+            let shot = sequence.views[view].shots[0];
+            shifts.iter().position(|(known, _)| *known == shot)
+        };
+        if let (Some(a), Some(b)) = (place(a), place(b)) {
+            let (one, other) = (shifts[a].1, shifts[b].1);
+            let mean = [0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1])];
+            (shifts[a].1, shifts[b].1) = (mean, mean);
+        }
+    }
 }
 
 /// Mean light of every sampled pixel while its cell is dark and while it is lit.
@@ -83,10 +102,6 @@ impl Levels {
         let (mut dark, mut lit) = (vec![0.0_f32; pixels], vec![0.0_f32; pixels]);
         let mut counts = vec![[0_u32; 2]; pixels];
         for (shot, pattern) in shown {
-            // White has more far light than all others and would tilt the mean.
-            if pattern.iter().all(|lit| *lit) {
-                continue;
-            }
             for (at, &value) in sampled.shots[*shot].iter().enumerate() {
                 match pattern.get(cells[at] as usize) {
                     Some(true) => {

@@ -1,11 +1,12 @@
 //! Gate `response`: the declared responses are those of the devices, and the
 //! projector shows a colour as the sum of its primaries.
 
+use super::super::calibration::CameraFit;
 use super::super::{Devices, RampChannel};
 use super::cause::Cause;
 use super::{Evidence, Gate, GateName, Verdict};
 
-/// Misfit of the declared camera response, where another one is clearly better.
+/// Misfit of the declared camera response beyond that of the best one.
 const WARN: f64 = 0.01;
 const MOST: f64 = 0.03;
 
@@ -37,7 +38,8 @@ pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
         next_step,
         evidence: evidence(devices),
     };
-    let camera_verdict = camera.map(|fit| Verdict::of(fit.declared_misfit, WARN, MOST));
+    let beyond = |fit: &CameraFit| (fit.declared_misfit - fit.best_misfit).max(0.0);
+    let camera_verdict = camera.map(|fit| Verdict::of(beyond(fit), WARN, MOST));
     let steps_verdict = steps.map(|steps| Verdict::of(steps, WARN_STEPS, MOST_STEPS));
     if let Some(complaint) = complaints.first() {
         let next_step = "Choose the projector's sRGB, film or photo mode, switch off dynamic \
@@ -53,7 +55,7 @@ pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
         );
         let next_step = "Write the measured response into capture.toml ([camera] response), or \
              \"measure\", and check again; photographs need not be taken again.";
-        let number = 100.0 * fit.declared_misfit;
+        let number = 100.0 * beyond(fit);
         return gate(verdict, number, 100.0 * MOST, "%", what, next_step);
     }
     if let (Some(steps), Some(verdict)) = (steps, steps_verdict) {
@@ -72,7 +74,7 @@ pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
     }
     match &devices.camera_fit {
         Some(fit) => {
-            let number = 100.0 * fit.declared_misfit;
+            let number = 100.0 * beyond(fit);
             gate(Verdict::Pass, number, 100.0 * MOST, "%", fit.words(), "")
         }
         None => Gate::not_judged(name, "there are no photographs to measure the responses by"),
