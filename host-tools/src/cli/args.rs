@@ -57,6 +57,10 @@ pub(super) enum Command {
     Key(Key),
     /// Write a zip file for support: versions, status, logs, transcripts; never keys
     Report(Report),
+    /// Write manual pages
+    Man(Man),
+    /// Print completions for a shell
+    Completions(Completions),
     /// Run the firmware on an emulated board, with its serial line as a port
     #[cfg(unix)]
     Emulate(Emulate),
@@ -292,6 +296,19 @@ pub(super) struct Report {
     /// Seconds for which logs are gathered
     #[arg(long, value_name = "SECONDS", default_value_t = 3)]
     pub(super) seconds: u16,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Man {
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Completions {
+    /// Shell to complete for
+    pub(super) shell: clap_complete::Shell,
 }
 
 #[derive(Debug, Args)]
