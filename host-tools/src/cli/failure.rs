@@ -1,6 +1,7 @@
 //! What a command failed for: words for people, a code for scripts.
 
 use super::active::Active;
+use super::check;
 use crate::capture::CaptureError;
 use crate::compile::CompileError;
 use crate::compile::sign::KeyError;
@@ -11,6 +12,7 @@ use crate::user::ConfigError;
 use iltm_runtime::link::Refusal;
 use iltm_runtime::trust::Rejected;
 use miette::Diagnostic;
+use serde_json::{Value, json};
 use std::fmt::{self, Write};
 
 /// Causes of failure, each with an exit code of its own. The codes are a contract.
@@ -264,6 +266,8 @@ pub(super) struct Failure {
     pub(super) next_step: String,
     /// Where a device's tables were about to change: which one is in use now.
     pub(super) active: Option<Active>,
+    /// What was found out before, for programs: an object that stands beside the error.
+    pub(super) data: Option<Box<Value>>,
 }
 
 impl Failure {
@@ -277,6 +281,7 @@ impl Failure {
             message: message.to_string(),
             next_step: next_step.into(),
             active: None,
+            data: None,
         }
     }
 
@@ -324,7 +329,13 @@ impl Diagnostic for Failure {
 impl From<LearnError> for Failure {
     fn from(error: LearnError) -> Self {
         match error {
-            LearnError::Capture(error) => Self::new(kind_of(&error), &error, error.next_step()),
+            LearnError::Capture(error) => {
+                let mut failure = Self::new(kind_of(&error), &error, error.next_step());
+                if let CaptureError::Refused { gates, .. } = &error {
+                    failure.data = Some(Box::new(json!({ "gates": check::gates(gates) })));
+                }
+                failure
+            }
             LearnError::Solve(error) => {
                 // The message of a solve error ends with what to do.
                 let message = error.to_string();
@@ -372,9 +383,8 @@ pub(super) const fn kind_of(error: &CaptureError) -> Kind {
         | CaptureError::BlackIndex { .. } => Kind::Usage,
         CaptureError::TooFewPhotographs { .. }
         | CaptureError::NoLight { .. }
-        | CaptureError::Overexposed { .. }
-        | CaptureError::NotLinear { .. }
-        | CaptureError::NothingRegistered { .. } => Kind::Photographs,
+        | CaptureError::Refused { .. }
+        | CaptureError::ResponseUnknown { .. } => Kind::Photographs,
         _ => Kind::Capture,
     }
 }

@@ -7,6 +7,7 @@
 mod active;
 mod args;
 mod bounces;
+mod check;
 mod compare;
 mod compensate;
 mod connect;
@@ -58,6 +59,7 @@ pub fn run(meter: Meter) -> ExitCode {
     let result = match &arguments.command {
         Command::Demo(demo) => demo::run(demo, &output),
         Command::Simulate(simulate) => simulate::run(simulate, &output),
+        Command::Check(check) => check::run(check, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
