@@ -22,6 +22,7 @@ mod key;
 mod man;
 mod monitor;
 mod output;
+mod patterns;
 mod ports;
 mod progress;
 mod report;
@@ -60,6 +61,7 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Demo(demo) => demo::run(demo, &output),
         Command::Simulate(simulate) => simulate::run(simulate, &output),
         Command::Check(check) => check::run(check, &output),
+        Command::Patterns(patterns) => patterns::run(patterns, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
