@@ -6,7 +6,6 @@ use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Fault, Mishap, Shooting, Simulation, SimulationOptions, folder};
 use std::fmt::Write;
-use std::path::Path;
 
 /// Seed of patterns and noise.
 const SEED: u64 = 1;
@@ -41,21 +40,20 @@ impl Session {
 }
 
 /// A scene to take photographs of.
-pub struct Rig {
-    scene: Scene,
-    simulation: Simulation,
+pub struct Rig<'s> {
+    scene: &'s Scene,
+    simulation: Simulation<'s>,
 }
 
-impl Rig {
-    /// The scene of a file.
+impl<'s> Rig<'s> {
+    /// Computes the light of a scene.
     ///
     /// # Panics
-    /// If it is not a scene: the files are part of the project.
+    /// If it cannot be simulated: the scenes are part of the project.
     #[must_use]
-    pub fn new(file: &Path) -> Self {
-        let scene = Scene::read(file).expect("a scene");
+    pub fn new(scene: &'s Scene) -> Self {
         let options = SimulationOptions::default();
-        let simulation = Simulation::new(&scene, &options, &Silent).expect("can be simulated");
+        let simulation = Simulation::new(scene, &options, &Silent).expect("can be simulated");
         Self { scene, simulation }
     }
 
@@ -67,7 +65,7 @@ impl Rig {
     pub fn session(&self, fault: Option<Fault>) -> Session {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("capture");
-        let shooting = Shooting::new(&self.scene, &self.simulation, SEED).expect("light");
+        let shooting = Shooting::new(self.scene, &self.simulation, SEED).expect("light");
         let faults: Vec<Fault> = fault.into_iter().collect();
         let shooting = shooting.with_faults(&faults);
         let patterns = shown(self.simulation.grid(), BERNOULLI, SEED);

@@ -118,16 +118,6 @@ pub enum CaptureError {
         /// Another.
         second: PathBuf,
     },
-    /// Photographs that `capture.csv` names are not there.
-    #[error("{}: {} of {of} photographs missing: {}", folder.display(), missing.len(), missing.join(", "))]
-    MissingPhotographs {
-        /// The capture folder.
-        folder: PathBuf,
-        /// Names of all that are missing, as the manifest has them.
-        missing: Vec<String>,
-        /// Photographs that the manifest names.
-        of: usize,
-    },
     /// A picture says it is larger than any camera's.
     #[error("{}: {width} x {height} pixels; at most {limit} pixels are read", path.display())]
     TooLarge {
@@ -371,9 +361,6 @@ impl CaptureError {
             }
             Self::NotFinite { .. } => "Export the picture again, without undefined pixels.",
             Self::Ambiguous { .. } => "Name the right one in capture.csv, or remove the other.",
-            Self::MissingPhotographs { .. } => {
-                "Take the missing photographs: `iltm capture` goes on where it stopped."
-            }
             Self::TooLarge { .. } => "Scale the photographs down, all by the same factor.",
             Self::Transparent { .. } => "Export the picture without an alpha channel.",
             Self::PatternValue { .. } => {

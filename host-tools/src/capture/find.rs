@@ -50,32 +50,18 @@ fn stands_for(name: &Path, stem: Option<&OsStr>) -> bool {
     picture && name.file_stem() == stem
 }
 
-/// Names in each shot the file that stands for its photograph.
+/// Names in each shot the file that stands for its photograph; one that is missing
+/// keeps the name it has.
 ///
 /// # Errors
-/// [`CaptureError::MissingPhotographs`] with all that are missing,
 /// [`CaptureError::Ambiguous`].
-pub(super) fn resolve<'s, R: 's>(
-    folder: &Path,
-    shots: impl IntoIterator<Item = &'s mut ShotOf<R>>,
-) -> Result<(), CaptureError> {
-    let mut of = 0;
-    let mut missing = Vec::new();
+pub(super) fn resolve<R>(folder: &Path, shots: &mut [ShotOf<R>]) -> Result<(), CaptureError> {
     for shot in shots {
-        of += 1;
-        match find_photo(folder, &shot.photo)? {
-            Some(found) => shot.photo = found,
-            None => missing.push(shot.photo.display().to_string()),
+        if let Some(found) = find_photo(folder, &shot.photo)? {
+            shot.photo = found;
         }
     }
-    if missing.is_empty() {
-        return Ok(());
-    }
-    Err(CaptureError::MissingPhotographs {
-        folder: folder.to_owned(),
-        missing,
-        of,
-    })
+    Ok(())
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use super::calibration::samples::{fit, used_pixels};
 use super::calibration::taken::{Seen, Taken, mean_of};
 use super::calibration::{Devices, Ramp};
+use super::gates::saturation::{self, Clipped};
 use super::photo::Reading;
 use super::photographs::Photographs;
 use super::sequence::Sequence;
@@ -81,6 +82,32 @@ impl<'a> Light<'a> {
         Ok(())
     }
 
+    /// Marks the pixels that are known to be saturated.
+    fn keep_saturated(&mut self, known: &[bool]) {
+        for (saturated, known) in self.saturated.iter_mut().zip(known) {
+            *saturated |= known;
+        }
+    }
+
+    /// Marks pixels that are cut off below full scale as saturated, and counts.
+    ///
+    /// # Errors
+    /// A photograph's own error.
+    pub(super) fn find_clipped(
+        &mut self,
+        sequence: &Sequence,
+        progress: &dyn Progress,
+    ) -> Result<Clipped, CaptureError> {
+        saturation::find(
+            sequence,
+            &mut self.photographs,
+            &self.flood,
+            &self.black,
+            &mut self.saturated,
+            progress,
+        )
+    }
+
     /// Measures the devices; afterwards the photographs are in the light that they
     /// say: of the measured camera response where that is asked for, and of the
     /// projector's channels where the camera mixes them.
@@ -108,7 +135,9 @@ impl<'a> Light<'a> {
                 ..self.reading.clone()
             };
             devices.camera = found.best.clone();
+            let known = std::mem::take(&mut self.saturated);
             *self = Self::read_with(folder, sequence, reading, progress)?;
+            self.keep_saturated(&known);
         }
         devices.camera_fit = camera;
         self.read_calibration(folder, sequence, progress)?;
@@ -123,7 +152,9 @@ impl<'a> Light<'a> {
         }
         if let Some(unmix) = devices.mixing().and_then(super::calibration::Mixing::unmix) {
             self.photographs.unmix(unmix);
+            let known = std::mem::take(&mut self.saturated);
             self.look(sequence, progress)?;
+            self.keep_saturated(&known);
             devices.unmixed = true;
         }
         Ok(devices)

@@ -218,12 +218,14 @@ fn measure_all(
     let mut light = Light::read(folder, sequence, settings, progress)?;
     let format = &light.photographs.format;
     gates.push(gates::format::judge(format.file, format.bits));
+    // In the camera's own channels, where a ceiling is one value.
+    let clipped = light.find_clipped(sequence, progress)?;
     let mut devices = light.measure_devices(folder, sequence, settings, progress)?;
     let Light {
         mut photographs,
         mut flood,
         black,
-        mut saturated,
+        saturated,
         taken,
         ..
     } = light;
@@ -241,14 +243,6 @@ fn measure_all(
         .map(|v| v.shots.len())
         .sum();
     progress.begin("decoding the Gray code", count(coded));
-    let clipped = gates::saturation::find(
-        sequence,
-        &mut photographs,
-        &flood,
-        &black,
-        &mut saturated,
-        progress,
-    )?;
     let gray = gray_code::decode(sequence, &mut photographs, &flood, &black, progress)?;
     progress.end();
 

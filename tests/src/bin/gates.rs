@@ -4,13 +4,15 @@
 //! Words choose the faults whose names contain one of them.
 
 use iltm::capture::Verdict;
+use iltm::scene::description::Scene;
 use iltm_tests::gates::{Rig, Session, table, tried};
 use std::path::Path;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/scenes");
-    let rig = Rig::new(&scenes.join("m-panels.toml"));
+    let scene = Scene::read(&scenes.join("m-panels.toml")).expect("a scene");
+    let rig = Rig::new(&scene);
     let say = |session: &Session| {
         let name = session
             .fault
