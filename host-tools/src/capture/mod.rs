@@ -278,9 +278,15 @@ fn measure_all(
     gates.push(gates::movement::judge(sequence, moved.as_ref()));
     gates.push(gates::drift::judge(sequence, &steadiness));
     gates.push(gates::flicker::judge(sequence, registration, &steadiness));
+    // Before one white there is nothing to follow the light by: what bends it would be
+    // taken for drift, and the sums for sound.
+    let single = sequence.white().shots.len() == 1;
+    let plain =
+        single.then(|| measure::average(sequence, &light, &cells, &drift::Drift::default()));
+    let summed = plain.as_ref().map_or(channels, |plain| &plain.channels);
     let superposition =
-        gates::superposition::median(gates::superposition::excesses(sequence, channels));
-    let sums = Sums::new(sequence, channels, &cells.live);
+        gates::superposition::median(gates::superposition::excesses(sequence, summed));
+    let sums = Sums::new(sequence, summed, &cells.live);
     let wrong = sums.as_ref().is_some_and(Sums::fail);
     let cause = wrong.then(|| cause::find(sequence, &cells.live, &light.channels, &sampled));
     gates.push(gates::superposition::judge(
