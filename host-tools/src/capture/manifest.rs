@@ -1,8 +1,8 @@
-//! `capture.csv`: which pattern each photograph shows.
+//! `capture.csv` and `calibration.csv`: which picture each photograph shows.
 
 use super::{CaptureError, Role};
 use std::collections::HashMap;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
@@ -10,54 +10,102 @@ use std::path::{Component, Path, PathBuf};
 /// Name of the manifest in a capture folder.
 pub const MANIFEST_FILE: &str = "capture.csv";
 
-/// The manifest's first line.
-const HEADER: [&str; 4] = ["index", "role", "pattern", "photo"];
+/// A manifest's first line. The last column may be left out.
+const HEADER: [&str; 5] = ["index", "role", "pattern", "photo", "exposure"];
+
+/// Columns that every manifest has.
+const NEEDED: usize = 4;
 
 /// Bytes a manifest may have: about 100,000 photographs.
 const MAX_BYTES: u64 = 8 << 20;
 
-/// One line of the manifest: a pattern and the photograph taken of it.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Shot {
+/// What the pictures of one manifest are shown for.
+pub trait ListedRole: Copy + fmt::Display {
+    /// Name of the manifest in a capture folder.
+    const FILE: &'static str;
+
+    /// Reads a role's name; `None` if it is not one.
+    fn from_name(name: &str) -> Option<Self>;
+
+    /// What is said about another name.
+    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError;
+}
+
+impl ListedRole for Role {
+    const FILE: &'static str = MANIFEST_FILE;
+
+    fn from_name(name: &str) -> Option<Self> {
+        Self::from_name(name)
+    }
+
+    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
+        CaptureError::UnknownRole {
+            path: path.to_owned(),
+            line,
+            role: role.to_owned(),
+        }
+    }
+}
+
+/// One line of a manifest: a pattern and the photograph taken of it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ShotOf<R> {
     /// Order of the pattern in the sequence.
     pub index: u32,
     /// What the pattern was shown for.
-    pub role: Role,
+    pub role: R,
     /// Pattern file, relative to the capture folder.
     pub pattern: PathBuf,
     /// Photograph file, relative to the capture folder.
     pub photo: PathBuf,
-    /// Line of `capture.csv`, the first is 1.
+    /// How long light was gathered, above 0, in seconds or any other unit that all
+    /// lines share; `None` where nothing is said.
+    pub exposure: Option<f64>,
+    /// Line of the manifest, the first is 1.
     pub line: u64,
 }
 
-/// All lines of a `capture.csv`, ordered by index.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Manifest {
-    /// The photographs, ordered by [`Shot::index`].
-    pub shots: Vec<Shot>,
+/// One line of `capture.csv`.
+pub type Shot = ShotOf<Role>;
+
+/// All lines of a manifest, ordered by index.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ManifestOf<R> {
+    /// The photographs, ordered by [`ShotOf::index`].
+    pub shots: Vec<ShotOf<R>>,
 }
 
-impl Manifest {
+/// All lines of a `capture.csv`, ordered by index.
+pub type Manifest = ManifestOf<Role>;
+
+impl<R: ListedRole> ManifestOf<R> {
     /// Reads the manifest of a capture folder.
     ///
     /// # Errors
     /// [`CaptureError::NoManifest`] if there is none, [`CaptureError::Io`] if it
-    /// cannot be read, otherwise as [`Manifest::parse`].
+    /// cannot be read, otherwise as [`ManifestOf::parse`].
     pub fn read(folder: &Path) -> Result<Self, CaptureError> {
-        let path = folder.join(MANIFEST_FILE);
+        let path = || folder.join(R::FILE);
+        Self::read_if_there(folder)?.ok_or_else(|| CaptureError::NoManifest { path: path() })
+    }
+
+    /// Reads the manifest of a capture folder; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`CaptureError::Io`] if it cannot be read, otherwise as
+    /// [`ManifestOf::parse`].
+    pub fn read_if_there(folder: &Path) -> Result<Option<Self>, CaptureError> {
+        let path = folder.join(R::FILE);
         let file = match File::open(&path) {
             Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => {
-                return Err(CaptureError::NoManifest { path });
-            }
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(CaptureError::Io { path, source }),
         };
         let mut bytes = Vec::new();
         if let Err(source) = file.take(MAX_BYTES + 1).read_to_end(&mut bytes) {
             return Err(CaptureError::Io { path, source });
         }
-        Self::parse(&bytes, &path)
+        Self::parse(&bytes, &path).map(Some)
     }
 
     /// Reads the contents of a manifest; `path` is only for errors.
@@ -86,24 +134,23 @@ impl Manifest {
         let mut lines = LineCounter::new(bytes);
         let mut seen = HashMap::new();
         let mut shots = Vec::new();
-        let mut headed = false;
+        let mut columns = 0;
         for record in reader.records() {
             let record = record.map_err(|error| {
                 let line = lines.at(error.position());
                 refuse(line, "it is not readable text".to_owned())
             })?;
             let line = lines.at(record.position());
-            if !headed {
-                if !record.iter().eq(HEADER) {
-                    return Err(refuse(
-                        line,
-                        format!("the header must be {}", HEADER.join(",")),
-                    ));
+            if columns == 0 {
+                columns = record.len();
+                if columns < NEEDED || !record.iter().eq(HEADER.into_iter().take(columns)) {
+                    let needed = HEADER[..NEEDED].join(",");
+                    let reason = format!("the header must be {needed}; \"exposure\" may follow");
+                    return Err(refuse(line, reason));
                 }
-                headed = true;
                 continue;
             }
-            let shot = shot(&record, line, path)?;
+            let shot = shot(&record, columns, line, path)?;
             if let Some(first_line) = seen.insert(shot.index, line) {
                 return Err(CaptureError::DuplicateIndex {
                     path: path.to_owned(),
@@ -114,21 +161,29 @@ impl Manifest {
             }
             shots.push(shot);
         }
-        if !headed {
+        if columns == 0 {
             return Err(refuse(1, "the file is empty".to_owned()));
         }
         shots.sort_by_key(|shot| shot.index);
         Ok(Self { shots })
     }
 
-    /// Writes the manifest as [`Manifest::parse`] reads it.
+    /// Writes the manifest as [`ManifestOf::parse`] reads it; the column of exposures
+    /// only if some line has one.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut text = HEADER.join(",") + "\n";
+        let exposed = self.shots.iter().any(|shot| shot.exposure.is_some());
+        let columns = if exposed { HEADER.len() } else { NEEDED };
+        let mut text = HEADER[..columns].join(",") + "\n";
         for shot in &self.shots {
             let (pattern, photo) = (quoted(&shot.pattern), quoted(&shot.photo));
             // Writing into a string cannot fail.
-            let _ = writeln!(text, "{},{},{pattern},{photo}", shot.index, shot.role);
+            let _ = write!(text, "{},{},{pattern},{photo}", shot.index, shot.role);
+            if exposed {
+                let exposure = shot.exposure.map(|exposure| exposure.to_string());
+                let _ = write!(text, ",{}", exposure.unwrap_or_default());
+            }
+            text.push('\n');
         }
         text
     }
@@ -165,20 +220,26 @@ impl<'a> LineCounter<'a> {
     }
 }
 
-/// Reads one line.
-fn shot(record: &csv::StringRecord, line: u64, path: &Path) -> Result<Shot, CaptureError> {
+/// Reads one line of as many `columns` as the header.
+fn shot<R: ListedRole>(
+    record: &csv::StringRecord,
+    columns: usize,
+    line: u64,
+    path: &Path,
+) -> Result<ShotOf<R>, CaptureError> {
     let refuse = |reason| CaptureError::ManifestLine {
         path: path.to_owned(),
         line,
         reason,
     };
     let fields: Vec<&str> = record.iter().collect();
-    let &[index, role, pattern, photo] = fields.as_slice() else {
+    let (&[index, role, pattern, photo, ref exposure @ ..], true) =
+        (fields.as_slice(), fields.len() == columns)
+    else {
         return Err(refuse(format!(
-            "{} fields instead of the {} of {}",
+            "{} fields instead of the {columns} of {}",
             fields.len(),
-            HEADER.len(),
-            HEADER.join(",")
+            HEADER[..columns].join(",")
         )));
     };
     let index = index.parse().map_err(|_| {
@@ -186,11 +247,16 @@ fn shot(record: &csv::StringRecord, line: u64, path: &Path) -> Result<Shot, Capt
             "the index \"{index}\" is not a whole number from 0"
         ))
     })?;
-    let role = Role::from_name(role).ok_or_else(|| CaptureError::UnknownRole {
-        path: path.to_owned(),
-        line,
-        role: role.to_owned(),
-    })?;
+    let role = R::from_name(role).ok_or_else(|| R::unknown(path, line, role))?;
+    let exposure = match exposure.first() {
+        None | Some(&"") => None,
+        Some(text) => Some(self::exposure(text).ok_or_else(|| {
+            refuse(format!(
+                "the exposure \"{text}\" is not a number above 0 (seconds, or any unit that all \
+                 lines share)"
+            ))
+        })?),
+    };
     let inside = |file: &str| {
         inside_folder(file).ok_or_else(|| CaptureError::OutsideFolder {
             path: path.to_owned(),
@@ -198,13 +264,21 @@ fn shot(record: &csv::StringRecord, line: u64, path: &Path) -> Result<Shot, Capt
             file: file.to_owned(),
         })
     };
-    Ok(Shot {
+    Ok(ShotOf {
         index,
         role,
         pattern: inside(pattern)?,
         photo: inside(photo)?,
+        exposure,
         line,
     })
+}
+
+/// A number of seconds, or of another unit.
+fn exposure(text: &str) -> Option<f64> {
+    let exposure: f64 = text.parse().ok()?;
+    // Neither zero nor so far out that a ratio of two would be.
+    (1e-9..=1e9).contains(&exposure).then_some(exposure)
 }
 
 /// The path if it stays inside the folder it is relative to, on any system:
@@ -235,6 +309,7 @@ fn quoted(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{CalibrationManifest, CalibrationRole};
     use super::*;
     use proptest::prelude::*;
 
@@ -295,6 +370,41 @@ mod tests {
     }
 
     #[test]
+    fn a_column_of_exposures_may_follow_and_have_gaps() {
+        let text = "index,role,pattern,photo,exposure\n0,white,p,f,0.0125\n1,white,p,g,\n";
+        let manifest = parse(text).unwrap();
+        let exposures = manifest.shots.iter().map(|shot| shot.exposure);
+        assert!(exposures.eq([Some(0.0125), None]));
+        assert_eq!(manifest.to_csv(), text);
+        for bad in ["0", "-1", "nan", "inf", "1/60", "1e300"] {
+            let text = format!("index,role,pattern,photo,exposure\n0,white,p,f,{bad}\n");
+            let error = parse(&text).unwrap_err().to_string();
+            assert!(error.contains("line 2: the exposure"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_manifest_without_exposures_keeps_its_four_columns() {
+        let text = "index,role,pattern,photo\n0,white,p,f\n";
+        assert_eq!(parse(text).unwrap().to_csv(), text);
+        assert!(refusal("0,white,p,f,0.5\n").contains("line 2: 5 fields instead of the 4"));
+    }
+
+    #[test]
+    fn calibration_has_roles_of_its_own() {
+        let path = Path::new("calibration.csv");
+        let parse = |text: &str| CalibrationManifest::parse(text.as_bytes(), path);
+        let text = "index,role,pattern,photo\n2,ramp-white-032,c,f\n5,probe,c,f\n";
+        let manifest = parse(text).unwrap();
+        assert_eq!(manifest.shots[1].role, CalibrationRole::Probe);
+        assert_eq!(manifest.to_csv(), text);
+        let error = parse("index,role,pattern,photo\n0,white,p,f\n").unwrap_err();
+        let error = error.to_string();
+        assert!(error.contains("line 2: unknown role \"white\""), "{error}");
+        assert!(error.contains("ramp-white-LLL"), "{error}");
+    }
+
+    #[test]
     fn a_path_out_of_the_folder_is_refused() {
         for file in [
             "/etc/x.png",
@@ -325,12 +435,16 @@ mod tests {
         }
 
         #[test]
-        fn a_written_manifest_is_read_back(names in proptest::collection::vec("[a-z ,\"é]{0,5}[a-z]", 1..9)) {
+        fn a_written_manifest_is_read_back(
+            names in proptest::collection::vec("[a-z ,\"é]{0,5}[a-z]", 1..9),
+            exposed: bool,
+        ) {
             let shots = names.iter().enumerate().map(|(i, name)| Shot {
                 index: i as u32,
                 role: Role::Bernoulli,
                 pattern: format!("p/{name}").into(),
                 photo: format!("f/{name}").into(),
+                exposure: (exposed && i % 3 != 1).then_some(0.1 + i as f64 / 7.0),
                 line: i as u64 + 2,
             }).collect();
             let manifest = Manifest { shots };

@@ -12,6 +12,7 @@
 //!                              place                  where between the cells a pixel lies
 //!                              fine_flood             the flood photograph on a finer grid
 //!                              shot_light             one photograph to look at
+//! calibration.csv           -> calibration            what measures the devices
 //! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
 //!
@@ -19,6 +20,7 @@
 //! checked before memory is taken, and whatever is wrong is a [`CaptureError`]
 //! with its place.
 
+mod calibration;
 mod diagnostics;
 mod error;
 mod fine_flood;
@@ -50,10 +52,13 @@ mod test_capture;
 #[cfg(test)]
 mod tests;
 
+pub use calibration::{
+    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, RampChannel,
+};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
 pub use fine_flood::FineFlood;
-pub use manifest::{MANIFEST_FILE, Manifest, Shot};
+pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;

@@ -157,6 +157,7 @@ impl TestCapture {
                 role,
                 pattern: format!("patterns/{index:03}.png").into(),
                 photo: format!("photos/{index:03}.png").into(),
+                exposure: None,
                 line: u64::from(index) + 2,
             };
             save_pattern(&pattern, &folder.join(&shot.pattern));

@@ -196,6 +196,7 @@ fn shot((index, (role, _)): (usize, &(Role, Pattern))) -> Shot {
         role: *role,
         pattern,
         photo,
+        exposure: None,
         line: index as u64 + 2,
     }
 }

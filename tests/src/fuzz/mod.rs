@@ -18,7 +18,9 @@ pub use targets::{TARGETS, Target};
 
 use crate::fake_device::FakeDevice;
 use crate::wedge_table;
-use iltm::capture::{self, CaptureOptions, Manifest, Settings, parse_reference};
+use iltm::capture::{
+    self, CalibrationRole, CaptureOptions, ListedRole, ManifestOf, Role, Settings, parse_reference,
+};
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};
 use iltm::video::{Compensator, OperatorMemory};
@@ -26,6 +28,7 @@ use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{DELIMITER, Decoder, Event, Response, Session};
 use iltm_runtime::pipeline::{Encoding, GridPipeline};
+use std::fmt;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -71,13 +74,18 @@ pub fn frames(bytes: &[u8]) {
     }
 }
 
-/// A `capture.csv`.
+/// A `capture.csv` or `calibration.csv`.
 ///
 /// # Panics
 /// If a manifest that was read is written and read again as another. Only the
 /// lines may differ: they are written in the order of the index.
 pub fn manifest(bytes: &[u8]) {
-    let parse = |bytes: &[u8]| Manifest::parse(bytes, Path::new("capture.csv"));
+    manifest_of::<Role>(bytes);
+    manifest_of::<CalibrationRole>(bytes);
+}
+
+fn manifest_of<R: ListedRole + PartialEq + fmt::Debug>(bytes: &[u8]) {
+    let parse = |bytes: &[u8]| ManifestOf::<R>::parse(bytes, Path::new(R::FILE));
     if let Ok(manifest) = parse(bytes) {
         let mut again = parse(manifest.to_csv().as_bytes()).expect("a written manifest is good");
         assert_eq!(again.shots.len(), manifest.shots.len(), "photographs");

@@ -72,6 +72,7 @@ impl Camera {
                 role,
                 pattern: format!("patterns/{index:03}.png").into(),
                 photo: format!("photos/{index:03}.png").into(),
+                exposure: None,
                 line: u64::from(index) + 2,
             };
             let (rows, cols) = (scene.grid.rows(), scene.grid.cols());
