@@ -22,4 +22,5 @@ pub mod scene;
 pub mod solve;
 pub mod tradeoff;
 pub mod user;
+pub mod verify;
 pub mod video;

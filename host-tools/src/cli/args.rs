@@ -6,7 +6,6 @@ use crate::device::emulator::Board;
 use crate::scene::Effect;
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
-#[cfg(unix)]
 use iltm_runtime::FrameSize;
 use std::path::PathBuf;
 
@@ -39,6 +38,8 @@ pub(super) enum Command {
     Compare(Compare),
     /// Show what accuracy costs in time, for a scene or a table
     Tradeoff(Tradeoff),
+    /// Prove a table on the wall: test images to photograph, then a verdict
+    Verify(Verify),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -314,6 +315,34 @@ pub(super) struct Compensate {
     pub(super) tier: Option<u8>,
 }
 
+#[derive(Debug, Args)]
+pub(super) struct Verify {
+    /// Table to verify
+    pub(super) table: PathBuf,
+    /// Folder made with --output, with the photographs in it: judge them
+    #[arg(
+        value_name = "FOLDER",
+        required_unless_present = "output",
+        conflicts_with = "output"
+    )]
+    pub(super) capture: Option<PathBuf>,
+    /// Folder to make, with the pictures to project
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(super) output: Option<PathBuf>,
+    /// Resolution of the projector; as when the scene's patterns were made
+    #[arg(long, value_name = "WxH", value_parser = frame_size, default_value = "1920x1080", requires = "output")]
+    pub(super) projector: FrameSize,
+    /// Black pixels on each side; as when the scene's patterns were made
+    #[arg(long, value_name = "PIXELS", default_value_t = 0, requires = "output")]
+    pub(super) border: u16,
+    /// Largest error that passes; by default 1.5 times what is to be expected
+    #[arg(long, value_name = "ERROR", value_parser = error_bound, conflicts_with = "output")]
+    pub(super) bound: Option<f64>,
+    /// Folder for the page and the maps; by default `verdict` in FOLDER
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    pub(super) report: Option<PathBuf>,
+}
+
 #[derive(Clone, Debug, Args)]
 pub(super) struct SerialLine {
     /// Serial port of the device; by default the one that answers
@@ -392,7 +421,13 @@ fn share(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "a share is a number from 0 to 1".to_owned())
 }
 
-#[cfg(unix)]
+fn error_bound(text: &str) -> Result<f64, String> {
+    let error = text.parse::<f64>().ok();
+    error
+        .filter(|error| *error > 0.0 && *error <= 1.0)
+        .ok_or_else(|| "an error is a number above 0, at most 1".to_owned())
+}
+
 fn frame_size(text: &str) -> Result<FrameSize, String> {
     let sides = text.split_once('x');
     let side = |text: &str| text.parse::<u16>().ok();

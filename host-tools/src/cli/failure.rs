@@ -11,6 +11,7 @@ use crate::user::ConfigError;
 use iltm_runtime::link::Refusal;
 use iltm_runtime::trust::Rejected;
 use miette::Diagnostic;
+use serde_json::Value;
 use std::fmt::{self, Write};
 
 /// Causes of failure, each with an exit code of its own. The codes are a contract.
@@ -75,6 +76,8 @@ pub(super) enum Kind {
     Interrupted = 29,
     /// A scene cannot be simulated as it is described.
     Scene = 30,
+    /// A table does not keep its promise on the wall.
+    Verdict = 31,
 }
 
 impl From<&Rejected> for Kind {
@@ -131,7 +134,7 @@ impl From<&UploadError> for Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 29] = [
+    const ALL: [(Self, &'static str, &'static str); 30] = [
         (
             Self::Usage,
             "usage",
@@ -229,6 +232,11 @@ impl Kind {
             "scene",
             "a scene cannot be simulated as it is described",
         ),
+        (
+            Self::Verdict,
+            "verdict",
+            "a table does not keep its promise on the wall",
+        ),
     ];
 
     pub(super) const fn code(self) -> u8 {
@@ -258,6 +266,8 @@ pub(super) struct Failure {
     pub(super) next_step: String,
     /// Where a device's tables were about to change: which one is in use now.
     pub(super) active: Option<Active>,
+    /// What was found out all the same: a JSON object, printed with the error.
+    pub(super) result: Option<Value>,
 }
 
 impl Failure {
@@ -271,7 +281,14 @@ impl Failure {
             message: message.to_string(),
             next_step: next_step.into(),
             active: None,
+            result: None,
         }
+    }
+
+    /// The same, with what was found out all the same: an object.
+    pub(super) fn with_result(mut self, result: Value) -> Self {
+        self.result = Some(result);
+        self
     }
 
     /// The same, with the table that is in use now.
@@ -358,7 +375,7 @@ fn compile_failure(error: &CompileError) -> Failure {
 }
 
 /// Whether a capture cannot be read, is not well-formed, or shows bad light.
-const fn kind_of(error: &CaptureError) -> Kind {
+pub(super) const fn kind_of(error: &CaptureError) -> Kind {
     match error {
         CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
         CaptureError::MorePhotographsThanTaken { .. }

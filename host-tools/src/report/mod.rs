@@ -40,6 +40,7 @@ pub use example::{Example, Shown, Treatment, Wanted};
 pub use files::PictureFile;
 pub use ladder::{Rung, Step, ladder, steps};
 pub use light_picture::LightPicture;
+pub(crate) use page::colour_bar;
 pub use page::{Command, Words};
 pub use predict::Projection;
 pub use summary::summary;

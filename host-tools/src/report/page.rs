@@ -406,7 +406,7 @@ fn clipping(shown: &Shown) -> String {
     }
 }
 
-fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
+pub(crate) fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
     const STOPS: usize = 16;
     let stops: Vec<String> = (0..=STOPS)
         .map(|stop| {

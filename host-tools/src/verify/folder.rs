@@ -29,8 +29,12 @@ pub struct Layout {
 impl Layout {
     /// Pixels of the cells together; `None` if the border leaves none.
     fn cells(self) -> Option<FrameSize> {
-        let side = |side: usize| u16::try_from(side.checked_sub(2 * usize::from(self.border))?).ok();
-        FrameSize::new(side(self.projector.width())?, side(self.projector.height())?)
+        let side =
+            |side: usize| u16::try_from(side.checked_sub(2 * usize::from(self.border))?).ok();
+        FrameSize::new(
+            side(self.projector.width())?,
+            side(self.projector.height())?,
+        )
     }
 }
 
@@ -109,7 +113,10 @@ pub fn write(
         (VERIFY_FILE, manifest.to_csv()),
         // Numbers and strings always have a TOML form.
         (SETTINGS_FILE, toml::to_string(settings).unwrap_or_default()),
-        ("README.md", README.replace("PHOTOGRAPHS", &slides.len().to_string())),
+        (
+            "README.md",
+            README.replace("PHOTOGRAPHS", &slides.len().to_string()),
+        ),
     ];
     for (name, text) in texts {
         let path = folder.path().join(name);
@@ -182,7 +189,10 @@ pub(super) fn plain(wanted: &Picture, curves: &ProjectorCurves) -> Picture {
         planes.map(move |(channel, plane)| (channel, f64::from(plane[pixel])))
     });
     let samples = samples.map(|(channel, light)| curves.code(channel, light));
-    eight(wanted.size(), samples.take(pixels_of(wanted) * channels).collect())
+    eight(
+        wanted.size(),
+        samples.take(pixels_of(wanted) * channels).collect(),
+    )
 }
 
 fn pixels_of(picture: &Picture) -> usize {

@@ -95,15 +95,30 @@ fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellLight)> {
             let plane = |channel: usize| {
                 let own = natural.column(NATURAL + image * 3 + channel);
                 let common = natural.column(image);
-                let mix = |(common, own)| if channels == 1 { common } else { 0.65 * common + 0.35 * own };
-                common.iter().copied().zip(own.iter().copied()).map(mix).collect()
+                let mix = |(common, own)| {
+                    if channels == 1 {
+                        common
+                    } else {
+                        0.65 * common + 0.35 * own
+                    }
+                };
+                common
+                    .iter()
+                    .copied()
+                    .zip(own.iter().copied())
+                    .map(mix)
+                    .collect()
             };
             let planes = (0..channels).map(plane).collect();
             (format!("Natural image {}", image + 1), planes)
         })
         .collect();
-    drawn.push(("Even grey".to_owned(), vec![vec![0.5; grid.cells()]; channels]));
-    let fields = |(row, col): (usize, usize)| f64::from((row / FIELD + col / FIELD).is_multiple_of(2));
+    drawn.push((
+        "Even grey".to_owned(),
+        vec![vec![0.5; grid.cells()]; channels],
+    ));
+    let fields =
+        |(row, col): (usize, usize)| f64::from((row / FIELD + col / FIELD).is_multiple_of(2));
     drawn.push((
         "Checkerboard".to_owned(),
         vec![cells().map(fields).collect(); channels],

@@ -33,6 +33,7 @@ pub use images::{TestImage, test_images};
 pub use judge::{Bound, Drift, ImageVerdict, Verdict, WorstCell, judge};
 pub use maps::pictures;
 pub use page::html;
+pub(crate) use page::reason;
 pub use response::ProjectorCurves;
 pub use role::{VERIFY_FILE, VerifyManifest, VerifyRole, VerifyShot};
 pub use session::{Session, Shown};

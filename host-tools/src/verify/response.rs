@@ -54,7 +54,10 @@ impl ProjectorCurves {
 fn drives(codes: &[u8]) -> Vec<f64> {
     let last = codes.len() - 1;
     let mut known: Vec<(usize, f64)> = Vec::new();
-    for run in (0..=last).collect::<Vec<_>>().chunk_by(|a, b| codes[*a] == codes[*b]) {
+    for run in (0..=last)
+        .collect::<Vec<_>>()
+        .chunk_by(|a, b| codes[*a] == codes[*b])
+    {
         let (first, end) = (run[0], run[run.len() - 1]);
         // Black and white are what they are, whatever else rounds to them.
         let middle = match (first, end) {
@@ -101,7 +104,10 @@ mod tests {
             for code in 0..=u8::MAX {
                 let exact = response.light(f64::from(code) / 255.0);
                 let drive = curves.drive(0, code);
-                assert!((drive - exact).abs() < 6e-4, "{response} {code}: {drive} {exact}");
+                assert!(
+                    (drive - exact).abs() < 6e-4,
+                    "{response} {code}: {drive} {exact}"
+                );
                 let back = curves.code(0, exact);
                 assert!(back.abs_diff(code) <= 1, "{response} {code}: {back}");
             }

@@ -96,7 +96,10 @@ impl Session {
             .collect();
         let revisited = revisit(folder, &settings, &code, &shots, progress)?;
         let live = live(folder, table, &revisited)?;
-        let shown = pairs.into_iter().zip(pictures).zip(revisited.pictures.chunks_exact(2));
+        let shown = pairs
+            .into_iter()
+            .zip(pictures)
+            .zip(revisited.pictures.chunks_exact(2));
         let shown = shown.map(|(((image, pair), picture), seen)| Shown {
             image,
             wanted: picture.wanted,
@@ -141,7 +144,10 @@ fn check_all_there(
     }
     Err(VerifyError::Missing {
         folder: folder.to_owned(),
-        missing: missing.into_iter().map(|(_, photo)| photo.clone()).collect(),
+        missing: missing
+            .into_iter()
+            .map(|(_, photo)| photo.clone())
+            .collect(),
     })
 }
 
