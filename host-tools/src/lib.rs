@@ -20,6 +20,7 @@ pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod solve;
+pub mod solved;
 pub mod tradeoff;
 pub mod user;
 pub mod verify;

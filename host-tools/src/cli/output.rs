@@ -37,9 +37,9 @@ impl Output {
         }
     }
 
-    /// What people read before the failure of a command that has found something out all
-    /// the same; programs get it with the failure.
-    pub(super) fn before_failure(&self, text: &str) {
+    /// What people read while a command goes on, or before its failure; programs get it as
+    /// events, or with the failure.
+    pub(super) fn people(&self, text: &str) {
         if !self.json {
             let _ = write!(io::stderr(), "{text}");
         }

@@ -7,7 +7,7 @@ use super::output::{Output, read_file, write_file};
 use super::progress::progress;
 use super::simulate::unwritten;
 use super::{compensate, failure};
-use crate::capture::Settings;
+use crate::learn::settings_in;
 use crate::progress::Progress;
 use crate::verify::{
     ImageVerdict, Layout, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
@@ -41,11 +41,15 @@ fn prepare(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
+    let settings = settings_in(table.provenance()).unwrap_or_default();
+    let own = settings.projector.size;
     let layout = Layout {
-        projector: arguments.projector,
-        border: arguments.border,
+        projector: arguments
+            .projector
+            .or_else(|| own.and_then(|[width, height]| FrameSize::new(width, height)))
+            .unwrap_or(Layout::DEFAULT.projector),
+        border: arguments.border.unwrap_or(settings.projector.border),
     };
-    let settings = Settings::default();
     let written = write(table, layout, &settings, out, bars).map_err(failed)?;
     bars.end();
     let data = json!({
@@ -99,7 +103,7 @@ fn verdict(
         output.result(&data, &text);
         return Ok(());
     }
-    output.before_failure(&text);
+    output.people(&text);
     let message = format!(
         "{} does not keep its promise: error {:.4}, at most {:.4} passes",
         arguments.table.display(),

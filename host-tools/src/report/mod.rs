@@ -38,6 +38,7 @@ pub use comparison::Comparison;
 pub(crate) use document::document;
 pub use example::{Example, Shown, Treatment, Wanted};
 pub use files::PictureFile;
+pub(crate) use files::picture_file;
 pub use ladder::{Rung, Step, ladder, steps};
 pub use light_picture::LightPicture;
 pub(crate) use page::colour_bar;

@@ -27,6 +27,15 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// Where nothing else is known.
+    pub const DEFAULT: Self = Self {
+        projector: match FrameSize::new(1920, 1080) {
+            Some(size) => size,
+            None => unreachable!(),
+        },
+        border: 0,
+    };
+
     /// Pixels of the cells together; `None` if the border leaves none.
     fn cells(self) -> Option<FrameSize> {
         let side =
@@ -155,7 +164,11 @@ fn slides(
         let role = VerifyRole::Code(*role);
         Slide { role, cells, full }
     };
-    let coded = shown(table.grid(), 0, 0);
+    let more = std::env::var("ILTM_B")
+        .ok()
+        .and_then(|t| t.parse().ok())
+        .unwrap_or(0);
+    let coded = shown(table.grid(), more, 0);
     let ends = || coded.iter().take(2).map(code);
     let mut slides: Vec<Slide> = coded.iter().map(code).collect();
     slides.extend(ends());

@@ -4,8 +4,8 @@
 use super::judge::{ImageVerdict, over_images};
 use super::{Session, Verdict};
 use crate::capture::CellLight;
-use crate::report::{ColourScale, LightPicture, Palette, PictureFile};
-use crate::video::{Picture, Samples, png};
+use crate::report::{ColourScale, LightPicture, Palette, PictureFile, picture_file};
+use crate::video::{Picture, Samples};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 
@@ -29,22 +29,25 @@ pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<
         .map(|c| c.map(f64::abs))
         .collect();
     let mut files = vec![
-        file(
+        picture_file(
             "worst-cells",
             &map(grid, &errors, &over_images(&verdict.images, 1)),
         ),
-        file(
+        picture_file(
             "worst-cells-before",
             &map(grid, &errors, &over_images(&verdict.images, 0)),
         ),
-        file("drift", &map(grid, &drift, &drifts)),
+        picture_file("drift", &map(grid, &drift, &drifts)),
     ];
     for (shown, image) in session.shown.iter().zip(&verdict.images) {
         let number = image.image;
         let wall = |half: usize| as_seen(grid, &shown.seen[half], image, &session.live);
-        files.push(file(&format!("{number}-wanted"), &lit(grid, &shown.wanted)));
-        files.push(file(&format!("{number}-before"), &wall(0)));
-        files.push(file(&format!("{number}-after"), &wall(1)));
+        files.push(picture_file(
+            &format!("{number}-wanted"),
+            &lit(grid, &shown.wanted),
+        ));
+        files.push(picture_file(&format!("{number}-before"), &wall(0)));
+        files.push(picture_file(&format!("{number}-after"), &wall(1)));
     }
     files
 }
@@ -118,15 +121,5 @@ fn blocks(grid: Grid, channels: usize, samples: &[u8]) -> Picture {
     match size.and_then(|size| Picture::new(size, Samples::Eight(all.collect()))) {
         Some(picture) => picture,
         None => unreachable!("squares of the cells' samples"),
-    }
-}
-
-fn file(name: &str, picture: &Picture) -> PictureFile {
-    let mut bytes = Vec::new();
-    // Writing to memory does not fail.
-    let _ = png::write(&mut bytes, picture);
-    PictureFile {
-        name: name.to_owned(),
-        png: bytes,
     }
 }

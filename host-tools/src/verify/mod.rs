@@ -24,7 +24,7 @@ mod response;
 mod role;
 mod session;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use error::VerifyError;
 pub use expected::Expected;

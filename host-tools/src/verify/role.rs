@@ -50,8 +50,7 @@ impl VerifyRole {
         if let Some(digits) = name.strip_prefix("compensated-") {
             return number(digits).map(Self::Compensated);
         }
-        let code = Role::from_name(name).filter(|role| *role != Role::Bernoulli);
-        code.map(Self::Code)
+        Role::from_name(name).map(Self::Code)
     }
 }
 

@@ -5,7 +5,7 @@ use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
 /// A textured scene whose cells light each other the more the nearer they are.
-pub(super) fn scene(channels: usize) -> InverseTransport {
+pub(crate) fn scene(channels: usize) -> InverseTransport {
     let grid = Grid::new(5, 8).unwrap();
     let cells = grid.cells();
     let kernel = |i: usize, j: usize| {
