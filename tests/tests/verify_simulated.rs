@@ -9,7 +9,8 @@ use iltm::scene::description::Scene;
 use iltm::scene::retake;
 use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
 use iltm::solve::SolveOptions;
-use iltm::verify::{Layout, Session, Verdict, VerifyError, judge, write};
+use iltm::session::Layout;
+use iltm::verify::{Session, Verdict, VerifyError, judge, write};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use nalgebra::DMatrix;
@@ -40,15 +41,13 @@ fn learned(scene: &Scene, place: &Path) -> Learned {
 /// A folder to verify `learned` with, photographed in `scene`.
 fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
     let table = Table::check(&learned.compiled.image).unwrap();
-    let layout = Layout {
-        projector: FrameSize::new(320, 200).unwrap(),
-        border: 4,
-    };
+    let projector = FrameSize::new(320, 200).unwrap();
+    let layout = Layout::new(table.grid(), projector, 4).unwrap();
     let settings = Settings {
         camera: learned.measurements.settings.camera,
         ..Settings::default()
     };
-    write(&table, layout, &settings, folder, &Silent).unwrap();
+    write(&table, &layout, &settings, folder, &Silent).unwrap();
     let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
     let shooting = Shooting::new(scene, &simulation, 11).unwrap();
     let session = retake::Session::read(folder, simulation.grid()).unwrap();
@@ -164,8 +163,8 @@ fn exchanged_photographs_are_named_and_missing_ones_listed() {
     let folder = place.path().join("folder");
     photographed(&learned, &original, &folder);
     let photo = |index: usize| folder.join("photos").join(format!("{index:03}.png"));
-    // Two pictures of different test images.
-    let first = 2 + 2 * (4 + 5) + 2;
+    // White and black, the Gray code, random patterns, white and black again.
+    let first = 2 + 2 * (4 + 5) + 32 + 2;
     std::fs::rename(photo(first), photo(900)).unwrap();
     std::fs::rename(photo(first + 3), photo(first)).unwrap();
     std::fs::rename(photo(900), photo(first + 3)).unwrap();

@@ -22,6 +22,8 @@ const MAX_BYTES: u64 = 64 << 10;
 /// [projector]
 /// response = "srgb"       # the same choice
 /// blur = 0.5              # out of focus: standard deviation in cells, 0 to 4
+/// size = [1920, 1080]     # its own resolution, width and height in pixels
+/// border = 0              # pixels that slides leave black on every side
 /// [scene]
 /// name = "M-shaped panels"
 /// ```
@@ -55,6 +57,18 @@ pub struct ProjectorSettings {
     /// 4; 0 if it is in focus.
     #[serde(deserialize_with = "blur")]
     pub blur: f64,
+    /// The projector's own width and height in pixels, which slides have.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u16; 2]>,
+    /// Pixels that slides leave black on every side, outside of the cells.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub border: u16,
+}
+
+/// Whether there is no border to speak of.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+const fn is_zero(border: &u16) -> bool {
+    *border == 0
 }
 
 /// Most blur that makes sense: a cell's light then spreads over some hundred.
@@ -75,6 +89,8 @@ impl Default for ProjectorSettings {
         Self {
             response: Response::Srgb,
             blur: 0.0,
+            size: None,
+            border: 0,
         }
     }
 }

@@ -27,6 +27,8 @@ pub(super) enum Command {
     Demo(Demo),
     /// Take photographs of a described scene, with the effects that it calls for
     Simulate(Simulate),
+    /// Make a folder of pictures to show and photograph, with the rules for doing so
+    Patterns(Patterns),
     /// Learn a scene from its photographs and write its table
     Solve(Solve),
     /// Say what is in a table
@@ -123,6 +125,40 @@ pub(super) struct Simulate {
     /// camera's noise hides
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub(super) threshold: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Patterns {
+    /// Capture folder to make
+    #[arg(short, long, value_name = "CAPTURE")]
+    pub(super) output: PathBuf,
+    /// Rows of cells
+    #[arg(long, value_name = "R")]
+    pub(super) rows: u16,
+    /// Columns of cells
+    #[arg(long, value_name = "C")]
+    pub(super) cols: u16,
+    /// Bernoulli patterns, beside white, black and the Gray code
+    #[arg(long, value_name = "M", default_value_t = 150, value_parser = clap::value_parser!(u16).range(..=10_000))]
+    pub(super) photos: u16,
+    /// Seed of the Bernoulli patterns
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// The projector's own resolution
+    #[arg(long, value_name = "WxH", value_parser = frame_size, default_value = "1920x1080")]
+    pub(super) projector: FrameSize,
+    /// Pixels to leave black on every side
+    #[arg(long, value_name = "PIXELS", default_value_t = 0)]
+    pub(super) border: u16,
+    /// Levels of the response ramp, shown in white and in each channel
+    #[arg(long, value_name = "LEVELS", default_value_t = 9, value_parser = clap::value_parser!(u16).range(2..=256))]
+    pub(super) ramp: u16,
+    /// Leave out the pictures that measure projector and camera: ramp and blur probe
+    #[arg(long, conflicts_with = "ramp")]
+    pub(super) no_calibration: bool,
+    /// Show white and black again after this many other pictures
+    #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) repeat_every: u16,
 }
 
 #[derive(Debug, Args)]

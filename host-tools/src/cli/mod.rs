@@ -20,6 +20,7 @@ mod interrupt;
 mod key;
 mod monitor;
 mod output;
+mod patterns;
 mod ports;
 mod progress;
 mod report;
@@ -46,6 +47,7 @@ pub fn run(meter: Meter) -> ExitCode {
     let result = match &arguments.command {
         Command::Demo(demo) => demo::run(demo, &output),
         Command::Simulate(simulate) => simulate::run(simulate, &output),
+        Command::Patterns(patterns) => patterns::run(patterns, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),

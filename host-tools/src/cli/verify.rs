@@ -8,9 +8,10 @@ use super::progress::progress;
 use super::simulate::unwritten;
 use super::{compensate, failure};
 use crate::learn::settings_in;
+use crate::session::Layout;
 use crate::progress::Progress;
 use crate::verify::{
-    ImageVerdict, Layout, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
+    ImageVerdict, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
     test_images, write,
 };
 use iltm_runtime::FrameSize;
@@ -43,14 +44,17 @@ fn prepare(
 ) -> Result<(), Failure> {
     let settings = settings_in(table.provenance()).unwrap_or_default();
     let own = settings.projector.size;
-    let layout = Layout {
-        projector: arguments
-            .projector
-            .or_else(|| own.and_then(|[width, height]| FrameSize::new(width, height)))
-            .unwrap_or(Layout::DEFAULT.projector),
-        border: arguments.border.unwrap_or(settings.projector.border),
+    let projector = arguments
+        .projector
+        .or_else(|| own.and_then(|[width, height]| FrameSize::new(width, height)))
+        .or_else(|| FrameSize::new(1920, 1080));
+    let Some(projector) = projector else {
+        unreachable!("sides above zero");
     };
-    let written = write(table, layout, &settings, out, bars).map_err(failed)?;
+    let border = arguments.border.unwrap_or(settings.projector.border);
+    let layout = Layout::new(table.grid(), projector, border)
+        .map_err(|error| failed(VerifyError::Slides(error)))?;
+    let written = write(table, &layout, &settings, out, bars).map_err(failed)?;
     bars.end();
     let data = json!({
         "folder": out.display().to_string(),
@@ -59,12 +63,12 @@ fn prepare(
             "title": image.title,
             "clipped": image.clipped,
         })).collect::<Vec<_>>(),
-        "projector": size(layout.projector),
-        "border": layout.border,
+        "projector": size(layout.projector()),
+        "border": layout.border(),
     });
     let text = format!(
         "{}: {} pictures to project and photograph ({} test images, each as it is and compensated;\n\
-         white, black and a Gray code). README.md in it says how. Then:\n\
+         white, black and patterns that find the cells). README.md in it says how. Then:\n\
          iltm verify {} {}\n",
         out.display(),
         written.pictures,
@@ -146,6 +150,7 @@ fn failed(error: VerifyError) -> Failure {
             return unwritten(error);
         }
         VerifyError::Video(error) => return compensate::failed(error),
+        VerifyError::Slides(_) => Kind::Usage,
         VerifyError::Capture(error) => failure::kind_of(error),
         VerifyError::NoManifest { .. } => Kind::Read,
         VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,

@@ -2,6 +2,7 @@
 
 use crate::capture::CaptureError;
 use crate::scene::folder::FolderError;
+use crate::session::PatternsError;
 use crate::video::VideoError;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,9 @@ pub enum VerifyError {
     /// The table cannot compensate the test images, or one of them cannot be read.
     #[error(transparent)]
     Video(#[from] VideoError),
+    /// Cells and projector do not fit together.
+    #[error(transparent)]
+    Slides(#[from] PatternsError),
     /// A file of the folder cannot be used.
     #[error(transparent)]
     Capture(#[from] CaptureError),
@@ -122,6 +126,7 @@ impl VerifyError {
             }
             Self::Folder(_) => "Check the folder and run the command again.".to_owned(),
             Self::Video(error) => error.next_step().to_owned(),
+            Self::Slides(error) => error.next_step().to_owned(),
             Self::Capture(error) => error.next_step().to_owned(),
             Self::NoManifest { path } => format!(
                 "Make the folder first: `iltm verify TABLE.iltm -o {}`, then photograph its slides.",

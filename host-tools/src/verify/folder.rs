@@ -7,6 +7,7 @@ use super::{TestImage, VerifyError};
 use crate::capture::{Pattern, Role, SETTINGS_FILE, Settings, shown};
 use crate::progress::Progress;
 use crate::scene::folder::{FolderError, beside, put_in_place};
+use crate::session::Layout;
 use crate::video::{Compensator, Picture, Samples, VideoError, png};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
@@ -17,36 +18,6 @@ use std::path::{Path, PathBuf};
 /// What stands in the folder for whoever takes the photographs.
 const README: &str = include_str!("README.txt");
 
-/// Where the cells lie on the projector's chip.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Layout {
-    /// The projector's resolution.
-    pub projector: FrameSize,
-    /// Pixels left black on each side.
-    pub border: u16,
-}
-
-impl Layout {
-    /// Where nothing else is known.
-    pub const DEFAULT: Self = Self {
-        projector: match FrameSize::new(1920, 1080) {
-            Some(size) => size,
-            None => unreachable!(),
-        },
-        border: 0,
-    };
-
-    /// Pixels of the cells together; `None` if the border leaves none.
-    fn cells(self) -> Option<FrameSize> {
-        let side =
-            |side: usize| u16::try_from(side.checked_sub(2 * usize::from(self.border))?).ok();
-        FrameSize::new(
-            side(self.projector.width())?,
-            side(self.projector.height())?,
-        )
-    }
-}
-
 /// What was written.
 #[derive(Clone, Debug)]
 pub struct Written {
@@ -56,47 +27,47 @@ pub struct Written {
     pub images: Vec<TestImage>,
 }
 
+/// Random patterns beside the Gray code: without them camera pixels are found so roughly
+/// that a good table seems four times worse than it is, and more of them bring little.
+const BERNOULLI: usize = 32;
+
+/// What they follow from: any number but those of captures.
+const SEED: u64 = 0x5EE;
+
 /// A picture to project.
 struct Slide {
     role: VerifyRole,
     /// One pixel a cell.
     cells: Picture,
-    /// What the projector is sent within the border.
+    /// What the projector is sent.
     full: Picture,
 }
 
 /// Writes the folder `out`, whole or not at all: for each test image the picture as it is
-/// and as `table` compensates it, white, black and a Gray code.
+/// and as `table` compensates it, white, black, a Gray code and some random patterns.
 ///
 /// # Errors
 /// [`VerifyError::Folder`] if something is in its place or it cannot be written,
-/// [`VerifyError::Video`] if a frame of the projector's size is smaller than the grid.
+/// [`VerifyError::Slides`] if cells and projector do not fit together.
 pub fn write(
     table: &Table<'_>,
-    layout: Layout,
+    layout: &Layout,
     settings: &Settings,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Written, VerifyError> {
-    let smaller = VideoError::SmallerThanGrid {
-        frame: layout.projector,
-        grid: table.grid(),
-    };
-    let size = layout.cells().filter(|size| size.holds(table.grid()));
-    let size = size.ok_or(smaller)?;
     let images = test_images(table)?;
     let folder = beside(out)?;
     for name in ["patterns", "slides", "photos", "wanted"] {
         let path = folder.path().join(name);
         fs::create_dir(&path).map_err(|source| FolderError::Io { path, source })?;
     }
-    let slides = slides(table, size, &images)?;
+    let slides = slides(table, layout, &images)?;
     progress.begin("writing the pictures", slides.len() as u64);
     let written = slides.par_iter().enumerate().map(|(index, slide)| {
         let [pattern, shown, _] = names(index);
         save(&folder.path().join(pattern), &slide.cells)?;
-        let bordered = bordered(&slide.full, layout);
-        save(&folder.path().join(shown), &bordered)?;
+        save(&folder.path().join(shown), &slide.full)?;
         progress.advance(1);
         Ok(())
     });
@@ -153,9 +124,9 @@ fn names(index: usize) -> [PathBuf; 3] {
 /// and at the end, so that a lamp that changes meanwhile is noticed.
 fn slides(
     table: &Table<'_>,
-    size: FrameSize,
+    layout: &Layout,
     images: &[TestImage],
-) -> Result<Vec<Slide>, VideoError> {
+) -> Result<Vec<Slide>, VerifyError> {
     let curves = ProjectorCurves::new(table);
     let compensator = Compensator::new(table, crate::video::Settings::default())?;
     let code = |(role, pattern): &(Role, Pattern)| {
@@ -169,16 +140,19 @@ fn slides(
         .and_then(|t| t.parse().ok())
         .unwrap_or(0);
     let coded = shown(table.grid(), more, 0);
-    let ends = || coded.iter().take(2).map(code);
-    let mut slides: Vec<Slide> = coded.iter().map(code).collect();
-    slides.extend(ends());
+    let ends = || coded.iter().take(2).map(code).collect::<Result<Vec<_>, VerifyError>>();
+    let mut slides = coded.iter().map(code).collect::<Result<Vec<_>, VerifyError>>()?;
+    slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);
-        let mut full = enlarged(&test.wanted, size);
+        let mut full = within.slide(&test.wanted)?;
         compensator.picture(&mut full)?;
+        let Some(full) = layout.framed(&full) else {
+            unreachable!("slides have 8 bits and the size of the cells");
+        };
         slides.push(Slide {
             role: VerifyRole::Plain(image),
-            full: enlarged(&plain, size),
+            full: layout.slide(&plain)?,
             cells: plain,
         });
         slides.push(Slide {
@@ -187,7 +161,7 @@ fn slides(
             full,
         });
     }
-    slides.extend(ends());
+    slides.extend(ends()?);
     Ok(slides)
 }
 
@@ -219,43 +193,6 @@ fn of_pattern(pattern: &Pattern) -> Picture {
         Some(size) => eight(size, lit.collect()),
         None => unreachable!("a grid has cells"),
     }
-}
-
-/// Every cell as a block of pixels: those whose middle lies in it.
-fn enlarged(cells: &Picture, size: FrameSize) -> Picture {
-    let Samples::Eight(samples) = cells.samples() else {
-        unreachable!("test images have 8 bits");
-    };
-    let channels = cells.channels();
-    let place = |pixel: usize, length: usize, cells: usize| (2 * pixel + 1) * cells / (2 * length);
-    let (rows, cols) = (cells.size().height(), cells.size().width());
-    let columns: Vec<usize> = (0..size.width())
-        .map(|x| place(x, size.width(), cols))
-        .collect();
-    let mut all = Vec::with_capacity(size.pixels() * channels);
-    for y in 0..size.height() {
-        let row = place(y, size.height(), rows);
-        for col in &columns {
-            all.extend(&samples[(row * cols + col) * channels..][..channels]);
-        }
-    }
-    eight(size, all)
-}
-
-/// The picture with its black border.
-fn bordered(picture: &Picture, layout: Layout) -> Picture {
-    let Samples::Eight(samples) = picture.samples() else {
-        unreachable!("slides have 8 bits");
-    };
-    let channels = picture.channels();
-    let (width, border) = (layout.projector.width(), usize::from(layout.border));
-    let mut all = vec![0; layout.projector.pixels() * channels];
-    let rows = samples.chunks_exact(picture.size().width() * channels);
-    for (row, line) in rows.enumerate() {
-        let start = ((row + border) * width + border) * channels;
-        all[start..][..line.len()].copy_from_slice(line);
-    }
-    eight(layout.projector, all)
 }
 
 /// A picture of 8-bit samples, one or three for each pixel.

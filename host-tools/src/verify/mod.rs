@@ -28,7 +28,7 @@ pub(crate) mod tests;
 
 pub use error::VerifyError;
 pub use expected::Expected;
-pub use folder::{Layout, Written, write};
+pub use folder::{Written, write};
 pub use images::{TestImage, test_images};
 pub use judge::{Bound, Drift, ImageVerdict, Verdict, WorstCell, judge};
 pub use maps::pictures;

@@ -17,10 +17,10 @@ pub type VerifyShot = ShotOf<VerifyRole>;
 ///
 /// [`fmt::Display`] writes and [`VerifyRole::from_name`] reads the name that stands
 /// there: `white`, `black`, `column-B`, `column-B-inverse`, `row-B`, `row-B-inverse`,
-/// `plain-K`, `compensated-K`.
+/// `bernoulli`, `plain-K`, `compensated-K`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum VerifyRole {
-    /// To find the cells: any role of `capture.csv` but a Bernoulli pattern.
+    /// To find the cells: any role of `capture.csv`.
     Code(Role),
     /// Test image K as it is.
     Plain(u8),
@@ -35,8 +35,7 @@ impl VerifyRole {
     /// use iltm::verify::VerifyRole;
     /// assert_eq!(VerifyRole::from_name("plain-3"), Some(VerifyRole::Plain(3)));
     /// assert_eq!(VerifyRole::from_name("plain-03"), None);
-    /// assert_eq!(VerifyRole::from_name("bernoulli"), None);
-    /// ```
+        /// ```
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let number = |digits: &str| {
@@ -77,7 +76,7 @@ impl ListedRole for VerifyRole {
             line,
             reason: format!(
                 "unknown role \"{role}\"; it must be white, black, column-B, row-B (the latter \
-                 two also with -inverse), plain-K or compensated-K"
+                 two also with -inverse), bernoulli, plain-K or compensated-K"
             ),
         }
     }
