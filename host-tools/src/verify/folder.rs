@@ -129,17 +129,16 @@ fn slides(
 ) -> Result<Vec<Slide>, VerifyError> {
     let curves = ProjectorCurves::new(table);
     let compensator = Compensator::new(table, crate::video::Settings::default())?;
-    let code = |(role, pattern): &(Role, Pattern)| {
+    let within = Layout::new(table.grid(), layout.inner(), 0)?;
+    let code = |(role, pattern): &(Role, Pattern)| -> Result<Slide, VerifyError> {
         let cells = of_pattern(pattern);
-        let full = enlarged(&cells, size);
-        let role = VerifyRole::Code(*role);
-        Slide { role, cells, full }
+        Ok(Slide {
+            role: VerifyRole::Code(*role),
+            full: layout.slide(&cells)?,
+            cells,
+        })
     };
-    let more = std::env::var("ILTM_B")
-        .ok()
-        .and_then(|t| t.parse().ok())
-        .unwrap_or(0);
-    let coded = shown(table.grid(), more, 0);
+    let coded = shown(table.grid(), BERNOULLI, SEED);
     let ends = || coded.iter().take(2).map(code).collect::<Result<Vec<_>, VerifyError>>();
     let mut slides = coded.iter().map(code).collect::<Result<Vec<_>, VerifyError>>()?;
     slides.extend(ends()?);
