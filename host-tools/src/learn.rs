@@ -97,7 +97,7 @@ pub fn learn_measured(
     let fine = compile::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
     let white = ChosenWhite::new(&inverse, fine.as_ref(), white)?;
     let options = CompileOptions {
-        projector: measurements.settings.projector.response,
+        projector: measurements.devices.projector.clone(),
         reference_white: Some(white.light),
         inverse_error: report.predicted_error(),
         provenance: provenance(capture, &measurements, &report, &white),
@@ -151,6 +151,18 @@ pub fn settings_in(provenance: &str) -> Option<Settings> {
     stored.map(|stored: Stored| stored.capture)
 }
 
+/// The mixing of projector channels in the camera's that a table's photographs were freed
+/// of, `[camera][projector]`; `None` if there was none.
+#[must_use]
+pub fn mixing_in(provenance: &str) -> Option<[[f64; 3]; 3]> {
+    #[derive(Deserialize)]
+    struct Stored {
+        mixing: [[f64; 3]; 3],
+    }
+    let stored = toml::from_str(provenance).ok();
+    stored.map(|stored: Stored| stored.mixing)
+}
+
 /// What a table says about where it comes from.
 #[derive(Serialize)]
 struct Provenance<'a> {
@@ -162,10 +174,15 @@ struct Provenance<'a> {
     live_cells: usize,
     lambda: f64,
     condition: f64,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    ignored_gates: Vec<&'static str>,
     compensation: &'static str,
     predicted_error: PredictedError,
     #[serde(skip_serializing_if = "Option::is_none")]
     recovery: Option<Recovery>,
+    /// Before the tables, as TOML wants it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mixing: Option<[[f64; 3]; 3]>,
     white: &'a ChosenWhite,
     capture: &'a Settings,
 }
@@ -211,6 +228,10 @@ fn provenance(
         live_cells: report.live_cells,
         lambda: report.lambda,
         condition: report.condition,
+        ignored_gates: (measurements.diagnostics.gates.iter())
+            .filter(|gate| gate.fails())
+            .map(|gate| gate.name.name())
+            .collect(),
         compensation: report.compensation.name(),
         predicted_error: PredictedError {
             uncompensated: report.prediction.uncompensated,
@@ -218,6 +239,9 @@ fn provenance(
             compensated: report.prediction.compensated,
         },
         recovery: report.recovery,
+        mixing: (measurements.devices.unmixed)
+            .then(|| measurements.devices.mixing().map(|mixing| mixing.matrix))
+            .flatten(),
         white,
         capture: &measurements.settings,
     };

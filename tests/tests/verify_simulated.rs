@@ -8,8 +8,8 @@ use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::retake;
 use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
-use iltm::solve::SolveOptions;
 use iltm::session::Layout;
+use iltm::solve::SolveOptions;
 use iltm::verify::{Session, Verdict, VerifyError, judge, write};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
@@ -44,7 +44,7 @@ fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
     let projector = FrameSize::new(320, 200).unwrap();
     let layout = Layout::new(table.grid(), projector, 4).unwrap();
     let settings = Settings {
-        camera: learned.measurements.settings.camera,
+        camera: learned.measurements.settings.camera.clone(),
         ..Settings::default()
     };
     write(&table, &layout, &settings, folder, &Silent).unwrap();
@@ -121,17 +121,27 @@ fn a_good_table_passes_with_the_errors_that_are_really_there_wherever_the_camera
             verdict.error, verdict.bound, verdict.drift.level, verdict.drift.shape
         );
         assert!(verdict.passed, "{name}");
-        assert!(verdict.cells.0 * 100 >= verdict.cells.1 * 95, "{:?}", verdict.cells);
+        assert!(
+            verdict.cells.0 * 100 >= verdict.cells.1 * 95,
+            "{:?}",
+            verdict.cells
+        );
         assert!((verdict.error[0] / truth[0] - 1.0).abs() < 0.05, "{name}");
         // The photographs' noise comes on top of the compensated pictures' small error.
         let noise = verdict.bound.noise.unwrap();
         let both = truth[1].hypot(noise);
-        assert!((verdict.error[1] / both - 1.0).abs() < 0.35, "{name}: {both}");
+        assert!(
+            (verdict.error[1] / both - 1.0).abs() < 0.35,
+            "{name}: {both}"
+        );
         assert!(verdict.error[1] < 0.1 * verdict.error[0], "{name}");
         // What the table makes of its own pictures without compensation is no guess.
         let modelled: f64 = verdict.images.iter().map(|image| image.modelled[0]).sum();
         let modelled = modelled / verdict.images.len() as f64;
-        assert!((modelled / verdict.error[0] - 1.0).abs() < 0.05, "{modelled}");
+        assert!(
+            (modelled / verdict.error[0] - 1.0).abs() < 0.05,
+            "{modelled}"
+        );
         assert!(verdict.drift.shape < 0.02, "{:?}", verdict.drift.shape);
     }
 }
@@ -152,7 +162,11 @@ fn a_table_of_another_scene_fails_and_white_says_that_the_scene_is_another() {
     assert!(verdict.drift.shape > 0.1, "{:?}", verdict.drift);
     // The worst cells are on the panel that was painted, or on the one that it lights:
     // columns 5 to 15 of 21 are the inner two.
-    assert!((4..=16).contains(&verdict.worst[0].col), "{:?}", verdict.worst);
+    assert!(
+        (4..=16).contains(&verdict.worst[0].col),
+        "{:?}",
+        verdict.worst
+    );
 }
 
 #[test]
@@ -175,5 +189,8 @@ fn exchanged_photographs_are_named_and_missing_ones_listed() {
     std::fs::remove_file(photo(first)).unwrap();
     let error = verdict(&learned, &folder).unwrap_err();
     let text = error.to_string();
-    assert!(text.contains("003.png") && text.contains(&format!("{first:03}.png")), "{text}");
+    assert!(
+        text.contains("003.png") && text.contains(&format!("{first:03}.png")),
+        "{text}"
+    );
 }

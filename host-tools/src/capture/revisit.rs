@@ -1,12 +1,14 @@
 //! The light of every cell in photographs of pictures that are no patterns, taken from
 //! anywhere: a Gray code among them says anew where the cells are.
 
+use super::calibration::Mixing;
+use super::frame::Frame;
+use super::light::Light;
 use super::measure::CellPixels;
-use super::photographs::Photographs;
-use super::sequence::Sequence;
+use super::sequence::{self, Sequence};
 use super::{
-    CaptureError, CaptureOptions, LeftOut, MANIFEST_FILE, Registration, Settings, Shot,
-    check_exposure, gray_code, registration,
+    CaptureError, CaptureOptions, LeftOut, Registration, Settings, Shot, find, gray_code,
+    registration,
 };
 use crate::progress::Progress;
 use iltm_runtime::Grid;
@@ -14,7 +16,7 @@ use std::path::Path;
 
 /// Light of the cells in one photograph: one entry a channel, in each one a cell, camera
 /// units; 0 where a cell was not measured.
-pub type CellLight = Vec<Vec<f64>>;
+pub type CellPlanes = Vec<Vec<f64>>;
 
 /// What photographs of a scene show of its cells.
 #[derive(Clone, Debug)]
@@ -30,65 +32,77 @@ pub struct Revisited {
     /// Where the cells are.
     pub registration: Registration,
     /// Each photograph of white, ambient light included.
-    pub white: Vec<CellLight>,
+    pub white: Vec<CellPlanes>,
     /// Mean of the photographs of black: ambient light and the projector's black.
-    pub black: CellLight,
+    pub black: CellPlanes,
     /// The photographs of the pictures, in their order, ambient light included.
-    pub pictures: Vec<CellLight>,
+    pub pictures: Vec<CellPlanes>,
 }
 
-/// Registers the cells by the photographs of `code` (white, black and the Gray code of
-/// both axes) and measures them in those of `pictures`. Of the latter only photograph
-/// and line are looked at.
+/// Registers the cells by the photographs of `code` (white, black, the Gray code of both
+/// axes and any Bernoulli patterns) and measures them in those of `pictures`. Of the
+/// latter only photograph and line are looked at. With `mixing`, of camera channels by
+/// projector channels, all light is that of the projector's channels.
 ///
 /// # Errors
-/// As [`read`](super::read), but that no Bernoulli photographs are asked for.
+/// [`CaptureError`] for whatever is missing, contradictory or unusable.
 pub fn revisit(
     folder: &Path,
     settings: &Settings,
-    code: &[Shot],
-    pictures: &[Shot],
+    mixing: Option<[[f64; 3]; 3]>,
+    (code, pictures): (&[Shot], &[Shot]),
     progress: &dyn Progress,
 ) -> Result<Revisited, CaptureError> {
     let options = CaptureOptions {
         min_bernoulli: 0,
         ..CaptureOptions::default()
     };
-    let sequence = Sequence::read(folder, code, &options)?;
-    let shots = [sequence.shots.as_slice(), pictures].concat();
-    let mut photographs = Photographs::new(folder, &shots, settings.camera.response)?;
-    photographs.prefetch(progress)?;
-    let white = &sequence.white().shots;
-    let white_path = photographs.path(white[0]);
+    let mut code = sequence::chosen(folder, code, &options)?;
+    let mut pictures = pictures.to_vec();
+    find::resolve(folder, &mut code)?;
+    find::resolve(folder, &mut pictures)?;
+    let mut sequence = Sequence::read(folder, code)?;
+    // Behind the patterns, where only their places here lead to them.
+    let first = sequence.frames.len();
+    sequence
+        .frames
+        .extend(Frame::of_each(&pictures, sequence.longest));
+    let mut light = Light::read(folder, &sequence, settings, progress)?;
+    light.find_clipped(&sequence, progress)?;
+    light.measure_devices(folder, &sequence, settings, progress)?;
+    let known = mixing.map(|matrix| Mixing {
+        matrix,
+        deviation: 0.0,
+        white: None,
+    });
+    if let Some(unmix) = known.as_ref().and_then(Mixing::unmix) {
+        light.unmix(unmix, &sequence, progress)?;
+    }
+    let Light {
+        mut photographs,
+        flood,
+        black,
+        saturated,
+        ..
+    } = light;
 
     progress.begin("finding the cells", 0);
-    let (flood, saturated) = photographs.mean(white, progress)?;
-    let (black, _) = photographs.mean(&sequence.black, progress)?;
-    check_exposure(&flood, &black, &saturated, &white_path)?;
     let gray = gray_code::decode(&sequence, &mut photographs, &flood, &black, progress)?;
     let registered = registration::register(&sequence, &mut photographs, &gray, progress)?;
-    let cells = CellPixels::choose(
-        &registered.registration,
-        &saturated,
-        &folder.join(MANIFEST_FILE),
-        &white_path,
-    )?;
+    let cells = CellPixels::choose(&registered.registration, &saturated);
     progress.end();
 
     progress.begin("measuring cells", pictures.len() as u64);
-    let mut measure = |shots: &[usize]| -> Result<Vec<CellLight>, CaptureError> {
-        let mut light = Vec::with_capacity(shots.len());
-        photographs.for_batches(shots, progress, |photos| {
+    let mut measure = |frames: &[usize]| -> Result<Vec<CellPlanes>, CaptureError> {
+        let mut light = Vec::with_capacity(frames.len());
+        photographs.for_batches(frames, progress, |photos| {
             let planes = photos.iter().map(|(_, photo)| &photo.planes);
             light.extend(planes.map(|planes| planes.iter().map(|p| cells.mean(p)).collect()));
         })?;
         Ok(light)
     };
-    let first = sequence.shots.len();
-    let (white, pictures) = (
-        measure(white)?,
-        measure(&(first..shots.len()).collect::<Vec<_>>())?,
-    );
+    let white = measure(&sequence.white().shots)?;
+    let pictures = measure(&(first..sequence.frames.len()).collect::<Vec<_>>())?;
     progress.end();
     Ok(Revisited {
         grid: sequence.grid,

@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use super::failure::Kind;
+use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
 use crate::scene::{Effect, Fault};
@@ -27,6 +28,8 @@ pub(super) enum Command {
     Demo(Demo),
     /// Take photographs of a described scene, with the effects that it calls for
     Simulate(Simulate),
+    /// Look whether photographs can be used: every gate with its number and next step
+    Check(Check),
     /// Make a folder of pictures to show and photograph, with the rules for doing so
     Patterns(Patterns),
     /// Learn a scene from its photographs and write its table
@@ -61,6 +64,10 @@ pub(super) enum Command {
     Key(Key),
     /// Write a zip file for support: versions, status, logs, transcripts; never keys
     Report(Report),
+    /// Write manual pages
+    Man(Man),
+    /// Print completions for a shell
+    Completions(Completions),
     /// Run the firmware on an emulated board, with its serial line as a port
     #[cfg(unix)]
     Emulate(Emulate),
@@ -128,6 +135,18 @@ pub(super) struct Simulate {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct Check {
+    /// Folder with `capture.csv`, patterns and photographs
+    pub(super) capture: PathBuf,
+    /// Folder to make, with a page that shows what each gate saw
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: Option<PathBuf>,
+    /// Look only at the first M Bernoulli photographs beside all others
+    #[arg(long, value_name = "M")]
+    pub(super) photos: Option<usize>,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct Patterns {
     /// Capture folder to make
     #[arg(short, long, value_name = "CAPTURE")]
@@ -171,6 +190,9 @@ pub(super) struct Solve {
     /// Use only the first M Bernoulli photographs beside all others
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
+    /// Go on although this gate fails (see `iltm check`); may be repeated
+    #[arg(long, value_name = "GATE")]
+    pub(super) ignore: Vec<GateName>,
     /// How to find the inverse: `joint` (all channels and photographs, with what
     /// physics knows), `direct` (the paper's plain l1), `two-stage` (plain l1 for the
     /// transport, then its inverse) or `brute-force` (least squares for the transport)
@@ -340,6 +362,19 @@ pub(super) struct Report {
     /// Seconds for which logs are gathered
     #[arg(long, value_name = "SECONDS", default_value_t = 3)]
     pub(super) seconds: u16,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Man {
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Completions {
+    /// Shell to complete for
+    pub(super) shell: clap_complete::Shell,
 }
 
 #[derive(Debug, Args)]

@@ -1,6 +1,7 @@
 //! What a command failed for: words for people, a code for scripts.
 
 use super::active::Active;
+use super::check;
 use crate::capture::CaptureError;
 use crate::compile::CompileError;
 use crate::compile::sign::KeyError;
@@ -11,7 +12,7 @@ use crate::user::ConfigError;
 use iltm_runtime::link::Refusal;
 use iltm_runtime::trust::Rejected;
 use miette::Diagnostic;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fmt::{self, Write};
 
 /// Causes of failure, each with an exit code of its own. The codes are a contract.
@@ -243,6 +244,12 @@ impl Kind {
         self as u8
     }
 
+    /// Every code with its name and its meaning.
+    pub(super) fn codes() -> Vec<(u8, &'static str, &'static str)> {
+        let code = |(kind, name, meaning): (Self, _, _)| (kind.code(), name, meaning);
+        Self::ALL.map(code).into()
+    }
+
     pub(super) fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(kind, ..)| *kind == self);
         named.map_or("unknown", |(_, name, _)| name)
@@ -266,8 +273,8 @@ pub(super) struct Failure {
     pub(super) next_step: String,
     /// Where a device's tables were about to change: which one is in use now.
     pub(super) active: Option<Active>,
-    /// What was found out all the same: a JSON object, printed with the error.
-    pub(super) result: Option<Value>,
+    /// What was found out before, for programs: an object that stands beside the error.
+    pub(super) data: Option<Box<Value>>,
 }
 
 impl Failure {
@@ -281,13 +288,13 @@ impl Failure {
             message: message.to_string(),
             next_step: next_step.into(),
             active: None,
-            result: None,
+            data: None,
         }
     }
 
     /// The same, with what was found out all the same: an object.
     pub(super) fn with_result(mut self, result: Value) -> Self {
-        self.result = Some(result);
+        self.data = Some(Box::new(result));
         self
     }
 
@@ -335,7 +342,13 @@ impl Diagnostic for Failure {
 impl From<LearnError> for Failure {
     fn from(error: LearnError) -> Self {
         match error {
-            LearnError::Capture(error) => Self::new(kind_of(&error), &error, error.next_step()),
+            LearnError::Capture(error) => {
+                let mut failure = Self::new(kind_of(&error), &error, error.next_step());
+                if let CaptureError::Refused { gates, .. } = &error {
+                    failure.data = Some(Box::new(json!({ "gates": check::gates(gates) })));
+                }
+                failure
+            }
             LearnError::Solve(error) => {
                 // The message of a solve error ends with what to do.
                 let message = error.to_string();
@@ -383,9 +396,8 @@ pub(super) const fn kind_of(error: &CaptureError) -> Kind {
         | CaptureError::BlackIndex { .. } => Kind::Usage,
         CaptureError::TooFewPhotographs { .. }
         | CaptureError::NoLight { .. }
-        | CaptureError::Overexposed { .. }
-        | CaptureError::NotLinear { .. }
-        | CaptureError::NothingRegistered { .. } => Kind::Photographs,
+        | CaptureError::Refused { .. }
+        | CaptureError::ResponseUnknown { .. } => Kind::Photographs,
         _ => Kind::Capture,
     }
 }

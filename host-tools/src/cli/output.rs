@@ -63,7 +63,11 @@ impl Output {
 
     pub(super) fn failure(&self, failure: &Failure) -> ExitCode {
         if self.json {
-            let mut data = failure.result.clone().unwrap_or_else(|| json!({}));
+            let mut data = failure
+                .data
+                .as_deref()
+                .cloned()
+                .unwrap_or_else(|| json!({}));
             data["error"] = json!({
                 "kind": failure.kind.name(),
                 "exit": failure.kind.code(),

@@ -5,7 +5,7 @@ use super::failure::{Failure, Kind};
 use super::key::seal;
 use super::output::{Output, cannot_write, write_file};
 use super::progress::progress;
-use crate::capture::{CaptureOptions, Why};
+use crate::capture::{CaptureOptions, Verdict, Why};
 use crate::compile::sign::read_key;
 use crate::compile::wish::WhiteWish;
 use crate::learn::{Learned, learn};
@@ -31,6 +31,7 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     let photographs = CaptureOptions {
         bernoulli: arguments.photos,
+        ignore: arguments.ignore.clone(),
         ..CaptureOptions::default()
     };
     let options = SolveOptions {
@@ -166,6 +167,7 @@ pub(super) fn summary(learned: &Learned) -> Value {
             "gray_code": report.photographs.gray_code,
             "bernoulli": report.photographs.bernoulli,
         },
+        "ignored_gates": ignored(learned),
         "lambda": report.lambda,
         "iterations": report.iterations,
         "condition": report.condition,
@@ -182,6 +184,13 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "bytes": learned.compiled.image.len(),
         "tiers": tiers(learned),
     })
+}
+
+/// Names of the gates that fail and were ignored.
+fn ignored(learned: &Learned) -> Vec<&'static str> {
+    let gates = &learned.measurements.diagnostics.gates;
+    let failed = gates.iter().filter(|gate| gate.fails());
+    failed.map(|gate| gate.name.name()).collect()
 }
 
 fn tiers(learned: &Learned) -> Vec<Value> {
@@ -287,6 +296,17 @@ pub(super) fn text(learned: &Learned) -> String {
     );
     for line in left_out(learned) {
         let _ = writeln!(text, "            {line}");
+    }
+    for gate in &learned.measurements.diagnostics.gates {
+        match gate.verdict {
+            Verdict::Fail => {
+                let _ = writeln!(text, "ignored     {gate}");
+            }
+            Verdict::Warn => {
+                let _ = writeln!(text, "note        {gate}");
+            }
+            Verdict::Pass | Verdict::NotJudged => {}
+        }
     }
     let _ = writeln!(
         text,

@@ -8,8 +8,8 @@ use super::progress::progress;
 use super::simulate::unwritten;
 use super::{compensate, failure};
 use crate::learn::settings_in;
-use crate::session::Layout;
 use crate::progress::Progress;
+use crate::session::Layout;
 use crate::verify::{
     ImageVerdict, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
     test_images, write,

@@ -195,16 +195,17 @@ fn shot((index, (role, _)): (usize, &(Role, Pattern))) -> Shot {
 fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
     let settings = Settings {
         camera: CameraSettings {
-            response: scene.camera.response,
+            response: scene.camera.response.into(),
+            ..CameraSettings::default()
         },
         projector: ProjectorSettings {
-            response: scene.projector.response,
+            response: scene.projector.response.into(),
             // Known exactly here, as whoever focused the projector might know it.
-            blur: if simulation.blurred() {
+            blur: Some(if simulation.blurred() {
                 scene.projector.blur
             } else {
                 0.0
-            },
+            }),
             ..ProjectorSettings::default()
         },
         scene: SceneSettings {

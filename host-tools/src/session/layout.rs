@@ -90,7 +90,9 @@ impl Layout {
         let lines = samples.chunks_exact(self.inner.width() * channels);
         for (y, line) in lines.enumerate() {
             let start = ((y + border) * width + border) * channels;
-            slide.get_mut(start..start + line.len())?.copy_from_slice(line);
+            slide
+                .get_mut(start..start + line.len())?
+                .copy_from_slice(line);
         }
         Picture::new(self.projector, Samples::Eight(slide))
     }

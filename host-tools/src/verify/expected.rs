@@ -4,7 +4,7 @@
 //! makes `p = g d' - K d'` of the wanted light `d' = d - a`, so the light that an input
 //! `p` makes is the `l` with `l = (p + K l) / g`, which iterating it converges to.
 
-use crate::capture::CellLight;
+use crate::capture::CellPlanes;
 use crate::video::OperatorMemory;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::stages::correct;
@@ -24,9 +24,9 @@ pub struct Expected<'t, 'a> {
     table: &'t Table<'a>,
     memory: OperatorMemory,
     /// `g`, drive per reference light, one entry a channel; 0 where a cell took no part.
-    gain: CellLight,
+    gain: CellPlanes,
     /// `a`, relative to reference white.
-    ambient: CellLight,
+    ambient: CellPlanes,
 }
 
 impl<'t, 'a> Expected<'t, 'a> {
@@ -67,14 +67,14 @@ impl<'t, 'a> Expected<'t, 'a> {
 
     /// Light under black, relative to reference white.
     #[must_use]
-    pub const fn ambient(&self) -> &CellLight {
+    pub const fn ambient(&self) -> &CellPlanes {
         &self.ambient
     }
 
     /// The light of every cell, ambient light included, relative to reference white, of an
     /// input relative to the projector's white; both one entry a channel.
     #[must_use]
-    pub fn photograph(&mut self, input: &CellLight) -> CellLight {
+    pub fn photograph(&mut self, input: &CellPlanes) -> CellPlanes {
         let mut light = self.reflect(input, None);
         for _ in 0..MOST_BOUNCES {
             let received = self.received(&light);
@@ -94,7 +94,7 @@ impl<'t, 'a> Expected<'t, 'a> {
     }
 
     /// `(p + K l) / g`; dark where the table knows nothing.
-    fn reflect(&self, input: &CellLight, received: Option<&CellLight>) -> CellLight {
+    fn reflect(&self, input: &CellPlanes, received: Option<&CellPlanes>) -> CellPlanes {
         let channels = self.gain.iter().zip(input).enumerate();
         let of_channel = |(channel, (gain, input)): (usize, (&Vec<f64>, &Vec<f64>))| {
             let cells = gain.iter().zip(input).enumerate();
@@ -112,7 +112,7 @@ impl<'t, 'a> Expected<'t, 'a> {
     }
 
     /// `K l`, by the runtime's own operator at the table's top tier.
-    fn received(&mut self, light: &CellLight) -> CellLight {
+    fn received(&mut self, light: &CellPlanes) -> CellPlanes {
         let brightest = light.iter().flatten().fold(0.0_f64, |a, b| a.max(*b));
         if brightest <= 0.0 {
             return light.clone();

@@ -139,8 +139,17 @@ fn slides(
         })
     };
     let coded = shown(table.grid(), BERNOULLI, SEED);
-    let ends = || coded.iter().take(2).map(code).collect::<Result<Vec<_>, VerifyError>>();
-    let mut slides = coded.iter().map(code).collect::<Result<Vec<_>, VerifyError>>()?;
+    let ends = || {
+        coded
+            .iter()
+            .take(2)
+            .map(code)
+            .collect::<Result<Vec<_>, VerifyError>>()
+    };
+    let mut slides = coded
+        .iter()
+        .map(code)
+        .collect::<Result<Vec<_>, VerifyError>>()?;
     slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);

@@ -5,7 +5,7 @@
 //! would still have to cut more than a little, the contrast is lowered, so that the error
 //! is that of the table and not of the image.
 
-use crate::capture::CellLight;
+use crate::capture::CellPlanes;
 use crate::content::wanted_images;
 use crate::video::{Compensator, Picture, Samples, Settings, VideoError};
 use iltm_runtime::image::Table;
@@ -83,13 +83,13 @@ pub fn test_images(table: &Table<'_>) -> Result<Vec<TestImage>, VideoError> {
 }
 
 /// Titles and shapes, 0 where darkest and 1 where brightest, one entry a channel.
-fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellLight)> {
+fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellPlanes)> {
     let (rows, cols) = (grid.rows(), grid.cols());
     let cells = move || (0..rows * cols).map(move |cell| (cell / cols, cell % cols));
     // Back from the range that `wanted_images` has to 0 to 1.
     let darkest = crate::content::DARKEST;
     let natural = wanted_images(grid).map(|light| (light - darkest) / (1.0 - darkest));
-    let mut drawn: Vec<(String, CellLight)> = (0..NATURAL)
+    let mut drawn: Vec<(String, CellPlanes)> = (0..NATURAL)
         .map(|image| {
             // Colours differ less than brightness does in what people watch.
             let plane = |channel: usize| {
@@ -132,7 +132,7 @@ fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellLight)> {
 }
 
 /// A shape as sRGB codes between two lights.
-fn codes(grid: Grid, shape: &CellLight, (dark, bright): (f64, f64)) -> Picture {
+fn codes(grid: Grid, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Picture {
     let code = |shape: f64| {
         let light = dark + (bright - dark) * shape;
         (crate::capture::Response::Srgb.value(light) * 255.0).round() as u8

@@ -8,7 +8,7 @@
 
 use super::session::Shown;
 use super::{Expected, Session, VerifyError};
-use crate::capture::CellLight;
+use crate::capture::CellPlanes;
 use crate::report::{Comparison, LightPicture, steps};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
@@ -124,7 +124,7 @@ pub fn judge(
     let mut expected = Expected::new(table);
     let known = expected.live().iter().filter(|live| **live).count();
     let lit = LiveCells::new(&session.live);
-    let models: Vec<[CellLight; 2]> = session
+    let models: Vec<[CellPlanes; 2]> = session
         .shown
         .iter()
         .map(|shown| {
@@ -168,7 +168,7 @@ impl LiveCells {
     }
 
     /// Their light side by side, to be compared like a picture.
-    fn light(&self, light: &CellLight) -> LightPicture {
+    fn light(&self, light: &CellPlanes) -> LightPicture {
         let plane = |plane: &Vec<f64>| self.0.iter().map(|cell| plane[*cell] as f32).collect();
         let size = FrameSize::new(self.0.len() as u16, 1);
         let planes = light.iter().map(plane).collect();
@@ -178,7 +178,7 @@ impl LiveCells {
         }
     }
 
-    fn compare(&self, seen: &CellLight, wanted: &CellLight) -> Comparison {
+    fn compare(&self, seen: &CellPlanes, wanted: &CellPlanes) -> Comparison {
         Comparison::new(&self.light(seen), &self.light(wanted))
     }
 
@@ -197,7 +197,7 @@ impl LiveCells {
     }
 }
 
-fn image(shown: &Shown, models: &[CellLight; 2], white: f64, lit: &LiveCells) -> ImageVerdict {
+fn image(shown: &Shown, models: &[CellPlanes; 2], white: f64, lit: &LiveCells) -> ImageVerdict {
     let cells = shown.wanted[0].len();
     let compared = shown
         .seen
@@ -218,7 +218,7 @@ fn image(shown: &Shown, models: &[CellLight; 2], white: f64, lit: &LiveCells) ->
 }
 
 /// The error at a scale that is not chosen.
-fn at_scale(seen: &CellLight, wanted: &CellLight, scale: f64, lit: &LiveCells) -> f64 {
+fn at_scale(seen: &CellPlanes, wanted: &CellPlanes, scale: f64, lit: &LiveCells) -> f64 {
     let pairs = || {
         let planes = seen.iter().zip(wanted);
         planes.flat_map(|(seen, wanted)| lit.of(seen).zip(lit.of(wanted)))
@@ -293,7 +293,7 @@ fn norm(picture: &LightPicture) -> f64 {
 fn check_order(
     folder: &Path,
     session: &Session,
-    models: &[[CellLight; 2]],
+    models: &[[CellPlanes; 2]],
     lit: &LiveCells,
 ) -> Result<(), VerifyError> {
     let named = |image: u8, half: usize| {
@@ -302,7 +302,7 @@ fn check_order(
     };
     for (own, shown) in session.shown.iter().enumerate() {
         for half in 0..2 {
-            let error = |model: &CellLight| lit.compare(model, &shown.seen[half]).error;
+            let error = |model: &CellPlanes| lit.compare(model, &shown.seen[half]).error;
             let of_own = error(&models[own][half]);
             // Plain and compensated pictures of one image differ by too little to tell
             // them apart where the table may be wrong.
@@ -350,7 +350,7 @@ fn drift(session: &Session, expected: &mut Expected<'_, '_>, white: f64, lit: &L
         }
         level.push(median);
     }
-    let total = |light: &CellLight| {
+    let total = |light: &CellPlanes| {
         light
             .iter()
             .map(|plane| lit.of(plane).sum::<f64>())

@@ -3,7 +3,7 @@
 
 use super::judge::{ImageVerdict, over_images};
 use super::{Session, Verdict};
-use crate::capture::CellLight;
+use crate::capture::CellPlanes;
 use crate::report::{ColourScale, LightPicture, Palette, PictureFile, picture_file};
 use crate::video::{Picture, Samples};
 use iltm_runtime::image::Table;
@@ -79,7 +79,7 @@ fn map(grid: Grid, scale: &ColourScale, cells: &[Option<f64>]) -> Picture {
 
 /// A photograph's cells at the brightness that suits the compensated one best, so that
 /// both are as bright as they were beside each other.
-fn as_seen(grid: Grid, seen: &CellLight, image: &ImageVerdict, live: &[bool]) -> Picture {
+fn as_seen(grid: Grid, seen: &CellPlanes, image: &ImageVerdict, live: &[bool]) -> Picture {
     let light = |plane: &Vec<f64>| {
         let cells = plane.iter().zip(live);
         let relative = cells.map(|(light, live)| {
@@ -95,7 +95,7 @@ fn as_seen(grid: Grid, seen: &CellLight, image: &ImageVerdict, live: &[bool]) ->
 }
 
 /// Light of the cells as a screen shows it.
-fn lit(grid: Grid, light: &CellLight) -> Picture {
+fn lit(grid: Grid, light: &CellPlanes) -> Picture {
     let plane = |plane: &Vec<f64>| plane.iter().map(|light| *light as f32).collect();
     let planes = light.iter().map(plane).collect();
     let Some(picture) = LightPicture::new(FrameSize::of_grid(grid), planes) else {

@@ -35,7 +35,7 @@ impl VerifyRole {
     /// use iltm::verify::VerifyRole;
     /// assert_eq!(VerifyRole::from_name("plain-3"), Some(VerifyRole::Plain(3)));
     /// assert_eq!(VerifyRole::from_name("plain-03"), None);
-        /// ```
+    /// ```
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let number = |digits: &str| {

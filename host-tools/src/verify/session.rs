@@ -4,7 +4,10 @@ use super::folder::{plain, wanted_file};
 use super::response::ProjectorCurves;
 use super::role::{VERIFY_FILE, VerifyManifest, VerifyRole, VerifyShot};
 use super::{Expected, VerifyError};
-use crate::capture::{CaptureError, CellLight, Response, Revisited, Settings, Shot, revisit};
+use crate::capture::{
+    CaptureError, CellPlanes, Response, Revisited, Settings, Shot, find_photo, revisit,
+};
+use crate::learn::mixing_in;
 use crate::progress::Progress;
 use crate::report::LightPicture;
 use crate::video::{Compensator, Picture, Samples, VideoError, png};
@@ -21,12 +24,12 @@ pub struct Shown {
     /// Its number in `verify.csv`.
     pub image: u8,
     /// The light that was wanted, relative to reference white, one entry a channel.
-    pub wanted: CellLight,
+    pub wanted: CellPlanes,
     /// Input of the projector for the picture as it is, and compensated, relative to its
     /// white.
-    pub input: [CellLight; 2],
+    pub input: [CellPlanes; 2],
     /// What was photographed of either, camera units, ambient light included.
-    pub seen: [CellLight; 2],
+    pub seen: [CellPlanes; 2],
     /// The photographs, relative to the folder.
     pub photos: [PathBuf; 2],
 }
@@ -62,6 +65,7 @@ impl Session {
             other => other.into(),
         })?;
         let settings = Settings::read(folder)?;
+        let mixing = mixing_in(table.provenance());
         let mut code: Vec<Shot> = Vec::new();
         let mut images: BTreeMap<u8, [Option<VerifyShot>; 2]> = BTreeMap::new();
         for shot in manifest.shots {
@@ -94,7 +98,7 @@ impl Session {
         let shots: Vec<Shot> = flat
             .map(|shot| with_role(shot, crate::capture::Role::White))
             .collect();
-        let revisited = revisit(folder, &settings, &code, &shots, progress)?;
+        let revisited = revisit(folder, &settings, mixing, (&code, &shots), progress)?;
         let live = live(folder, table, &revisited)?;
         let shown = pairs
             .into_iter()
@@ -134,10 +138,12 @@ fn check_all_there(
     let of_code = code.iter().map(|shot| (shot.index, &shot.photo));
     let of_images = pairs.iter().flat_map(|(_, pair)| pair);
     let of_images = of_images.map(|shot| (shot.index, &shot.photo));
-    let mut missing: Vec<(u32, &PathBuf)> = of_code
-        .chain(of_images)
-        .filter(|(_, photo)| matches!(folder.join(photo).try_exists(), Ok(false)))
-        .collect();
+    let mut missing = Vec::new();
+    for (index, photo) in of_code.chain(of_images) {
+        if find_photo(folder, photo)?.is_none() {
+            missing.push((index, photo));
+        }
+    }
     missing.sort();
     if missing.is_empty() {
         return Ok(());
@@ -153,8 +159,8 @@ fn check_all_there(
 
 /// What the pictures of a test image say.
 struct Pictures {
-    wanted: CellLight,
-    input: [CellLight; 2],
+    wanted: CellPlanes,
+    input: [CellPlanes; 2],
 }
 
 /// Reads the pictures and makes sure that they are what this table makes.
@@ -222,13 +228,13 @@ fn read(folder: &Path, name: &Path, table: &Table<'_>) -> Result<Picture, Verify
     Ok(picture)
 }
 
-fn light(picture: &LightPicture) -> CellLight {
+fn light(picture: &LightPicture) -> CellPlanes {
     let plane = |plane: &Vec<f32>| plane.iter().map(|light| f64::from(*light)).collect();
     picture.planes().iter().map(plane).collect()
 }
 
 /// The projector's input that codes stand for.
-fn input(picture: &Picture, curves: &ProjectorCurves) -> CellLight {
+fn input(picture: &Picture, curves: &ProjectorCurves) -> CellPlanes {
     let Samples::Eight(samples) = picture.samples() else {
         unreachable!("`read` takes 8 bits only");
     };

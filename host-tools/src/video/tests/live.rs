@@ -98,9 +98,15 @@ fn a_new_table_takes_over_between_two_frames_and_no_frame_is_torn() {
         let output = frames(LINE, &output);
         for (number, frame) in output.iter().enumerate() {
             let expected = if number < at { &old } else { &new };
-            assert!(*frame == frames(LINE, expected)[number], "{at}: frame {number}");
+            assert!(
+                *frame == frames(LINE, expected)[number],
+                "{at}: frame {number}"
+            );
         }
-        assert_eq!((output.len(), summary.frames.frames, summary.tables), (20, 20, 1));
+        assert_eq!(
+            (output.len(), summary.frames.frames, summary.tables),
+            (20, 20, 1)
+        );
         assert!(matches!(events[..], [Event::Table { frame, .. }] if frame == at as u64));
     }
 }
@@ -112,7 +118,11 @@ fn a_new_table_of_another_grid_and_of_one_channel_takes_over_too() {
     let input = stream(LINE, 6);
     let (output, _, _) = live(&first, None, &[(3, &second), (4, &first)], &input);
     let (one, other) = (fixed(&first, None, &input), fixed(&second, None, &input));
-    let (output, one, other) = (frames(LINE, &output), frames(LINE, &one), frames(LINE, &other));
+    let (output, one, other) = (
+        frames(LINE, &output),
+        frames(LINE, &one),
+        frames(LINE, &other),
+    );
     assert!(output[..3] == one[..3] && output[3] == other[3] && output[4..] == one[4..]);
 }
 
@@ -129,11 +139,18 @@ fn what_is_no_table_or_does_not_suit_the_stream_keeps_the_old_one() {
     let (output, summary, events) = live(&first, None, &newer, &input);
     assert_eq!(output, fixed(&first, None, &input));
     assert_eq!((summary.tables, summary.refused), (0, 4));
-    assert!(events.iter().all(|event| matches!(event, Event::Refused { .. })));
+    assert!(
+        events
+            .iter()
+            .all(|event| matches!(event, Event::Refused { .. }))
+    );
     // One that is refused is no hindrance for a later one.
     let (output, summary, _) = live(&first, None, &[(1, &damaged), (2, &second)], &input);
     assert_eq!((summary.tables, summary.refused), (1, 1));
-    assert_eq!(frames(LINE, &output)[7], frames(LINE, &fixed(&second, None, &input))[7]);
+    assert_eq!(
+        frames(LINE, &output)[7],
+        frames(LINE, &fixed(&second, None, &input))[7]
+    );
 }
 
 #[test]
@@ -175,7 +192,10 @@ fn a_large_budget_climbs_to_the_top_tier_and_every_frame_is_its_tier_s() {
             tier = usize::from(change.to);
             changes.next();
         }
-        assert!(*frame == frames(LINE, &of_tier[tier])[number], "frame {number}");
+        assert!(
+            *frame == frames(LINE, &of_tier[tier])[number],
+            "frame {number}"
+        );
     }
     assert_eq!(tier, 2);
 }
