@@ -18,7 +18,7 @@ const SIDE: usize = 384;
 /// black beside white.
 const DARKEST: f64 = 0.1;
 
-/// The user's own pictures, a natural image and a test card.
+/// The user's own pictures; without any a natural image and a test card.
 pub(super) fn wanted(table: &Table<'_>, content: &[Content]) -> Vec<Wanted> {
     let (grid, channels) = (table.grid(), usize::from(table.channels()));
     let mut wanted: Vec<Wanted> = OWN
@@ -35,6 +35,10 @@ pub(super) fn wanted(table: &Table<'_>, content: &[Content]) -> Vec<Wanted> {
             })
         })
         .collect();
+    // White was chosen for these: others would only show that it was not for them.
+    if !wanted.is_empty() {
+        return wanted;
+    }
     wanted.push(natural(grid, channels));
     if let Some(size) = size(grid) {
         let card = test_card(size);

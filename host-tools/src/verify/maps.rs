@@ -20,7 +20,13 @@ const UNKNOWN: [u8; 3] = [88, 92, 100];
 #[must_use]
 pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<PictureFile> {
     let grid = table.grid();
-    let errors = error_scale(verdict);
+    let errors = |half| {
+        map(
+            grid,
+            &error_scale(verdict, half),
+            &over_images(&verdict.images, half),
+        )
+    };
     let drift = drift_scale(verdict);
     let drifts: Vec<Option<f64>> = verdict
         .drift
@@ -29,14 +35,8 @@ pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<
         .map(|c| c.map(f64::abs))
         .collect();
     let mut files = vec![
-        picture_file(
-            "worst-cells",
-            &map(grid, &errors, &over_images(&verdict.images, 1)),
-        ),
-        picture_file(
-            "worst-cells-before",
-            &map(grid, &errors, &over_images(&verdict.images, 0)),
-        ),
+        picture_file("worst-cells", &errors(1)),
+        picture_file("worst-cells-before", &errors(0)),
         picture_file("drift", &map(grid, &drift, &drifts)),
     ];
     for (shown, image) in session.shown.iter().zip(&verdict.images) {
@@ -52,10 +52,11 @@ pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<
     files
 }
 
-/// Colours of the error maps: what is left without compensation is the brightest.
-pub(super) fn error_scale(verdict: &Verdict) -> ColourScale {
-    let before = over_images(&verdict.images, 0).into_iter().flatten();
-    ColourScale::linear(Palette::Magma, rounded(before.fold(0.0, f64::max)))
+/// Colours of the map of errors with (1) or without (0) compensation: each has its own, or
+/// nothing would be seen of what is left.
+pub(super) fn error_scale(verdict: &Verdict, half: usize) -> ColourScale {
+    let errors = over_images(&verdict.images, half).into_iter().flatten();
+    ColourScale::linear(Palette::Magma, rounded(errors.fold(0.0, f64::max)))
 }
 
 /// Colours of the map of changes.

@@ -163,10 +163,9 @@ fn worst(verdict: &Verdict, files: &[PictureFile]) -> Markup {
         h2 { "Where it is worst" }
         p { "Error of every cell over all test images, relative to reference white. Grey cells could not be compared." }
         div .half {
-            figure { (picture(files, "worst-cells-before", "Error of each cell without compensation")) figcaption { "As it is" } }
-            figure { (picture(files, "worst-cells", "Error of each cell with compensation")) figcaption { "Compensated" } }
+            figure { (picture(files, "worst-cells-before", "Error of each cell without compensation")) (colour_bar(&error_scale(verdict, 0), false)) figcaption { "As it is" } }
+            figure { (picture(files, "worst-cells", "Error of each cell with compensation")) (colour_bar(&error_scale(verdict, 1), false)) figcaption { "Compensated; the colours have another scale" } }
         }
-        (colour_bar(&error_scale(verdict), false))
         div .scroll { table {
             thead { tr { th { "row" } th { "column" } th { "error, of white" } } }
             tbody { @for cell in &verdict.worst { tr { td { (cell.row) } td { (cell.col) } td { (percent(cell.error)) } } } }
