@@ -3,7 +3,7 @@
 
 use super::calibration::samples::{fit, used_pixels};
 use super::calibration::taken::{Seen, Taken, mean_of};
-use super::calibration::{Devices, Ramp};
+use super::calibration::{Devices, Ramp, Unmix};
 use super::gates::saturation::{self, Clipped};
 use super::photo::Reading;
 use super::photographs::Photographs;
@@ -151,13 +151,27 @@ impl<'a> Light<'a> {
             return Err(unknown(folder, "projector"));
         }
         if let Some(unmix) = devices.mixing().and_then(super::calibration::Mixing::unmix) {
-            self.photographs.unmix(unmix);
-            let known = std::mem::take(&mut self.saturated);
-            self.look(sequence, progress)?;
-            self.keep_saturated(&known);
+            self.unmix(unmix, sequence, progress)?;
             devices.unmixed = true;
         }
         Ok(devices)
+    }
+
+    /// Turns the photographs into the projector's channels.
+    ///
+    /// # Errors
+    /// A photograph's own error.
+    pub(super) fn unmix(
+        &mut self,
+        unmix: Unmix,
+        sequence: &Sequence,
+        progress: &dyn Progress,
+    ) -> Result<(), CaptureError> {
+        self.photographs.unmix(unmix);
+        let known = std::mem::take(&mut self.saturated);
+        self.look(sequence, progress)?;
+        self.keep_saturated(&known);
+        Ok(())
     }
 
     fn read_calibration(

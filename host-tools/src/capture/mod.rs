@@ -12,6 +12,7 @@
 //!                              place                  where between the cells a pixel lies
 //!                              fine_flood             the flood photograph on a finer grid
 //!                              shot_light             one photograph to look at
+//!                              revisit                cells in pictures that are no patterns
 //! calibration.csv           -> calibration            what measures the devices
 //! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
@@ -53,6 +54,7 @@ mod refusal_tests;
 mod registration;
 mod regression;
 mod response;
+mod revisit;
 mod role;
 mod sampled;
 mod sequence;
@@ -83,6 +85,7 @@ pub use pattern::Pattern;
 pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
 pub use response::{Declared, Response};
+pub use revisit::{CellPlanes, Revisited, revisit};
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};

@@ -9,6 +9,7 @@ use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Cancels the light that bounces between the surfaces of a projection.
 #[derive(Debug, Parser)]
@@ -43,6 +44,8 @@ pub(super) enum Command {
     Compare(Compare),
     /// Show what accuracy costs in time, for a scene or a table
     Tradeoff(Tradeoff),
+    /// Prove a table on the wall: test images to photograph, then a verdict
+    Verify(Verify),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -201,8 +204,18 @@ pub(super) struct Solve {
     pub(super) lambda: Option<f64>,
     /// Light of reference white in camera units; by default the brightest uniform
     /// grey that every live cell reaches
-    #[arg(long, value_name = "LIGHT")]
+    #[arg(long, value_name = "LIGHT", conflicts_with = "content")]
     pub(super) white: Option<f64>,
+    /// Picture or video (PNG, Y4M) that is going to be shown: reference white is the
+    /// brightest that cuts no more of it than --clip-share; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub(super) content: Vec<PathBuf>,
+    /// Share of the content's samples that may be cut at the projector's white
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.001, requires = "content")]
+    pub(super) clip_share: f64,
+    /// Folder for a report of the scene: a page with pictures; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub(super) report: Option<PathBuf>,
     /// Sign the table with this key
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
@@ -397,8 +410,45 @@ pub(super) struct Compensate {
     #[arg(long)]
     pub(super) linear: bool,
     /// Tier of the table's accuracy ladder; the most accurate if left out
-    #[arg(long, value_name = "TIER")]
+    #[arg(long, value_name = "TIER", conflicts_with = "budget")]
     pub(super) tier: Option<u8>,
+    /// Look at the table's file while the video runs, and go on with a new table between
+    /// two frames; one that cannot be used changes nothing
+    #[arg(long)]
+    pub(super) watch: bool,
+    /// Milliseconds that computing a frame may take: lower tiers when it takes longer,
+    /// higher ones when there is time, as on the device
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
+    pub(super) budget: Option<Duration>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Verify {
+    /// Table to verify
+    pub(super) table: PathBuf,
+    /// Folder made with --output, with the photographs in it: judge them
+    #[arg(
+        value_name = "FOLDER",
+        required_unless_present = "output",
+        conflicts_with = "output"
+    )]
+    pub(super) capture: Option<PathBuf>,
+    /// Folder to make, with the pictures to project
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(super) output: Option<PathBuf>,
+    /// Resolution of the projector; by default as the patterns of the scene had it, which
+    /// the table remembers, or 1920x1080
+    #[arg(long, value_name = "WxH", value_parser = frame_size, requires = "output")]
+    pub(super) projector: Option<FrameSize>,
+    /// Black pixels on each side; by default as the patterns of the scene had it, or none
+    #[arg(long, value_name = "PIXELS", requires = "output")]
+    pub(super) border: Option<u16>,
+    /// Largest error that passes; by default 1.5 times what is to be expected
+    #[arg(long, value_name = "ERROR", value_parser = error_bound, conflicts_with = "output")]
+    pub(super) bound: Option<f64>,
+    /// Folder for the page and the maps; by default `verdict` in FOLDER
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    pub(super) report: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug, Args)]
@@ -477,6 +527,20 @@ fn share(text: &str) -> Result<f64, String> {
     share
         .filter(|share| (0.0..1.0).contains(share))
         .ok_or_else(|| "a share is a number from 0 to 1".to_owned())
+}
+
+fn milliseconds(text: &str) -> Result<Duration, String> {
+    let time = text.parse::<f64>().ok();
+    time.filter(|time| (0.001..=60_000.0).contains(time))
+        .map(|time| Duration::from_secs_f64(time / 1e3))
+        .ok_or_else(|| "a budget is a number of milliseconds from 0.001 to 60000".to_owned())
+}
+
+fn error_bound(text: &str) -> Result<f64, String> {
+    let error = text.parse::<f64>().ok();
+    error
+        .filter(|error| *error > 0.0 && *error <= 1.0)
+        .ok_or_else(|| "an error is a number above 0, at most 1".to_owned())
 }
 
 fn frame_size(text: &str) -> Result<FrameSize, String> {

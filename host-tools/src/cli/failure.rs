@@ -77,6 +77,8 @@ pub(super) enum Kind {
     Interrupted = 29,
     /// A scene cannot be simulated as it is described.
     Scene = 30,
+    /// A table does not keep its promise on the wall.
+    Verdict = 31,
 }
 
 impl From<&Rejected> for Kind {
@@ -133,7 +135,7 @@ impl From<&UploadError> for Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 29] = [
+    const ALL: [(Self, &'static str, &'static str); 30] = [
         (
             Self::Usage,
             "usage",
@@ -231,6 +233,11 @@ impl Kind {
             "scene",
             "a scene cannot be simulated as it is described",
         ),
+        (
+            Self::Verdict,
+            "verdict",
+            "a table does not keep its promise on the wall",
+        ),
     ];
 
     pub(super) const fn code(self) -> u8 {
@@ -283,6 +290,12 @@ impl Failure {
             active: None,
             data: None,
         }
+    }
+
+    /// The same, with what was found out all the same: an object.
+    pub(super) fn with_result(mut self, result: Value) -> Self {
+        self.data = Some(Box::new(result));
+        self
     }
 
     /// The same, with the table that is in use now.

@@ -32,6 +32,7 @@ mod solve;
 mod status;
 mod tradeoff;
 mod trial;
+mod verify;
 
 use crate::compare::Meter;
 use args::{Arguments, Command};
@@ -68,6 +69,7 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Compensate(compensate) => compensate::run(compensate, &output),
         Command::Bounces(bounces) => bounces::run(bounces, &output),
         Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
+        Command::Verify(verify) => verify::run(verify, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),
