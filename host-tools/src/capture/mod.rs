@@ -21,6 +21,8 @@
 //! with its place.
 
 pub mod calibration;
+#[cfg(test)]
+mod calibration_tests;
 mod cell_model;
 mod curve;
 mod diagnostics;
@@ -218,6 +220,7 @@ fn measure_all(
     // In the camera's own channels, where a ceiling is one value.
     let clipped = light.find_clipped(sequence, progress)?;
     let mut devices = light.measure_devices(folder, sequence, settings, progress)?;
+    gates.push(gates::response::judge(&devices));
     let Light {
         mut photographs,
         mut flood,

@@ -27,6 +27,7 @@ pub(super) mod format;
 pub(super) mod movement;
 pub(super) mod noise;
 pub(super) mod order;
+pub(super) mod response;
 pub(super) mod saturation;
 pub(super) mod superposition;
 
