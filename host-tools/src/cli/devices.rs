@@ -2,6 +2,7 @@
 
 use crate::capture::calibration::CameraFit;
 use crate::capture::{Devices, Diagnostics, FileFormat, LeftOut, Measurements, Why};
+use crate::solve::{Flux, InverseTransport};
 use serde_json::{Value, json};
 
 /// Projector and camera, for programs.
@@ -95,6 +96,20 @@ pub(super) fn files(diagnostics: &Diagnostics) -> Value {
         "format": diagnostics.file.to_string(),
         "bits": diagnostics.bits,
         "lossy": diagnostics.file == FileFormat::Jpeg,
+    })
+}
+
+/// How the projector's light falls off over the picture, where cells that light each
+/// other tell it; `null` elsewhere.
+pub(super) fn flux(inverse: &InverseTransport) -> Value {
+    Flux::find(inverse).map_or(Value::Null, |flux| {
+        json!({
+            "dimmest_of_brightest": flux.evenness(),
+            "misfit": flux.misfit,
+            "misfit_if_even": flux.misfit_if_even,
+            "pairs": flux.pairs,
+            "cells": flux.cells,
+        })
     })
 }
 

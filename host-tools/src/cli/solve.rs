@@ -1,7 +1,7 @@
 //! `iltm solve`
 
 use super::args::Solve;
-use super::devices::{ambient_share, device_lines, devices, files, unmeasured};
+use super::devices::{ambient_share, device_lines, devices, files, flux, unmeasured};
 use super::failure::Failure;
 use super::key::seal;
 use super::output::{Output, write_file};
@@ -78,6 +78,7 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "files": files(&learned.measurements.diagnostics),
         "devices": devices(&learned.measurements.devices),
         "ambient_share": ambient_share(&learned.measurements),
+        "flux": flux(&learned.inverse),
         "method": report.method.name(),
         "photographs": {
             "white": report.photographs.white,
