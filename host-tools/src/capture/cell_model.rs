@@ -149,17 +149,6 @@ impl CellModel {
         };
         (0..self.cells.len()).filter(lit)
     }
-
-    /// What of each photograph is left over at its gain, relative to the light in it:
-    /// root mean square over all cells.
-    pub(super) fn misfits(&self) -> Vec<f64> {
-        let of_shot = |(at, gain): (usize, &f64)| {
-            let (light, predicted) = (self.light.column(at), self.predicted.column(at));
-            let left = (light - predicted * *gain).norm_squared();
-            (left / light.norm_squared().max(f64::MIN_POSITIVE)).sqrt()
-        };
-        self.gains.iter().enumerate().map(of_shot).collect()
-    }
 }
 
 /// Lit share of each block of the grid in each photograph, `shots x blocks`.

@@ -90,11 +90,13 @@ pub use shot_light::ShotLight;
 pub use shown::{columns, shown};
 
 use crate::progress::Progress;
+use gates::cause;
+use gates::superposition::Sums;
 use light::Light;
 use measure::CellPixels;
 use nalgebra::DMatrix;
 use sampled::Sampled;
-use sequence::Sequence;
+use sequence::{Chosen, Sequence};
 use std::path::Path;
 
 /// How to read a capture.
@@ -171,12 +173,11 @@ pub fn examine(
 ) -> Result<Examined, CaptureError> {
     let manifest = Manifest::read(folder)?;
     let settings = Settings::read(folder)?;
-    let mut wanted = sequence::chosen(folder, &manifest.shots, options)?;
-    find::resolve(folder, &mut wanted)?;
-    let (complete, present) = gates::complete::judge(folder, &wanted);
+    let mut chosen = Chosen::new(folder, &manifest.shots, options)?;
+    let complete = gates::complete::judge(folder, &mut chosen.frames)?;
     let mut gates = vec![complete];
     // What is there says more, if it is enough to go on with.
-    let sequence = match Sequence::read(folder, present) {
+    let sequence = match Sequence::read(folder, chosen) {
         Err(_) if gates[0].fails() => {
             let measurements = None;
             return Ok(Examined {
@@ -187,15 +188,14 @@ pub fn examine(
         sequence => sequence?,
     };
     let measured = measure_all(folder, &sequence, &settings, &mut gates, progress);
-    gates.sort_by_key(|gate| gate.name);
     let mut measurements = match measured {
         Err(error @ (CaptureError::PhotoSize { .. } | CaptureError::PhotoChannels { .. })) => {
             gates.push(gates::format::refused(&error));
-            gates.sort_by_key(|gate| gate.name);
             None
         }
         measured => measured?,
     };
+    gates::settle(&mut gates, None);
     let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
     if let Some(measurements) = &mut measurements {
         let taken = manifest.shots.iter().filter(is_bernoulli).count();
@@ -216,11 +216,11 @@ fn measure_all(
     progress: &dyn Progress,
 ) -> Result<Option<Measurements>, CaptureError> {
     let mut light = Light::read(folder, sequence, settings, progress)?;
-    gates.push(gates::format::judge(folder, &sequence.shots));
+    let format = &light.photographs.format;
+    gates.push(gates::format::judge(format.file, format.bits));
     // In the camera's own channels, where a ceiling is one value.
     let clipped = light.find_clipped(sequence, progress)?;
     let mut devices = light.measure_devices(folder, sequence, settings, progress)?;
-    gates.push(gates::response::judge(&devices));
     let Light {
         mut photographs,
         mut flood,
@@ -280,7 +280,15 @@ fn measure_all(
     gates.push(gates::flicker::judge(sequence, registration, &steadiness));
     let superposition =
         gates::superposition::median(gates::superposition::excesses(sequence, channels));
-    gates.push(gates::superposition::judge(sequence, channels, &cells.live));
+    let sums = Sums::new(sequence, channels, &cells.live);
+    let wrong = sums.as_ref().is_some_and(Sums::fail);
+    let cause = wrong.then(|| cause::find(sequence, &cells.live, &light.channels, &sampled));
+    gates.push(gates::superposition::judge(
+        sequence,
+        sums.as_ref(),
+        cause,
+        steadiness.excess,
+    ));
     gates.push(gates::noise::judge(
         sequence.grid,
         channels,
@@ -294,10 +302,11 @@ fn measure_all(
     }
     if let Some((probe, lit)) = &taken.probe {
         let flood = gray_code::channel_sum(&flood);
-        let registration = &registered.registration;
         let probe = Probe::measure(sequence.grid, lit, registration, probe, &flood);
         devices.take_probe(probe, settings.projector.blur);
     }
+    gates.push(gates::response::judge(&devices, cause));
+    gates::settle(gates, cause);
     let diagnostics = Diagnostics {
         file: photographs.format.file,
         bits: photographs.format.bits,

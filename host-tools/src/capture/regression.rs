@@ -262,8 +262,9 @@ impl Shown<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sequence::Chosen;
     use super::super::test_capture::TestCapture;
-    use super::super::{Manifest, Response};
+    use super::super::{CaptureOptions, Manifest, Response};
     use super::*;
     use crate::progress::Silent;
 
@@ -276,7 +277,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         scene.write(folder.path());
         let shots = Manifest::read(folder.path()).unwrap().shots;
-        let sequence = Sequence::read(folder.path(), shots).unwrap();
+        let chosen = Chosen::new(folder.path(), &shots, &CaptureOptions::default()).unwrap();
+        let sequence = Sequence::read(folder.path(), chosen).unwrap();
         let mut photographs =
             Photographs::new(folder.path(), &sequence.shots, &Response::Linear.into()).unwrap();
         let (width, height) = scene.camera();

@@ -73,20 +73,47 @@ pub(super) struct Sequence {
     bernoulli_from: usize,
 }
 
+/// The frames that a capture is learned from.
+#[derive(Clone, Debug)]
+pub(super) struct Chosen {
+    pub(super) frames: Vec<Frame>,
+    /// The longest exposure, if exposures are given.
+    longest: Option<f64>,
+}
+
+impl Chosen {
+    /// Chooses the frames that `options` ask for. `shots` are ordered by index.
+    ///
+    /// # Errors
+    /// What [`CaptureError`] says about roles and the number of photographs; a
+    /// pattern's own error where brackets need it.
+    pub(super) fn new(
+        folder: &Path,
+        shots: &[Shot],
+        options: &CaptureOptions,
+    ) -> Result<Self, CaptureError> {
+        let manifest = folder.join(MANIFEST_FILE);
+        check_levels(shots, &manifest)?;
+        let longest = frame::longest(shots, &manifest)?;
+        let frames = match longest {
+            Some(longest) => frame::bracketed(shots, &read_patterns(folder, shots)?, longest),
+            None => Frame::of_each(shots, None),
+        };
+        let frames = chosen(frames, options, &manifest)?;
+        Ok(Self { frames, longest })
+    }
+}
+
 impl Sequence {
-    /// Reads the patterns of `shots`, which are ordered by index, and checks them.
+    /// Reads the patterns of the frames that were chosen and checks them.
     ///
     /// # Errors
     /// What [`CaptureError`] says about roles and patterns.
-    pub(super) fn read(folder: &Path, shots: Vec<Shot>) -> Result<Self, CaptureError> {
+    pub(super) fn read(folder: &Path, chosen: Chosen) -> Result<Self, CaptureError> {
         let manifest = folder.join(MANIFEST_FILE);
-        check_roles(&shots, &manifest)?;
-        let longest = frame::longest(&shots, &manifest)?;
-        let frames = match longest {
-            Some(longest) => frame::bracketed(&shots, &read_patterns(folder, &shots)?, longest),
-            None => Frame::of_each(&shots, None),
-        };
+        let Chosen { frames, longest } = chosen;
         let shots: Vec<Shot> = frames.iter().map(|frame| frame.shots[0].clone()).collect();
+        check_levels(&shots, &manifest)?;
         let patterns = read_patterns(folder, &shots)?;
         let grid = common_grid(folder, &shots, &patterns)?;
         let bits = [
@@ -196,58 +223,8 @@ fn read_patterns(folder: &Path, shots: &[Shot]) -> Result<Vec<Pattern>, CaptureE
     patterns.into_iter().collect()
 }
 
-/// The shots that `options` ask for: all but the Bernoulli ones beyond their number,
-/// the photographs of a bracket counting as one.
-///
-/// # Errors
-/// [`CaptureError::NoBlack`], [`CaptureError::NoWhite`],
-/// [`CaptureError::MorePhotographsThanTaken`] or [`CaptureError::TooFewPhotographs`];
-/// of a capture with exposures also what is wrong with them or with a pattern.
-pub(super) fn chosen(
-    folder: &Path,
-    shots: &[Shot],
-    options: &CaptureOptions,
-) -> Result<Vec<Shot>, CaptureError> {
-    let manifest = folder.join(MANIFEST_FILE);
-    check_roles(shots, &manifest)?;
-    let frames = match frame::longest(shots, &manifest)? {
-        Some(longest) => frame::bracketed(shots, &read_patterns(folder, shots)?, longest),
-        None => Frame::of_each(shots, None),
-    };
-    let is_bernoulli = |frame: &&Frame| frame.shots[0].role == Role::Bernoulli;
-    let found = frames.iter().filter(is_bernoulli).count();
-    let used = options.bernoulli.unwrap_or(found);
-    if used > found {
-        return Err(CaptureError::MorePhotographsThanTaken {
-            path: manifest,
-            asked: used,
-            found,
-        });
-    }
-    if used < options.min_bernoulli {
-        return Err(CaptureError::TooFewPhotographs {
-            path: manifest,
-            used,
-            needed: options.min_bernoulli,
-        });
-    }
-    let mut left = used;
-    let mut wanted = |frame: &Frame| {
-        if !is_bernoulli(&frame) {
-            return true;
-        }
-        let wanted = left > 0;
-        left = left.saturating_sub(1);
-        wanted
-    };
-    let frames = frames.into_iter().filter(|frame| wanted(frame));
-    let mut chosen: Vec<Shot> = frames.flat_map(|frame| frame.shots).collect();
-    chosen.sort_by_key(|shot| shot.index);
-    Ok(chosen)
-}
-
-/// Refuses shots without white or black.
-fn check_roles(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
+/// Refuses a capture without black or without white.
+fn check_levels(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
     let path = || manifest.to_owned();
     let has = |role| shots.iter().any(|shot| shot.role == role);
     if !has(Role::Black) {
@@ -257,6 +234,42 @@ fn check_roles(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
         return Err(CaptureError::NoWhite { path: path() });
     }
     Ok(())
+}
+
+/// The frames to use: all but the Bernoulli ones beyond the number asked for.
+fn chosen(
+    frames: Vec<Frame>,
+    options: &CaptureOptions,
+    manifest: &Path,
+) -> Result<Vec<Frame>, CaptureError> {
+    let path = || manifest.to_owned();
+    let is_bernoulli = |frame: &Frame| frame.shots[0].role == Role::Bernoulli;
+    let found = frames.iter().filter(|frame| is_bernoulli(frame)).count();
+    let used = options.bernoulli.unwrap_or(found);
+    if used > found {
+        return Err(CaptureError::MorePhotographsThanTaken {
+            path: path(),
+            asked: used,
+            found,
+        });
+    }
+    if used < options.min_bernoulli {
+        return Err(CaptureError::TooFewPhotographs {
+            path: path(),
+            used,
+            needed: options.min_bernoulli,
+        });
+    }
+    let mut left = used;
+    let mut wanted = |frame: &Frame| {
+        if !is_bernoulli(frame) {
+            return true;
+        }
+        let wanted = left > 0;
+        left = left.saturating_sub(1);
+        wanted
+    };
+    Ok(frames.into_iter().filter(|frame| wanted(frame)).collect())
 }
 
 /// The grid that all patterns share.

@@ -4,7 +4,7 @@ use super::failure::Kind;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
-use crate::scene::Effect;
+use crate::scene::{Effect, Fault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 #[cfg(unix)]
@@ -77,14 +77,31 @@ pub(super) struct Simulate {
     /// Scene to simulate
     #[arg(value_name = "SCENE.toml")]
     pub(super) scene: PathBuf,
-    /// Capture folder to make
+    /// Capture folder to make; with --shot, the photograph to write
     #[arg(
         short,
         long,
         value_name = "CAPTURE",
-        required_unless_present_any = ["explain", "ablate"]
+        required_unless_present_any = ["explain", "ablate", "photograph"]
     )]
     pub(super) output: Option<PathBuf>,
+    /// Take the photographs that this folder calls for and does not have: one that
+    /// `iltm patterns` or `iltm verify` made
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) photograph: Option<PathBuf>,
+    /// Take only the photograph with this index, and write it to --output
+    #[arg(
+        long,
+        value_name = "INDEX",
+        requires = "photograph",
+        requires = "output"
+    )]
+    pub(super) shot: Option<u32>,
+    /// Let something go wrong, to practise: gamma, auto-exposure, tripod, swapped,
+    /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
+    /// larger than usual; may be repeated
+    #[arg(long, value_name = "FAULT")]
+    pub(super) fault: Vec<Fault>,
     /// Say which effects are simulated and why
     #[arg(long)]
     pub(super) explain: bool,

@@ -369,7 +369,7 @@ fn compile_failure(error: &CompileError) -> Failure {
 }
 
 /// Whether a capture cannot be read, is not well-formed, or shows bad light.
-const fn kind_of(error: &CaptureError) -> Kind {
+pub(super) const fn kind_of(error: &CaptureError) -> Kind {
     match error {
         CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
         CaptureError::MorePhotographsThanTaken { .. }

@@ -21,7 +21,8 @@ pub use targets::{TARGETS, Target};
 use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{
-    self, CalibrationRole, CaptureOptions, ListedRole, ManifestOf, Role, Settings, parse_reference,
+    self, CalibrationRole, CaptureOptions, ListedRole, ManifestOf, Role, Settings, ShotLight,
+    parse_reference,
 };
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};

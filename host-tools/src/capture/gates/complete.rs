@@ -1,6 +1,7 @@
 //! Gate `complete`: every photograph is there, once.
 
-use super::super::{Role, Shot};
+use super::super::frame::Frame;
+use super::super::{CaptureError, Role, Shot, find_photo};
 use super::{Evidence, Gate, GateName, Verdict, listed};
 use std::collections::HashMap;
 use std::fs::File;
@@ -11,16 +12,26 @@ use std::path::Path;
 /// File names that a sentence lists.
 const MOST_NAMED: usize = 12;
 
-/// Looks for every photograph of `shots`; returns the gate and the shots that have
-/// one.
-pub(crate) fn judge(folder: &Path, shots: &[Shot]) -> (Gate, Vec<Shot>) {
-    let is_missing = |shot: &&Shot| matches!(folder.join(&shot.photo).try_exists(), Ok(false));
-    let missing: Vec<&Shot> = shots.iter().filter(is_missing).collect();
-    let present: Vec<Shot> = shots
-        .iter()
-        .filter(|shot| !missing.contains(shot))
-        .cloned()
-        .collect();
+/// Looks for the photographs of all frames and names in each shot the file that stands
+/// for it; shots without one are taken out.
+///
+/// # Errors
+/// [`CaptureError::Ambiguous`] if several files could be meant.
+pub(crate) fn judge(folder: &Path, frames: &mut Vec<Frame>) -> Result<Gate, CaptureError> {
+    let mut missing = Vec::new();
+    let all: usize = frames.iter().map(|frame| frame.shots.len()).sum();
+    for frame in &mut *frames {
+        for at in (0..frame.shots.len()).rev() {
+            match find_photo(folder, &frame.shots[at].photo)? {
+                Some(found) => frame.shots[at].photo = found,
+                None => {
+                    missing.push(frame.shots.remove(at));
+                    frame.times.remove(at);
+                }
+            }
+        }
+    }
+    frames.retain(|frame| !frame.shots.is_empty());
     let gate = |verdict, number, what, next_step| Gate {
         name: GateName::Complete,
         verdict,
@@ -32,37 +43,30 @@ pub(crate) fn judge(folder: &Path, shots: &[Shot]) -> (Gate, Vec<Shot>) {
         evidence: Evidence::None,
     };
     if !missing.is_empty() {
+        missing.sort_by_key(|shot| shot.index);
         let names = listed(missing.iter().map(|shot| shot.photo.display()), MOST_NAMED);
-        let lines = listed(missing.iter().map(|shot| shot.line), MOST_NAMED);
-        let what = format!(
-            "{} of {} photographs missing: {names}, named in line {lines} of capture.csv",
-            missing.len(),
-            shots.len()
-        );
-        let next_step = "Put the files there or take those photographs again; \
-             if one was never taken, remove its line from capture.csv.";
-        return (
-            gate(Verdict::Fail, missing.len() as f64, what, next_step),
-            present,
-        );
+        let what = format!("{} of {all} photographs missing: {names}", missing.len());
+        let next_step = "Take the missing photographs: `iltm capture` goes on where it stopped.";
+        return Ok(gate(Verdict::Fail, missing.len() as f64, what, next_step));
     }
-    let twins = twins(folder, &present);
+    let shots: Vec<Shot> = frames
+        .iter()
+        .flat_map(|frame| frame.shots.clone())
+        .collect();
+    let twins = twins(folder, &shots);
     if let Some((first, second)) = twins.first() {
         let what = format!(
-            "{} photographs are exact copies of others that should show another pattern: {} is {}",
+            "{} photographs are exact copies of others that show another pattern: {} is {}",
             twins.len(),
             second.photo.display(),
             first.photo.display()
         );
         let next_step =
             "Take those photographs again: the camera or the copying gave an old file twice.";
-        return (
-            gate(Verdict::Fail, twins.len() as f64, what, next_step),
-            present,
-        );
+        return Ok(gate(Verdict::Fail, twins.len() as f64, what, next_step));
     }
-    let what = format!("all {} photographs are there", shots.len());
-    (gate(Verdict::Pass, 0.0, what, ""), present)
+    let what = format!("all {all} photographs are there");
+    Ok(gate(Verdict::Pass, 0.0, what, ""))
 }
 
 /// Pairs of shots that should show different patterns and have the same file.

@@ -19,6 +19,7 @@
 //! judged from goes along as [`Evidence`], for whoever draws it.
 
 mod bands;
+pub(super) mod cause;
 pub(super) mod complete;
 pub(super) mod coverage;
 pub(super) mod drift;
@@ -98,7 +99,7 @@ impl GateName {
 
 impl fmt::Display for GateName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        f.pad(self.name())
     }
 }
 
@@ -234,6 +235,35 @@ impl Gate {
 impl fmt::Display for Gate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.name, self.what)
+    }
+}
+
+/// Puts gates in order and takes back what only follows from a gate that fails
+/// before: numbers of photographs that show other patterns mean nothing.
+pub(super) fn settle(gates: &mut [Gate], cause: Option<cause::Cause>) {
+    gates.sort_by_key(|gate| gate.name);
+    let fails = |name: GateName| gates.iter().any(|gate| gate.name == name && gate.fails());
+    let (order, movement) = (fails(GateName::Order), fails(GateName::Movement));
+    let known = cause.is_some_and(cause::Cause::is_known) && fails(GateName::Superposition);
+    let flicker = fails(GateName::Flicker);
+    for gate in gates {
+        let because = match gate.name {
+            GateName::Order | GateName::Complete | GateName::Format | GateName::Saturation => None,
+            _ if order => Some(GateName::Order),
+            GateName::Movement | GateName::Coverage => None,
+            _ if movement => Some(GateName::Movement),
+            GateName::Flicker | GateName::Drift | GateName::Noise if known => {
+                Some(GateName::Superposition)
+            }
+            GateName::Superposition | GateName::Response | GateName::Noise if !known && flicker => {
+                Some(GateName::Flicker)
+            }
+            _ => None,
+        };
+        if let Some(because) = because.filter(|_| gate.verdict != Verdict::Pass) {
+            let why = format!("cannot be judged before `{because}` passes");
+            *gate = Gate::not_judged(gate.name, why);
+        }
     }
 }
 

@@ -154,7 +154,7 @@ pub(crate) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gat
     Gate {
         name: GateName::Saturation,
         verdict,
-        number: 100.0 * pixels.max(cells * MOST_PIXELS / MOST_CELLS),
+        number: 100.0 * pixels.max(cells * MOST_PIXELS / MOST_CELLS).min(1.0),
         limit: 100.0 * MOST_PIXELS,
         unit: "%",
         what,

@@ -3,14 +3,19 @@
 
 use super::super::sequence::Sequence;
 use super::super::{ChannelMeasurements, Measurements};
+use super::cause::Cause;
 use super::{Evidence, Gate, GateName, Verdict};
 
-/// From here on it is worth a word: good rigs hold 1 to 1.8 %.
-const WARN: f64 = 0.02;
+/// From here on it is worth a word.
+const WARN: f64 = 0.015;
 
-/// Photographs of cameras with a curve that nobody declared are off by 14 to 24 %,
-/// and a table errs by about as much as light does not add up.
-const MOST: f64 = 0.05;
+/// A table errs by about as much as light does not add up. Photographs of cameras
+/// with a curve that nobody declared are off by 14 to 24 %.
+const MOST: f64 = 0.03;
+
+/// How much more single cells may be off than all together: good rigs hold 1 to
+/// 1.8 % in blocks of 16 x 16 pixels.
+const CELLS: f64 = 1.7;
 
 /// How far each Gray code pattern and its inverse together exceed white, summed
 /// over all cells and relative to white, one number a pair and channel.
@@ -60,25 +65,71 @@ pub(crate) fn by_cell(
     Some((0..live.len()).map(of_cell).collect())
 }
 
-/// Judges how well light adds up.
-pub(crate) fn judge(sequence: &Sequence, channels: &[ChannelMeasurements], live: &[bool]) -> Gate {
-    let name = GateName::Superposition;
-    let overall = median(excesses(sequence, channels));
-    let cells = by_cell(sequence, channels, live);
-    let (Some(overall), Some(cells)) = (overall, cells) else {
-        let why = "no pattern was photographed together with its inverse";
-        return Gate::not_judged(name, why);
-    };
-    let (mut squares, mut lights) = (0.0, 0.0);
-    for (cell, excess) in cells.iter().enumerate().filter(|(_, e)| e.is_finite()) {
-        let light: f64 = (channels.iter())
-            .map(|c| c.observations[(cell, Measurements::WHITE)])
-            .sum();
-        squares += (excess * light).powi(2);
-        lights += light * light;
+/// How well light adds up.
+pub(crate) struct Sums {
+    /// The middle excess of all pairs, relative to white.
+    overall: f64,
+    /// The same in each cell; NaN where there is none.
+    cells: Vec<f64>,
+    /// Root mean square over the cells, without noise.
+    spread: f64,
+}
+
+impl Sums {
+    /// Measures it; `None` without inverses.
+    pub(crate) fn new(
+        sequence: &Sequence,
+        channels: &[ChannelMeasurements],
+        live: &[bool],
+    ) -> Option<Self> {
+        let overall = median(excesses(sequence, channels))?;
+        let cells = by_cell(sequence, channels, live)?;
+        // White's noise is in all pairs, and a median of n has 1.57 / n of one's.
+        let pairs = sequence.code_pairs().len() as f64;
+        let share = 1.0 + 2.0 * 1.57 / pairs;
+        let (mut squares, mut lights) = (0.0, 0.0);
+        for (cell, excess) in cells.iter().enumerate().filter(|(_, e)| e.is_finite()) {
+            let light: f64 = (channels.iter())
+                .map(|c| c.observations[(cell, Measurements::WHITE)])
+                .sum();
+            let noise: f64 = channels.iter().map(|c| c.noise[cell].powi(2)).sum();
+            squares += (excess * light).powi(2) - share * noise;
+            lights += light * light;
+        }
+        let spread = (squares.max(0.0) / lights).sqrt();
+        Some(Self {
+            overall,
+            cells,
+            spread,
+        })
     }
-    let spread = (squares / lights).sqrt();
-    let number = overall.abs().max(spread);
+
+    /// What is compared with the limit.
+    fn number(&self) -> f64 {
+        self.overall.abs().max(self.spread / CELLS)
+    }
+
+    /// Whether it is worth looking for a cause.
+    pub(crate) fn fail(&self) -> bool {
+        Verdict::of(self.number(), WARN, MOST) != Verdict::Pass
+    }
+}
+
+/// Judges how well light adds up, and why not.
+///
+/// Without inverses there is only `excess`: how much brighter other photographs are
+/// than white lets expect.
+pub(crate) fn judge(
+    sequence: &Sequence,
+    sums: Option<&Sums>,
+    cause: Option<Cause>,
+    excess: Option<f64>,
+) -> Gate {
+    let name = GateName::Superposition;
+    let Some(sums) = sums else {
+        return without_inverses(excess);
+    };
+    let number = sums.number();
     let verdict = Verdict::of(number, WARN, MOST);
     let what = match verdict {
         Verdict::Pass => format!(
@@ -87,11 +138,13 @@ pub(crate) fn judge(sequence: &Sequence, channels: &[ChannelMeasurements], live:
         ),
         _ => format!(
             "light does not add up: patterns and their inverses together are {:+.1} % off white \
-             and black together ({:.1} % from cell to cell)",
-            100.0 * overall,
-            100.0 * spread
+             and black together ({:.1} % from cell to cell): {}",
+            100.0 * sums.overall,
+            100.0 * sums.spread,
+            words(cause)
         ),
     };
+    let values = sums.cells.iter().map(|excess| 100.0 * excess);
     Gate {
         name,
         verdict,
@@ -101,16 +154,85 @@ pub(crate) fn judge(sequence: &Sequence, channels: &[ChannelMeasurements], live:
         what,
         next_step: match verdict {
             Verdict::Pass => "",
-            _ => {
-                "Fix exposure and white balance, and state the camera's response in capture.toml \
-                 ([camera] response = \"srgb\" for camera JPEGs)."
-            }
+            _ => next_step(cause),
         },
         evidence: Evidence::Cells {
             what: "pattern and inverse against white and black, %",
             rows: sequence.grid.rows(),
             cols: sequence.grid.cols(),
-            values: cells.iter().map(|excess| 100.0 * excess).collect(),
+            values: values.collect(),
         },
+    }
+}
+
+/// The gate of a capture without inverses.
+fn without_inverses(excess: Option<f64>) -> Gate {
+    let name = GateName::Superposition;
+    let Some(excess) = excess else {
+        let why = "no pattern was photographed together with its inverse";
+        return Gate::not_judged(name, why);
+    };
+    let verdict = Verdict::of(excess.abs(), WARN, MOST);
+    Gate {
+        name,
+        verdict,
+        number: 100.0 * excess.abs(),
+        limit: 100.0 * MOST,
+        unit: "%",
+        what: format!(
+            "patterns are {:+.1} % brighter than white lets expect (there are no inverses to add up)",
+            100.0 * excess
+        ),
+        next_step: match verdict {
+            Verdict::Pass => "",
+            _ => next_step(None),
+        },
+        evidence: Evidence::None,
+    }
+}
+
+/// The likely cause in words.
+fn words(cause: Option<Cause>) -> String {
+    match cause {
+        Some(Cause::Curve { gamma }) => format!(
+            "they would add up if the light were raised to the power {gamma:.2}, so that the \
+             camera's gamma is not the declared one"
+        ),
+        Some(Cause::Exposure) => "all cells and ambient light by the same factor, so that the \
+             camera's automatic exposure follows the picture"
+            .to_owned(),
+        Some(Cause::Projector) => {
+            "all cells by the same factor and ambient light not, so that the \
+             projector's dynamic contrast, iris or \"vivid\" mode follows the picture"
+                .to_owned()
+        }
+        Some(Cause::Either) => "all cells by the same factor, so that the camera's automatic \
+             exposure or the projector's \"vivid\" mode or dynamic contrast follows the picture"
+            .to_owned(),
+        Some(Cause::Unknown) | None => {
+            "no one gamma and no one exposure explains it; the light changes in other ways"
+                .to_owned()
+        }
+    }
+}
+
+fn next_step(cause: Option<Cause>) -> &'static str {
+    match cause {
+        Some(Cause::Curve { .. }) => {
+            "State the camera's response in capture.toml ([camera] response = \"srgb\" for camera \
+             JPEGs, a gamma number, or \"measure\") and check again; no new photographs are needed."
+        }
+        Some(Cause::Exposure) => {
+            "Set exposure, gain (ISO) and white balance by hand, and take the capture again."
+        }
+        Some(Cause::Projector) => {
+            "Choose the projector's sRGB, film or photo mode, switch off dynamic contrast, iris and \
+             eco modes, and take the capture again."
+        }
+        _ => {
+            "Set exposure, gain (ISO) and white balance by hand, switch off the projector's dynamic \
+             modes, keep other light out, and take the capture again; if the camera's values are \
+             curved, state [camera] response in capture.toml."
+        }
     }
 }
