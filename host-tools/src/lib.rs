@@ -19,6 +19,7 @@ pub mod learn;
 pub mod progress;
 pub mod report;
 pub mod scene;
+pub mod session;
 pub mod solve;
 pub mod tradeoff;
 pub mod user;

@@ -11,6 +11,7 @@ pub mod hard_cases;
 pub mod hard_frames;
 pub mod instructions;
 pub mod made_up;
+pub mod reference_pages;
 pub mod slots;
 #[cfg(unix)]
 pub mod socket;

@@ -26,6 +26,8 @@ const MAX_BYTES: u64 = 64 << 10;
 ///                         # of calibration.csv, or sRGB where there is none
 /// blur = 0.5              # out of focus: standard deviation in cells, 0 to 4; left
 ///                         # out, it is measured from the probe of calibration.csv
+/// size = [1920, 1080]     # its own resolution, width and height in pixels
+/// border = 0              # pixels that slides leave black on every side
 /// [scene]
 /// name = "M-shaped panels"
 /// ```
@@ -106,6 +108,18 @@ pub struct ProjectorSettings {
     /// photographed, and 0 elsewhere.
     #[serde(deserialize_with = "blur", skip_serializing_if = "Option::is_none")]
     pub blur: Option<f64>,
+    /// The projector's own width and height in pixels, which slides have.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u16; 2]>,
+    /// Pixels that slides leave black on every side, outside of the cells.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub border: u16,
+}
+
+/// Whether there is no border to speak of.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+const fn is_zero(border: &u16) -> bool {
+    *border == 0
 }
 
 /// Most blur that makes sense: a cell's light then spreads over some hundred.

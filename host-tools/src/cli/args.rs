@@ -7,7 +7,6 @@ use crate::device::emulator::Board;
 use crate::scene::{Effect, Fault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
-#[cfg(unix)]
 use iltm_runtime::FrameSize;
 use std::path::PathBuf;
 
@@ -30,6 +29,8 @@ pub(super) enum Command {
     Simulate(Simulate),
     /// Look whether photographs can be used: every gate with its number and next step
     Check(Check),
+    /// Make a folder of pictures to show and photograph, with the rules for doing so
+    Patterns(Patterns),
     /// Learn a scene from its photographs and write its table
     Solve(Solve),
     /// Say what is in a table
@@ -60,6 +61,10 @@ pub(super) enum Command {
     Key(Key),
     /// Write a zip file for support: versions, status, logs, transcripts; never keys
     Report(Report),
+    /// Write manual pages
+    Man(Man),
+    /// Print completions for a shell
+    Completions(Completions),
     /// Run the firmware on an emulated board, with its serial line as a port
     #[cfg(unix)]
     Emulate(Emulate),
@@ -136,6 +141,40 @@ pub(super) struct Check {
     /// Look only at the first M Bernoulli photographs beside all others
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Patterns {
+    /// Capture folder to make
+    #[arg(short, long, value_name = "CAPTURE")]
+    pub(super) output: PathBuf,
+    /// Rows of cells
+    #[arg(long, value_name = "R")]
+    pub(super) rows: u16,
+    /// Columns of cells
+    #[arg(long, value_name = "C")]
+    pub(super) cols: u16,
+    /// Bernoulli patterns, beside white, black and the Gray code
+    #[arg(long, value_name = "M", default_value_t = 150, value_parser = clap::value_parser!(u16).range(..=10_000))]
+    pub(super) photos: u16,
+    /// Seed of the Bernoulli patterns
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub(super) seed: u64,
+    /// The projector's own resolution
+    #[arg(long, value_name = "WxH", value_parser = frame_size, default_value = "1920x1080")]
+    pub(super) projector: FrameSize,
+    /// Pixels to leave black on every side
+    #[arg(long, value_name = "PIXELS", default_value_t = 0)]
+    pub(super) border: u16,
+    /// Levels of the response ramp, shown in white and in each channel
+    #[arg(long, value_name = "LEVELS", default_value_t = 9, value_parser = clap::value_parser!(u16).range(2..=256))]
+    pub(super) ramp: u16,
+    /// Leave out the pictures that measure projector and camera: ramp and blur probe
+    #[arg(long, conflicts_with = "ramp")]
+    pub(super) no_calibration: bool,
+    /// Show white and black again after this many other pictures
+    #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) repeat_every: u16,
 }
 
 #[derive(Debug, Args)]
@@ -313,6 +352,19 @@ pub(super) struct Report {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct Man {
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Completions {
+    /// Shell to complete for
+    pub(super) shell: clap_complete::Shell,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct Inspect {
     /// Table to read
     pub(super) table: PathBuf,
@@ -427,7 +479,6 @@ fn share(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "a share is a number from 0 to 1".to_owned())
 }
 
-#[cfg(unix)]
 fn frame_size(text: &str) -> Result<FrameSize, String> {
     let sides = text.split_once('x');
     let side = |text: &str| text.parse::<u16>().ok();

@@ -237,6 +237,12 @@ impl Kind {
         self as u8
     }
 
+    /// Every code with its name and its meaning.
+    pub(super) fn codes() -> Vec<(u8, &'static str, &'static str)> {
+        let code = |(kind, name, meaning): (Self, _, _)| (kind.code(), name, meaning);
+        Self::ALL.map(code).into()
+    }
+
     pub(super) fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(kind, ..)| *kind == self);
         named.map_or("unknown", |(_, name, _)| name)

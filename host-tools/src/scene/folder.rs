@@ -206,6 +206,7 @@ fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
             } else {
                 0.0
             }),
+            ..ProjectorSettings::default()
         },
         scene: SceneSettings {
             name: scene.name.clone(),

@@ -25,6 +25,24 @@ impl AreaAverage {
         frame.holds(grid).then_some(Self { grid, frame })
     }
 
+    /// The cell that has the largest part of a pixel, `row * cols + col`; of two that
+    /// share it evenly, the later one. `None` outside of the frame.
+    ///
+    /// A picture of the cells that is drawn by this rule is lit where the averages
+    /// look, but for the pixels that a border cuts.
+    #[must_use]
+    pub fn owner(&self, x: usize, y: usize) -> Option<usize> {
+        // Cells are a pixel wide or wider, so no more than one border cuts a pixel,
+        // and whose its centre is, of that it is the larger part.
+        let along = |pixel: usize, cells: usize, length: usize| {
+            let (twice, cells) = (2 * pixel as u64 + 1, cells as u64);
+            (pixel < length).then(|| (twice * cells / (2 * length as u64)) as usize)
+        };
+        let row = along(y, self.grid.rows(), self.frame.height())?;
+        let col = along(x, self.grid.cols(), self.frame.width())?;
+        Some(row * self.grid.cols() + col)
+    }
+
     /// Adds row `y` of one channel to the `sums` of the cells that it crosses.
     ///
     /// `sums` has one element a cell; `light` one a pixel of the row. The order

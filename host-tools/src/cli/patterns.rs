@@ -1,0 +1,62 @@
+//! `iltm patterns`
+
+use super::args::Patterns;
+use super::failure::{Failure, Kind};
+use super::output::Output;
+use super::progress::progress;
+use super::simulate::unwritten;
+use crate::scene::folder;
+use crate::session::{self, Layout, OrderOptions, PatternsError};
+use iltm_runtime::Grid;
+use serde_json::json;
+
+pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> {
+    let out = &arguments.output;
+    // A folder that is in the way is known before the work, not after it.
+    folder::check_free(out).map_err(unwritten)?;
+    let grid = Grid::new(arguments.rows, arguments.cols).map_err(|error| unmade(error.into()))?;
+    let layout = Layout::new(grid, arguments.projector, arguments.border).map_err(unmade)?;
+    let options = OrderOptions {
+        bernoulli: arguments.photos.into(),
+        seed: arguments.seed,
+        ramp: if arguments.no_calibration {
+            0
+        } else {
+            arguments.ramp
+        },
+        probe: !arguments.no_calibration,
+        repeat_every: arguments.repeat_every.into(),
+    };
+    let slides = session::order(grid, &options);
+    let bars = progress(output);
+    let made = session::write(&slides, &layout, out, bars.as_ref()).map_err(unmade)?;
+    let data = json!({
+        "capture": out.display().to_string(),
+        "rows": grid.rows(),
+        "cols": grid.cols(),
+        "projector": [layout.projector().width(), layout.projector().height()],
+        "border": layout.border(),
+        "slides": made.slides,
+        "calibration": made.calibration,
+        "seed": arguments.seed,
+    });
+    let text = format!(
+        "capture     {}: {} slides of {}, {} of them to measure projector and camera\n\
+         next        read {}, then `iltm capture {} --display N --camera CMD`\n",
+        out.display(),
+        made.slides,
+        layout.projector(),
+        made.calibration,
+        out.join("README.md").display(),
+        out.display(),
+    );
+    output.result(&data, &text);
+    Ok(())
+}
+
+fn unmade(error: PatternsError) -> Failure {
+    match error {
+        PatternsError::Folder(error) => unwritten(error),
+        error => Failure::new(Kind::Usage, &error, error.next_step()),
+    }
+}

@@ -1,0 +1,181 @@
+//! Where the cells lie on the projector's pixels.
+
+use super::PatternsError;
+use crate::video::{MAX_PIXELS, Picture, Samples};
+use iltm_runtime::resample::area::AreaAverage;
+use iltm_runtime::{FrameSize, Grid};
+
+/// How pictures of one pixel a cell become pictures of the projector's size: by the
+/// rule by which the runtime averages a frame over the cells, so that a cell is lit
+/// where compensated video will be looked at. Cells need not be of one size.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    grid: Grid,
+    projector: FrameSize,
+    border: u16,
+    cells: AreaAverage,
+    inner: FrameSize,
+}
+
+impl Layout {
+    /// `grid` over all of `projector` but `border` pixels on every side.
+    ///
+    /// # Errors
+    /// [`PatternsError::Projector`] if that is more than any projector has,
+    /// [`PatternsError::Cells`] if a cell would have no pixel.
+    pub fn new(grid: Grid, projector: FrameSize, border: u16) -> Result<Self, PatternsError> {
+        if projector.pixels() > MAX_PIXELS {
+            return Err(PatternsError::Projector { projector });
+        }
+        let left = |side: usize| {
+            u16::try_from(side)
+                .ok()?
+                .checked_sub(border.checked_mul(2)?)
+        };
+        let size = left(projector.width()).zip(left(projector.height()));
+        let inner = size.and_then(|(width, height)| FrameSize::new(width, height));
+        inner
+            .and_then(|inner| Some((AreaAverage::new(grid, inner)?, inner)))
+            .map(|(cells, inner)| Self {
+                grid,
+                projector,
+                border,
+                cells,
+                inner,
+            })
+            .ok_or(PatternsError::Cells {
+                grid,
+                projector,
+                border,
+            })
+    }
+
+    /// The cells.
+    #[must_use]
+    pub const fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The projector's size.
+    #[must_use]
+    pub const fn projector(&self) -> FrameSize {
+        self.projector
+    }
+
+    /// Pixels left black on every side.
+    #[must_use]
+    pub const fn border(&self) -> u16 {
+        self.border
+    }
+
+    /// The projector's picture of a picture of one pixel a cell, 8 bits, grey or
+    /// RGB.
+    ///
+    /// # Errors
+    /// [`PatternsError::NotCells`] if that is of another size or depth.
+    pub fn slide(&self, cells: &Picture) -> Result<Picture, PatternsError> {
+        self.enlarged(cells).ok_or_else(|| PatternsError::NotCells {
+            found: cells.size(),
+            grid: self.grid,
+        })
+    }
+
+    fn enlarged(&self, cells: &Picture) -> Option<Picture> {
+        let Samples::Eight(samples) = cells.samples() else {
+            return None;
+        };
+        if cells.size() != FrameSize::of_grid(self.grid) {
+            return None;
+        }
+        let channels = cells.channels();
+        let mut slide = vec![0; self.projector.pixels() * channels];
+        let border = usize::from(self.border);
+        let rows = slide
+            .chunks_exact_mut(self.projector.width() * channels)
+            .skip(border);
+        for (y, row) in rows.take(self.inner.height()).enumerate() {
+            let pixels = row.chunks_exact_mut(channels).skip(border);
+            for (x, pixel) in pixels.take(self.inner.width()).enumerate() {
+                let cell = self.cells.owner(x, y)?;
+                pixel.copy_from_slice(samples.get(cell * channels..(cell + 1) * channels)?);
+            }
+        }
+        Picture::new(self.projector, Samples::Eight(slide))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use iltm_runtime::units::Light;
+    use proptest::prelude::*;
+
+    fn eight(picture: &Picture) -> &[u8] {
+        match picture.samples() {
+            Samples::Eight(samples) => samples,
+            Samples::Sixteen(_) => panic!("8 bits"),
+        }
+    }
+
+    fn grey(grid: Grid, samples: Vec<u8>) -> Picture {
+        Picture::new(FrameSize::of_grid(grid), Samples::Eight(samples)).unwrap()
+    }
+
+    #[test]
+    fn a_border_is_black_and_cells_are_as_even_as_the_pixels_allow() {
+        let grid = Grid::new(1, 3).unwrap();
+        let layout = Layout::new(grid, FrameSize::new(9, 4).unwrap(), 1).unwrap();
+        let slide = layout.slide(&grey(grid, vec![10, 20, 30])).unwrap();
+        // Borders at 7/3 and 14/3: pixels 0, 1 | 2, 3, 4 | 5, 6 by their centres.
+        let row = [0, 10, 10, 20, 20, 20, 30, 30, 0];
+        let expected = [[0; 9], row, row, [0; 9]].concat();
+        assert_eq!(eight(&slide), expected);
+    }
+
+    #[test]
+    fn colours_stay_together() {
+        let grid = Grid::new(1, 2).unwrap();
+        let layout = Layout::new(grid, FrameSize::new(4, 1).unwrap(), 0).unwrap();
+        let slide = layout.slide(&grey(grid, vec![1, 2, 3, 4, 5, 6])).unwrap();
+        assert_eq!(eight(&slide), [1, 2, 3, 1, 2, 3, 4, 5, 6, 4, 5, 6]);
+    }
+
+    #[test]
+    fn more_cells_than_pixels_are_refused_with_both_numbers() {
+        let grid = Grid::new(4, 10).unwrap();
+        let error = Layout::new(grid, FrameSize::new(12, 12).unwrap(), 2).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("4 x 10 cells"), "{text}");
+        assert!(text.contains("8 x 8 pixels"), "{text}");
+        let huge = FrameSize::new(65_535, 65_535).unwrap();
+        let error = Layout::new(grid, huge, 0).unwrap_err();
+        assert!(matches!(error, PatternsError::Projector { .. }), "{error}");
+        assert!(Layout::new(grid, FrameSize::new(30, 30).unwrap(), u16::MAX).is_err());
+    }
+
+    proptest! {
+        /// Against the runtime's own averages: no cell has more of a pixel than the
+        /// one whose colour it gets.
+        #[test]
+        fn a_pixel_shows_the_cell_that_has_most_of_it(
+            rows in 1_u16..6, cols in 1_u16..6, more in (0_u16..14, 0_u16..14),
+        ) {
+            let grid = Grid::new(rows, cols).unwrap();
+            let size = FrameSize::new(cols + more.0, rows + more.1).unwrap();
+            let area = AreaAverage::new(grid, size).unwrap();
+            let layout = Layout::new(grid, size, 0).unwrap();
+            let numbered = grey(grid, (0..grid.cells()).map(|cell| cell as u8).collect());
+            let slide = layout.slide(&numbered).unwrap();
+            for y in 0..size.height() {
+                for x in 0..size.width() {
+                    let mut light = vec![Light::ZERO; size.width()];
+                    light[x] = Light::ONE;
+                    let mut sums = vec![0; grid.cells()];
+                    area.add_row(y, &light, &mut sums);
+                    let shown = usize::from(eight(&slide)[y * size.width() + x]);
+                    prop_assert_eq!(sums[shown], *sums.iter().max().unwrap());
+                }
+            }
+        }
+    }
+}
