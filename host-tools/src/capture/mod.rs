@@ -22,6 +22,8 @@
 //! with its place.
 
 pub mod calibration;
+#[cfg(test)]
+mod calibration_tests;
 mod cell_model;
 mod curve;
 mod diagnostics;

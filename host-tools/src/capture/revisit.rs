@@ -5,7 +5,7 @@ use super::calibration::Mixing;
 use super::frame::Frame;
 use super::light::Light;
 use super::measure::CellPixels;
-use super::sequence::{self, Sequence};
+use super::sequence::{Chosen, Sequence};
 use super::{
     CaptureError, CaptureOptions, LeftOut, Registration, Settings, Shot, find, gray_code,
     registration,
@@ -57,11 +57,11 @@ pub fn revisit(
         min_bernoulli: 0,
         ..CaptureOptions::default()
     };
-    let mut code = sequence::chosen(folder, code, &options)?;
+    let mut code = code.to_vec();
     let mut pictures = pictures.to_vec();
     find::resolve(folder, &mut code)?;
     find::resolve(folder, &mut pictures)?;
-    let mut sequence = Sequence::read(folder, code)?;
+    let mut sequence = Sequence::read(folder, Chosen::new(folder, &code, &options)?)?;
     // Behind the patterns, where only their places here lead to them.
     let first = sequence.frames.len();
     sequence

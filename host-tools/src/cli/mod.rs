@@ -12,6 +12,7 @@ mod compare;
 mod compensate;
 mod connect;
 mod demo;
+mod devices;
 #[cfg(unix)]
 mod emulate;
 mod failure;

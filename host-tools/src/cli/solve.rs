@@ -1,6 +1,7 @@
 //! `iltm solve`
 
 use super::args::Solve;
+use super::devices::{ambient_share, device_lines, devices, files, flux, unmeasured};
 use super::failure::{Failure, Kind};
 use super::key::seal;
 use super::output::{Output, cannot_write, write_file};
@@ -161,6 +162,11 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "channels": learned.inverse.channels.len(),
         "live_cells": report.live_cells,
         "left_out": left_out(learned),
+        "unmeasured_cells": unmeasured(&learned.measurements),
+        "files": files(&learned.measurements.diagnostics),
+        "devices": devices(&learned.measurements.devices),
+        "ambient_share": ambient_share(&learned.measurements),
+        "flux": flux(&learned.inverse),
         "method": report.method.name(),
         "photographs": {
             "white": report.photographs.white,
@@ -238,6 +244,9 @@ fn unseen(learned: &Learned, cell: usize) -> &'static str {
     let found = diagnostics.left_out.iter().find(|out| out.cell == cell);
     match found.map(|out| out.why) {
         Some(Why::Saturated { .. }) => "saturated in the flood photograph",
+        Some(Why::TooFewPixels { pixels: 0 }) => {
+            "seen by no camera pixel (what they throw on others is accounted for)"
+        }
         _ => "seen alone by too few camera pixels (what they throw on others is accounted for)",
     }
 }
@@ -316,6 +325,10 @@ pub(super) fn text(learned: &Learned) -> String {
         learned.white.light,
         learned.white.reason()
     );
+    let known = device_lines(&learned.measurements);
+    if !known.is_empty() {
+        text += &lines("devices     ", &known);
+    }
     if let Some(recovery) = &report.recovery {
         text += &lines("recovery    ", &recovery.lines());
     }
