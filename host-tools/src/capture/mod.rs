@@ -23,6 +23,7 @@
 mod calibration;
 mod diagnostics;
 mod error;
+mod exposed;
 mod fine_flood;
 mod gray_code;
 mod manifest;
@@ -57,6 +58,7 @@ pub use calibration::{
 };
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
+pub use exposed::Exposed;
 pub use fine_flood::FineFlood;
 pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
 pub use measurements::{ChannelMeasurements, Measurements};

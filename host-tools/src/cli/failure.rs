@@ -7,6 +7,7 @@ use crate::compile::sign::KeyError;
 use crate::device::DeviceError;
 use crate::device::upload::UploadError;
 use crate::learn::LearnError;
+use crate::session::SessionError;
 use crate::user::ConfigError;
 use iltm_runtime::link::Refusal;
 use iltm_runtime::trust::Rejected;
@@ -75,6 +76,10 @@ pub(super) enum Kind {
     Interrupted = 29,
     /// A scene cannot be simulated as it is described.
     Scene = 30,
+    /// A camera gives no photograph, or none that can be used.
+    Camera = 32,
+    /// Slides cannot be shown.
+    Display = 33,
 }
 
 impl From<&Rejected> for Kind {
@@ -131,7 +136,7 @@ impl From<&UploadError> for Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 29] = [
+    const ALL: [(Self, &'static str, &'static str); 31] = [
         (
             Self::Usage,
             "usage",
@@ -229,6 +234,12 @@ impl Kind {
             "scene",
             "a scene cannot be simulated as it is described",
         ),
+        (
+            Self::Camera,
+            "camera",
+            "a camera gives no photograph that can be used",
+        ),
+        (Self::Display, "display", "slides cannot be shown"),
     ];
 
     pub(super) const fn code(self) -> u8 {
@@ -333,6 +344,24 @@ impl From<LearnError> for Failure {
                  Bernoulli photographs, or average several of each pattern.",
             ),
         }
+    }
+}
+
+impl From<SessionError> for Failure {
+    fn from(error: SessionError) -> Self {
+        let kind = match &error {
+            SessionError::Capture(error) => kind_of(error),
+            SessionError::IndexTwice { .. } => Kind::Capture,
+            SessionError::NoIndex { .. } => Kind::Usage,
+            SessionError::NoSlide { .. } => Kind::Read,
+            SessionError::Display { .. }
+            | SessionError::NoDisplay { .. }
+            | SessionError::DisplaySize { .. } => Kind::Display,
+            SessionError::Camera { .. } | SessionError::Latency { .. } => Kind::Camera,
+            SessionError::Write { .. } => Kind::Write,
+            SessionError::Stopped => Kind::Interrupted,
+        };
+        Self::new(kind, &error, error.next_step())
     }
 }
 
