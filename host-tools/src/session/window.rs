@@ -206,6 +206,10 @@ impl Wall<'_> {
         let refuse = |reason: String| SessionError::Display { reason };
         let attributes = Window::default_attributes()
             .with_title("iltm")
+            // For a desktop without a window manager, which full screen is a wish to.
+            .with_position(chosen.position())
+            .with_inner_size(chosen.size())
+            .with_decorations(false)
             .with_fullscreen(Some(Fullscreen::Borderless(Some(chosen.clone()))));
         let window = events.create_window(attributes);
         let window = Rc::new(window.map_err(|error| refuse(error.to_string()))?);
