@@ -93,7 +93,7 @@ pub fn learn_measured(
     progress.begin("compiling the table", 0);
     let fine = compile::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
     let options = CompileOptions {
-        projector: measurements.settings.projector.response,
+        projector: measurements.devices.projector.clone(),
         reference_white,
         inverse_error: report.predicted_error(),
         provenance: provenance(capture, &measurements, &report),
@@ -133,6 +133,8 @@ struct Provenance<'a> {
     live_cells: usize,
     lambda: f64,
     condition: f64,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    ignored_gates: Vec<&'static str>,
     compensation: &'static str,
     predicted_error: PredictedError,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -175,6 +177,10 @@ fn provenance(capture: &Path, measurements: &Measurements, report: &SolveReport)
         live_cells: report.live_cells,
         lambda: report.lambda,
         condition: report.condition,
+        ignored_gates: (measurements.diagnostics.gates.iter())
+            .filter(|gate| gate.fails())
+            .map(|gate| gate.name.name())
+            .collect(),
         compensation: report.compensation.name(),
         predicted_error: PredictedError {
             uncompensated: report.prediction.uncompensated,

@@ -83,7 +83,7 @@ fn a_scene_becomes_a_capture_that_solve_takes() {
     let data: Value = serde_json::from_slice(&output.stdout).expect("one object");
     // White, black, 2 bits of rows and 3 of columns with inverses, and 40 more.
     assert_eq!(data["photographs"], 52);
-    assert_eq!(data["effects"].as_array().map(Vec::len), Some(16));
+    assert_eq!(data["effects"].as_array().map(Vec::len), Some(19));
     assert_eq!(names(folder.path()), ["capture", "scene.toml"]);
     let solve = ["solve", "capture", "-o", "t.iltm"];
     let output = run(folder.path(), &solve);
@@ -273,5 +273,168 @@ fn words_that_are_no_effect_and_scenes_that_are_not_there_have_codes_of_their_ow
         output.status.code(),
         Some(2),
         "without -o there is nothing to do"
+    );
+}
+
+/// A capture of the small scene, without photographs.
+fn without_photographs(folder: &Path) {
+    let made = run(
+        folder,
+        &["simulate", "scene.toml", "-o", "c", "--photos", "12"],
+    );
+    assert!(made.status.success(), "{}", said(&made));
+    fs::rename(folder.join("c/photos"), folder.join("taken")).expect("moved");
+}
+
+fn photograph(folder: &Path, more: &[&str]) -> Output {
+    let arguments = ["simulate", "scene.toml", "--photograph", "c"];
+    run(folder, &[&arguments, more].concat())
+}
+
+/// Sum of the squared differences of two pictures' values.
+fn difference(a: &Path, b: &Path) -> f64 {
+    let values = |path: &Path| image::open(path).expect("a PNG").into_luma16();
+    let (a, b) = (values(a), values(b));
+    let squares = a
+        .iter()
+        .zip(b.iter())
+        .map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
+    squares.sum()
+}
+
+#[test]
+fn a_folder_of_patterns_gets_the_photographs_that_it_lacks() {
+    let folder = folder(|scene| scene);
+    let place = folder.path();
+    without_photographs(place);
+    let same = |name: &str| {
+        let read = |from: &str| fs::read(place.join(from).join(name)).expect("a photograph");
+        read("c/photos") == read("taken")
+    };
+    let one = photograph(place, &["--shot", "7", "-o", "one.png"]);
+    assert!(one.status.success(), "{}", said(&one));
+    // Bounces end where the patterns of one pass have lost their light, so that a pattern
+    // by itself differs by that little.
+    let taken = |name: &str| place.join("taken").join(name);
+    let (own, other) = (
+        difference(&place.join("one.png"), &taken("007.png")),
+        difference(&place.join("one.png"), &taken("008.png")),
+    );
+    assert!(own < 1e-4 * other, "{own} {other}");
+    let all = photograph(place, &["--json"]);
+    let data: Value = serde_json::from_slice(&all.stdout).expect("one JSON object");
+    // White, black, three bits of columns and two of rows with inverses, 12 by chance.
+    assert_eq!(data["photographs"], 24);
+    assert!(names(&place.join("taken")).iter().all(|name| same(name)));
+    fs::remove_file(place.join("c/photos/011.png")).expect("removed");
+    let again = photograph(place, &["--json"]);
+    let data: Value = serde_json::from_slice(&again.stdout).expect("one JSON object");
+    assert_eq!(data["photographs"], 1);
+    let alone = difference(&place.join("c/photos/011.png"), &taken("011.png"));
+    assert!(alone < 1e-4 * other, "{alone} {other}");
+}
+
+#[test]
+fn what_goes_wrong_on_purpose_is_in_the_photographs() {
+    let folder = folder(|scene| scene);
+    let place = folder.path();
+    without_photographs(place);
+    let taken = photograph(place, &["--fault", "swapped=0.5", "--fault", "dropped=0.9"]);
+    assert!(taken.status.success(), "{}", said(&taken));
+    assert!(!place.join("c/photos/021.png").exists());
+    // The photograph named 12 shows the pattern of 13: the same but for the noise.
+    let (own, other) = (
+        difference(
+            &place.join("c/photos/012.png"),
+            &place.join("taken/012.png"),
+        ),
+        difference(
+            &place.join("c/photos/012.png"),
+            &place.join("taken/013.png"),
+        ),
+    );
+    assert!(other < 0.01 * own, "{own} {other}");
+    let refused = photograph(place, &["--fault", "flikker"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        said(&refused).contains("auto-exposure"),
+        "{}",
+        said(&refused)
+    );
+    let refused = photograph(place, &["--shot", "99", "-o", "x.png"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("index 99"), "{}", said(&refused));
+}
+
+#[test]
+fn patterns_of_another_grid_are_refused() {
+    let folder = folder(|scene| scene);
+    let place = folder.path();
+    without_photographs(place);
+    let other = fs::read_to_string(place.join("scene.toml")).expect("there");
+    fs::write(
+        place.join("scene.toml"),
+        other.replace("cols = 6", "cols = 5"),
+    )
+    .expect("written");
+    let refused = photograph(place, &[]);
+    assert_eq!(refused.status.code(), Some(4));
+    let said = said(&refused);
+    assert!(
+        said.contains("4 x 6 cells") && said.contains("has 4 x 5"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_lamp_that_drifts_darkens_later_photographs_and_a_lens_bends_them() {
+    let folder = folder(|scene| {
+        let scene = scene.replace("cols = 6", "cols = 6\ndrift = 0.1");
+        scene.replace("full_well = 20000", "distortion = [0.1, 0]")
+    });
+    let place = folder.path();
+    let made = run(
+        place,
+        &["simulate", "scene.toml", "-o", "c", "--photos", "12"],
+    );
+    assert!(made.status.success(), "{}", said(&made));
+    let made = run(
+        place,
+        &[
+            "simulate",
+            "scene.toml",
+            "-o",
+            "d",
+            "--photos",
+            "12",
+            "--without",
+            "drift",
+        ],
+    );
+    assert!(made.status.success(), "{}", said(&made));
+    let sum = |name: &str| -> f64 {
+        let picture = image::open(place.join(name)).expect("a PNG").into_luma16();
+        picture.iter().map(|value| f64::from(*value)).sum()
+    };
+    // The last photograph has lost what the scene says, the first nothing.
+    assert!((sum("c/photos/023.png") / sum("d/photos/023.png") - 0.9).abs() < 1e-3);
+    assert!((sum("c/photos/000.png") / sum("d/photos/000.png") - 1.0).abs() < 1e-9);
+    let made = run(
+        place,
+        &[
+            "simulate",
+            "scene.toml",
+            "-o",
+            "e",
+            "--photos",
+            "12",
+            "--without",
+            "distortion",
+        ],
+    );
+    assert!(made.status.success(), "{}", said(&made));
+    assert_ne!(
+        fs::read(place.join("c/photos/000.png")).expect("there"),
+        fs::read(place.join("e/photos/000.png")).expect("there")
     );
 }

@@ -337,9 +337,9 @@ pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) ->
     });
     let options = CompileOptions {
         projector: if effects.response {
-            Response::Srgb
+            Response::Srgb.into()
         } else {
-            Response::Linear
+            Response::Linear.into()
         },
         inverse_error: 0.01,
         provenance: format!("seed = {seed}\n"),

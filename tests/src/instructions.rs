@@ -66,7 +66,7 @@ pub fn cases() -> Vec<Case> {
     };
     let compiled = |inverse: &_, targets: &[f64]| {
         let options = CompileOptions {
-            projector: Response::Srgb,
+            projector: Response::Srgb.into(),
             targets: Some(targets.to_vec()),
             ..CompileOptions::default()
         };

@@ -11,6 +11,7 @@ pub mod hard_cases;
 pub mod hard_frames;
 pub mod instructions;
 pub mod made_up;
+pub mod reference_pages;
 pub mod slots;
 #[cfg(unix)]
 pub mod socket;
@@ -102,7 +103,7 @@ pub fn wedge_table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
 pub fn wedge_table_for(projector: Response, rows: u16, cols: u16, channels: usize) -> Vec<u8> {
     let grid = Grid::new(rows, cols).expect("a small grid");
     let options = CompileOptions {
-        projector,
+        projector: projector.into(),
         inverse_error: 0.005,
         provenance: "scene = \"wedge\"\n".to_owned(),
         ..CompileOptions::default()

@@ -98,7 +98,7 @@ impl MadeUp {
             image.section(SectionKind::Ambient, 0, halfwords(ambient.iter().copied()));
         }
         if self.response {
-            let knots = response::knots(Response::Srgb).expect("not linear");
+            let knots = response::knots(&Response::Srgb.into(), 1).expect("not linear");
             image.section(SectionKind::Codes, 0, response::codes(&knots));
             image.section(SectionKind::Response, 0, halfwords(knots));
         }

@@ -6,7 +6,7 @@ use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, Simulation, SimulationOptions, folder};
+use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
 use iltm::solve::SolveOptions;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -155,7 +155,8 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
     let patterns = shown(simulation.grid(), 60, 1);
-    let written = folder::write(&scene, &simulation, &patterns, 1, &capture, &Silent).unwrap();
+    let shooting = Shooting::new(&scene, &simulation, 1).unwrap();
+    let written = folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());
     let learned = learn(
         &capture,
@@ -180,7 +181,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     );
     // The same seed gives the same bytes.
     let again = place.path().join("again");
-    folder::write(&scene, &simulation, &patterns, 1, &again, &Silent).unwrap();
+    folder::write(&shooting, &patterns, &again, &Silent).unwrap();
     for name in ["photos/000.png", "photos/050.png", "capture.csv"] {
         let read = |folder: &Path| std::fs::read(folder.join(name)).unwrap();
         assert_eq!(read(&capture), read(&again), "{name}");

@@ -1,10 +1,14 @@
 //! What reading a capture found out about it.
 
-use super::{NoiseSource, PixelCount, RegistrationMethod};
+use super::{FileFormat, Gate, NoiseSource, PixelCount, RegistrationMethod};
 
 /// What was used, what was left out and why.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Diagnostics {
+    /// What the photographs' files are.
+    pub file: FileFormat,
+    /// Bits of a sample in them, 32 for floating point.
+    pub bits: u8,
     /// Photographs used, of every role.
     pub photographs: usize,
     /// Bernoulli photographs used.
@@ -27,6 +31,8 @@ pub struct Diagnostics {
     /// without inverses. A linear camera has 0; automatic exposure or an
     /// undeclared response shows here.
     pub superposition: Option<f64>,
+    /// What the gates said; those that fail were ignored on purpose.
+    pub gates: Vec<Gate>,
 }
 
 /// A cell that was not measured.

@@ -1,6 +1,6 @@
 //! Everything that can be wrong with a capture folder.
 
-use super::{Axis, Role};
+use super::{Axis, Gate, Role};
 use iltm_runtime::GridError;
 use std::path::PathBuf;
 
@@ -82,13 +82,41 @@ pub enum CaptureError {
         /// What is wrong, with the line.
         reason: String,
     },
+    /// A response shall be measured, and the photographs do not tell it.
+    #[error("{}: {device}.response is to be measured, but the photographs do not tell it", path.display())]
+    ResponseUnknown {
+        /// The `capture.toml`.
+        path: PathBuf,
+        /// "camera" or "projector".
+        device: &'static str,
+    },
     /// A picture cannot be decoded.
-    #[error("{}: not a readable PNG: {reason}", path.display())]
-    Png {
+    #[error("{}: {reason}", path.display())]
+    Picture {
         /// The picture.
         path: PathBuf,
-        /// What the decoder says.
+        /// What is wrong, with what the decoder says.
         reason: String,
+    },
+    /// A floating point picture has a value that is no number.
+    #[error("{}: the value at row {row}, column {col} is not a finite number", path.display())]
+    NotFinite {
+        /// The picture.
+        path: PathBuf,
+        /// Row of the first such pixel.
+        row: u32,
+        /// Column of the first such pixel.
+        col: u32,
+    },
+    /// A photograph is missing under its name, and several could stand for it.
+    #[error("{}: missing, and both {} and {} could stand for it", path.display(), first.display(), second.display())]
+    Ambiguous {
+        /// The file that the manifest names.
+        path: PathBuf,
+        /// One candidate.
+        first: PathBuf,
+        /// Another.
+        second: PathBuf,
     },
     /// A picture says it is larger than any camera's.
     #[error("{}: {width} x {height} pixels; at most {limit} pixels are read", path.display())]
@@ -269,39 +297,26 @@ pub enum CaptureError {
         /// The flood photograph.
         path: PathBuf,
     },
-    /// Much of the flood photograph is at the camera's full scale.
-    #[error("{}: overexposed: {saturated} of {seen} {of} reach the camera's full scale", path.display())]
-    Overexposed {
-        /// The flood photograph.
+    /// Gates say that the photographs cannot be used.
+    #[error("{}: {}", path.display(), failures(gates))]
+    Refused {
+        /// The capture folder.
         path: PathBuf,
-        /// Cells or pixels at full scale.
-        saturated: usize,
-        /// Cells or pixels that the projector lights.
-        seen: usize,
-        /// "cells" or "lit pixels".
-        of: &'static str,
+        /// The gates that fail, at least one, what explains others first.
+        gates: Vec<Gate>,
     },
-    /// A pattern and its inverse do not add up to white.
-    #[error("{}: light does not add up: patterns and their inverses together are {percent:.1} % off \
-        white and black together (at most {limit:.0} % can be used)", path.display())]
-    NotLinear {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Mean relative excess in percent, signed.
-        percent: f64,
-        /// Largest magnitude that is accepted.
-        limit: f64,
-    },
-    /// Hardly any cell was found in the photographs.
-    #[error("{}: only {live} of {cells} cells were found in the photographs", path.display())]
-    NothingRegistered {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Cells found.
-        live: usize,
-        /// Cells of the grid.
-        cells: usize,
-    },
+}
+
+/// What the gates that fail say.
+fn failures(gates: &[Gate]) -> String {
+    let failed: Vec<String> = gates.iter().map(ToString::to_string).collect();
+    match failed.len() {
+        1 => format!("the photographs do not pass the gate {}", failed[0]),
+        count => format!(
+            "the photographs do not pass {count} gates: {}",
+            failed.join("; ")
+        ),
+    }
 }
 
 impl CaptureError {
@@ -328,10 +343,24 @@ impl CaptureError {
                 "Put the file there, or remove its line if it was never taken."
             }
             Self::Settings { .. } => {
-                "Correct capture.toml; it may hold camera.response, projector.response and \
-                 scene.name."
+                "Correct capture.toml; it may hold camera.response, camera.full_scale, \
+                 projector.response, projector.blur and scene.name."
             }
-            Self::Png { .. } => "Copy or export the picture again, as PNG with 8 or 16 bit.",
+            Self::ResponseUnknown {
+                device: "camera", ..
+            } => {
+                "Photograph a few patterns with two or three exposures, or write the camera's \
+                 response (\"srgb\" for camera JPEGs)."
+            }
+            Self::ResponseUnknown { .. } => {
+                "Photograph the pictures of calibration.csv, or write the projector's response."
+            }
+            Self::Picture { .. } => {
+                "Copy or export the picture again: photographs as PNG, TIFF, JPEG, OpenEXR, PGM \
+                 or PPM, patterns as PNG with 8 bit."
+            }
+            Self::NotFinite { .. } => "Export the picture again, without undefined pixels.",
+            Self::Ambiguous { .. } => "Name the right one in capture.csv, or remove the other.",
             Self::TooLarge { .. } => "Scale the photographs down, all by the same factor.",
             Self::Transparent { .. } => "Export the picture without an alpha channel.",
             Self::PatternValue { .. } => {
@@ -366,17 +395,9 @@ impl CaptureError {
             Self::NoLight { .. } => {
                 "Check that the projector lit the scene, and that white and black are not exchanged."
             }
-            Self::Overexposed { .. } => {
-                "Take the capture again with a shorter exposure: white at about 80 % of full scale."
-            }
-            Self::NotLinear { .. } => {
-                "Fix exposure and white balance, and state the camera's response in capture.toml \
-                 ([camera] response = \"srgb\" for camera JPEGs)."
-            }
-            Self::NothingRegistered { .. } => {
-                "Check that the camera sees the projection, that nothing moved, and that the \
-                 photographs belong to the patterns of their lines."
-            }
+            Self::Refused { gates, .. } => gates
+                .first()
+                .map_or("Run `iltm check` on the capture.", |gate| gate.next_step),
         }
     }
 }

@@ -37,6 +37,13 @@ impl Exposed {
         let (mean, bright) = match opened.decode()? {
             Samples::Eight(values) => levels(values, 255.0),
             Samples::Sixteen(values) => levels(values, 65_535.0),
+            // Of numbers that are not negative, the bits have the same order.
+            Samples::Float(values) => {
+                let bits = values
+                    .into_iter()
+                    .map(|value| Light(value.max(0.0).to_bits()));
+                levels(bits.collect(), 1.0)
+            }
         };
         Ok(Self {
             size,
@@ -44,6 +51,16 @@ impl Exposed {
             mean,
             bright,
         })
+    }
+}
+
+/// A number that is not negative, by its bits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Light(u32);
+
+impl From<Light> for f64 {
+    fn from(light: Light) -> Self {
+        f32::from_bits(light.0).into()
     }
 }
 

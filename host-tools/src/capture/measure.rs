@@ -1,5 +1,6 @@
 //! From registered pixels to one observation a cell and view.
 
+use super::drift::Drift;
 use super::noise_samples::NoiseSamples;
 use super::photographs::Photographs;
 use super::registration::{NO_CELL, Registration};
@@ -10,7 +11,6 @@ use super::{
 use crate::progress::Progress;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::path::Path;
 
 /// Camera pixels that a cell must keep: one could be a defect of the sensor.
 const MIN_PIXELS: u32 = 2;
@@ -18,12 +18,6 @@ const MIN_PIXELS: u32 = 2;
 /// Share of a cell's pixels that may be saturated. These are not used, but more
 /// of them mean that the rest is close to saturation too.
 const SATURATED_PIXELS: f64 = 0.1;
-
-/// Share of the cells that may be saturated before the capture is refused.
-const SATURATED_CELLS: f64 = 0.05;
-
-/// Share of the cells that must be found.
-const LEAST_LIVE: f64 = 0.1;
 
 /// The cells that can be measured, and their pixels.
 pub(super) struct CellPixels {
@@ -37,16 +31,8 @@ pub(super) struct CellPixels {
 
 impl CellPixels {
     /// Chooses the pixels to average: registered ones that are not `saturated`
-    /// under white. `manifest` and `flood` are only for errors.
-    ///
-    /// # Errors
-    /// [`CaptureError::Overexposed`] and [`CaptureError::NothingRegistered`].
-    pub(super) fn choose(
-        registration: &Registration,
-        saturated: &[bool],
-        manifest: &Path,
-        flood: &Path,
-    ) -> Result<Self, CaptureError> {
+    /// under white.
+    pub(super) fn choose(registration: &Registration, saturated: &[bool]) -> Self {
         let cells = registration.centre.len();
         let mut of_cell: Vec<Vec<u32>> = vec![Vec::new(); cells];
         let mut lost = vec![0_u32; cells];
@@ -78,7 +64,6 @@ impl CellPixels {
         for out in &left_out {
             live[out.cell] = false;
         }
-        check_live(&left_out, cells, manifest, flood)?;
         let mut begin = vec![0];
         let mut pixels = Vec::new();
         for (cell, of_cell) in of_cell.iter().enumerate() {
@@ -87,12 +72,12 @@ impl CellPixels {
             }
             begin.push(pixels.len());
         }
-        Ok(Self {
+        Self {
             pixels,
             begin,
             live,
             left_out,
-        })
+        }
     }
 
     /// Number of cells.
@@ -121,42 +106,14 @@ impl CellPixels {
     }
 }
 
-/// Refuses a capture in which too many cells are saturated or missing.
-fn check_live(
-    left_out: &[LeftOut],
-    cells: usize,
-    manifest: &Path,
-    flood: &Path,
-) -> Result<(), CaptureError> {
-    let is_saturated = |out: &&LeftOut| matches!(out.why, Why::Saturated { .. });
-    let saturated = left_out.iter().filter(is_saturated).count();
-    let live = cells - left_out.len();
-    if saturated as f64 > SATURATED_CELLS * (live + saturated) as f64 {
-        return Err(CaptureError::Overexposed {
-            path: flood.to_owned(),
-            saturated,
-            seen: live + saturated,
-            of: "cells",
-        });
-    }
-    if (live as f64) < (LEAST_LIVE * cells as f64).max(1.0) {
-        return Err(CaptureError::NothingRegistered {
-            path: manifest.to_owned(),
-            live,
-            cells,
-        });
-    }
-    Ok(())
+/// Light of every cell in every photograph, before black is subtracted.
+pub(super) struct CellLight {
+    /// One entry a channel: `N x shots`, camera units, 0 where a cell is not live.
+    pub(super) channels: Vec<DMatrix<f64>>,
+    samples: NoiseSamples,
 }
 
-/// Everything that a pass over all photographs yields.
-pub(super) struct Observed {
-    pub(super) channels: Vec<ChannelMeasurements>,
-    pub(super) noise: NoiseSource,
-}
-
-/// Averages every photograph over the pixels of each cell, subtracts `black`
-/// (one plane a channel) and estimates the noise.
+/// Averages every photograph over the pixels of each cell.
 ///
 /// # Errors
 /// A photograph's own error.
@@ -164,64 +121,83 @@ pub(super) fn observe(
     sequence: &Sequence,
     photographs: &mut Photographs<'_>,
     cells: &CellPixels,
-    black: &[Vec<f32>],
     progress: &dyn Progress,
-) -> Result<Observed, CaptureError> {
-    let channels = photographs.format.channels;
-    let shots: Vec<usize> = sequence
-        .views
-        .iter()
-        .flat_map(|v| v.shots.clone())
-        .collect();
-    let columns: Vec<usize> = (0..)
-        .zip(&sequence.views)
-        .flat_map(|(at, v)| vec![at; v.shots.len()])
-        .collect();
+) -> Result<CellLight, CaptureError> {
+    let shots: Vec<usize> = (0..sequence.shots.len()).collect();
+    let empty = DMatrix::zeros(cells.cells(), shots.len());
+    let mut channels = vec![empty; photographs.format.channels];
     let mut samples = NoiseSamples::new(sequence, cells);
-    let mut light = vec![DMatrix::zeros(cells.cells(), sequence.views.len()); channels];
-    let mut done = 0;
     photographs.for_batches(&shots, progress, |photos| {
         let means: Vec<Vec<Vec<f64>>> = photos
             .par_iter()
-            .map(|(_, photo)| photo.planes.iter().map(|plane| cells.mean(plane)).collect())
+            .map(|(_, photo)| photo.planes.iter().map(|p| cells.mean(p)).collect())
             .collect();
         for ((shot, photo), means) in photos.iter().zip(means) {
-            let column = columns[done];
-            done += 1;
-            let share = 1.0 / sequence.views[column].shots.len() as f64;
-            for (light, mean) in light.iter_mut().zip(means) {
-                for (cell, mean) in mean.into_iter().enumerate() {
-                    light[(cell, column)] += share * mean;
-                }
+            for (light, mean) in channels.iter_mut().zip(means) {
+                light.column_mut(*shot).copy_from_slice(&mean);
             }
             samples.keep(*shot, photo);
         }
     })?;
+    Ok(CellLight { channels, samples })
+}
+
+/// Everything that the photographs yield.
+pub(super) struct Observed {
+    pub(super) channels: Vec<ChannelMeasurements>,
+    pub(super) noise: NoiseSource,
+}
+
+/// Divides slow changes out, subtracts black, averages the photographs of each
+/// view and estimates the noise.
+pub(super) fn average(
+    sequence: &Sequence,
+    light: &CellLight,
+    cells: &CellPixels,
+    drift: &Drift,
+) -> Observed {
     let source = NoiseSamples::source(sequence);
+    let samples = &light.samples;
     let counts = cells.counts();
-    let channels = light
-        .into_iter()
-        .enumerate()
-        .map(|(channel, mut observations)| {
-            let ambient = cells.mean(&black[channel]);
-            for mut column in observations.column_iter_mut() {
-                for (light, ambient) in column.iter_mut().zip(&ambient) {
-                    *light -= ambient;
+    let of_channel = |(channel, light): (usize, &DMatrix<f64>)| {
+        let ambient = black(sequence, light);
+        let mut observations = DMatrix::zeros(light.nrows(), sequence.views.len());
+        for (view, mut mean) in sequence.views.iter().zip(observations.column_iter_mut()) {
+            let share = 1.0 / view.shots.len() as f64;
+            for &shot in &view.shots {
+                let gain = drift.gain(channel, shot);
+                let dark = drift.dark(channel, shot);
+                for ((mean, light), ambient) in
+                    mean.iter_mut().zip(light.column(shot).iter()).zip(&ambient)
+                {
+                    *mean += share * (light - dark * ambient) / gain;
                 }
             }
-            let noise_model = samples.fit(sequence, source, channel);
-            let noise = white_noise(sequence, &observations, &ambient, &counts, noise_model);
-            ChannelMeasurements {
-                observations,
-                ambient,
-                noise,
-                noise_model,
-            }
-        });
-    Ok(Observed {
-        channels: channels.collect(),
+        }
+        let gains = |shot: usize| drift.gain(channel, shot);
+        let noise_model = samples.fit(sequence, source, channel, gains);
+        let noise = white_noise(sequence, &observations, &ambient, &counts, noise_model);
+        ChannelMeasurements {
+            observations,
+            ambient,
+            noise,
+            noise_model,
+        }
+    };
+    Observed {
+        channels: light.channels.iter().enumerate().map(of_channel).collect(),
         noise: source,
-    })
+    }
+}
+
+/// Mean of the photographs of black in each cell, length `N`.
+pub(super) fn black(sequence: &Sequence, light: &DMatrix<f64>) -> Vec<f64> {
+    let share = 1.0 / sequence.black.len() as f64;
+    let of_cell = |cell: usize| -> f64 {
+        let black = sequence.black.iter().map(|&shot| light[(cell, shot)]);
+        share * black.sum::<f64>()
+    };
+    (0..light.nrows()).map(of_cell).collect()
 }
 
 /// Standard deviation of each cell's observation under white: the mean of its
@@ -244,24 +220,4 @@ fn white_noise(
         (variance / f64::from(counts[cell].max(1))).sqrt()
     };
     (0..counts.len()).map(deviation).collect()
-}
-
-/// How far each Gray code pattern and its inverse together exceed white, summed
-/// over all cells and relative to white; the median over pairs and channels.
-/// Summing first makes noise harmless, while a curved response or an exposure
-/// that follows the picture pushes all cells the same way.
-pub(super) fn superposition(sequence: &Sequence, channels: &[ChannelMeasurements]) -> Option<f64> {
-    let pairs = sequence.code_pairs();
-    let excess = |channel: &ChannelMeasurements, (a, b): (usize, usize)| {
-        let total = |view: usize| channel.observations.column(view).sum();
-        let white = total(Measurements::WHITE);
-        (total(a) + total(b) - white) / white
-    };
-    let mut excesses: Vec<f64> = channels
-        .iter()
-        .flat_map(|channel| pairs.iter().map(move |&pair| excess(channel, pair)))
-        .filter(|excess| excess.is_finite())
-        .collect();
-    excesses.sort_by(f64::total_cmp);
-    excesses.get(excesses.len() / 2).copied()
 }

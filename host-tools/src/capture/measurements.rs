@@ -1,7 +1,7 @@
 //! What the solver gets: projected patterns and what the camera saw of them,
 //! cell by cell.
 
-use super::{Diagnostics, NoiseModel, Registration, Role, Settings};
+use super::{Devices, Diagnostics, NoiseModel, Registration, Role, Settings};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
@@ -20,7 +20,7 @@ pub struct Measurements {
     /// [`Role::White`], none is [`Role::Black`].
     pub roles: Vec<Role>,
     /// Photographs averaged for each column of `patterns`, length `m`: more than
-    /// one where white or a Gray code pattern was photographed again.
+    /// one where a pattern was photographed again. A bracket counts as one.
     pub repeats: Vec<u32>,
     /// One entry (grey) or three (red, green, blue).
     pub channels: Vec<ChannelMeasurements>,
@@ -36,6 +36,8 @@ pub struct Measurements {
     pub flood: Vec<Vec<f32>>,
     /// The capture's `capture.toml`.
     pub settings: Settings,
+    /// Projector and camera: what `capture.toml` says and what was measured.
+    pub devices: Devices,
     /// What was left out and why, noise, linearity.
     pub diagnostics: Diagnostics,
 }
@@ -50,7 +52,7 @@ impl Measurements {
 #[derive(Clone, Debug)]
 pub struct ChannelMeasurements {
     /// Observed light `C`, `N x m`, in camera units (1 is the photograph's full
-    /// scale), mean over the cell's pixels, ambient removed.
+    /// scale, at the longest exposure if there are several), mean over the cell's pixels, ambient removed.
     pub observations: DMatrix<f64>,
     /// Observed light under black, length `N`, camera units.
     pub ambient: Vec<f64>,

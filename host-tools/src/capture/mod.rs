@@ -20,12 +20,20 @@
 //! checked before memory is taken, and whatever is wrong is a [`CaptureError`]
 //! with its place.
 
-mod calibration;
+pub mod calibration;
+mod cell_model;
+mod curve;
 mod diagnostics;
+mod drift;
 mod error;
 mod exposed;
+mod file_format;
+mod find;
 mod fine_flood;
+mod frame;
+mod gates;
 mod gray_code;
+mod light;
 mod manifest;
 mod measure;
 mod measurements;
@@ -35,6 +43,8 @@ mod pattern;
 mod photo;
 mod photographs;
 mod picture;
+#[cfg(test)]
+mod picture_tests;
 mod place;
 mod reference;
 #[cfg(test)]
@@ -43,6 +53,7 @@ mod registration;
 mod regression;
 mod response;
 mod role;
+mod sampled;
 mod sequence;
 mod settings;
 mod sharing;
@@ -54,19 +65,25 @@ mod test_capture;
 mod tests;
 
 pub use calibration::{
-    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, RampChannel,
+    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, Devices, Probe,
+    RampChannel,
 };
+pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
 pub use exposed::Exposed;
+pub use file_format::FileFormat;
+pub use find::find_photo;
+pub(crate) use find::pictures_of_stem;
 pub use fine_flood::FineFlood;
+pub use gates::{Evidence, Gate, GateName, Verdict};
 pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
 pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
-pub use response::Response;
+pub use response::{Declared, Response};
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};
@@ -74,9 +91,10 @@ pub use shot_light::ShotLight;
 pub use shown::{columns, shown};
 
 use crate::progress::Progress;
+use light::Light;
 use measure::CellPixels;
 use nalgebra::DMatrix;
-use photographs::Photographs;
+use sampled::Sampled;
 use sequence::Sequence;
 use std::path::Path;
 
@@ -88,10 +106,8 @@ pub struct CaptureOptions {
     pub bernoulli: Option<usize>,
     /// Fewer Bernoulli photographs than this are refused.
     pub min_bernoulli: usize,
-    /// Largest magnitude of [`Diagnostics::superposition`] that is accepted. On
-    /// real rigs a linear camera stays below 0.02 and camera JPEGs taken for
-    /// linear are off by 0.14 to 0.24.
-    pub max_superposition: f64,
+    /// Gates that may fail: [`read`] goes on despite them, as far as it can.
+    pub ignore: Vec<GateName>,
 }
 
 impl Default for CaptureOptions {
@@ -99,97 +115,205 @@ impl Default for CaptureOptions {
         Self {
             bernoulli: None,
             min_bernoulli: MIN_BERNOULLI,
-            max_superposition: 0.08,
+            ignore: Vec::new(),
         }
     }
 }
 
-/// Share of the lit pixels that may be saturated before the capture is refused
-/// without looking for cells.
-const SATURATED_LIT: f64 = 0.1;
+/// What the gates say of a capture, and what was measured in it.
+#[derive(Clone, Debug)]
+pub struct Examined {
+    /// All gates that could be judged, what explains others first.
+    pub gates: Vec<Gate>,
+    /// What was measured; `None` if the photographs do not allow it.
+    pub measurements: Option<Measurements>,
+}
 
 /// Reads a capture folder and measures every cell under every pattern.
 ///
 /// # Errors
-/// A [`CaptureError`] for whatever is missing, contradictory or unusable. Files
-/// are checked in this order: `capture.csv`, `capture.toml`, patterns,
-/// photographs.
+/// A [`CaptureError`] for whatever is missing, contradictory or unusable;
+/// [`CaptureError::Refused`] if gates fail that `options` do not ignore.
 pub fn read(
     folder: &Path,
     options: &CaptureOptions,
     progress: &dyn Progress,
 ) -> Result<Measurements, CaptureError> {
-    let manifest_path = folder.join(MANIFEST_FILE);
+    let examined = examine(folder, options, progress)?;
+    let fails = |gate: &&Gate| gate.fails() && !options.ignore.contains(&gate.name);
+    let failed: Vec<Gate> = examined.gates.iter().filter(fails).cloned().collect();
+    match examined.measurements {
+        Some(mut measurements) if failed.is_empty() => {
+            measurements.diagnostics.gates = examined.gates;
+            Ok(measurements)
+        }
+        // Without cells there is nothing to go on with, whatever is ignored.
+        _ => Err(CaptureError::Refused {
+            path: folder.to_owned(),
+            gates: if failed.is_empty() {
+                let failed = examined.gates.into_iter().filter(Gate::fails);
+                failed.collect()
+            } else {
+                failed
+            },
+        }),
+    }
+}
+
+/// Looks at a capture as closely as [`read`] and says what every gate says of it.
+///
+/// # Errors
+/// A [`CaptureError`] for what is not a well-formed capture. Files are looked at in
+/// this order: `capture.csv`, `capture.toml`, patterns, photographs.
+pub fn examine(
+    folder: &Path,
+    options: &CaptureOptions,
+    progress: &dyn Progress,
+) -> Result<Examined, CaptureError> {
     let manifest = Manifest::read(folder)?;
     let settings = Settings::read(folder)?;
-    let sequence = Sequence::read(folder, &manifest.shots, options)?;
-    let mut photographs = Photographs::new(folder, &sequence.shots, settings.camera.response)?;
-    let white = &sequence.white().shots;
-    let white_path = photographs.path(white[0]);
+    let mut wanted = sequence::chosen(folder, &manifest.shots, options)?;
+    find::resolve(folder, &mut wanted)?;
+    let (complete, present) = gates::complete::judge(folder, &wanted);
+    let mut gates = vec![complete];
+    // What is there says more, if it is enough to go on with.
+    let sequence = match Sequence::read(folder, present) {
+        Err(_) if gates[0].fails() => {
+            let measurements = None;
+            return Ok(Examined {
+                gates,
+                measurements,
+            });
+        }
+        sequence => sequence?,
+    };
+    let measured = measure_all(folder, &sequence, &settings, &mut gates, progress);
+    gates.sort_by_key(|gate| gate.name);
+    let mut measurements = match measured {
+        Err(error @ (CaptureError::PhotoSize { .. } | CaptureError::PhotoChannels { .. })) => {
+            gates.push(gates::format::refused(&error));
+            gates.sort_by_key(|gate| gate.name);
+            None
+        }
+        measured => measured?,
+    };
+    let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
+    if let Some(measurements) = &mut measurements {
+        let taken = manifest.shots.iter().filter(is_bernoulli).count();
+        measurements.diagnostics.bernoulli_taken = taken;
+    }
+    Ok(Examined {
+        gates,
+        measurements,
+    })
+}
 
-    photographs.prefetch(progress)?;
+/// Measures the photographs of a sequence and judges them; `None` if no cell is found.
+fn measure_all(
+    folder: &Path,
+    sequence: &Sequence,
+    settings: &Settings,
+    gates: &mut Vec<Gate>,
+    progress: &dyn Progress,
+) -> Result<Option<Measurements>, CaptureError> {
+    let mut light = Light::read(folder, sequence, settings, progress)?;
+    gates.push(gates::format::judge(folder, &sequence.shots));
+    // In the camera's own channels, where a ceiling is one value.
+    let clipped = light.find_clipped(sequence, progress)?;
+    let mut devices = light.measure_devices(folder, sequence, settings, progress)?;
+    let Light {
+        mut photographs,
+        mut flood,
+        black,
+        saturated,
+        taken,
+        ..
+    } = light;
     let count = |shots: usize| shots as u64;
+    progress.begin(
+        "comparing photographs and patterns",
+        count(sequence.shots.len()),
+    );
+    let sampled = Sampled::take(&mut photographs, sequence.shots.len(), progress)?;
+    let order = gates::order::find(sequence, &sampled);
+    gates.push(gates::order::judge(sequence, order.as_ref()));
+    progress.end();
     let coded: usize = sequence.views[sequence.coded()]
         .iter()
         .map(|v| v.shots.len())
         .sum();
-    progress.begin(
-        "decoding the Gray code",
-        count(white.len() + sequence.black.len() + coded),
-    );
-    let (mut flood, saturated) = photographs.mean(white, progress)?;
-    let (black, _) = photographs.mean(&sequence.black, progress)?;
-    check_exposure(&flood, &black, &saturated, &white_path)?;
-    let gray = gray_code::decode(&sequence, &mut photographs, &flood, &black, progress)?;
+    progress.begin("decoding the Gray code", count(coded));
+    let gray = gray_code::decode(sequence, &mut photographs, &flood, &black, progress)?;
     progress.end();
 
     progress.begin(
         "registering camera pixels",
         count(sequence.bernoulli().len()),
     );
-    let registered = registration::register(&sequence, &mut photographs, &gray, progress)?;
+    let registered = registration::register(sequence, &mut photographs, &gray, progress)?;
     progress.end();
 
-    let cells = CellPixels::choose(
-        &registered.registration,
-        &saturated,
-        &manifest_path,
-        &white_path,
-    )?;
-    progress.begin(
-        "measuring cells",
-        count(sequence.shots.len() - sequence.black.len()),
-    );
-    let observed = measure::observe(&sequence, &mut photographs, &cells, &black, progress)?;
-    progress.end();
-
-    let superposition = measure::superposition(&sequence, &observed.channels);
-    if let Some(excess) = superposition.filter(|e| e.abs() > options.max_superposition) {
-        return Err(CaptureError::NotLinear {
-            path: manifest_path,
-            percent: 100.0 * excess,
-            limit: 100.0 * options.max_superposition,
-        });
+    let cells = CellPixels::choose(&registered.registration, &saturated);
+    let counts = cells.counts();
+    let live = cells.live.iter().filter(|live| **live).count();
+    gates.push(gates::saturation::judge(&clipped, &cells.left_out, live));
+    gates.push(gates::coverage::judge(
+        sequence.grid,
+        &cells.live,
+        &counts,
+        &cells.left_out,
+    ));
+    if live == 0 {
+        return Ok(None);
     }
+    progress.begin("measuring cells", count(sequence.shots.len()));
+    let light = measure::observe(sequence, &mut photographs, &cells, progress)?;
+    progress.end();
+    let steadiness = drift::assess(sequence, &cells.live, &light.channels);
+    let observed = measure::average(sequence, &light, &cells, &steadiness.drift);
+
+    let channels = &observed.channels;
+    let registration = &registered.registration;
+    let moved = gates::movement::find(sequence, &sampled, registration);
+    gates.push(gates::movement::judge(sequence, moved.as_ref()));
+    gates.push(gates::drift::judge(sequence, &steadiness));
+    gates.push(gates::flicker::judge(sequence, registration, &steadiness));
+    let superposition =
+        gates::superposition::median(gates::superposition::excesses(sequence, channels));
+    gates.push(gates::superposition::judge(sequence, channels, &cells.live));
+    gates.push(gates::noise::judge(
+        sequence.grid,
+        channels,
+        &cells.live,
+        &counts,
+    ));
     for (flood, black) in flood.iter_mut().zip(&black) {
         for (flood, black) in flood.iter_mut().zip(black) {
             *flood -= black;
         }
     }
-    let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
+    if let Some((probe, lit)) = &taken.probe {
+        let flood = gray_code::channel_sum(&flood);
+        let registration = &registered.registration;
+        let probe = Probe::measure(sequence.grid, lit, registration, probe, &flood);
+        devices.take_probe(probe, settings.projector.blur);
+    }
     let diagnostics = Diagnostics {
-        photographs: sequence.shots.len(),
+        file: photographs.format.file,
+        bits: photographs.format.bits,
+        photographs: sequence.frames.iter().map(|frame| frame.shots.len()).sum(),
         bernoulli: sequence.bernoulli().len(),
-        bernoulli_taken: manifest.shots.iter().filter(is_bernoulli).count(),
+        bernoulli_taken: sequence.bernoulli().len(),
         method: registered.method,
         pixels: registered.count,
         exposure: exposure(&observed.channels, &cells.live),
         noise: observed.noise,
         superposition,
         left_out: cells.left_out.clone(),
+        gates: Vec::new(),
     };
     let views = &sequence.views;
-    Ok(Measurements {
+    Ok(Some(Measurements {
         grid: sequence.grid,
         patterns: DMatrix::from_fn(sequence.grid.cells(), views.len(), |cell, view| {
             f64::from(views[view].lit[cell])
@@ -197,42 +321,14 @@ pub fn read(
         roles: views.iter().map(|view| view.role).collect(),
         repeats: views.iter().map(|view| view.shots.len() as u32).collect(),
         channels: observed.channels,
-        pixels: cells.counts(),
+        pixels: counts,
         live: cells.live,
         registration: registered.registration,
         flood,
-        settings,
+        devices,
+        settings: settings.clone(),
         diagnostics,
-    })
-}
-
-/// Refuses a flood photograph so overexposed that cells could not be told apart.
-fn check_exposure(
-    flood: &[Vec<f32>],
-    black: &[Vec<f32>],
-    saturated: &[bool],
-    path: &Path,
-) -> Result<(), CaptureError> {
-    let (flood, black) = (gray_code::channel_sum(flood), gray_code::channel_sum(black));
-    let light: Vec<f32> = flood.iter().zip(&black).map(|(f, b)| f - b).collect();
-    let least = 0.05 * gray_code::percentile(&light, 0.95);
-    // A lamp in view is saturated under black too and says nothing about white.
-    let lit = || {
-        light
-            .iter()
-            .zip(saturated)
-            .filter(|&(&light, _)| light > least)
-    };
-    let (seen, clipped) = (lit().count(), lit().filter(|&(_, &s)| s).count());
-    if clipped as f64 > SATURATED_LIT * seen as f64 {
-        return Err(CaptureError::Overexposed {
-            path: path.to_owned(),
-            saturated: clipped,
-            seen,
-            of: "lit pixels",
-        });
-    }
-    Ok(())
+    }))
 }
 
 /// 95th percentile of the flood light over the live cells, in the brightest

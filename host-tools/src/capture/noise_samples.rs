@@ -76,19 +76,25 @@ impl NoiseSamples {
         }
     }
 
-    /// Fits the noise of one channel.
+    /// Fits the noise of one channel; the light of a photograph is divided by its
+    /// `gain` first.
     pub(super) fn fit(
         &self,
         sequence: &Sequence,
         source: NoiseSource,
         channel: usize,
+        gain: impl Fn(usize) -> f64,
     ) -> NoiseModel {
-        let of_shot = |shot: usize| &self.values[shot][channel];
+        let of_shot = |shot: usize| -> Vec<f32> {
+            let share = (1.0 / gain(shot)) as f32;
+            let values = &self.values[shot][channel];
+            values.iter().map(|value| share * value).collect()
+        };
         match source {
             NoiseSource::Pairs { .. } => {
                 let sum = |(a, b): (usize, usize)| -> Vec<f32> {
                     let first = |view: usize| of_shot(sequence.views[view].shots[0]);
-                    first(a).iter().zip(first(b)).map(|(a, b)| a + b).collect()
+                    first(a).iter().zip(&first(b)).map(|(a, b)| a + b).collect()
                 };
                 let photographs: Vec<_> = sequence.code_pairs().into_iter().map(sum).collect();
                 noise::fit(&Alike {
@@ -98,7 +104,7 @@ impl NoiseSamples {
             }
             NoiseSource::Repeats { .. } => {
                 let white = &sequence.white().shots;
-                let photographs: Vec<_> = white.iter().map(|&s| of_shot(s).clone()).collect();
+                let photographs: Vec<_> = white.iter().map(|&s| of_shot(s)).collect();
                 noise::fit(&Alike {
                     photographs: &photographs,
                     summed: 1,

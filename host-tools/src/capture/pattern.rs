@@ -1,7 +1,7 @@
 //! Projected patterns: which cells are lit.
 
 use super::picture::{Opened, Samples, Source};
-use super::{CaptureError, Role};
+use super::{CaptureError, FileFormat, Role};
 use iltm_runtime::Grid;
 
 /// A pattern, one entry a cell (`row * cols + col`), `true` where lit.
@@ -56,6 +56,13 @@ impl Pattern {
     /// what [`Opened`] returns.
     pub(super) fn read(source: Source<'_>) -> Result<Self, CaptureError> {
         let picture = Opened::open(source)?;
+        // What `iltm patterns` writes and scripts beside this tool read.
+        if picture.format() != FileFormat::Png {
+            return Err(CaptureError::Picture {
+                path: source.path.to_owned(),
+                reason: format!("a pattern is a PNG, this is {}", picture.format()),
+            });
+        }
         let (width, height) = picture.size();
         let channels = picture.channels();
         // More cells than any grid: refused before its pixels are decoded.
@@ -79,6 +86,7 @@ impl Pattern {
                 let first = samples.first().copied().unwrap_or(0);
                 return Err(refuse(0, format!("{first} of 65535 (16 bit)")));
             }
+            Samples::Float(_) => return Err(refuse(0, "floating point".to_owned())),
         };
         let mut lit = Vec::with_capacity(samples.len() / channels);
         for (at, pixel) in samples.chunks_exact(channels).enumerate() {
@@ -99,7 +107,7 @@ impl Pattern {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::tests::source;
+    use super::super::picture_tests::source;
     use super::*;
     use image::{DynamicImage, GrayImage, ImageBuffer, Luma, RgbImage};
 

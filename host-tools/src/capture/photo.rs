@@ -1,7 +1,7 @@
 //! One photograph in linear light.
 
 use super::picture::{Opened, Samples, Source};
-use super::{CaptureError, Response};
+use super::{CaptureError, DeviceResponse, FileFormat};
 use std::path::PathBuf;
 
 /// Pixels a photograph is kept at. A larger one is averaged over squares of
@@ -12,6 +12,25 @@ const WORKING_PIXELS: u64 = 4 << 20;
 /// Value, of full scale, from which a sample counts as saturated: sensors bend
 /// and clip a little below the last code.
 const SATURATED_VALUE: f64 = 0.98;
+
+/// How the values of photographs become light.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Reading {
+    /// From a value, of full scale, to light. OpenEXR is linear by definition and
+    /// does not ask.
+    pub(super) response: DeviceResponse,
+    /// Value of a floating point file at the camera's full scale.
+    pub(super) full_scale: f64,
+}
+
+impl<R: Into<DeviceResponse>> From<R> for Reading {
+    fn from(response: R) -> Self {
+        Self {
+            response: response.into(),
+            full_scale: 1.0,
+        }
+    }
+}
 
 /// A photograph in linear light, 0 to 1 of the camera's full scale, saturated
 /// samples as [`Photo::SATURATED`].
@@ -42,6 +61,11 @@ pub(super) struct PhotoFormat {
     pub(super) width: usize,
     /// Height after binning.
     pub(super) height: usize,
+    /// What the file is.
+    pub(super) file: FileFormat,
+    /// Bits of a sample, 32 for floating point.
+    pub(super) bits: u8,
+    reading: Reading,
     /// Light of each 8-bit value.
     eight: Vec<f32>,
     /// Light of each 16-bit value.
@@ -53,7 +77,7 @@ impl PhotoFormat {
     ///
     /// # Errors
     /// As [`Opened::open`].
-    pub(super) fn of_first(source: Source<'_>, response: Response) -> Result<Self, CaptureError> {
+    pub(super) fn of_first(source: Source<'_>, reading: &Reading) -> Result<Self, CaptureError> {
         let opened = Opened::open(source)?;
         let (width, height) = opened.size();
         let pixels = u64::from(width) * u64::from(height);
@@ -68,8 +92,11 @@ impl PhotoFormat {
             binning,
             width: (width as usize / binning).max(1),
             height: (height as usize / binning).max(1),
-            eight: light_table(response, u8::MAX.into()),
-            sixteen: light_table(response, u16::MAX),
+            file: opened.format(),
+            bits: opened.bits(),
+            eight: light_table(&reading.response, u8::MAX.into()),
+            sixteen: light_table(&reading.response, u16::MAX),
+            reading: reading.clone(),
         })
     }
 
@@ -81,7 +108,8 @@ impl PhotoFormat {
     /// Bytes of one photograph while it is being decoded.
     pub(super) fn decoding_bytes(&self) -> usize {
         let (width, height) = self.file_size;
-        width as usize * height as usize * self.channels * 2 + self.bytes()
+        let sample = usize::from(self.bits.max(16) / 8);
+        width as usize * height as usize * self.channels * sample + self.bytes()
     }
 
     /// Bytes of one decoded photograph.
@@ -112,22 +140,37 @@ impl PhotoFormat {
                 expected: self.channels,
             });
         }
+        let file = opened.format();
         Ok(match opened.decode()? {
-            Samples::Eight(samples) => self.linear(&samples, &self.eight),
-            Samples::Sixteen(samples) => self.linear(&samples, &self.sixteen),
+            Samples::Eight(samples) => self.linear(&samples, |v| self.eight[usize::from(v)]),
+            Samples::Sixteen(samples) => self.linear(&samples, |v| self.sixteen[usize::from(v)]),
+            Samples::Float(samples) => self.linear(&samples, |value| self.float(file, value)),
         })
     }
 
+    /// Light of a floating point value. What noise and a subtracted dark frame
+    /// made negative stays so: its mean is right.
+    fn float(&self, file: FileFormat, value: f32) -> f32 {
+        let value = f64::from(value) / self.reading.full_scale;
+        if value >= SATURATED_VALUE {
+            Photo::SATURATED
+        } else if file == FileFormat::OpenExr || value < 0.0 {
+            value as f32
+        } else {
+            self.reading.response.light(value) as f32
+        }
+    }
+
     /// Looks up the light of every sample and averages squares of pixels.
-    fn linear<T: Copy + Into<usize>>(&self, samples: &[T], light: &[f32]) -> Photo {
+    fn linear<T: Copy>(&self, samples: &[T], light: impl Fn(T) -> f32) -> Photo {
         let channels = self.channels;
         let plane = |channel: usize| -> Vec<f32> {
             if self.binning == 1 {
                 let values = samples.iter().skip(channel).step_by(channels);
-                return values.map(|&value| light[value.into()]).collect();
+                return values.map(|&value| light(value)).collect();
             }
             (0..self.pixels())
-                .map(|at| self.binned(samples, light, channel, at))
+                .map(|at| self.binned(samples, &light, channel, at))
                 .collect()
         };
         Photo {
@@ -137,10 +180,10 @@ impl PhotoFormat {
 
     /// One binned pixel. Rows and columns that do not fill a square are cut off,
     /// unless there would be nothing left.
-    fn binned<T: Copy + Into<usize>>(
+    fn binned<T: Copy>(
         &self,
         samples: &[T],
-        light: &[f32],
+        light: &impl Fn(T) -> f32,
         channel: usize,
         at: usize,
     ) -> f32 {
@@ -155,7 +198,7 @@ impl PhotoFormat {
         let mut sum = 0.0;
         for r in rows {
             for c in cols.clone() {
-                let value = light[samples[(r * file_width + c) * self.channels + channel].into()];
+                let value = light(samples[(r * file_width + c) * self.channels + channel]);
                 if value >= Photo::SATURATED {
                     return Photo::SATURATED;
                 }
@@ -167,7 +210,7 @@ impl PhotoFormat {
 }
 
 /// Light of each value from 0 to `full_scale`.
-fn light_table(response: Response, full_scale: u16) -> Vec<f32> {
+fn light_table(response: &DeviceResponse, full_scale: u16) -> Vec<f32> {
     let full = f64::from(full_scale);
     (0..=full_scale)
         .map(|value| f64::from(value) / full)
@@ -183,7 +226,8 @@ fn light_table(response: Response, full_scale: u16) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::tests::source;
+    use super::super::Response;
+    use super::super::picture_tests::source;
     use super::*;
     use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 
@@ -191,7 +235,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("f.png");
         picture.into().save(&path).unwrap();
-        PhotoFormat::of_first(source(&path), response)?.read(source(&path))
+        PhotoFormat::of_first(source(&path), &response.into())?.read(source(&path))
     }
 
     #[test]
@@ -226,7 +270,7 @@ mod tests {
         GrayImage::new(4, 3).save_with_format(&a, png).unwrap();
         GrayImage::new(3, 4).save_with_format(&b, png).unwrap();
         RgbImage::new(4, 3).save_with_format(&c, png).unwrap();
-        let format = PhotoFormat::of_first(source(&a), Response::Linear).unwrap();
+        let format = PhotoFormat::of_first(source(&a), &Response::Linear.into()).unwrap();
         let error = format.read(source(&b)).unwrap_err().to_string();
         assert!(
             error.contains("3 x 4 pixels, but") && error.contains("has 4 x 3"),

@@ -1,14 +1,26 @@
-//! PNG files from strangers: opened with limits, decoded without alpha.
+//! Picture files from strangers: opened with limits, decoded without alpha.
+//!
+//! A format is told by a file's first bytes. What EXIF says about orientation is
+//! ignored on purpose: some cameras turn that flag with gravity between two
+//! shots, others never; the rows as the sensor read them are the only thing that
+//! is the same in all photographs of a camera that stands still.
 
-use super::CaptureError;
+use super::{CaptureError, FileFormat};
+use image::codecs::jpeg::JpegDecoder;
+use image::codecs::openexr::OpenExrDecoder;
 use image::codecs::png::PngDecoder;
-use image::{DynamicImage, ImageDecoder, Limits};
+use image::codecs::pnm::PnmDecoder;
+use image::codecs::tiff::TiffDecoder;
+use image::{ColorType, DynamicImage, ImageDecoder, ImageResult, Limits};
 use std::fs::File;
-use std::io::{BufReader, ErrorKind};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Pixels a picture may have: the largest medium-format sensors.
 pub(super) const MAX_PIXELS: u64 = 160_000_000;
+
+/// Bytes the widest pixel takes: floating point with alpha.
+const WIDEST_PIXEL: u64 = 16;
 
 /// Bytes the decoder may allocate beside the pixels themselves.
 const DECODER_BYTES: u64 = 32 << 20;
@@ -20,24 +32,43 @@ pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
     /// "pattern" or "photograph".
     pub(super) what: &'static str,
-    /// Line of `capture.csv` that names it.
+    /// Line of the manifest that names it.
     pub(super) line: u64,
 }
 
 /// A picture whose header is read and whose pixels are not.
 pub(super) struct Opened {
     path: PathBuf,
-    decoder: PngDecoder<BufReader<File>>,
+    format: FileFormat,
+    decoder: Decoder,
+}
+
+/// What reads the pixels.
+enum Decoder {
+    /// The image crate.
+    Image(Box<dyn ImageDecoder>),
+    /// Floating point grey, which the image crate has no type for.
+    GreyFloat(GreyFloat),
+}
+
+/// A floating point grey TIFF.
+struct GreyFloat {
+    size: (u32, u32),
+    decoder: tiff::decoder::Decoder<BufReader<File>>,
 }
 
 impl Opened {
-    /// Opens a PNG and reads its header.
+    /// Opens a picture of any [`FileFormat`] and reads its header.
     ///
     /// # Errors
     /// [`CaptureError::MissingFile`], [`CaptureError::Io`],
-    /// [`CaptureError::Png`] or [`CaptureError::TooLarge`].
+    /// [`CaptureError::Picture`] or [`CaptureError::TooLarge`].
     pub(super) fn open(source: Source<'_>) -> Result<Self, CaptureError> {
         let path = source.path.to_owned();
+        let io = |source| CaptureError::Io {
+            path: path.clone(),
+            source,
+        };
         let metadata = match std::fs::metadata(&path) {
             Ok(metadata) => metadata,
             Err(error) if error.kind() == ErrorKind::NotFound => {
@@ -47,25 +78,27 @@ impl Opened {
                     line: source.line,
                 });
             }
-            Err(source) => return Err(CaptureError::Io { path, source }),
+            Err(source) => return Err(io(source)),
+        };
+        let refuse = |reason: String| CaptureError::Picture {
+            path: path.clone(),
+            reason,
         };
         // Opening a pipe would wait for a writer for ever.
         if !metadata.is_file() {
-            let reason = "it is not a regular file".to_owned();
-            return Err(CaptureError::Png { path, reason });
+            return Err(refuse("it is not a regular file".to_owned()));
         }
-        let file = match File::open(&path) {
-            Ok(file) => file,
-            Err(source) => return Err(CaptureError::Io { path, source }),
+        let most = MAX_PIXELS * WIDEST_PIXEL + DECODER_BYTES;
+        if metadata.len() > most {
+            return Err(refuse(format!("it has more than {most} bytes")));
+        }
+        let mut file = File::open(&path).map_err(io)?;
+        let format = sniff(&mut file).map_err(io)?;
+        let Some(format) = format else {
+            return Err(refuse(format!("it is not a {}", FileFormat::NAMES)));
         };
-        let mut limits = Limits::no_limits();
-        // 8 bytes: the widest pixel, 16-bit RGB with alpha.
-        limits.max_alloc = Some(MAX_PIXELS * 8 + DECODER_BYTES);
-        let decoder = match PngDecoder::with_limits(BufReader::new(file), limits) {
-            Ok(decoder) => decoder,
-            Err(error) => return Err(undecodable(path, &error)),
-        };
-        let (width, height) = decoder.dimensions();
+        let decoder = Decoder::new(format, file).map_err(refuse)?;
+        let (width, height) = decoder.size();
         if u64::from(width) * u64::from(height) > MAX_PIXELS {
             return Err(CaptureError::TooLarge {
                 path,
@@ -74,20 +107,42 @@ impl Opened {
                 limit: MAX_PIXELS,
             });
         }
-        Ok(Self { path, decoder })
+        if width == 0 || height == 0 {
+            return Err(refuse("it has no pixels".to_owned()));
+        }
+        Ok(Self {
+            path,
+            format,
+            decoder,
+        })
+    }
+
+    /// What kind of file it is.
+    pub(super) fn format(&self) -> FileFormat {
+        self.format
     }
 
     /// Width and height in pixels, at least 1.
     pub(super) fn size(&self) -> (u32, u32) {
-        self.decoder.dimensions()
+        self.decoder.size()
     }
 
     /// Colour channels without alpha, 1 or 3.
     pub(super) fn channels(&self) -> usize {
-        if self.decoder.color_type().has_color() {
-            3
-        } else {
-            1
+        match &self.decoder {
+            Decoder::Image(decoder) if decoder.color_type().has_color() => 3,
+            _ => 1,
+        }
+    }
+
+    /// Bits of a sample: 8, 16, or 32 for floating point.
+    pub(super) fn bits(&self) -> u8 {
+        match &self.decoder {
+            Decoder::Image(decoder) => {
+                let colour = decoder.color_type();
+                (8 * colour.bytes_per_pixel() / colour.channel_count()) as u8
+            }
+            Decoder::GreyFloat(_) => 32,
         }
     }
 
@@ -98,58 +153,203 @@ impl Opened {
     /// refused.
     ///
     /// # Errors
-    /// [`CaptureError::Png`] or [`CaptureError::Transparent`].
+    /// [`CaptureError::Picture`], [`CaptureError::Transparent`] or
+    /// [`CaptureError::NotFinite`].
     pub(super) fn decode(self) -> Result<Samples, CaptureError> {
-        let Self { path, decoder } = self;
-        let decoded = match DynamicImage::from_decoder(decoder) {
-            Ok(decoded) => decoded,
-            Err(error) => return Err(undecodable(path, &error)),
-        };
-        let transparent = |width: u32, at: usize| CaptureError::Transparent {
+        let Self {
+            path,
+            format,
+            decoder,
+        } = self;
+        let refuse = |reason| CaptureError::Picture {
             path: path.clone(),
-            row: at as u32 / width,
-            col: at as u32 % width,
+            reason,
         };
-        let width = decoded.width();
-        match decoded {
-            DynamicImage::ImageLuma8(picture) => Ok(Samples::Eight(picture.into_raw())),
-            DynamicImage::ImageRgb8(picture) => Ok(Samples::Eight(picture.into_raw())),
-            DynamicImage::ImageLuma16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
-            DynamicImage::ImageRgb16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
-            DynamicImage::ImageLumaA8(picture) => opaque(&picture, 2).map(Samples::Eight),
-            DynamicImage::ImageRgba8(picture) => opaque(&picture, 4).map(Samples::Eight),
-            DynamicImage::ImageLumaA16(picture) => opaque(&picture, 2).map(Samples::Sixteen),
-            DynamicImage::ImageRgba16(picture) => opaque(&picture, 4).map(Samples::Sixteen),
-            other => {
-                let reason = format!("its pixels are {:?}", other.color());
-                return Err(CaptureError::Png { path, reason });
+        let ((width, _), channels) = (decoder.size(), decoder.channels());
+        let place = |at: usize| (at as u32 / width, at as u32 % width);
+        let samples = match decoder {
+            Decoder::Image(decoder) => {
+                let decoded = DynamicImage::from_decoder(decoder);
+                let decoded = decoded.map_err(|error| refuse(unreadable(format, &error)))?;
+                without_alpha(decoded).map_err(|flaw| match flaw {
+                    Flaw::Transparent(at) => {
+                        let (row, col) = place(at);
+                        let path = path.clone();
+                        CaptureError::Transparent { path, row, col }
+                    }
+                    Flaw::Pixels(colour) => refuse(format!("its pixels are {colour:?}")),
+                })?
             }
+            Decoder::GreyFloat(grey) => grey.decode().map_err(refuse)?,
+        };
+        if let Samples::Float(values) = &samples
+            && let Some(at) = values.iter().position(|value| !value.is_finite())
+        {
+            let (row, col) = place(at / channels);
+            return Err(CaptureError::NotFinite { path, row, col });
         }
-        .map_err(|at| transparent(width, at))
+        Ok(samples)
     }
 }
 
+impl Decoder {
+    /// Reads the header of a file of this format.
+    fn new(format: FileFormat, file: File) -> Result<Self, String> {
+        let mut limits = Limits::no_limits();
+        limits.max_alloc = Some(MAX_PIXELS * WIDEST_PIXEL + DECODER_BYTES);
+        let words = |error: image::ImageError| unreadable(format, &error);
+        if format == FileFormat::Tiff
+            && let Some(grey) = GreyFloat::new(file.try_clone().map_err(|e| e.to_string())?)?
+        {
+            return Ok(Self::GreyFloat(grey));
+        }
+        if format == FileFormat::Jpeg && !jpeg_ends(&file).map_err(|error| error.to_string())? {
+            return Err("not a readable JPEG: its end is missing".to_owned());
+        }
+        let mut file = BufReader::new(file);
+        file.rewind().map_err(|error| error.to_string())?;
+        let boxed: ImageResult<Box<dyn ImageDecoder>> = match format {
+            FileFormat::Png => {
+                PngDecoder::with_limits(file, limits.clone()).map(|decoder| Box::new(decoder) as _)
+            }
+            FileFormat::Tiff => TiffDecoder::new(file).map(|decoder| Box::new(decoder) as _),
+            FileFormat::Jpeg => JpegDecoder::new(file).map(|decoder| Box::new(decoder) as _),
+            FileFormat::OpenExr => OpenExrDecoder::new(file).map(|decoder| Box::new(decoder) as _),
+            FileFormat::Netpbm => PnmDecoder::new(file).map(|decoder| Box::new(decoder) as _),
+        };
+        let mut decoder = boxed.map_err(words)?;
+        decoder.set_limits(limits).map_err(words)?;
+        Ok(Self::Image(decoder))
+    }
+
+    fn size(&self) -> (u32, u32) {
+        match self {
+            Self::Image(decoder) => decoder.dimensions(),
+            Self::GreyFloat(grey) => grey.size,
+        }
+    }
+
+    fn channels(&self) -> usize {
+        match self {
+            Self::Image(decoder) if decoder.color_type().has_color() => 3,
+            _ => 1,
+        }
+    }
+}
+
+impl GreyFloat {
+    /// Opens a TIFF; `None` if its pixels are of another kind or its header is
+    /// not readable, which the image crate then says in its own words.
+    fn new(file: File) -> Result<Option<Self>, String> {
+        let mut file = BufReader::new(file);
+        file.rewind().map_err(|error| error.to_string())?;
+        let Ok(mut decoder) = tiff::decoder::Decoder::new(file) else {
+            return Ok(None);
+        };
+        let formats = decoder.find_tag_unsigned_vec::<u16>(tiff::tags::Tag::SampleFormat);
+        let float = tiff::tags::SampleFormat::IEEEFP.to_u16();
+        let (Ok(Some(formats)), Ok(tiff::ColorType::Gray(_)), Ok(size)) =
+            (formats, decoder.colortype(), decoder.dimensions())
+        else {
+            return Ok(None);
+        };
+        if formats != [float] || u64::from(size.0) * u64::from(size.1) > MAX_PIXELS {
+            return Ok(None);
+        }
+        let mut limits = tiff::decoder::Limits::default();
+        limits.decoding_buffer_size = (MAX_PIXELS * 8) as usize;
+        limits.intermediate_buffer_size = (MAX_PIXELS * 8) as usize;
+        let decoder = decoder.with_limits(limits);
+        Ok(Some(Self { size, decoder }))
+    }
+
+    fn decode(mut self) -> Result<Samples, String> {
+        use tiff::decoder::DecodingResult;
+        let decoded = self.decoder.read_image();
+        let decoded = decoded.map_err(|error| format!("not a readable TIFF: {error}"))?;
+        let values: Vec<f32> = match decoded {
+            DecodingResult::F32(values) => values,
+            DecodingResult::F64(values) => values.into_iter().map(|value| value as f32).collect(),
+            DecodingResult::F16(values) => values.into_iter().map(f32::from).collect(),
+            _ => return Err("its pixels are not what its header says".to_owned()),
+        };
+        let pixels = self.size.0 as usize * self.size.1 as usize;
+        if values.len() != pixels {
+            return Err(format!(
+                "it has {} values for {pixels} pixels",
+                values.len()
+            ));
+        }
+        Ok(Samples::Float(values))
+    }
+}
+
+/// Format of a file by its first bytes.
+fn sniff(file: &mut File) -> std::io::Result<Option<FileFormat>> {
+    let mut first = Vec::new();
+    file.by_ref()
+        .take(FileFormat::SIGNATURE as u64)
+        .read_to_end(&mut first)?;
+    Ok(FileFormat::of(&first))
+}
+
+/// Whether a JPEG has an end after its last scan: the decoder fills up what a
+/// broken transfer cut off with grey and says nothing.
+fn jpeg_ends(mut file: &File) -> std::io::Result<bool> {
+    let mut bytes = Vec::new();
+    file.seek(SeekFrom::Start(0))?;
+    file.read_to_end(&mut bytes)?;
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|two| two == marker);
+    Ok(last([0xff, 0xd9]) > last([0xff, 0xda]))
+}
+
 /// Values of a picture, row by row, channels side by side.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(super) enum Samples {
     /// 0 to 255.
     Eight(Vec<u8>),
     /// 0 to 65,535.
     Sixteen(Vec<u16>),
+    /// Finite; 1 is full scale.
+    Float(Vec<f32>),
 }
 
-/// The samples without the last of every `step`, the alpha; an error is the
-/// first pixel whose alpha is not full.
+/// Why decoded pixels cannot be used.
+enum Flaw {
+    /// The first pixel whose alpha is not full.
+    Transparent(usize),
+    /// Pixels of a kind that no camera writes.
+    Pixels(ColorType),
+}
+
+/// The samples of a picture whose alpha, if any, is full everywhere.
+fn without_alpha(decoded: DynamicImage) -> Result<Samples, Flaw> {
+    match decoded {
+        DynamicImage::ImageLuma8(picture) => Ok(Samples::Eight(picture.into_raw())),
+        DynamicImage::ImageRgb8(picture) => Ok(Samples::Eight(picture.into_raw())),
+        DynamicImage::ImageLuma16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
+        DynamicImage::ImageRgb16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
+        DynamicImage::ImageRgb32F(picture) => Ok(Samples::Float(picture.into_raw())),
+        DynamicImage::ImageLumaA8(picture) => opaque(&picture, 2).map(Samples::Eight),
+        DynamicImage::ImageRgba8(picture) => opaque(&picture, 4).map(Samples::Eight),
+        DynamicImage::ImageLumaA16(picture) => opaque(&picture, 2).map(Samples::Sixteen),
+        DynamicImage::ImageRgba16(picture) => opaque(&picture, 4).map(Samples::Sixteen),
+        DynamicImage::ImageRgba32F(picture) => opaque(&picture, 4).map(Samples::Float),
+        other => Err(Flaw::Pixels(other.color())),
+    }
+}
+
+/// The samples without the last of every `step`, the alpha.
 fn opaque<T: Copy + PartialEq + image::Primitive>(
     samples: &[T],
     step: usize,
-) -> Result<Vec<T>, usize> {
+) -> Result<Vec<T>, Flaw> {
     let pixels = samples.chunks_exact(step);
     if let Some(at) = pixels
         .clone()
         .position(|pixel| pixel.last() != Some(&T::DEFAULT_MAX_VALUE))
     {
-        return Err(at);
+        return Err(Flaw::Transparent(at));
     }
     Ok(pixels
         .flat_map(|pixel| &pixel[..step - 1])
@@ -157,119 +357,6 @@ fn opaque<T: Copy + PartialEq + image::Primitive>(
         .collect())
 }
 
-fn undecodable(path: PathBuf, error: &image::ImageError) -> CaptureError {
-    CaptureError::Png {
-        path,
-        reason: error.to_string(),
-    }
-}
-
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    pub(crate) fn source(path: &Path) -> Source<'_> {
-        Source {
-            path,
-            what: "photograph",
-            line: 2,
-        }
-    }
-
-    fn decode(bytes: &[u8]) -> Result<Samples, CaptureError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x.png");
-        std::fs::write(&path, bytes).unwrap();
-        Opened::open(source(&path))?.decode()
-    }
-
-    fn png(picture: &DynamicImage) -> Vec<u8> {
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        picture
-            .write_to(&mut bytes, image::ImageFormat::Png)
-            .unwrap();
-        bytes.into_inner()
-    }
-
-    #[test]
-    fn an_opaque_alpha_channel_is_dropped_and_a_see_through_pixel_is_named() {
-        let mut picture = image::RgbaImage::from_pixel(3, 2, image::Rgba([1, 2, 3, 255]));
-        let samples = decode(&png(&picture.clone().into())).unwrap();
-        assert_eq!(samples, Samples::Eight([1, 2, 3].repeat(6)));
-        picture.put_pixel(2, 1, image::Rgba([1, 2, 3, 254]));
-        let error = decode(&png(&picture.into())).unwrap_err();
-        assert!(
-            error.to_string().contains("row 1, column 2 is transparent"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn a_header_that_asks_for_a_terapixel_allocates_nothing() {
-        let mut bytes = png(&image::GrayImage::new(2, 2).into());
-        // Width and height of IHDR stand at bytes 16..24, its CRC at 29..33.
-        bytes[16..24].copy_from_slice(&[0, 16, 0, 0, 0, 16, 0, 0]);
-        let crc = crc32(&bytes[12..29]);
-        bytes[29..33].copy_from_slice(&crc.to_be_bytes());
-        let error = decode(&bytes).unwrap_err();
-        assert!(
-            matches!(
-                error,
-                CaptureError::TooLarge {
-                    width: 1_048_576,
-                    ..
-                }
-            ),
-            "{error}"
-        );
-    }
-
-    /// CRC-32 of the PNG specification, annex D, bit by bit.
-    fn crc32(bytes: &[u8]) -> u32 {
-        !bytes.iter().fold(u32::MAX, |crc, &byte| {
-            (0..8).fold(crc ^ u32::from(byte), |c, _| {
-                (c >> 1) ^ (0xedb8_8320 * (c & 1))
-            })
-        })
-    }
-
-    #[test]
-    fn a_folder_and_a_missing_file_are_told_apart() {
-        let folder = tempfile::tempdir().unwrap();
-        let error = Opened::open(source(folder.path())).err().unwrap();
-        assert!(error.to_string().contains("not a regular file"), "{error}");
-        let error = Opened::open(source(&folder.path().join("no.png")))
-            .err()
-            .unwrap();
-        assert!(
-            error
-                .to_string()
-                .contains("missing photograph, named in line 2"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn every_truncation_of_a_picture_is_refused() {
-        let bytes =
-            png(&image::GrayImage::from_fn(9, 9, |x, y| image::Luma([(x * y) as u8])).into());
-        // The last 12 bytes are the empty end chunk.
-        for length in 0..bytes.len() - 12 {
-            assert!(
-                matches!(decode(&bytes[..length]), Err(CaptureError::Png { .. })),
-                "{length}"
-            );
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn a_damaged_picture_never_panics(at in 0_usize..200, with: u8) {
-            let mut bytes = png(&image::GrayImage::new(9, 9).into());
-            let length = bytes.len();
-            bytes[at % length] = with;
-            let _ = decode(&bytes);
-        }
-    }
+fn unreadable(format: FileFormat, error: &image::ImageError) -> String {
+    format!("not a readable {format}: {error}")
 }

@@ -263,7 +263,7 @@ impl Shown<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::test_capture::TestCapture;
-    use super::super::{CaptureOptions, Manifest, Response};
+    use super::super::{Manifest, Response};
     use super::*;
     use crate::progress::Silent;
 
@@ -276,9 +276,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         scene.write(folder.path());
         let shots = Manifest::read(folder.path()).unwrap().shots;
-        let sequence = Sequence::read(folder.path(), &shots, &CaptureOptions::default()).unwrap();
+        let sequence = Sequence::read(folder.path(), shots).unwrap();
         let mut photographs =
-            Photographs::new(folder.path(), &sequence.shots, Response::Linear).unwrap();
+            Photographs::new(folder.path(), &sequence.shots, &Response::Linear.into()).unwrap();
         let (width, height) = scene.camera();
         let own = |pixel: usize, cell: usize| {
             scene.overlap(pixel / width, cell / scene.cols)

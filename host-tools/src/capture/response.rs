@@ -70,42 +70,116 @@ impl Serialize for Response {
     }
 }
 
+/// What `capture.toml` says of a response.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub enum Declared {
+    /// Nothing.
+    #[default]
+    Unsaid,
+    /// `"measure"`: it shall be measured from photographs.
+    Measure,
+    /// What it is.
+    As(Response),
+}
+
+impl Declared {
+    /// The response, if one was declared.
+    #[must_use]
+    pub const fn known(self) -> Option<Response> {
+        match self {
+            Self::As(response) => Some(response),
+            Self::Unsaid | Self::Measure => None,
+        }
+    }
+
+    // serde hands a reference.
+    #[allow(clippy::trivially_copy_pass_by_ref)]
+    pub(super) fn is_unsaid(&self) -> bool {
+        *self == Self::Unsaid
+    }
+}
+
+impl From<Response> for Declared {
+    fn from(response: Response) -> Self {
+        Self::As(response)
+    }
+}
+
+impl Serialize for Declared {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::As(response) => response.serialize(serializer),
+            Self::Measure => serializer.serialize_str(MEASURE),
+            Self::Unsaid => serializer.serialize_none(),
+        }
+    }
+}
+
+/// Name of [`Declared::Measure`].
+const MEASURE: &str = "measure";
+
+impl<'de> Deserialize<'de> for Declared {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Name { measure: true })
+    }
+}
+
 impl<'de> Deserialize<'de> for Response {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Name;
-        impl Visitor<'_> for Name {
-            type Value = Response;
+        let name = Name { measure: false };
+        let declared = deserializer.deserialize_any(name)?;
+        // Without `measure` the visitor makes nothing else.
+        declared.known().ok_or_else(|| de::Error::custom(name))
+    }
+}
 
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                let (low, high) = (Response::GAMMA.start(), Response::GAMMA.end());
-                write!(f, "\"linear\", \"srgb\" or a gamma from {low} to {high}")
-            }
+/// Reads a response, and also [`MEASURE`] where that may stand.
+#[derive(Clone, Copy)]
+struct Name {
+    measure: bool,
+}
 
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Response, E> {
-                match name {
-                    "linear" => Ok(Response::Linear),
-                    "srgb" => Ok(Response::Srgb),
-                    _ => Err(E::invalid_value(de::Unexpected::Str(name), &self)),
-                }
-            }
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (low, high) = (Response::GAMMA.start(), Response::GAMMA.end());
+        let measure = if self.measure { "\"measure\", " } else { "" };
+        write!(
+            f,
+            "\"linear\", \"srgb\", {measure}or a gamma from {low} to {high}"
+        )
+    }
+}
 
-            fn visit_f64<E: de::Error>(self, gamma: f64) -> Result<Response, E> {
-                if Response::GAMMA.contains(&gamma) {
-                    Ok(Response::Gamma(gamma))
-                } else {
-                    Err(E::invalid_value(de::Unexpected::Float(gamma), &self))
-                }
-            }
+impl Visitor<'_> for Name {
+    type Value = Declared;
 
-            fn visit_i64<E: de::Error>(self, gamma: i64) -> Result<Response, E> {
-                self.visit_f64(gamma as f64)
-            }
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
 
-            fn visit_u64<E: de::Error>(self, gamma: u64) -> Result<Response, E> {
-                self.visit_f64(gamma as f64)
-            }
+    fn visit_str<E: de::Error>(self, name: &str) -> Result<Declared, E> {
+        match name {
+            "linear" => Ok(Response::Linear.into()),
+            "srgb" => Ok(Response::Srgb.into()),
+            MEASURE if self.measure => Ok(Declared::Measure),
+            _ => Err(E::invalid_value(de::Unexpected::Str(name), &self)),
         }
-        deserializer.deserialize_any(Name)
+    }
+
+    fn visit_f64<E: de::Error>(self, gamma: f64) -> Result<Declared, E> {
+        if Response::GAMMA.contains(&gamma) {
+            Ok(Response::Gamma(gamma).into())
+        } else {
+            Err(E::invalid_value(de::Unexpected::Float(gamma), &self))
+        }
+    }
+
+    fn visit_i64<E: de::Error>(self, gamma: i64) -> Result<Declared, E> {
+        self.visit_f64(gamma as f64)
+    }
+
+    fn visit_u64<E: de::Error>(self, gamma: u64) -> Result<Declared, E> {
+        self.visit_f64(gamma as f64)
     }
 }
 

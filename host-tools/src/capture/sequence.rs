@@ -1,6 +1,7 @@
 //! The patterns that were shown, checked against each other before any
 //! photograph is decoded.
 
+use super::frame::{self, Frame};
 use super::manifest::MANIFEST_FILE;
 use super::picture::Source;
 use super::{CaptureError, CaptureOptions, Pattern, Role, Shot};
@@ -16,6 +17,11 @@ use std::path::{Path, PathBuf};
 /// patterns tell a cell's light from that of the others in its column or row;
 /// and a solve keeps some of them back to choose its sparsity with.
 pub const MIN_BERNOULLI: usize = 10;
+
+/// Cells from which on two equal Bernoulli patterns are the same one shown again:
+/// by chance, one in 16 million pairs is. On fewer cells chance draws patterns
+/// twice, and each draw counts.
+const FEWEST_FOR_REPEATS: usize = 24;
 
 /// One axis of the grid.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -40,8 +46,8 @@ impl fmt::Display for Axis {
 pub(super) struct View {
     /// What it was shown for; never black.
     pub(super) role: Role,
-    /// Photographs of it, as indices into the used shots. More than one only
-    /// where a role other than Bernoulli was photographed again.
+    /// Frames of it, as indices into the used ones. More than one where it was
+    /// photographed again.
     pub(super) shots: Vec<usize>,
     /// Whether each cell is lit, length `N`.
     pub(super) lit: Vec<bool>,
@@ -51,7 +57,11 @@ pub(super) struct View {
 #[derive(Clone, Debug)]
 pub(super) struct Sequence {
     pub(super) grid: Grid,
-    /// Used shots, in the order they were taken.
+    /// Used frames, in the order they were taken.
+    pub(super) frames: Vec<Frame>,
+    /// The longest exposure, if exposures are given.
+    pub(super) longest: Option<f64>,
+    /// The first photograph of each frame.
     pub(super) shots: Vec<Shot>,
     /// Photographs of black, as indices into `shots`, at least one.
     pub(super) black: Vec<usize>,
@@ -64,36 +74,20 @@ pub(super) struct Sequence {
 }
 
 impl Sequence {
-    /// Chooses the shots that `options` ask for, reads their patterns and checks
-    /// them. `shots` are ordered by index.
+    /// Reads the patterns of `shots`, which are ordered by index, and checks them.
     ///
     /// # Errors
-    /// What [`CaptureError`] says about roles, patterns and missing files.
-    pub(super) fn read(
-        folder: &Path,
-        shots: &[Shot],
-        options: &CaptureOptions,
-    ) -> Result<Self, CaptureError> {
+    /// What [`CaptureError`] says about roles and patterns.
+    pub(super) fn read(folder: &Path, shots: Vec<Shot>) -> Result<Self, CaptureError> {
         let manifest = folder.join(MANIFEST_FILE);
-        let shots = chosen(shots, options, &manifest)?;
-        for shot in &shots {
-            let path = folder.join(&shot.photo);
-            if matches!(path.try_exists(), Ok(false)) {
-                let (what, line) = ("photograph", shot.line);
-                return Err(CaptureError::MissingFile { path, what, line });
-            }
-        }
-        let patterns = shots
-            .par_iter()
-            .map(|shot| {
-                Pattern::read(Source {
-                    path: &folder.join(&shot.pattern),
-                    what: "pattern",
-                    line: shot.line,
-                })
-            })
-            .collect::<Vec<_>>();
-        let patterns = patterns.into_iter().collect::<Result<Vec<_>, _>>()?;
+        check_roles(&shots, &manifest)?;
+        let longest = frame::longest(&shots, &manifest)?;
+        let frames = match longest {
+            Some(longest) => frame::bracketed(&shots, &read_patterns(folder, &shots)?, longest),
+            None => Frame::of_each(&shots, None),
+        };
+        let shots: Vec<Shot> = frames.iter().map(|frame| frame.shots[0].clone()).collect();
+        let patterns = read_patterns(folder, &shots)?;
         let grid = common_grid(folder, &shots, &patterns)?;
         let bits = [
             code_bits(Axis::Column, grid.cols(), &shots, &manifest)?,
@@ -102,14 +96,24 @@ impl Sequence {
         for (shot, pattern) in shots.iter().zip(&patterns) {
             check_role(folder, shot, pattern, grid, bits)?;
         }
-        Ok(Self::grouped(grid, bits, shots, patterns))
+        let mut sequence = Self::grouped(grid, bits, frames, shots, patterns);
+        sequence.longest = longest;
+        Ok(sequence)
     }
 
     /// Puts photographs of one pattern together.
-    fn grouped(grid: Grid, bits: [u8; 2], shots: Vec<Shot>, patterns: Vec<Pattern>) -> Self {
+    fn grouped(
+        grid: Grid,
+        bits: [u8; 2],
+        frames: Vec<Frame>,
+        shots: Vec<Shot>,
+        patterns: Vec<Pattern>,
+    ) -> Self {
         let mut black = Vec::new();
         let mut coded: Vec<View> = Vec::new();
-        let mut bernoulli = Vec::new();
+        let mut bernoulli: Vec<View> = Vec::new();
+        let again =
+            |known: &View, view: &View| grid.cells() >= FEWEST_FOR_REPEATS && known.lit == view.lit;
         for (at, (shot, pattern)) in shots.iter().zip(patterns).enumerate() {
             let role = shot.role;
             let view = View {
@@ -119,7 +123,10 @@ impl Sequence {
             };
             match role {
                 Role::Black => black.push(at),
-                Role::Bernoulli => bernoulli.push(view),
+                Role::Bernoulli => match bernoulli.iter_mut().find(|known| again(known, &view)) {
+                    Some(known) => known.shots.push(at),
+                    None => bernoulli.push(view),
+                },
                 _ => match coded.iter_mut().find(|view| view.role == role) {
                     Some(view) => view.shots.push(at),
                     None => coded.push(view),
@@ -132,6 +139,8 @@ impl Sequence {
         coded.append(&mut bernoulli);
         Self {
             grid,
+            frames,
+            longest: None,
             shots,
             black,
             views: coded,
@@ -175,12 +184,70 @@ impl Sequence {
     }
 }
 
-/// The shots to use: all but the Bernoulli ones beyond the number asked for.
-fn chosen(
+fn read_patterns(folder: &Path, shots: &[Shot]) -> Result<Vec<Pattern>, CaptureError> {
+    let read = |shot: &Shot| {
+        Pattern::read(Source {
+            path: &folder.join(&shot.pattern),
+            what: "pattern",
+            line: shot.line,
+        })
+    };
+    let patterns: Vec<_> = shots.par_iter().map(read).collect();
+    patterns.into_iter().collect()
+}
+
+/// The shots that `options` ask for: all but the Bernoulli ones beyond their number,
+/// the photographs of a bracket counting as one.
+///
+/// # Errors
+/// [`CaptureError::NoBlack`], [`CaptureError::NoWhite`],
+/// [`CaptureError::MorePhotographsThanTaken`] or [`CaptureError::TooFewPhotographs`];
+/// of a capture with exposures also what is wrong with them or with a pattern.
+pub(super) fn chosen(
+    folder: &Path,
     shots: &[Shot],
     options: &CaptureOptions,
-    manifest: &Path,
 ) -> Result<Vec<Shot>, CaptureError> {
+    let manifest = folder.join(MANIFEST_FILE);
+    check_roles(shots, &manifest)?;
+    let frames = match frame::longest(shots, &manifest)? {
+        Some(longest) => frame::bracketed(shots, &read_patterns(folder, shots)?, longest),
+        None => Frame::of_each(shots, None),
+    };
+    let is_bernoulli = |frame: &&Frame| frame.shots[0].role == Role::Bernoulli;
+    let found = frames.iter().filter(is_bernoulli).count();
+    let used = options.bernoulli.unwrap_or(found);
+    if used > found {
+        return Err(CaptureError::MorePhotographsThanTaken {
+            path: manifest,
+            asked: used,
+            found,
+        });
+    }
+    if used < options.min_bernoulli {
+        return Err(CaptureError::TooFewPhotographs {
+            path: manifest,
+            used,
+            needed: options.min_bernoulli,
+        });
+    }
+    let mut left = used;
+    let mut wanted = |frame: &Frame| {
+        if !is_bernoulli(&frame) {
+            return true;
+        }
+        let wanted = left > 0;
+        left = left.saturating_sub(1);
+        wanted
+    };
+    let frames = frames.into_iter().filter(|frame| wanted(frame));
+    let mut chosen: Vec<Shot> = frames.flat_map(|frame| frame.shots).collect();
+    chosen.sort_by_key(|shot| shot.index);
+    Ok(chosen)
+}
+
+/// Refuses shots without white or black.
+fn check_roles(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
     let path = || manifest.to_owned();
     let has = |role| shots.iter().any(|shot| shot.role == role);
     if !has(Role::Black) {
@@ -189,33 +256,7 @@ fn chosen(
     if !has(Role::White) {
         return Err(CaptureError::NoWhite { path: path() });
     }
-    let is_bernoulli = |shot: &&Shot| shot.role == Role::Bernoulli;
-    let found = shots.iter().filter(is_bernoulli).count();
-    let used = options.bernoulli.unwrap_or(found);
-    if used > found {
-        return Err(CaptureError::MorePhotographsThanTaken {
-            path: path(),
-            asked: used,
-            found,
-        });
-    }
-    if used < options.min_bernoulli {
-        return Err(CaptureError::TooFewPhotographs {
-            path: path(),
-            used,
-            needed: options.min_bernoulli,
-        });
-    }
-    let mut left = used;
-    let mut wanted = |shot: &&Shot| {
-        if shot.role != Role::Bernoulli {
-            return true;
-        }
-        let wanted = left > 0;
-        left = left.saturating_sub(1);
-        wanted
-    };
-    Ok(shots.iter().filter(|shot| wanted(shot)).cloned().collect())
+    Ok(())
 }
 
 /// The grid that all patterns share.

@@ -1,6 +1,7 @@
 //! One photograph of a capture as light, for whoever wants to look at it rather
 //! than to solve from it.
 
+use super::find;
 use super::photographs::Photographs;
 use super::{CaptureError, MANIFEST_FILE, Manifest, Role, Settings, Shot};
 use crate::progress::Progress;
@@ -38,15 +39,16 @@ impl ShotLight {
         index: Option<u32>,
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
-        let shots = Manifest::read(folder)?.shots;
+        let mut shots = Manifest::read(folder)?.shots;
         let settings = Settings::read(folder)?;
         let chosen = choose(&shots, index, &folder.join(MANIFEST_FILE))?;
+        find::resolve(folder, &mut shots)?;
         let black = of_role(&shots, Role::Black);
         if black.is_empty() {
             let path = folder.join(MANIFEST_FILE);
             return Err(CaptureError::NoBlack { path });
         }
-        let mut photographs = Photographs::new(folder, &shots, settings.camera.response)?;
+        let mut photographs = Photographs::new(folder, &shots, &settings.camera.reading())?;
         let count = (chosen.len() + black.len()) as u64;
         progress.begin("reading the photograph", count);
         let (black_light, _) = photographs.mean(&black, progress)?;

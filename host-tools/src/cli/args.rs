@@ -1,9 +1,10 @@
 //! What can be typed.
 
 use super::failure::Kind;
+use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
-use crate::scene::Effect;
+use crate::scene::{Effect, Fault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
@@ -27,6 +28,8 @@ pub(super) enum Command {
     Demo(Demo),
     /// Take photographs of a described scene, with the effects that it calls for
     Simulate(Simulate),
+    /// Look whether photographs can be used: every gate with its number and next step
+    Check(Check),
     /// Make a folder of pictures to show and photograph, with the rules for doing so
     Patterns(Patterns),
     /// Show a folder's slides and photograph each, with a camera on a cable or a person
@@ -62,6 +65,10 @@ pub(super) enum Command {
     Key(Key),
     /// Write a zip file for support: versions, status, logs, transcripts; never keys
     Report(Report),
+    /// Write manual pages
+    Man(Man),
+    /// Print completions for a shell
+    Completions(Completions),
     /// Run the firmware on an emulated board, with its serial line as a port
     #[cfg(unix)]
     Emulate(Emulate),
@@ -79,14 +86,31 @@ pub(super) struct Simulate {
     /// Scene to simulate
     #[arg(value_name = "SCENE.toml")]
     pub(super) scene: PathBuf,
-    /// Capture folder to make
+    /// Capture folder to make; with --shot, the photograph to write
     #[arg(
         short,
         long,
         value_name = "CAPTURE",
-        required_unless_present_any = ["explain", "ablate"]
+        required_unless_present_any = ["explain", "ablate", "photograph"]
     )]
     pub(super) output: Option<PathBuf>,
+    /// Take the photographs that this folder calls for and does not have: one that
+    /// `iltm patterns` or `iltm verify` made
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) photograph: Option<PathBuf>,
+    /// Take only the photograph with this index, and write it to --output
+    #[arg(
+        long,
+        value_name = "INDEX",
+        requires = "photograph",
+        requires = "output"
+    )]
+    pub(super) shot: Option<u32>,
+    /// Let something go wrong, to practise: gamma, auto-exposure, tripod, swapped,
+    /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
+    /// larger than usual; may be repeated
+    #[arg(long, value_name = "FAULT")]
+    pub(super) fault: Vec<Fault>,
     /// Say which effects are simulated and why
     #[arg(long)]
     pub(super) explain: bool,
@@ -109,6 +133,18 @@ pub(super) struct Simulate {
     /// camera's noise hides
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub(super) threshold: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Check {
+    /// Folder with `capture.csv`, patterns and photographs
+    pub(super) capture: PathBuf,
+    /// Folder to make, with a page that shows what each gate saw
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: Option<PathBuf>,
+    /// Look only at the first M Bernoulli photographs beside all others
+    #[arg(long, value_name = "M")]
+    pub(super) photos: Option<usize>,
 }
 
 #[derive(Debug, Args)]
@@ -207,6 +243,9 @@ pub(super) struct Solve {
     /// Use only the first M Bernoulli photographs beside all others
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
+    /// Go on although this gate fails (see `iltm check`); may be repeated
+    #[arg(long, value_name = "GATE")]
+    pub(super) ignore: Vec<GateName>,
     /// How to find the inverse: `joint` (all channels and photographs, with what
     /// physics knows), `direct` (the paper's plain l1), `two-stage` (plain l1 for the
     /// transport, then its inverse) or `brute-force` (least squares for the transport)
@@ -366,6 +405,19 @@ pub(super) struct Report {
     /// Seconds for which logs are gathered
     #[arg(long, value_name = "SECONDS", default_value_t = 3)]
     pub(super) seconds: u16,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Man {
+    /// Folder to write into; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Completions {
+    /// Shell to complete for
+    pub(super) shell: clap_complete::Shell,
 }
 
 #[derive(Debug, Args)]

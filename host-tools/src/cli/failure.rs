@@ -1,6 +1,7 @@
 //! What a command failed for: words for people, a code for scripts.
 
 use super::active::Active;
+use super::check;
 use crate::capture::CaptureError;
 use crate::compile::CompileError;
 use crate::compile::sign::KeyError;
@@ -12,6 +13,7 @@ use crate::user::ConfigError;
 use iltm_runtime::link::Refusal;
 use iltm_runtime::trust::Rejected;
 use miette::Diagnostic;
+use serde_json::{Value, json};
 use std::fmt::{self, Write};
 
 /// Causes of failure, each with an exit code of its own. The codes are a contract.
@@ -246,6 +248,12 @@ impl Kind {
         self as u8
     }
 
+    /// Every code with its name and its meaning.
+    pub(super) fn codes() -> Vec<(u8, &'static str, &'static str)> {
+        let code = |(kind, name, meaning): (Self, _, _)| (kind.code(), name, meaning);
+        Self::ALL.map(code).into()
+    }
+
     pub(super) fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(kind, ..)| *kind == self);
         named.map_or("unknown", |(_, name, _)| name)
@@ -269,6 +277,8 @@ pub(super) struct Failure {
     pub(super) next_step: String,
     /// Where a device's tables were about to change: which one is in use now.
     pub(super) active: Option<Active>,
+    /// What was found out before, for programs: an object that stands beside the error.
+    pub(super) data: Option<Box<Value>>,
 }
 
 impl Failure {
@@ -282,6 +292,7 @@ impl Failure {
             message: message.to_string(),
             next_step: next_step.into(),
             active: None,
+            data: None,
         }
     }
 
@@ -329,7 +340,13 @@ impl Diagnostic for Failure {
 impl From<LearnError> for Failure {
     fn from(error: LearnError) -> Self {
         match error {
-            LearnError::Capture(error) => Self::new(kind_of(&error), &error, error.next_step()),
+            LearnError::Capture(error) => {
+                let mut failure = Self::new(kind_of(&error), &error, error.next_step());
+                if let CaptureError::Refused { gates, .. } = &error {
+                    failure.data = Some(Box::new(json!({ "gates": check::gates(gates) })));
+                }
+                failure
+            }
             LearnError::Solve(error) => {
                 // The message of a solve error ends with what to do.
                 let message = error.to_string();
@@ -387,7 +404,7 @@ fn compile_failure(error: &CompileError) -> Failure {
 }
 
 /// Whether a capture cannot be read, is not well-formed, or shows bad light.
-const fn kind_of(error: &CaptureError) -> Kind {
+pub(super) const fn kind_of(error: &CaptureError) -> Kind {
     match error {
         CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
         CaptureError::MorePhotographsThanTaken { .. }
@@ -395,9 +412,8 @@ const fn kind_of(error: &CaptureError) -> Kind {
         | CaptureError::BlackIndex { .. } => Kind::Usage,
         CaptureError::TooFewPhotographs { .. }
         | CaptureError::NoLight { .. }
-        | CaptureError::Overexposed { .. }
-        | CaptureError::NotLinear { .. }
-        | CaptureError::NothingRegistered { .. } => Kind::Photographs,
+        | CaptureError::Refused { .. }
+        | CaptureError::ResponseUnknown { .. } => Kind::Photographs,
         _ => Kind::Capture,
     }
 }

@@ -8,6 +8,7 @@ mod active;
 mod args;
 mod bounces;
 mod capture;
+mod check;
 mod compare;
 mod compensate;
 mod connect;
@@ -19,6 +20,7 @@ mod flash;
 mod inspect;
 mod interrupt;
 mod key;
+mod man;
 mod monitor;
 mod output;
 mod patterns;
@@ -34,9 +36,21 @@ mod trial;
 
 use crate::compare::Meter;
 use args::{Arguments, Command};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use output::Output;
 use std::process::ExitCode;
+
+/// The command line as clap knows it: names, options, words.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
+
+/// Exit codes: number, name, and what each means.
+#[must_use]
+pub fn exit_codes() -> Vec<(u8, &'static str, &'static str)> {
+    failure::Kind::codes()
+}
 
 /// Runs the command that the process was started with; `meter` reads the program's
 /// memory.
@@ -47,6 +61,7 @@ pub fn run(meter: Meter) -> ExitCode {
     let result = match &arguments.command {
         Command::Demo(demo) => demo::run(demo, &output),
         Command::Simulate(simulate) => simulate::run(simulate, &output),
+        Command::Check(check) => check::run(check, &output),
         Command::Patterns(patterns) => patterns::run(patterns, &output),
         Command::Capture(capture) => capture::run(capture, &output),
         Command::Solve(solve) => solve::run(solve, &output),
@@ -61,6 +76,8 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Confirm(line) => trial::confirm(line, &output),
         Command::Rollback(line) => trial::rollback(line, &output),
         Command::Key(key) => key::run(key, &output),
+        Command::Man(man) => man::run(man, &output),
+        Command::Completions(completions) => man::completions(completions, &output),
         Command::Report(report) => report::run(report, &output),
         Command::Status(status) => status::run(status, &output),
         Command::Monitor(monitor) => monitor::run(monitor, &output),

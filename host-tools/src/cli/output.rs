@@ -37,6 +37,13 @@ impl Output {
         }
     }
 
+    /// What people read although the command fails; programs get it with the error.
+    pub(super) fn people(&self, text: &str) {
+        if !self.json {
+            let _ = write!(io::stderr(), "{text}");
+        }
+    }
+
     /// A remark for people, where there are some.
     pub(super) fn remark(&self, text: &str) {
         if self.terminal && !self.json {
@@ -55,13 +62,18 @@ impl Output {
 
     pub(super) fn failure(&self, failure: &Failure) -> ExitCode {
         if self.json {
-            let data = json!({ "error": {
+            let mut data = failure
+                .data
+                .as_deref()
+                .cloned()
+                .unwrap_or_else(|| json!({}));
+            data["error"] = json!({
                 "kind": failure.kind.name(),
                 "exit": failure.kind.code(),
                 "message": failure.message,
                 "next_step": failure.next_step,
                 "active": failure.active.as_ref().map(Active::data),
-            }});
+            });
             let _ = writeln!(io::stdout(), "{data}");
         }
         let mut text = String::new();

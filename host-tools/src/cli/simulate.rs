@@ -1,25 +1,28 @@
 //! `iltm simulate`
 
 use super::args::Simulate;
-use super::failure::{Failure, Kind};
+use super::failure::{Failure, Kind, kind_of};
 use super::output::{Output, cannot_write};
 use super::progress::progress;
 use crate::capture::shown;
+use crate::progress::Progress;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::{Scene, SceneError};
 use crate::scene::folder::{self, FolderError, Written};
+use crate::scene::retake::{RetakeError, Session};
 use crate::scene::{
-    Decision, Effect, Forced, Simulation, SimulationError, SimulationOptions, percent,
+    Decision, Effect, Forced, Shooting, Simulation, SimulationError, SimulationOptions, percent,
 };
 use serde_json::{Value, json};
 use std::fmt::Write;
+use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
     let scene = Scene::read(&arguments.scene).map_err(|error| unreadable(&error))?;
     // A folder that is in the way is known before the work, not after it.
-    if let Some(out) = &arguments.output {
+    if let (Some(out), None) = (&arguments.output, &arguments.photograph) {
         folder::check_free(out).map_err(unwritten)?;
     }
     let mut forced = Forced::default();
@@ -46,17 +49,19 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     let simulation = simulation.map_err(|error| unsimulated(&error))?;
     let ready = start.elapsed().as_secs_f64();
     let mut written = None;
-    if let Some(out) = &arguments.output {
-        let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
-        let done = folder::write(
-            &scene,
-            &simulation,
-            &patterns,
-            arguments.seed,
-            out,
-            bars.as_ref(),
-        );
-        written = Some(done.map_err(unwritten)?);
+    let mut taken = None;
+    if arguments.output.is_some() || arguments.photograph.is_some() {
+        let shooting = Shooting::new(&scene, &simulation, arguments.seed);
+        let shooting = shooting.map_err(|error| unsimulated(&error))?;
+        let shooting = shooting.with_faults(&arguments.fault);
+        if let Some(folder) = &arguments.photograph {
+            let count = photograph(arguments, folder, &shooting, bars.as_ref());
+            taken = Some(count.map_err(|error| not_taken(&error))?);
+        } else if let Some(out) = &arguments.output {
+            let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
+            let done = folder::write(&shooting, &patterns, out, bars.as_ref());
+            written = Some(done.map_err(unwritten)?);
+        }
     }
     let ablated = if arguments.ablate {
         ablate(&scene, &options, bars.as_ref()).map_err(|error| unsimulated(&error))?
@@ -96,8 +101,50 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
             bounces(written),
         );
     }
+    if let (Some(folder), Some(taken)) = (&arguments.photograph, taken) {
+        data["folder"] = json!(folder.display().to_string());
+        data["photographs"] = json!(taken);
+        let photographs = if taken == 1 {
+            "photograph"
+        } else {
+            "photographs"
+        };
+        let _ = writeln!(
+            text,
+            "{:<11} {}: {taken} {photographs} taken in {seconds:.2} s",
+            "session",
+            folder.display(),
+        );
+    }
     output.result(&data, &text);
     Ok(())
+}
+
+/// Takes what a folder calls for; returns how many photographs.
+fn photograph(
+    arguments: &Simulate,
+    folder: &Path,
+    shooting: &Shooting<'_>,
+    progress: &dyn Progress,
+) -> Result<usize, RetakeError> {
+    let session = Session::read(folder, shooting.grid())?;
+    match (arguments.shot, &arguments.output) {
+        (Some(index), Some(file)) => session.take_one(shooting, index, file).map(|()| 1),
+        _ => session.take_missing(shooting, progress),
+    }
+}
+
+fn not_taken(error: &RetakeError) -> Failure {
+    let kind = match error {
+        RetakeError::Capture(error) => {
+            return Failure::new(kind_of(error), error, error.next_step());
+        }
+        RetakeError::Simulation(error) => return unsimulated(error),
+        RetakeError::Pattern { .. } => Kind::Capture,
+        RetakeError::NoIndex { .. } | RetakeError::Missed { .. } => Kind::Usage,
+        RetakeError::Io { .. } => Kind::Write,
+    };
+    Failure::new(kind, error, error.next_step())
 }
 
 fn bounces(written: Written) -> String {

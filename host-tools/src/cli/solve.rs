@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::key::seal;
 use super::output::{Output, write_file};
 use super::progress::progress;
-use crate::capture::{CaptureOptions, Why};
+use crate::capture::{CaptureOptions, Verdict, Why};
 use crate::compile::sign::read_key;
 use crate::learn::{Learned, learn};
 use crate::solve::{Compensation, SolveOptions, WhyLeftOut};
@@ -22,6 +22,7 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     let photographs = CaptureOptions {
         bernoulli: arguments.photos,
+        ignore: arguments.ignore.clone(),
         ..CaptureOptions::default()
     };
     let options = SolveOptions {
@@ -78,6 +79,7 @@ pub(super) fn summary(learned: &Learned) -> Value {
             "gray_code": report.photographs.gray_code,
             "bernoulli": report.photographs.bernoulli,
         },
+        "ignored_gates": ignored(learned),
         "lambda": report.lambda,
         "iterations": report.iterations,
         "condition": report.condition,
@@ -93,6 +95,13 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "bytes": learned.compiled.image.len(),
         "tiers": tiers(learned),
     })
+}
+
+/// Names of the gates that fail and were ignored.
+fn ignored(learned: &Learned) -> Vec<&'static str> {
+    let gates = &learned.measurements.diagnostics.gates;
+    let failed = gates.iter().filter(|gate| gate.fails());
+    failed.map(|gate| gate.name.name()).collect()
 }
 
 fn tiers(learned: &Learned) -> Vec<Value> {
@@ -198,6 +207,17 @@ pub(super) fn text(learned: &Learned) -> String {
     );
     for line in left_out(learned) {
         let _ = writeln!(text, "            {line}");
+    }
+    for gate in &learned.measurements.diagnostics.gates {
+        match gate.verdict {
+            Verdict::Fail => {
+                let _ = writeln!(text, "ignored     {gate}");
+            }
+            Verdict::Warn => {
+                let _ = writeln!(text, "note        {gate}");
+            }
+            Verdict::Pass | Verdict::NotJudged => {}
+        }
     }
     let _ = writeln!(
         text,

@@ -13,7 +13,7 @@ use crate::capture::{
 use crate::progress::Progress;
 use crate::scene::description::{Scene, SceneError};
 use crate::scene::folder::{self, FolderError};
-use crate::scene::{Simulation, SimulationError, SimulationOptions};
+use crate::scene::{Shooting, Simulation, SimulationError, SimulationOptions};
 use crate::solve::{SolveError, SolveOptions, solve};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
@@ -119,7 +119,8 @@ impl Light {
         let room = tempfile::tempdir()?;
         let folder = room.path().join("capture");
         let patterns = shown(simulation.grid(), REGISTRATION, seed);
-        folder::write(&scene, &simulation, &patterns, seed, &folder, progress)?;
+        let shooting = Shooting::new(&scene, &simulation, seed)?;
+        folder::write(&shooting, &patterns, &folder, progress)?;
         let measurements = capture::read(&folder, &CaptureOptions::default(), progress)?;
         let transport = simulated(&simulation, &measurements, progress)?;
         let live = measurements.live.clone();

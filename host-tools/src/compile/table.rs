@@ -7,7 +7,7 @@ use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
 use super::response;
 use super::white::{ReferenceWhite, reference_white};
-use crate::capture::Response;
+use crate::capture::ProjectorResponse;
 use crate::solve::InverseTransport;
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm_runtime::haar::Basis;
@@ -22,7 +22,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Default)]
 pub struct CompileOptions {
     /// The projector's response.
-    pub projector: Response,
+    pub projector: ProjectorResponse,
     /// Light of reference white in camera units; by default the brightest uniform
     /// grey that every live cell reaches.
     pub reference_white: Option<f64>,
@@ -209,7 +209,7 @@ pub fn compile(
     if let Some(ambient) = ambient(inverse, white.light) {
         image.section(SectionKind::Ambient, 0, halfwords(ambient));
     }
-    if let Some(knots) = response::knots(options.projector) {
+    if let Some(knots) = response::knots(&options.projector, inverse.channels.len()) {
         image.section(SectionKind::Codes, 0, response::codes(&knots));
         image.section(SectionKind::Response, 0, halfwords(knots));
     }

@@ -1,7 +1,7 @@
 //! One wanted image, and what becomes of it on the wall.
 
 use super::{Comparison, LightPicture, Projection};
-use crate::capture::Response;
+use crate::capture::{ProjectorResponse, Response};
 use crate::video::{Compensator, Picture, Settings, VideoError};
 use iltm_runtime::image::Table;
 
@@ -90,7 +90,7 @@ impl Example {
     pub fn new(
         table: &Table<'_>,
         projection: &Projection,
-        projector: Response,
+        projector: &ProjectorResponse,
         wanted: Wanted,
     ) -> Result<Self, VideoError> {
         let light = LightPicture::decode(&wanted.picture, Response::Srgb);
@@ -111,7 +111,7 @@ impl Example {
                 let summary = Compensator::new(table, settings)?.picture(&mut input)?;
                 clipped = summary.clipped as f64 / summary.samples.max(1) as f64;
             }
-            let drive = LightPicture::decode(&input, projector);
+            let drive = LightPicture::decode(&input, projector.clone());
             let photograph = projection.photograph(&drive);
             let comparison = Comparison::new(&photograph, &light);
             shown.push(Shown {

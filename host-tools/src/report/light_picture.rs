@@ -1,6 +1,6 @@
 //! Pictures as light, which adds up, rather than as codes, which do not.
 
-use crate::capture::Response;
+use crate::capture::{ProjectorResponse, Response};
 use crate::video::{Picture, Samples};
 use iltm_runtime::FrameSize;
 
@@ -22,10 +22,11 @@ impl LightPicture {
 
     /// The light that codes stand for under `response`, 0 to 1.
     #[must_use]
-    pub fn decode(picture: &Picture, response: Response) -> Self {
+    pub fn decode(picture: &Picture, response: impl Into<ProjectorResponse>) -> Self {
         let channels = picture.channels();
-        let light = |value: f64| response.light(value) as f32;
+        let response = response.into();
         let plane = |channel: usize| -> Vec<f32> {
+            let light = |value: f64| response.channel(channel).light(value) as f32;
             let own = (channel..picture.samples().len()).step_by(channels);
             match picture.samples() {
                 Samples::Eight(codes) => {

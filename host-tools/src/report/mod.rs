@@ -117,7 +117,7 @@ impl<'a> Report<'a> {
         progress: &dyn Progress,
     ) -> Result<Self, ReportError> {
         let table = Table::check(&learned.compiled.image).map_err(ReportError::Table)?;
-        let projector = learned.measurements.settings.projector.response;
+        let projector = &learned.measurements.devices.projector;
         let white = learned.compiled.white.light;
         progress.begin("predicting photographs", wanted.len() as u64);
         let mut examples = Vec::new();

@@ -273,7 +273,7 @@ mod tests {
         for channels in [1, 3] {
             let inverse = scene(channels);
             let options = CompileOptions {
-                projector: Response::Linear,
+                projector: Response::Linear.into(),
                 ..CompileOptions::default()
             };
             for fine in [None, Some(fine(&inverse))] {

@@ -1,6 +1,6 @@
 //! Looks at a scene and decides which effects it calls for.
 
-use super::description::{Albedo, Scene};
+use super::description::{Albedo, Camera, Projector, Scene};
 use super::effects::{Decisions, Effect};
 use super::estimate::{self, Estimate};
 use super::facets::Facets;
@@ -63,6 +63,15 @@ pub(super) fn named(facets: &Facets<'_>, threshold: f64, decisions: &mut Decisio
         "the projector's black is dark",
         decisions,
     );
+    share(
+        Effect::Drift,
+        projector.drift,
+        "of the lamp's light is lost from the first photograph to the last",
+        "the lamp is steady",
+        decisions,
+    );
+    mixing(projector, threshold, decisions);
+    distortion(&scene.camera, decisions);
     let ambient = scene.ambient.into_iter().fold(0.0, f64::max) / estimate::level(facets);
     share(
         Effect::Ambient,
@@ -72,6 +81,38 @@ pub(super) fn named(facets: &Facets<'_>, threshold: f64, decisions: &mut Decisio
         decisions,
     );
     sensor(scene, decisions);
+}
+
+/// Pixels by which a lens may displace something unnoticed.
+const UNNOTICED_PIXELS: f64 = 0.02;
+
+fn mixing(projector: &Projector, threshold: f64, decisions: &mut Decisions) {
+    let mixed = projector.foreign_light();
+    if projector.mixing == Projector::UNMIXED {
+        decisions.rule_out(
+            Effect::Mixing,
+            "each channel of the camera sees one of the projector's",
+        );
+    } else {
+        let reason = format!(
+            "a channel of the camera has up to {} of its light from another of the projector's",
+            percent(mixed)
+        );
+        decisions.decide(Effect::Mixing, mixed >= threshold, reason);
+    }
+}
+
+fn distortion(camera: &Camera, decisions: &mut Decisions) {
+    if camera.distortion == [0.0; 2] {
+        decisions.rule_out(
+            Effect::Distortion,
+            "the lens leaves straight lines straight",
+        );
+    } else {
+        let pixels = camera.most_displaced();
+        let reason = format!("the lens displaces by up to {} pixels", number(pixels));
+        decisions.decide(Effect::Distortion, pixels >= UNNOTICED_PIXELS, reason);
+    }
 }
 
 /// What the camera makes of light: on wherever the scene names it.
@@ -120,6 +161,15 @@ fn colour(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
         };
         if of_panel > widest.0 {
             widest = (of_panel, format!("`{}`", panel.name));
+        }
+    }
+    if scene.projector.mixing != Projector::UNMIXED {
+        let mixed = scene.projector.foreign_light();
+        if mixed > widest.0 {
+            widest = (
+                mixed,
+                "what the camera sees of the projector's light".to_owned(),
+            );
         }
     }
     let (spread, whose) = widest;

@@ -31,8 +31,14 @@ pub enum Effect {
     Vignetting,
     /// The projector's black is not dark.
     Black,
+    /// The projector's lamp grows darker while photographs are taken.
+    Drift,
+    /// The camera's channels see more than one of the projector's.
+    Mixing,
     /// Light from elsewhere.
     Ambient,
+    /// The camera's lens bends straight lines.
+    Distortion,
     /// Photographs are noisy.
     Noise,
     /// Photographs are rounded to the converter's bits.
@@ -43,7 +49,7 @@ pub enum Effect {
 
 impl Effect {
     /// Every effect, in the order in which it is decided about.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 19] = [
         Self::Colour,
         Self::Shadows,
         Self::Interreflection,
@@ -56,7 +62,10 @@ impl Effect {
         Self::Blur,
         Self::Vignetting,
         Self::Black,
+        Self::Drift,
+        Self::Mixing,
         Self::Ambient,
+        Self::Distortion,
         Self::Noise,
         Self::Quantisation,
         Self::Response,
@@ -78,7 +87,10 @@ impl Effect {
             Self::Blur => "blur",
             Self::Vignetting => "vignetting",
             Self::Black => "black",
+            Self::Drift => "drift",
+            Self::Mixing => "mixing",
             Self::Ambient => "ambient",
+            Self::Distortion => "distortion",
             Self::Noise => "noise",
             Self::Quantisation => "quantisation",
             Self::Response => "response",

@@ -18,8 +18,9 @@ const MOST_SPECULAR: usize = 100;
 /// channel.
 #[derive(Clone, Debug)]
 pub struct Exposed {
-    /// What the projector shows, cells x patterns, its black included.
-    shown: DMatrix<f64>,
+    /// What each channel of the camera gets from the projector, cells x patterns, its
+    /// black included; one entry where it is the same for all channels.
+    shown: Vec<DMatrix<f64>>,
     /// Irradiance that is not straight from the projector.
     indirect: Vec<DMatrix<f64>>,
     /// Light that leaves patches.
@@ -30,6 +31,11 @@ pub struct Exposed {
     pub bounces: usize,
 }
 
+/// The entry of a channel; there is one alone where all are the same.
+fn of_channel(entries: &[DMatrix<f64>], channel: usize) -> &DMatrix<f64> {
+    &entries[channel.min(entries.len() - 1)]
+}
+
 impl Simulation<'_> {
     /// Light in the scene while the projector shows `patterns`, cells x patterns, 0
     /// to 1.
@@ -37,13 +43,25 @@ impl Simulation<'_> {
     /// # Errors
     /// [`SimulationError::Radiosity`] if there is no end to the bounces.
     pub fn expose(&self, patterns: &DMatrix<f64>) -> Result<Exposed, SimulationError> {
-        let black = if self.decisions.on(Effect::Black) {
-            self.scene.projector.black
-        } else {
-            0.0
-        };
-        let shown = patterns.map(|light| black + (1.0 - black) * light);
-        let direct = self.on_patches.product(&shown);
+        let lamp = vec![1.0; patterns.ncols()];
+        self.expose_projected(std::slice::from_ref(patterns), &lamp)
+    }
+
+    /// Light in the scene while each of the projector's channels shows an entry of
+    /// `projected`, cells x patterns, 0 to 1, or all the same one entry. `lamp`
+    /// multiplies all the projector's light, black as well, one factor a pattern.
+    ///
+    /// A grey camera sees the mean of the channels.
+    ///
+    /// # Errors
+    /// [`SimulationError::Radiosity`] if there is no end to the bounces.
+    pub fn expose_projected(
+        &self,
+        projected: &[DMatrix<f64>],
+        lamp: &[f64],
+    ) -> Result<Exposed, SimulationError> {
+        let shown = self.seen_by_channels(projected, lamp);
+        let direct: Vec<_> = shown.iter().map(|s| self.on_patches.product(s)).collect();
         let mut exposed = Exposed {
             shown,
             indirect: Vec::new(),
@@ -60,18 +78,55 @@ impl Simulation<'_> {
             let albedo: Vec<f64> = self.patches.iter().map(|p| p.albedo[channel]).collect();
             // It comes from where no other surface is in the way.
             let open = self.exchange.as_ref().map(Exchange::row_sums);
+            let direct = of_channel(&direct, channel);
             let mut indirect = DMatrix::from_fn(direct.nrows(), direct.ncols(), |patch, _| {
                 ambient * (1.0 - open.as_ref().map_or(0.0, |sums| sums[patch]))
             });
             if let Some(specular) = &self.specular {
-                indirect += specular.from_cells.product(&exposed.shown);
+                indirect += specular
+                    .from_cells
+                    .product(of_channel(&exposed.shown, channel));
             }
-            let leaving = self.bounce(&albedo, &direct, &mut indirect, &mut exposed)?;
+            let leaving = self.bounce(&albedo, direct, &mut indirect, &mut exposed)?;
             exposed.indirect.push(indirect);
             exposed.leaving.push(leaving);
             exposed.ambient.push(ambient);
         }
         Ok(exposed)
+    }
+
+    /// What each of the camera's channels gets of the projector's, its black included.
+    fn seen_by_channels(&self, projected: &[DMatrix<f64>], lamp: &[f64]) -> Vec<DMatrix<f64>> {
+        let black = if self.decisions.on(Effect::Black) {
+            self.scene.projector.black
+        } else {
+            0.0
+        };
+        let lit = |light: &DMatrix<f64>| {
+            let mut lit = light.map(|light| black + (1.0 - black) * light);
+            for (mut column, lamp) in lit.column_iter_mut().zip(lamp) {
+                column *= *lamp;
+            }
+            lit
+        };
+        let lit: Vec<_> = projected.iter().map(lit).collect();
+        let mixed = |weights: [f64; 3]| {
+            let mut sum = weights[0] * of_channel(&lit, 0);
+            sum += weights[1] * of_channel(&lit, 1);
+            sum += weights[2] * of_channel(&lit, 2);
+            sum
+        };
+        if self.channels == 1 {
+            return if lit.len() == 1 {
+                lit
+            } else {
+                vec![mixed([1.0 / 3.0; 3])]
+            };
+        }
+        if self.decisions.on(Effect::Mixing) {
+            return self.scene.projector.mixing.map(mixed).into();
+        }
+        lit
     }
 
     /// The light that leaves patches, from what arrives straight and otherwise; adds
@@ -126,9 +181,10 @@ impl Simulation<'_> {
     /// by row, before exposure and noise.
     #[must_use]
     pub fn photograph(&self, exposed: &Exposed, pattern: usize) -> Vec<Vec<f32>> {
-        let shown = exposed.shown.column(pattern);
         (0..self.channels)
             .map(|channel| {
+                let shown = of_channel(&exposed.shown, channel);
+                let shown = shown.column(pattern);
                 let indirect = exposed.indirect[channel].column(pattern);
                 let leaving = exposed.leaving[channel].column(pattern);
                 let ambient = exposed.ambient[channel];

@@ -1,25 +1,20 @@
 //! Writes the photographs of a simulated scene as a capture folder.
 
 use super::description::Scene;
-use super::exposure::Exposed;
-use super::sensor::Sensor;
+use super::shooting::{Shooting, Slide, save};
 use super::simulation::{Simulation, SimulationError};
 use crate::capture::{
     CameraSettings, MANIFEST_FILE, Manifest, Pattern, ProjectorSettings, Role, SETTINGS_FILE,
-    SceneSettings, Settings, Shot, columns,
+    SceneSettings, Settings, Shot,
 };
 use crate::progress::Progress;
-use image::{ColorType, ImageFormat};
-use nalgebra::DMatrix;
-use rayon::prelude::*;
+use image::ColorType;
 use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
-
-/// Photographs that are exposed together: their light is held in memory.
-const TOGETHER: usize = 64;
 
 /// Why a capture could not be written.
 #[derive(Debug, Error)]
@@ -53,15 +48,13 @@ pub struct Written {
 }
 
 /// Photographs `patterns` and writes the folder `out`: beside its place first, then
-/// renamed, so that it is whole or not there. `seed` repeats the noise.
+/// renamed, so that it is whole or not there.
 ///
 /// # Errors
 /// [`FolderError`] if something is in its place or it cannot be written.
 pub fn write(
-    scene: &Scene,
-    simulation: &Simulation<'_>,
+    shooting: &Shooting<'_>,
     patterns: &[(Role, Pattern)],
-    seed: u64,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Written, FolderError> {
@@ -75,33 +68,31 @@ pub fn write(
         let path = folder.join(name);
         fs::create_dir(&path).map_err(at(&path))?;
     }
-    let flood = simulation.expose(&DMatrix::from_element(simulation.grid().cells(), 1, 1.0))?;
-    let sensor = simulation.sensor(&simulation.photograph(&flood, 0));
-    progress.begin("taking photographs", patterns.len() as u64);
-    let mut bounces = flood.bounces;
-    for (chunk, patterns) in patterns.chunks(TOGETHER).enumerate() {
-        let exposed = simulation.expose(&columns(patterns))?;
-        bounces = bounces.max(exposed.bounces);
-        let written = patterns.par_iter().enumerate().map(|(k, (_, pattern))| {
-            let shot = Shooting {
-                scene,
-                simulation,
-                exposed: &exposed,
-                sensor: &sensor,
-            };
-            let index = chunk * TOGETHER + k;
-            shot.write(folder, index, k, pattern, seed.wrapping_add(index as u64))?;
-            progress.advance(1);
-            Ok(())
-        });
-        written.collect::<Result<Vec<()>, FolderError>>()?;
+    for (index, (_, pattern)) in patterns.iter().enumerate() {
+        let [path, _] = names(index).map(|name| folder.join(name));
+        let lit: Vec<u8> = pattern.lit.iter().map(|lit| 255 * u8::from(*lit)).collect();
+        let size = (pattern.cols as u32, pattern.rows as u32);
+        save(&path, &lit, size, ColorType::L8).map_err(at(&path))?;
     }
+    progress.begin("taking photographs", patterns.len() as u64);
+    let slides: Vec<Slide> = patterns.iter().map(|(_, pattern)| pattern.into()).collect();
+    let all: Vec<usize> = (0..slides.len()).collect();
+    let taken = AtomicUsize::new(0);
+    let bounces = shooting.take(&slides, &all, |place, photograph| {
+        let [_, path] = names(place).map(|name| folder.join(name));
+        if let Some(photograph) = photograph {
+            photograph.save(&path).map_err(at(&path))?;
+            taken.fetch_add(1, Ordering::Relaxed);
+        }
+        progress.advance(1);
+        Ok::<(), FolderError>(())
+    })?;
     let manifest = Manifest {
         shots: patterns.iter().enumerate().map(shot).collect(),
     };
     let texts = [
         (MANIFEST_FILE, manifest.to_csv()),
-        (SETTINGS_FILE, settings(scene, simulation)),
+        (SETTINGS_FILE, settings(shooting.scene, shooting.simulation)),
     ];
     for (name, text) in texts {
         let path = folder.join(name);
@@ -110,7 +101,7 @@ pub fn write(
     put_in_place(beside, out)?;
     progress.end();
     Ok(Written {
-        photographs: patterns.len(),
+        photographs: taken.into_inner(),
         bounces,
     })
 }
@@ -204,16 +195,17 @@ fn shot((index, (role, _)): (usize, &(Role, Pattern))) -> Shot {
 fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
     let settings = Settings {
         camera: CameraSettings {
-            response: scene.camera.response,
+            response: scene.camera.response.into(),
+            ..CameraSettings::default()
         },
         projector: ProjectorSettings {
-            response: scene.projector.response,
+            response: scene.projector.response.into(),
             // Known exactly here, as whoever focused the projector might know it.
-            blur: if simulation.blurred() {
+            blur: Some(if simulation.blurred() {
                 scene.projector.blur
             } else {
                 0.0
-            },
+            }),
             ..ProjectorSettings::default()
         },
         scene: SceneSettings {
@@ -222,62 +214,4 @@ fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
     };
     // Numbers and strings always have a TOML form.
     toml::to_string(&settings).unwrap_or_default()
-}
-
-struct Shooting<'s> {
-    scene: &'s Scene,
-    simulation: &'s Simulation<'s>,
-    exposed: &'s Exposed,
-    sensor: &'s Sensor<'s>,
-}
-
-impl Shooting<'_> {
-    fn write(
-        &self,
-        folder: &Path,
-        index: usize,
-        column: usize,
-        pattern: &Pattern,
-        seed: u64,
-    ) -> Result<(), FolderError> {
-        let [pattern_name, photo_name] = names(index).map(|name| folder.join(name));
-        let lit: Vec<u8> = pattern.lit.iter().map(|lit| 255 * u8::from(*lit)).collect();
-        let size = (pattern.cols as u32, pattern.rows as u32);
-        save(&pattern_name, &lit, size, ColorType::L8)?;
-        let planes = self.simulation.photograph(self.exposed, column);
-        let values: Vec<Vec<u16>> = (planes.iter().zip(0_u64..))
-            // Each channel has noise of its own.
-            .map(|(plane, channel)| self.sensor.values(plane, seed ^ (channel << 40)))
-            .collect();
-        let eight = self.sensor.file_scale() == 255;
-        let mut bytes = Vec::new();
-        for pixel in 0..values[0].len() {
-            for plane in &values {
-                if eight {
-                    bytes.push(plane[pixel] as u8);
-                } else {
-                    bytes.extend(plane[pixel].to_ne_bytes());
-                }
-            }
-        }
-        let kind = match (values.len(), eight) {
-            (1, true) => ColorType::L8,
-            (1, false) => ColorType::L16,
-            (_, true) => ColorType::Rgb8,
-            (_, false) => ColorType::Rgb16,
-        };
-        save(&photo_name, &bytes, self.scene.camera.size, kind)
-    }
-}
-
-fn save(path: &Path, bytes: &[u8], size: (u32, u32), kind: ColorType) -> Result<(), FolderError> {
-    image::save_buffer_with_format(path, bytes, size.0, size.1, kind, ImageFormat::Png).map_err(
-        |error| FolderError::Io {
-            path: path.to_owned(),
-            source: match error {
-                image::ImageError::IoError(source) => source,
-                other => io::Error::other(other),
-            },
-        },
-    )
 }

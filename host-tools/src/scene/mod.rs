@@ -13,7 +13,9 @@
 //! simulation    all of it, ready for patterns            between
 //! exposure      light under patterns, what pixels see of it
 //! sensor        exposure, noise, bits, response
+//! shooting      one photograph after another, drift   fault
 //! folder        the photographs as a capture
+//! retake        the photographs that a folder of patterns calls for
 //! ablation      what each effect contributes
 //! coaxial       scenes whose transport is known exactly, cell by cell
 //! ```
@@ -33,13 +35,16 @@ mod estimate;
 pub mod exchange;
 mod exposure;
 mod facets;
+mod fault;
 pub mod folder;
 pub mod form_factor;
 pub mod geometry;
 mod near;
 mod patches;
 mod projector_light;
+pub mod retake;
 mod sensor;
+mod shooting;
 mod sight;
 mod simulation;
 mod sparse;
@@ -50,10 +55,12 @@ pub(crate) use decide::percent;
 pub use effects::{Decision, Decisions, Effect, Forced, UnknownEffect};
 pub use exposure::Exposed;
 pub use facets::Facets;
+pub use fault::{Fault, Mishap, UnknownFault};
 pub use near::NearLight;
 pub use patches::{Cut, Patch, Patches};
 pub use projector_light::{Beam, ProjectorLight};
 pub use sensor::{Readout, Sensor};
+pub use shooting::{Photograph, Shooting, Slide};
 pub use sight::{Looks, Sight};
 pub use simulation::{Simulation, SimulationError, SimulationOptions, Work};
 pub use sparse::Rows;

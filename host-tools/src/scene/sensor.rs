@@ -1,6 +1,7 @@
 //! From light to the values in a photograph: exposure, noise, converter, response.
 
 use super::description::Camera;
+use crate::capture::Response;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64Mcg;
@@ -26,6 +27,8 @@ pub struct Sensor<'c> {
     readout: Readout,
     /// Share of full scale for each unit of light.
     exposure: f64,
+    /// From light to values, if that is simulated.
+    response: Response,
 }
 
 impl<'c> Sensor<'c> {
@@ -51,7 +54,18 @@ impl<'c> Sensor<'c> {
             } else {
                 1.0
             },
+            response: if readout.response {
+                camera.response
+            } else {
+                Response::Linear
+            },
         }
+    }
+
+    /// The same with another response than the camera's.
+    #[must_use]
+    pub fn responding(self, response: Response) -> Self {
+        Self { response, ..self }
     }
 
     /// Share of full scale for each unit of light.
@@ -80,10 +94,7 @@ impl<'c> Sensor<'c> {
             if self.readout.noise {
                 seen = self.noisy(seen, &mut random);
             }
-            let mut value = seen.clamp(0.0, 1.0);
-            if self.readout.response {
-                value = self.camera.response.value(value);
-            }
+            let mut value = self.response.value(seen.clamp(0.0, 1.0));
             if let (true, Some(bits)) = (self.readout.quantisation, self.camera.bits) {
                 let steps = f64::from((1_u32 << bits) - 1);
                 value = (value * steps).round() / steps;
@@ -128,7 +139,6 @@ fn normal(mean: f64, deviation: f64, random: &mut Pcg64Mcg) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
     use crate::scene::View;
     use nalgebra::Vector3;
 

@@ -30,6 +30,8 @@ pub struct Looks {
     pub gloss: bool,
     /// Whether mirrors reflect.
     pub mirrors: bool,
+    /// Whether the camera's lens bends straight lines.
+    pub distortion: bool,
 }
 
 /// What the camera's pixels see, row by row from the top left.
@@ -159,12 +161,17 @@ impl<'e> Eye<'e> {
     fn pixel(&self, col: u32, row: u32) -> Pixel {
         let camera = &self.facets.scene().camera;
         let (width, height) = camera.size;
+        let distortion = if self.looks.distortion {
+            camera.distortion
+        } else {
+            [0.0; 2]
+        };
         let mut pixel = Pixel::default();
         for ray in 0..RAYS * RAYS {
             let offset = |k: usize| (k as f64 + 0.5) / RAYS as f64;
             let across = (f64::from(col) + offset(ray % RAYS)) / f64::from(width);
             let down = (f64::from(row) + offset(ray / RAYS)) / f64::from(height);
-            let way = camera.view.ray(across, down);
+            let way = camera.ray(across, down, distortion);
             self.follow(camera.view.position(), way, &mut pixel);
         }
         self.vary(&mut pixel);

@@ -167,6 +167,7 @@ impl<'s> Simulation<'s> {
             channels,
             gloss: simulation.decisions.on(Effect::Gloss),
             mirrors: simulation.decisions.on(Effect::Mirrors),
+            distortion: simulation.decisions.on(Effect::Distortion),
         };
         simulation.sight = Sight::new(&facets, &patches, &light, near.as_ref(), looks);
         progress.end();
@@ -245,6 +246,19 @@ impl<'s> Simulation<'s> {
             lit: self.on_patches.entries(),
             exchanged: self.exchange.as_ref().map_or(0, |e| e.report().evaluated),
         }
+    }
+
+    /// Light of the projector's lamp at a moment of a session, 0 to 1 from its first
+    /// photograph to its last, relative to the first.
+    #[must_use]
+    pub fn lamp(&self, moment: f64) -> f64 {
+        /// Time constants in a session: a lamp settles in some ten minutes.
+        const SETTLING: f64 = 3.0;
+        if !self.decisions.on(Effect::Drift) {
+            return 1.0;
+        }
+        let settled = |moment: f64| 1.0 - (-SETTLING * moment).exp();
+        1.0 - self.scene.projector.drift * settled(moment) / settled(1.0)
     }
 
     /// Whether the projector's blur is simulated.

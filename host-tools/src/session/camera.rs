@@ -3,6 +3,7 @@
 use super::SessionError;
 use super::list::{Planned, endings};
 use super::shell::{self, Ran};
+use crate::capture::FileFormat;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -90,11 +91,6 @@ impl Camera for CommandCamera<'_> {
     }
 }
 
-/// Endings of files that are taken for photographs, lower case.
-const ENDINGS: [&str; 9] = [
-    "png", "tif", "tiff", "jpg", "jpeg", "exr", "pgm", "ppm", "pnm",
-];
-
 /// A file's length and time have to stay for so long.
 const STABLE: Duration = Duration::from_millis(600);
 
@@ -128,7 +124,7 @@ impl<'a> WatchedFolder<'a> {
             // A file that goes away at this moment was not meant.
             let metadata = fs::metadata(&path).ok().filter(fs::Metadata::is_file);
             if let Some(metadata) = metadata
-                && ENDINGS.iter().any(|known| ending == *known)
+                && FileFormat::EXTENSIONS.iter().any(|known| ending == *known)
             {
                 looks.insert(path, (metadata.len(), metadata.modified().ok()));
             }

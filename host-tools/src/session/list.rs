@@ -2,7 +2,8 @@
 
 use super::{SLIDES_FOLDER, SessionError};
 use crate::capture::{
-    CALIBRATION_FILE, CaptureError, Exposed, ListedRole, MANIFEST_FILE, ManifestOf,
+    CALIBRATION_FILE, CaptureError, Exposed, ListedRole, MANIFEST_FILE, ManifestOf, find_photo,
+    pictures_of_stem,
 };
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -138,44 +139,18 @@ pub fn states(list: &[Planned], progress: &dyn Progress) -> Vec<State> {
 }
 
 fn state(photo: &Path) -> State {
-    match found(photo).as_slice() {
-        [] => State::Missing,
-        [file] => match Exposed::read(file) {
-            Ok(exposed) => State::Whole(exposed),
-            Err(error) => State::Bad(error.to_string()),
-        },
-        several => State::Bad(format!(
-            "there are several: {}",
-            several
-                .iter()
-                .filter_map(|path| path.file_name())
-                .map(|name| name.to_string_lossy())
-                .collect::<Vec<_>>()
-                .join(", ")
-        )),
-    }
+    let whole = find_photo(Path::new(""), photo).and_then(|found| {
+        let Some(file) = found else {
+            return Ok(State::Missing);
+        };
+        Exposed::read(&file).map(State::Whole)
+    });
+    whole.unwrap_or_else(|error| State::Bad(error.to_string()))
 }
 
-/// The files that may be a planned photograph: the one of its name, or else all of
-/// the same name with another ending, as the camera wrote it.
-pub(super) fn found(photo: &Path) -> Vec<PathBuf> {
-    if photo.exists() {
-        return vec![photo.to_owned()];
-    }
-    endings(photo)
-}
-
-/// All files of a name, whatever its ending.
+/// All photographs of a name, whatever its ending.
 pub(super) fn endings(photo: &Path) -> Vec<PathBuf> {
-    let entries = photo.parent().and_then(|folder| folder.read_dir().ok());
-    let mut files: Vec<PathBuf> = entries
-        .into_iter()
-        .flatten()
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.file_stem() == photo.file_stem() && path.is_file())
-        .collect();
-    files.sort();
-    files
+    pictures_of_stem(Path::new(""), photo)
 }
 
 /// In what a photograph differs from the others.

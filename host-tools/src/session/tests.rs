@@ -271,7 +271,7 @@ fn a_folder_says_what_is_missing_and_what_is_of_no_use() {
     let session = rig.open();
     let states: Vec<&State> = session.list().map(|(_, state)| state).collect();
     assert_eq!(states[1], &State::Missing);
-    for (at, why) in [(4, "004.png"), (5, "4 x 3 pixels"), (6, "006.jpg, 006.tif")] {
+    for (at, why) in [(4, "004.png"), (5, "4 x 3 pixels"), (6, "006.tif")] {
         let State::Bad(reason) = states[at] else {
             panic!("{at}: {:?}", states[at])
         };

@@ -62,7 +62,7 @@ impl<'a> From<&'a Measurements> for Observed<'a> {
                         .collect(),
                 })
                 .collect(),
-            blur: measurements.settings.projector.blur,
+            blur: measurements.devices.blur,
         }
     }
 }

@@ -105,7 +105,7 @@ pub(super) fn of_capture(
 impl Base<'_> {
     fn options(&self) -> CompileOptions {
         CompileOptions {
-            projector: self.learned.measurements.settings.projector.response,
+            projector: self.learned.measurements.devices.projector.clone(),
             reference_white: None,
             inverse_error: self.learned.report.predicted_error(),
             targets: None,

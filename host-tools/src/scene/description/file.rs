@@ -1,5 +1,6 @@
 //! A scene file as it is written: TOML, every key named, unknown ones refused.
 
+use super::Projector;
 use crate::capture::Response;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -40,6 +41,10 @@ pub(super) struct ProjectorTable {
     pub(super) blur: f64,
     #[serde(default)]
     pub(super) black: f64,
+    #[serde(default)]
+    pub(super) drift: f64,
+    #[serde(default = "unmixed")]
+    pub(super) mixing: [[f64; 3]; 3],
 }
 
 /// `[camera]`
@@ -63,6 +68,8 @@ pub(super) struct CameraTable {
     pub(super) bits: Option<u8>,
     #[serde(default)]
     pub(super) response: Response,
+    #[serde(default)]
+    pub(super) distortion: [f64; 2],
 }
 
 /// `[[panel]]`
@@ -130,6 +137,10 @@ const fn up() -> [f64; 3] {
 
 const fn srgb() -> Response {
     Response::Srgb
+}
+
+const fn unmixed() -> [[f64; 3]; 3] {
+    Projector::UNMIXED
 }
 
 const fn exposed() -> f64 {

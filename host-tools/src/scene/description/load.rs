@@ -121,7 +121,27 @@ impl Check<'_> {
                 0.0..=0.5,
                 "from 0 to 0.5 of white",
             )?,
+            drift: self.within(
+                "[projector] drift",
+                table.drift,
+                0.0..=0.5,
+                "from 0 to 0.5 of the light",
+            )?,
+            mixing: self.mixing(table.mixing)?,
         })
+    }
+
+    fn mixing(&self, mixing: [[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SceneError> {
+        let key = "[projector] mixing";
+        for value in mixing.as_flattened() {
+            self.within(key, *value, 0.0..=10.0, "from 0 to 10")?;
+        }
+        let dark = |row: &[f64; 3]| row.iter().sum::<f64>() <= 0.0;
+        if mixing.iter().any(dark) {
+            let must = "some light in every channel of the camera, a row each";
+            return Err(self.value(key, format!("{mixing:?}"), must));
+        }
+        Ok(mixing)
     }
 
     fn camera(&self, table: &CameraTable) -> Result<Camera, SceneError> {
@@ -173,7 +193,21 @@ impl Check<'_> {
             )?,
             bits: table.bits,
             response: table.response,
+            distortion: self.distortion(table.distortion)?,
         })
+    }
+
+    /// Beyond half, a lens of this kind would fold the picture over.
+    fn distortion(&self, terms: [f64; 2]) -> Result<[f64; 2], SceneError> {
+        for term in terms {
+            self.within(
+                "[camera] distortion",
+                term,
+                -0.15..=0.5,
+                "from -0.15 to 0.5",
+            )?;
+        }
+        Ok(terms)
     }
 
     fn view(

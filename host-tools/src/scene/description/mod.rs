@@ -60,6 +60,12 @@ pub struct Projector {
     pub blur: f64,
     /// Light of black, as a share of white.
     pub black: f64,
+    /// Light that the lamp has lost at the end of a session of photographs, as a
+    /// share: most of it early, as a lamp does that was switched on just before.
+    pub drift: f64,
+    /// Light of each of the projector's channels (columns) in each of the camera's
+    /// (rows).
+    pub mixing: [[f64; 3]; 3],
 }
 
 /// The camera.
@@ -80,6 +86,59 @@ pub struct Camera {
     pub bits: Option<u8>,
     /// From light to the file's values.
     pub response: Response,
+    /// Radial distortion of the lens; see [`Camera::ray`].
+    pub distortion: [f64; 2],
+}
+
+impl Projector {
+    /// [`Projector::mixing`] of a camera that sees each channel by itself.
+    pub const UNMIXED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+    /// Largest share of a camera channel's light that comes from the two of the
+    /// projector's channels that it is not named after.
+    #[must_use]
+    pub fn foreign_light(&self) -> f64 {
+        let of = |(channel, row): (usize, &[f64; 3])| {
+            let all: f64 = row.iter().sum();
+            (all - row[channel]) / all
+        };
+        self.mixing.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+}
+
+impl Camera {
+    /// The way from the pinhole to what is seen at a place in the photograph, of
+    /// depth 1, through a lens with `distortion` `[a, b]`: what is seen at the distance
+    /// `r` from the centre (in half widths) would be at `r (1 + a r^2 + b r^4)` without
+    /// it. A positive `a` makes a barrel of a square.
+    #[must_use]
+    pub fn ray(&self, across: f64, down: f64, distortion: [f64; 2]) -> Vector3<f64> {
+        let [across, down] = self.undistorted([across, down], distortion);
+        self.view.ray(across, down)
+    }
+
+    /// Where a place in the photograph would be without `distortion`.
+    #[must_use]
+    pub fn undistorted(&self, [across, down]: [f64; 2], [a, b]: [f64; 2]) -> [f64; 2] {
+        let shape = f64::from(self.size.1) / f64::from(self.size.0);
+        let (x, y) = (2.0 * across - 1.0, (2.0 * down - 1.0) * shape);
+        let r2 = x * x + y * y;
+        let farther = 1.0 + r2 * (a + b * r2);
+        [across, down].map(|place| 0.5 + (place - 0.5) * farther)
+    }
+
+    /// Most pixels by which the lens displaces anything in the photograph.
+    #[must_use]
+    pub fn most_displaced(&self) -> f64 {
+        let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
+        let of = |place: [f64; 2]| {
+            let [across, down] = self.undistorted(place, self.distortion);
+            ((across - place[0]) * width).hypot((down - place[1]) * height)
+        };
+        // Not only in the corner: the two terms may cancel there.
+        let along = (0..=16).map(|k| 0.5 * f64::from(k) / 16.0);
+        along.map(|d| of([0.5 + d, 0.5 + d])).fold(0.0, f64::max)
+    }
 }
 
 /// A named part of the scene with one surface.

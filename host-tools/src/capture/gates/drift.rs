@@ -1,0 +1,61 @@
+//! Gate `drift`: lamp, lens and daylight changed slowly, and by little.
+
+use super::super::drift::Steadiness;
+use super::super::sequence::Sequence;
+use super::{Evidence, Gate, GateName, Verdict};
+
+/// Change over the session from which it is worth a word.
+const WARN: f64 = 0.1;
+
+/// Change over the session that a straight correction cannot be trusted with.
+const MOST: f64 = 0.3;
+
+/// Judges the slow changes.
+pub(crate) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
+    let name = GateName::Drift;
+    if steadiness.shots.len() < 2 {
+        let why = "white was photographed once, and there are too few other photographs to tell \
+             how the light changed";
+        return Gate::not_judged(name, why);
+    }
+    let size = steadiness.size.max(0.0);
+    let verdict = Verdict::of(size, WARN, MOST);
+    let corrected = steadiness.drift != super::super::drift::Drift::default();
+    let mut what = if corrected {
+        format!(
+            "brightness drifted by {:.1} % over the session, which is corrected",
+            100.0 * size
+        )
+    } else {
+        format!("brightness is steady within {:.1} %", 100.0 * size)
+    };
+    if steadiness.dark > 0.02 {
+        what += &format!(
+            "; ambient light changed by {:.0} %",
+            100.0 * steadiness.dark
+        );
+    }
+    let shots = steadiness.shots.iter().zip(&steadiness.gains);
+    Gate {
+        name,
+        verdict,
+        number: 100.0 * size,
+        limit: 100.0 * MOST,
+        unit: "%",
+        what,
+        next_step: match verdict {
+            Verdict::Pass => "",
+            _ => {
+                "Let the projector warm up for 20 minutes, keep daylight out, and take the capture \
+                 again."
+            }
+        },
+        evidence: Evidence::Photographs {
+            what: "brightness against the session's mean, %",
+            values: shots
+                .map(|(&shot, gain)| (sequence.shots[shot].index, 100.0 * (gain - 1.0)))
+                .collect(),
+            limit: None,
+        },
+    }
+}

@@ -1,0 +1,86 @@
+//! Gate `flicker`: brightness does not jump from photograph to photograph, nor from
+//! row to row within one.
+
+use super::super::Registration;
+use super::super::drift::Steadiness;
+use super::super::sequence::Sequence;
+use super::bands::{self, Bands};
+use super::{Evidence, Gate, GateName, Verdict};
+
+/// Scatter of the brightness from which it is worth a word.
+const WARN: f64 = 0.006;
+
+/// Scatter of the brightness that spoils a table by as much.
+const MOST: f64 = 0.015;
+
+/// Judges the fast changes.
+pub(crate) fn judge(
+    sequence: &Sequence,
+    registration: &Registration,
+    steadiness: &Steadiness,
+) -> Gate {
+    let name = GateName::Flicker;
+    if steadiness.models.is_empty() {
+        return Gate::not_judged(
+            name,
+            "there are too few photographs to compare with each other",
+        );
+    }
+    let offs: Vec<f64> = (steadiness.gains.iter().zip(&steadiness.slow))
+        .map(|(gain, slow)| gain / slow - 1.0)
+        .collect();
+    let scatter = scatter(&offs, &steadiness.errors);
+    let bands = bands::find(registration, &steadiness.models);
+    // The root mean square of a sine is its amplitude over the root of 2.
+    let striped = bands.map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
+    let number = scatter.max(striped);
+    let verdict = Verdict::of(number, WARN, MOST);
+    let what = match (verdict, bands) {
+        (Verdict::Pass, _) => format!(
+            "brightness jumps by {:.2} % from photograph to photograph",
+            100.0 * scatter
+        ),
+        (_, Some(Bands { cycles, amplitude })) if striped > scatter => format!(
+            "flicker: bands of {:.1} % run across the photographs, {cycles:.1} from top to bottom: \
+             lamps on 50 or 60 Hz mains or the projector's colour wheel, seen by a rolling shutter",
+            100.0 * amplitude
+        ),
+        _ => format!(
+            "flicker: brightness jumps by {:.2} % from photograph to photograph: the exposure is no \
+             multiple of the period of lamps (50 or 60 Hz) or projector, or is automatic",
+            100.0 * scatter
+        ),
+    };
+    let shots = steadiness.shots.iter().zip(&offs);
+    Gate {
+        name,
+        verdict,
+        number: 100.0 * number,
+        limit: 100.0 * MOST,
+        unit: "%",
+        what,
+        next_step: match verdict {
+            Verdict::Pass => "",
+            _ => {
+                "Set a longer exposure that is a multiple of the projector's refresh period and of \
+                 the mains' (1/25 or 1/30 s and longer), switch lamps off, set the exposure by hand."
+            }
+        },
+        evidence: Evidence::Photographs {
+            what: "brightness against the slow curve, %",
+            values: shots
+                .map(|(&shot, off)| (sequence.shots[shot].index, 100.0 * off))
+                .collect(),
+            limit: Some(100.0 * MOST),
+        },
+    }
+}
+
+/// Standard deviation of what is off the slow curve, robust, without what the gains
+/// themselves are uncertain by.
+fn scatter(offs: &[f64], errors: &[f64]) -> f64 {
+    let middle = |values: Vec<f64>| super::superposition::median(values).unwrap_or(0.0);
+    let spread = 1.4826 * middle(offs.iter().map(|off| off.abs()).collect());
+    let own = middle(errors.to_vec());
+    (spread * spread - own * own).max(0.0).sqrt()
+}

@@ -1,0 +1,332 @@
+//! Gate `order`: every photograph shows the pattern of its line.
+//!
+//! Some pixels are given to cells by their whole series: each pixel goes to the cell
+//! whose on and off over all photographs its own light follows best. That needs no
+//! Gray code and survives some photographs that show another pattern; where all
+//! after one are shifted, the shift that fits best is tried. Then every photograph
+//! is compared with every pattern.
+
+use super::super::sampled::{SIDE, Sampled};
+use super::super::sequence::Sequence;
+use super::{Evidence, Gate, GateName, Verdict, listed};
+use nalgebra::DMatrix;
+
+/// Pixels that are given to cells.
+const MOST_PIXELS: usize = 1024;
+
+/// Photographs, other than black, from which a pixel's series says which cell it is.
+const LEAST_SHOTS: usize = 24;
+
+/// Photographs that one may be taken too early or too late by.
+const MOST_SHIFT: isize = 2;
+
+/// Correlation of a pixel's series with its cell's from which it is used.
+const LEAST_ALIKE: f64 = 0.5;
+
+/// Pixels that must be left.
+const LEAST_PIXELS: usize = 24;
+
+/// Distance to the own pattern, in those to the best other, from which the other one
+/// is shown.
+const OTHER: f64 = 1.5;
+
+/// Distance to the own pattern, of the range between dark and lit squared, from which
+/// no pattern is shown; one half is another random pattern's.
+const NONE: f64 = 0.2;
+
+/// What a photograph shows instead of its own pattern.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Wrong {
+    /// The shot.
+    pub(crate) shot: usize,
+    /// A shot whose pattern it shows; `None` if it shows no pattern.
+    pub(crate) shows: Option<usize>,
+}
+
+/// What the comparison of photographs and patterns found.
+pub(crate) struct Order {
+    /// Photographs that show another pattern, in order.
+    pub(crate) wrong: Vec<Wrong>,
+    /// Distance of each photograph to its own pattern.
+    distances: Vec<f64>,
+}
+
+/// Compares every photograph with every pattern; `None` if there are too few, or too
+/// few pixels that follow any cell.
+pub(crate) fn find(sequence: &Sequence, sampled: &Sampled) -> Option<Order> {
+    let patterns = patterns(sequence);
+    if patterns.len() < LEAST_SHOTS {
+        return None;
+    }
+    let light = light(sampled);
+    let shifts = (0..=MOST_SHIFT).flat_map(|shift| [shift, -shift]);
+    let best = shifts
+        .map(|shift| Assigned::new(&light, &patterns, shift))
+        // The first of equals: no shift at all.
+        .fold(None, |best: Option<Assigned>, next| match best {
+            Some(best) if best.alike >= 1.05 * next.alike => Some(best),
+            Some(best) if best.shift == -next.shift && best.shift == 0 => Some(best),
+            Some(best) if next.alike <= 1.05 * best.alike => Some(best),
+            _ => Some(next),
+        })?;
+    if best.pixels.len() < LEAST_PIXELS {
+        return None;
+    }
+    Some(best.compare(&light, &patterns))
+}
+
+/// Which cells are lit in each shot.
+fn patterns(sequence: &Sequence) -> Vec<Vec<bool>> {
+    let dark = vec![false; sequence.grid.cells()];
+    let mut patterns = vec![dark; sequence.shots.len()];
+    for view in &sequence.views {
+        for &shot in &view.shots {
+            patterns[shot].clone_from(&view.lit);
+        }
+    }
+    patterns
+}
+
+/// Light of some of the sampled pixels, `pixels x shots`: the middle ones of each
+/// square's quarters.
+fn light(sampled: &Sampled) -> DMatrix<f32> {
+    let quarter = SIDE / 4;
+    let places: Vec<usize> = (0..sampled.squares())
+        .flat_map(|square| {
+            (0..4).map(move |k| {
+                let (row, col) = (quarter + k / 2 * 2 * quarter, quarter + k % 2 * 2 * quarter);
+                square * SIDE * SIDE + row * SIDE + col
+            })
+        })
+        .collect();
+    let step = places.len().div_ceil(MOST_PIXELS).max(1);
+    let places: Vec<usize> = places.into_iter().step_by(step).collect();
+    DMatrix::from_fn(places.len(), sampled.shots.len(), |pixel, shot| {
+        sampled.shots[shot][places[pixel]]
+    })
+}
+
+/// Pixels and their cells, if photograph `s` shows the pattern of shot `s + shift`.
+struct Assigned {
+    shift: isize,
+    /// Pixels that follow a cell, and that cell.
+    pixels: Vec<(usize, usize)>,
+    /// Sum over the pixels of how well they do.
+    alike: f64,
+}
+
+impl Assigned {
+    fn new(light: &DMatrix<f32>, patterns: &[Vec<bool>], shift: isize) -> Self {
+        let cells = patterns[0].len();
+        let shown =
+            |shot: usize| -> Option<&Vec<bool>> { patterns.get(shot.checked_add_signed(shift)?) };
+        let shots: Vec<usize> = (0..patterns.len())
+            .filter(|&s| shown(s).is_some())
+            .collect();
+        let mut codes = DMatrix::from_fn(shots.len(), cells, |at, cell| {
+            let lit = shown(shots[at]).is_some_and(|lit| lit[cell]);
+            f32::from(u8::from(lit))
+        });
+        let mut series = DMatrix::from_fn(shots.len(), light.nrows(), |at, pixel| {
+            light[(pixel, shots[at])]
+        });
+        for mut column in codes.column_iter_mut().chain(series.column_iter_mut()) {
+            let mean = column.mean();
+            column.add_scalar_mut(-mean);
+            let norm = column.norm();
+            if norm > 0.0 {
+                column /= norm;
+            }
+        }
+        let alike = series.tr_mul(&codes);
+        let best = (alike.row_iter().enumerate()).map(|(pixel, row)| {
+            let (mut cell, mut most) = (0, f32::MIN);
+            for (at, &value) in row.iter().enumerate() {
+                if value > most {
+                    (cell, most) = (at, value);
+                }
+            }
+            (pixel, cell, f64::from(most))
+        });
+        let best: Vec<(usize, usize, f64)> = best.filter(|b| b.2 > LEAST_ALIKE).collect();
+        Self {
+            shift,
+            alike: best.iter().map(|b| b.2).sum(),
+            pixels: best
+                .into_iter()
+                .map(|(pixel, cell, _)| (pixel, cell))
+                .collect(),
+        }
+    }
+
+    /// Compares every photograph with every pattern.
+    fn compare(&self, light: &DMatrix<f32>, patterns: &[Vec<bool>]) -> Order {
+        let shots = patterns.len();
+        let shown = |shot: usize| {
+            let at = shot.checked_add_signed(self.shift)?;
+            patterns.get(at)
+        };
+        // How far each pixel is from dark to lit in each photograph.
+        let rows = self.pixels.iter().map(|&(pixel, cell)| {
+            let middle = |lit: bool| {
+                let of = (0..shots).filter(|&s| shown(s).is_some_and(|l| l[cell] == lit));
+                let values: Vec<f64> = of.map(|s| f64::from(light[(pixel, s)])).collect();
+                super::superposition::median(values).unwrap_or(0.0)
+            };
+            let (dark, lit) = (middle(false), middle(true));
+            let range = (lit - dark).max(1e-6);
+            let value =
+                move |s: usize| ((f64::from(light[(pixel, s)]) - dark) / range).clamp(-0.5, 1.5);
+            (0..shots).map(value).collect::<Vec<f64>>()
+        });
+        let rows: Vec<Vec<f64>> = rows.collect();
+        let pixels = rows.len() as f64;
+        let distance = |shot: usize, pattern: &[bool]| {
+            let of = rows.iter().zip(&self.pixels).map(|(row, &(_, cell))| {
+                let off = row[shot] - f64::from(u8::from(pattern[cell]));
+                off * off
+            });
+            of.sum::<f64>() / pixels
+        };
+        let distances: Vec<f64> = (0..shots).map(|s| distance(s, &patterns[s])).collect();
+        let wrong = (0..shots).filter_map(|shot| {
+            let own = distances[shot];
+            // What fits well needs no comparison.
+            if own < 0.25 * NONE {
+                return None;
+            }
+            let all = (0..shots).map(|other| (other, distance(shot, &patterns[other])));
+            let (best, least) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+            let other = patterns[best] != patterns[shot] && own > OTHER * least && least < NONE;
+            // White is brighter than any sum of its parts, and black darker.
+            let even = patterns[shot].iter().all(|lit| *lit == patterns[shot][0]);
+            match (other, own > NONE && !even) {
+                (true, _) => Some(Wrong {
+                    shot,
+                    shows: Some(best),
+                }),
+                (false, true) => Some(Wrong { shot, shows: None }),
+                (false, false) => None,
+            }
+        });
+        Order {
+            wrong: wrong.collect(),
+            distances,
+        }
+    }
+}
+
+/// Judges what was found.
+pub(crate) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
+    let name = GateName::Order;
+    let Some(order) = order else {
+        let why = "too few photographs, or too few pixels that follow any cell, to tell which \
+             pattern each shows";
+        return Gate::not_judged(name, why);
+    };
+    let shown = order.distances.iter().enumerate();
+    let gate = |verdict, what: String, next_step| Gate {
+        name,
+        verdict,
+        number: order.wrong.len() as f64,
+        limit: 0.0,
+        unit: "photographs",
+        what,
+        next_step,
+        evidence: Evidence::Photographs {
+            what: "distance to the own pattern (0: the same, 0.5: another random one)",
+            values: shown
+                .map(|(shot, distance)| (sequence.shots[shot].index, *distance))
+                .collect(),
+            limit: Some(NONE),
+        },
+    };
+    let photo = |shot: usize| sequence.shots[shot].photo.display();
+    match order.wrong.as_slice() {
+        [] => {
+            let what = format!(
+                "all {} photographs show their patterns",
+                order.distances.len()
+            );
+            gate(Verdict::Pass, what, "")
+        }
+        [a, b] if a.shows == Some(b.shot) && b.shows == Some(a.shot) => {
+            let what = format!(
+                "{} and {} are exchanged: each shows the other's pattern",
+                photo(a.shot),
+                photo(b.shot)
+            );
+            gate(
+                Verdict::Fail,
+                what,
+                "Exchange the two files and check again.",
+            )
+        }
+        wrong => {
+            let (what, next_step) = shifted(sequence, wrong).unwrap_or_else(|| {
+                let one = |wrong: &Wrong| match wrong.shows {
+                    Some(other) => format!("{} shows that of {}", photo(wrong.shot), photo(other)),
+                    None => format!("{} shows none", photo(wrong.shot)),
+                };
+                let what = format!(
+                    "{} photographs show another pattern than their line says (exchanged, moved or \
+                     disturbed): {}",
+                    wrong.len(),
+                    listed(wrong.iter().map(one), 4)
+                );
+                (
+                    what,
+                    "Take those photographs again, or put them in their places.",
+                )
+            });
+            gate(Verdict::Fail, what, next_step)
+        }
+    }
+}
+
+/// The sentence and next step if all wrong photographs show the same number of
+/// patterns later or earlier.
+fn shifted(sequence: &Sequence, wrong: &[Wrong]) -> Option<(String, &'static str)> {
+    let mut counts = std::collections::BTreeMap::new();
+    for wrong in wrong {
+        if let Some(other) = wrong.shows {
+            *counts
+                .entry(other as isize - wrong.shot as isize)
+                .or_insert(0) += 1;
+        }
+    }
+    let (&shift, &count) = counts.iter().max_by_key(|(_, count)| **count)?;
+    if wrong.len() < 3 || 10 * count < 7 * wrong.len() {
+        return None;
+    }
+    let first = wrong
+        .iter()
+        .find(|w| w.shows == w.shot.checked_add_signed(shift))?;
+    let photo = sequence.shots[first.shot].photo.display();
+    let (what, next_step) = if shift > 0 {
+        (
+            format!(
+                "from {photo} on, photographs show the pattern {shift} later than their line: {} \
+                 missing before it and all others moved up",
+                if shift == 1 {
+                    "one is".to_owned()
+                } else {
+                    format!("{shift} are")
+                }
+            ),
+            "Number the photographs from that one on one higher for each missing one, and take \
+             the missing ones again.",
+        )
+    } else {
+        (
+            format!(
+                "from {photo} on, photographs show the pattern {} earlier than their line: one was \
+                 taken twice, or the camera was faster than the projector",
+                -shift
+            ),
+            "Remove the photograph that was taken twice and number those after it one lower, or \
+             take the capture again with a longer wait before each photograph.",
+        )
+    };
+    Some((what, next_step))
+}

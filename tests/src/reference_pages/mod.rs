@@ -1,0 +1,69 @@
+//! Pages of the site that are made from the source: every command with its options, and
+//! every error with what to do about it.
+
+mod errors;
+
+use std::fmt::Write;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The pages with their paths.
+///
+/// # Errors
+/// If the source cannot be read, or is not Rust.
+pub fn pages() -> io::Result<Vec<(PathBuf, String)>> {
+    let docs = root().join("docs");
+    Ok(vec![
+        (docs.join("commands.md"), commands()),
+        (docs.join("errors.md"), errors()?),
+    ])
+}
+
+/// The repository.
+#[must_use]
+pub fn root() -> PathBuf {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    tests.parent().unwrap_or(tests).to_owned()
+}
+
+fn commands() -> String {
+    let options = clap_markdown::MarkdownOptions::new()
+        .title("Commands".to_owned())
+        .show_footer(false);
+    let body = clap_markdown::help_markdown_command_custom(&iltm::cli::command(), &options);
+    // Trailing spaces are for no one.
+    let lines: Vec<&str> = body.lines().map(str::trim_end).collect();
+    lines.join("\n") + "\n"
+}
+
+fn errors() -> io::Result<String> {
+    let mut text = String::from(
+        "# Errors\n\nA command that fails prints what happened, where, and what to do next; with \
+         `--json` the same as one object on standard output. The exit code tells the cause:\n\n\
+         | code | name | cause |\n|---|---|---|\n",
+    );
+    for (code, name, meaning) in iltm::cli::exit_codes() {
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "| {code} | `{name}` | {meaning} |");
+    }
+    text.push_str(
+        "\nWhat stands in braces below is filled in: a path, a line, a number. Messages of the \
+         gates before a solve are in [their own page](gates.md).\n",
+    );
+    for house in ["host-tools/src", "runtime/src"] {
+        for error in errors::in_folder(&root().join(house))? {
+            let _ = write!(text, "\n## {}\n\n{}\n\n", error.name, error.about);
+            for case in &error.cases {
+                let _ = write!(text, "- **{}**: {}", case.name, case.about);
+                if let Some(message) = &case.message {
+                    let _ = write!(text, " \"`{message}`\"");
+                }
+                if let Some(next) = &case.next_step {
+                    let _ = write!(text, "\n  *Next:* {next}");
+                }
+                text.push('\n');
+            }
+        }
+    }
+    Ok(text)
+}
