@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use super::failure::Kind;
+use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
@@ -170,6 +171,10 @@ pub(super) struct Patterns {
     /// Pixels to leave black on every side
     #[arg(long, value_name = "PIXELS", default_value_t = 0)]
     pub(super) border: u16,
+    /// How the camera's files follow the light: linear (developed without a curve),
+    /// srgb (JPEG and most 8-bit files), a gamma, or measure
+    #[arg(long, value_name = "RESPONSE", default_value = "linear", value_parser = camera_response)]
+    pub(super) camera: CameraSettings,
     /// Levels of the response ramp, shown in white and in each channel
     #[arg(long, value_name = "LEVELS", default_value_t = 9, value_parser = clap::value_parser!(u16).range(2..=256))]
     pub(super) ramp: u16,
@@ -191,8 +196,7 @@ Commands are run by the shell. These words are replaced, quoted where the shell 
 Cameras, each with exposure, white balance and focus set by hand before:
   --camera 'gphoto2 --force-overwrite --capture-image-and-download --filename {stem}.jpg'
   --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 --awbgains 2,2 -o {photo}'
-  --camera 'v4l2-ctl -c auto_exposure=1,exposure_time_absolute=333 && ffmpeg -v error -y \\
-            -f v4l2 -i /dev/video0 -frames:v 1 {photo}'
+  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 --stream-to={stem}.jpg'
   --watch ~/Pictures/tethered      whatever fills that folder, or a person at the release
 
 Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command returns
@@ -203,7 +207,7 @@ goes on with what is missing.";
 pub(super) struct Capture {
     /// Folder that `iltm patterns` made
     pub(super) capture: PathBuf,
-    /// Display to show slides on, the first is 1; of another one, all are listed
+    /// Display to show slides on, the first is 0; of one that is not there, all are listed
     #[arg(long, value_name = "N", group = "screen", required_unless_present_any = ["show", "list"])]
     pub(super) display: Option<u16>,
     /// Show slides by a command instead, which returns when the slide is shown
@@ -526,6 +530,17 @@ fn device_number(text: &str) -> Result<u64, String> {
         None => text.parse(),
     };
     number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
+}
+
+/// A response as `capture.toml` has it.
+fn camera_response(text: &str) -> Result<CameraSettings, String> {
+    let word = match text.parse::<f64>() {
+        Ok(gamma) => toml::Value::Float(gamma),
+        Err(_) => toml::Value::String(text.to_owned()),
+    };
+    let table = toml::Table::from_iter([("response".to_owned(), word)]);
+    let settings = table.try_into::<CameraSettings>();
+    settings.map_err(|error| error.message().to_owned())
 }
 
 /// A number, or two with all between them.

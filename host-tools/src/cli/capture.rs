@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Capture, output: &Output) -> Result<(), Failure> {
                 &mut teller,
             )
         }
-        (None, display) => with_window(display.unwrap_or(1).into(), size, |screen, closed| {
+        (None, display) => with_window(display.unwrap_or(0).into(), size, |screen, closed| {
             let stop = || interrupt::stopped() || closed();
             photograph(
                 &mut session,

@@ -2,7 +2,7 @@
 //! `now`, which is the wall, and a photograph is a copy of that.
 
 use super::*;
-use crate::capture::Exposed;
+use crate::capture::{CameraSettings, Exposed};
 use crate::progress::Silent;
 use crate::video::png;
 use iltm_runtime::{FrameSize, Grid};
@@ -39,7 +39,7 @@ impl Rig {
         );
         // A name that the shell has to be told about.
         let out = folder.path().join("the wall's");
-        let made = write(&slides, &layout, &out, &Silent).unwrap();
+        let made = write(&slides, &layout, &CameraSettings::default(), &out, &Silent).unwrap();
         Self {
             folder,
             slides: made.slides,

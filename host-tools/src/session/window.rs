@@ -36,7 +36,7 @@ enum Order {
 /// What the window's thread answers.
 type Answer = Result<(), SessionError>;
 
-/// Runs `session` with a window on display `display`, the first being 1, for slides
+/// Runs `session` with a window on display `display`, the first being 0, for slides
 /// of `size` pixels (width, height). The session's `stop` is true once the user closes
 /// the window or presses Escape. Call it from the thread that the process began with.
 ///
@@ -188,11 +188,10 @@ impl Wall<'_> {
     /// Opens the window.
     fn open(&self, events: &ActiveEventLoop) -> Result<Surface, SessionError> {
         let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
-        let chosen = self.display.checked_sub(1).and_then(|at| monitors.get(at));
-        let Some(chosen) = chosen else {
+        let Some(chosen) = monitors.get(self.display) else {
             return Err(SessionError::NoDisplay {
                 asked: self.display,
-                found: (1..).zip(&monitors).map(|(n, m)| described(n, m)).collect(),
+                found: (0..).zip(&monitors).map(|(n, m)| described(n, m)).collect(),
             });
         };
         let found = (chosen.size().width, chosen.size().height);
