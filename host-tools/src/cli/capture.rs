@@ -5,7 +5,7 @@ use super::failure::{Failure, Kind};
 use super::interrupt;
 use super::output::Output;
 use super::progress::progress;
-use crate::capture::{Exposed, Role};
+use crate::capture::{Exposed, MANIFEST_FILE, Role};
 use crate::progress::Progress;
 use crate::session::{
     Camera, CommandCamera, CommandScreen, Event, Screen, Session, SessionError, SessionOptions,
@@ -183,10 +183,14 @@ fn finished(summary: Summary, arguments: &Capture) -> (Value, String) {
         "latency_ms": summary.latency.map(|latency| latency.wait.as_millis() as u64),
         "discard": summary.latency.map(|latency| latency.discard),
     });
-    let text = format!(
+    let mut text = format!(
         "capture     {capture}: {} photographs taken, all {} are there\n",
         summary.taken, summary.all
     );
+    // A folder to verify a table with is none to solve.
+    if arguments.capture.join(MANIFEST_FILE).exists() {
+        let _ = writeln!(text, "next        `iltm check {capture}`");
+    }
     (data, text)
 }
 

@@ -330,7 +330,8 @@ fn beside(photo: &Path) -> Result<tempfile::TempDir, SessionError> {
 fn put_in_place(taken: &Path, photo: &Path) -> Result<PathBuf, SessionError> {
     let place = photo.with_extension(taken.extension().unwrap_or_default());
     let put = || {
-        fs::File::open(taken)?.sync_all()?;
+        // Where that cannot be had, a power cut may cost this photograph.
+        let _ = fs::File::open(taken).and_then(|file| file.sync_all());
         fs::rename(taken, &place)?;
         for other in endings(photo).into_iter().filter(|file| *file != place) {
             fs::remove_file(other)?;

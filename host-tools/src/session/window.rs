@@ -25,6 +25,10 @@ use winit::window::{Fullscreen, Window, WindowId};
 /// Longest that a window may take to open, or a slide to be drawn.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// Given to the desktop to bring the window to its size, with whatever it likes to
+/// show meanwhile.
+const SETTLING: Duration = Duration::from_secs(1);
+
 /// What the session's thread asks of the window's.
 enum Order {
     /// Show this picture.
@@ -70,9 +74,10 @@ pub fn with_window<T: Send>(
         let running = scope.spawn(move || {
             let mut screen = WindowScreen { proxy, answers };
             // The first answer: there is a window.
-            let result = screen
-                .answer()
-                .and_then(|()| session(&mut screen, &|| closed.load(Ordering::SeqCst)));
+            let result = screen.answer().and_then(|()| {
+                thread::sleep(SETTLING);
+                session(&mut screen, &|| closed.load(Ordering::SeqCst))
+            });
             // Without an event loop nobody has to be told.
             let _ = screen.proxy.send_event(Order::Close);
             result
@@ -116,6 +121,9 @@ impl Screen for WindowScreen {
         };
         let file = File::open(&planned.slide).map_err(|error| refuse(error.to_string()))?;
         let picture = png::read(BufReader::new(file)).map_err(|error| refuse(error.to_string()))?;
+        if !matches!(picture.samples(), Samples::Eight(_)) {
+            return Err(refuse("a display shows 8 bits, it has 16".to_owned()));
+        }
         if self.proxy.send_event(Order::Show(picture)).is_err() {
             return Err(SessionError::Stopped);
         }
@@ -144,7 +152,10 @@ impl ApplicationHandler<Order> for Wall<'_> {
         }
         let opened = self.open(events);
         let failed = opened.is_err();
-        let answer = opened.map(|surface| self.surface = Some(surface));
+        let answer = opened.map(|surface| {
+            surface.window().request_redraw();
+            self.surface = Some(surface);
+        });
         let _ = self.answer.send(answer);
         if failed {
             events.exit();
@@ -218,9 +229,10 @@ impl Wall<'_> {
         softbuffer::Surface::new(&context, window).map_err(|error| refuse(error.to_string()))
     }
 
-    /// Draws the picture in the middle of the window, black around it.
+    /// Draws the picture in the middle of the window, black around it and before the
+    /// first one.
     fn draw(&mut self) -> Result<(), SessionError> {
-        let (Some(surface), Some(picture)) = (&mut self.surface, &self.picture) else {
+        let Some(surface) = &mut self.surface else {
             return Ok(());
         };
         let refuse = |error: softbuffer::SoftBufferError| SessionError::Display {
@@ -233,7 +245,10 @@ impl Wall<'_> {
         };
         surface.resize(width, height).map_err(refuse)?;
         let mut buffer = surface.buffer_mut().map_err(refuse)?;
-        paint(picture, &mut buffer, size.width as usize);
+        buffer.fill(0);
+        if let Some(picture) = &self.picture {
+            paint(picture, &mut buffer, size.width as usize);
+        }
         buffer.present().map_err(refuse)
     }
 }
@@ -255,7 +270,6 @@ fn described(number: usize, monitor: &MonitorHandle) -> String {
 
 /// Paints the picture into the middle of a window of this width, `0RGB` a pixel.
 fn paint(picture: &Picture, window: &mut [u32], width: usize) {
-    window.fill(0);
     let Samples::Eight(samples) = picture.samples() else {
         return;
     };
@@ -290,14 +304,14 @@ mod tests {
         let size = FrameSize::new(2, 1).unwrap();
         let colours = Samples::Eight(vec![1, 2, 3, 4, 5, 6]);
         let picture = Picture::new(size, colours).unwrap();
-        let mut window = [9; 12];
+        let mut window = [0; 12];
         paint(&picture, &mut window, 4);
         assert_eq!(
             window,
             [0, 0, 0, 0, 0, 0x01_02_03, 0x04_05_06, 0, 0, 0, 0, 0]
         );
         let grey = Picture::new(size, Samples::Eight(vec![7, 8])).unwrap();
-        let mut window = [9; 1];
+        let mut window = [0; 1];
         paint(&grey, &mut window, 1);
         assert_eq!(window, [0x07_07_07]);
     }
