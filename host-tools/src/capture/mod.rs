@@ -29,6 +29,7 @@ mod curve;
 mod diagnostics;
 mod drift;
 mod error;
+mod exposed;
 mod file_format;
 mod find;
 mod fine_flood;
@@ -76,8 +77,10 @@ pub use calibration::{
 pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
+pub use exposed::Exposed;
 pub use file_format::FileFormat;
 pub use find::find_photo;
+pub(crate) use find::pictures_of_stem;
 pub use fine_flood::FineFlood;
 pub use gates::{Evidence, Gate, GateName, Verdict};
 pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};

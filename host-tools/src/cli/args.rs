@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use super::failure::Kind;
+use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
@@ -8,6 +9,7 @@ use crate::scene::{Effect, Fault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -32,6 +34,9 @@ pub(super) enum Command {
     Check(Check),
     /// Make a folder of pictures to show and photograph, with the rules for doing so
     Patterns(Patterns),
+    /// Show a folder's slides and photograph each, with a camera on a cable or a person
+    #[command(after_help = CAMERAS)]
+    Capture(Capture),
     /// Learn a scene from its photographs and write its table
     Solve(Solve),
     /// Say what is in a table
@@ -169,6 +174,10 @@ pub(super) struct Patterns {
     /// Pixels to leave black on every side
     #[arg(long, value_name = "PIXELS", default_value_t = 0)]
     pub(super) border: u16,
+    /// How the camera's files follow the light: linear (developed without a curve),
+    /// srgb (JPEG and most 8-bit files), a gamma, or measure
+    #[arg(long, value_name = "RESPONSE", default_value = "linear", value_parser = camera_response)]
+    pub(super) camera: CameraSettings,
     /// Levels of the response ramp, shown in white and in each channel
     #[arg(long, value_name = "LEVELS", default_value_t = 9, value_parser = clap::value_parser!(u16).range(2..=256))]
     pub(super) ramp: u16,
@@ -178,6 +187,57 @@ pub(super) struct Patterns {
     /// Show white and black again after this many other pictures
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
     pub(super) repeat_every: u16,
+}
+
+/// What `iltm capture --help` ends with.
+const CAMERAS: &str = "\
+Commands are run by the shell. These words are replaced, quoted where the shell needs it:
+  {photo}     file to write      {stem}  the same without its ending, for another one
+  {slide}     file that is shown {index} its number    {role}  what it is shown for
+  {exposure}  the fifth column of capture.csv, if there is one
+
+Cameras, each with exposure, white balance and focus set by hand before:
+  --camera 'gphoto2 --force-overwrite --capture-image-and-download --filename {stem}.jpg'
+  --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 --awbgains 2,2 -o {photo}'
+  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 --stream-to={stem}.jpg'
+  --watch ~/Pictures/tethered      whatever fills that folder, or a person at the release
+
+Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command returns
+when the slide is shown. Escape on the slide, or ctrl-C, ends a session; the same command
+goes on with what is missing.";
+
+#[derive(Debug, Args)]
+pub(super) struct Capture {
+    /// Folder that `iltm patterns` made
+    pub(super) capture: PathBuf,
+    /// Display to show slides on, the first is 0; of one that is not there, all are listed
+    #[arg(long, value_name = "N", group = "screen", required_unless_present_any = ["show", "list"])]
+    pub(super) display: Option<u16>,
+    /// Show slides by a command instead, which returns when the slide is shown
+    #[arg(long, value_name = "CMD", group = "screen")]
+    pub(super) show: Option<String>,
+    /// Command that takes one photograph and writes it to {photo}
+    #[arg(long, value_name = "CMD", group = "taker", required_unless_present_any = ["watch", "list"])]
+    pub(super) camera: Option<String>,
+    /// Take the photographs that appear in a folder instead, one a slide
+    #[arg(long, value_name = "FOLDER", group = "taker")]
+    pub(super) watch: Option<PathBuf>,
+    /// Wait this long after each change of the picture; measured with flashes of white
+    /// and black if left out (with --watch: no wait)
+    #[arg(long, value_name = "MS")]
+    pub(super) latency: Option<u32>,
+    /// Wait this long for one photograph
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) timeout: u32,
+    /// Try a photograph that fails so many times more
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(super) retries: u32,
+    /// Take these again although they are there: 7, or 7-12
+    #[arg(long, value_name = "INDEX", num_args = 1.., value_delimiter = ',', value_parser = indices)]
+    pub(super) again: Vec<RangeInclusive<u32>>,
+    /// Say what is missing, and take nothing
+    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency"])]
+    pub(super) list: bool,
 }
 
 #[derive(Debug, Args)]
@@ -520,6 +580,27 @@ fn device_number(text: &str) -> Result<u64, String> {
         None => text.parse(),
     };
     number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
+}
+
+/// A response as `capture.toml` has it.
+fn camera_response(text: &str) -> Result<CameraSettings, String> {
+    let word = match text.parse::<f64>() {
+        Ok(gamma) => toml::Value::Float(gamma),
+        Err(_) => toml::Value::String(text.to_owned()),
+    };
+    let table = toml::Table::from_iter([("response".to_owned(), word)]);
+    let settings = table.try_into::<CameraSettings>();
+    settings.map_err(|error| error.message().to_owned())
+}
+
+/// A number, or two with all between them.
+fn indices(text: &str) -> Result<RangeInclusive<u32>, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let range = first.parse().ok().zip(last.parse().ok());
+    range
+        .filter(|(first, last)| first <= last)
+        .map(|(first, last)| first..=last)
+        .ok_or_else(|| "numbers of slides are written like 7 or 7-12".to_owned())
 }
 
 fn share(text: &str) -> Result<f64, String> {

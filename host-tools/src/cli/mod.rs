@@ -7,6 +7,7 @@
 mod active;
 mod args;
 mod bounces;
+mod capture;
 mod check;
 mod compare;
 mod compensate;
@@ -64,6 +65,7 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Simulate(simulate) => simulate::run(simulate, &output),
         Command::Check(check) => check::run(check, &output),
         Command::Patterns(patterns) => patterns::run(patterns, &output),
+        Command::Capture(capture) => capture::run(capture, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
