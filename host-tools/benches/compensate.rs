@@ -16,12 +16,14 @@ mod sample_table;
 use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
 use iltm::compile::response::codes as response_codes;
 use iltm::progress::Silent;
+use iltm::video::live::Live;
+use iltm::video::watch::FileWatch;
 use iltm::video::{Compensator, Settings};
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
 use sample_table::SampleTable;
 use std::io::{Read, Write};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Runs of each case.
 const RUNS: usize = 5;
@@ -39,6 +41,9 @@ struct Case {
     tier: u8,
     threads: usize,
     colour: &'static str,
+    /// As with `--watch --budget`: a table's file is watched, and the tier follows a
+    /// budget of 16 ms.
+    live: bool,
 }
 
 fn main() {
@@ -47,7 +52,7 @@ fn main() {
     println!("{cores} cores; median and range of {RUNS} runs");
     for case in cases(cores) {
         let name = format!(
-            "{} x {} C{}, grid {} x {}, {} channels, tier {}, {} threads",
+            "{} x {} C{}, grid {} x {}, {} channels, tier {}, {} threads{}",
             case.width,
             case.height,
             case.colour,
@@ -55,7 +60,8 @@ fn main() {
             case.grid.1,
             case.channels,
             case.tier,
-            case.threads
+            case.threads,
+            if case.live { ", live" } else { "" }
         );
         if filter.as_ref().is_some_and(|word| !name.contains(word)) {
             continue;
@@ -86,12 +92,17 @@ fn cases(cores: usize) -> Vec<Case> {
         tier,
         threads,
         colour,
+        live: false,
     };
     let full_hd = (1920, 1080);
     let mut cases = Vec::new();
     for grid in [(13, 21), (16, 24), (48, 64)] {
         cases.push(case(full_hd, grid, 3, 2, cores, "420jpeg"));
     }
+    cases.push(Case {
+        live: true,
+        ..case(full_hd, (16, 24), 3, 2, cores, "420jpeg")
+    });
     for tier in [0, 1] {
         cases.push(case(full_hd, (48, 64), 3, tier, cores, "420jpeg"));
     }
@@ -171,10 +182,26 @@ fn run(case: &Case) -> (f64, f64) {
             Ok::<_, std::io::Error>(())
         });
         let (start, before) = (Instant::now(), processor_time());
-        let summary = compensator
-            .y4m(input, output, &Silent)
-            .expect("a whole stream");
-        assert_eq!(summary.frames, frames as u64);
+        let done = if case.live {
+            let file = tempfile::NamedTempFile::new().expect("a file");
+            std::fs::write(file.path(), &image).expect("a table's file");
+            let (bytes, watch) = FileWatch::read(file.path()).expect("the same");
+            let live = Live {
+                settings: Settings {
+                    tier: None,
+                    ..settings
+                },
+                budget: Some(Duration::from_millis(16)),
+                newer: &mut || watch.newer(),
+                said: &mut |_| {},
+            };
+            let summary = live.y4m(&bytes, input, output, &Silent);
+            summary.expect("a whole stream").frames.frames
+        } else {
+            let summary = compensator.y4m(input, output, &Silent);
+            summary.expect("a whole stream").frames
+        };
+        assert_eq!(done, frames as u64);
         let rate = frames as f64 / start.elapsed().as_secs_f64();
         (rate, (processor_time() - before) / frames as f64)
     })

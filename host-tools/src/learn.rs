@@ -1,6 +1,7 @@
 //! The whole job on photographs: capture to table.
 
-use crate::capture::{self, CaptureError, CaptureOptions, FineFlood, Measurements};
+use crate::capture::{self, CaptureError, CaptureOptions, FineFlood, Measurements, Settings};
+use crate::compile::wish::{ChosenWhite, WhiteWish};
 use crate::compile::{self, CompileError, CompileOptions, Compiled};
 use crate::progress::Progress;
 use crate::solve::{
@@ -20,6 +21,8 @@ pub struct Learned {
     pub inverse: InverseTransport,
     /// How the inverse came about.
     pub report: SolveReport,
+    /// The reference white, and why it is that.
+    pub white: ChosenWhite,
     /// The table.
     pub compiled: Compiled,
 }
@@ -60,11 +63,11 @@ pub fn learn(
     capture: &Path,
     photographs: &CaptureOptions,
     options: &SolveOptions,
-    reference_white: Option<f64>,
+    white: Option<WhiteWish<'_>>,
     progress: &dyn Progress,
 ) -> Result<Learned, LearnError> {
     let measurements = capture::read(capture, photographs, progress)?;
-    learn_measured(measurements, capture, options, reference_white, progress)
+    learn_measured(measurements, capture, options, white, progress)
 }
 
 /// The same from photographs that have been read before; `capture` is where.
@@ -75,7 +78,7 @@ pub fn learn_measured(
     measurements: Measurements,
     capture: &Path,
     options: &SolveOptions,
-    reference_white: Option<f64>,
+    white: Option<WhiteWish<'_>>,
     progress: &dyn Progress,
 ) -> Result<Learned, LearnError> {
     let (inverse, report) = solve::solve(&measurements, options, progress)?;
@@ -92,11 +95,12 @@ pub fn learn_measured(
     };
     progress.begin("compiling the table", 0);
     let fine = compile::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
+    let white = ChosenWhite::new(&inverse, fine.as_ref(), white)?;
     let options = CompileOptions {
         projector: measurements.devices.projector.clone(),
-        reference_white,
+        reference_white: Some(white.light),
         inverse_error: report.predicted_error(),
-        provenance: provenance(capture, &measurements, &report),
+        provenance: provenance(capture, &measurements, &report, &white),
         targets: None,
     };
     let compiled = compile::compile(&inverse, fine.as_ref(), &options)?;
@@ -105,6 +109,7 @@ pub fn learn_measured(
         measurements,
         inverse,
         report,
+        white,
         compiled,
     })
 }
@@ -120,6 +125,42 @@ pub fn recovery_in(provenance: &str) -> Option<Recovery> {
     toml::from_str(provenance)
         .ok()
         .map(|stored: Stored| stored.recovery)
+}
+
+/// What a table's provenance says of its reference white; `None` if the table is older
+/// than that, or was not made from photographs.
+#[must_use]
+pub fn white_in(provenance: &str) -> Option<ChosenWhite> {
+    #[derive(Deserialize)]
+    struct Stored {
+        white: ChosenWhite,
+    }
+    let stored = toml::from_str(provenance).ok();
+    stored.map(|stored: Stored| stored.white)
+}
+
+/// The `capture.toml` that a table was learned with, as its provenance has it; `None` if
+/// the table is older than that, or was not made from photographs.
+#[must_use]
+pub fn settings_in(provenance: &str) -> Option<Settings> {
+    #[derive(Deserialize)]
+    struct Stored {
+        capture: Settings,
+    }
+    let stored = toml::from_str(provenance).ok();
+    stored.map(|stored: Stored| stored.capture)
+}
+
+/// The mixing of projector channels in the camera's that a table's photographs were freed
+/// of, `[camera][projector]`; `None` if there was none.
+#[must_use]
+pub fn mixing_in(provenance: &str) -> Option<[[f64; 3]; 3]> {
+    #[derive(Deserialize)]
+    struct Stored {
+        mixing: [[f64; 3]; 3],
+    }
+    let stored = toml::from_str(provenance).ok();
+    stored.map(|stored: Stored| stored.mixing)
 }
 
 /// What a table says about where it comes from.
@@ -139,6 +180,11 @@ struct Provenance<'a> {
     predicted_error: PredictedError,
     #[serde(skip_serializing_if = "Option::is_none")]
     recovery: Option<Recovery>,
+    /// Before the tables, as TOML wants it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mixing: Option<[[f64; 3]; 3]>,
+    white: &'a ChosenWhite,
+    capture: &'a Settings,
 }
 
 #[derive(Serialize)]
@@ -155,7 +201,12 @@ struct PredictedError {
     compensated: f64,
 }
 
-fn provenance(capture: &Path, measurements: &Measurements, report: &SolveReport) -> String {
+fn provenance(
+    capture: &Path,
+    measurements: &Measurements,
+    report: &SolveReport,
+    white: &ChosenWhite,
+) -> String {
     let folder = || {
         let name = capture.canonicalize().ok();
         let name = name.as_deref().and_then(Path::file_name);
@@ -188,6 +239,11 @@ fn provenance(capture: &Path, measurements: &Measurements, report: &SolveReport)
             compensated: report.prediction.compensated,
         },
         recovery: report.recovery,
+        mixing: (measurements.devices.unmixed)
+            .then(|| measurements.devices.mixing().map(|mixing| mixing.matrix))
+            .flatten(),
+        white,
+        capture: &measurements.settings,
     };
     // A struct of numbers and strings always has a TOML form.
     toml::to_string(&provenance).unwrap_or_default()

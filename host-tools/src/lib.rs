@@ -21,6 +21,8 @@ pub mod report;
 pub mod scene;
 pub mod session;
 pub mod solve;
+pub mod solved;
 pub mod tradeoff;
 pub mod user;
+pub mod verify;
 pub mod video;

@@ -136,6 +136,11 @@ fn messages_are_read_as_they_were_written() {
 }
 
 #[test]
+fn changed_photographs_of_every_format_are_no_trouble() {
+    short_run("photograph", 2_000);
+}
+
+#[test]
 fn changed_scenes_and_meshes_are_no_trouble() {
     short_run("scene", 4_000);
     short_run("mesh", 4_000);

@@ -128,11 +128,14 @@ impl DeviceResponse {
     }
 
     /// Largest difference to `other` in the values for one light, in steps of an
-    /// 8-bit value.
+    /// 8-bit value. Light below a hundredth of full light, where curves differ most
+    /// and nobody sees it, does not count.
     #[must_use]
     pub fn steps_from(&self, other: &Self) -> f64 {
+        const SEEN: f64 = 0.01;
         let light = (0..=255).map(|step| self.light(f64::from(step) / 255.0));
         light
+            .filter(|light| *light >= SEEN)
             .map(|light| 255.0 * (self.value(light) - other.value(light)).abs())
             .fold(0.0, f64::max)
     }

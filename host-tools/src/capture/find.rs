@@ -19,16 +19,7 @@ pub fn find_photo(folder: &Path, named: &Path) -> Result<Option<PathBuf>, Captur
     if !matches!(folder.join(named).try_exists(), Ok(false)) {
         return Ok(Some(named.to_owned()));
     }
-    let parent = named.parent().unwrap_or(Path::new(""));
-    let Ok(entries) = std::fs::read_dir(folder.join(parent)) else {
-        return Ok(None);
-    };
-    let names = entries.filter_map(|entry| Some(entry.ok()?.file_name()));
-    let mut found: Vec<PathBuf> = names
-        .filter(|name| stands_for(Path::new(name), named.file_stem()))
-        .map(|name| parent.join(name))
-        .collect();
-    found.sort();
+    let found = pictures_of_stem(folder, named);
     match found.as_slice() {
         [first, second, ..] => Err(CaptureError::Ambiguous {
             path: folder.join(named),
@@ -37,6 +28,23 @@ pub fn find_photo(folder: &Path, named: &Path) -> Result<Option<PathBuf>, Captur
         }),
         found => Ok(found.first().cloned()),
     }
+}
+
+/// All picture files of the stem of `named` in its place, relative to `folder`, in
+/// the order of their names.
+pub(crate) fn pictures_of_stem(folder: &Path, named: &Path) -> Vec<PathBuf> {
+    let parent = named.parent().unwrap_or(Path::new(""));
+    let entries = std::fs::read_dir(folder.join(parent));
+    let names = entries
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| Some(entry.ok()?.file_name()));
+    let mut found: Vec<PathBuf> = names
+        .filter(|name| stands_for(Path::new(name), named.file_stem()))
+        .map(|name| parent.join(name))
+        .collect();
+    found.sort();
+    found
 }
 
 /// Whether a file name has this stem and a picture's extension.

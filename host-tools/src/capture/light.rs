@@ -3,7 +3,7 @@
 
 use super::calibration::samples::{fit, used_pixels};
 use super::calibration::taken::{Seen, Taken, mean_of};
-use super::calibration::{Devices, Ramp};
+use super::calibration::{CameraFit, Devices, Ramp, Unmix};
 use super::gates::saturation::{self, Clipped};
 use super::photo::Reading;
 use super::photographs::Photographs;
@@ -124,9 +124,9 @@ impl<'a> Light<'a> {
     ) -> Result<Devices, CaptureError> {
         let mut devices = Devices::declared(settings);
         let used = used_pixels(&self.flood, &self.black, &self.saturated);
-        let camera = fit(sequence, &mut self.photographs, &used, &self.reading)?;
+        let mut camera = fit(sequence, &mut self.photographs, &used, &self.reading)?;
         if settings.camera.response == Declared::Measure {
-            let told = camera.as_ref().filter(|fit| fit.tells());
+            let told = camera.filter(CameraFit::tells).map(CameraFit::adopted);
             let Some(found) = told else {
                 return Err(unknown(folder, "camera"));
             };
@@ -135,6 +135,7 @@ impl<'a> Light<'a> {
                 ..self.reading.clone()
             };
             devices.camera = found.best.clone();
+            camera = Some(found);
             let known = std::mem::take(&mut self.saturated);
             *self = Self::read_with(folder, sequence, reading, progress)?;
             self.keep_saturated(&known);
@@ -151,13 +152,27 @@ impl<'a> Light<'a> {
             return Err(unknown(folder, "projector"));
         }
         if let Some(unmix) = devices.mixing().and_then(super::calibration::Mixing::unmix) {
-            self.photographs.unmix(unmix);
-            let known = std::mem::take(&mut self.saturated);
-            self.look(sequence, progress)?;
-            self.keep_saturated(&known);
+            self.unmix(unmix, sequence, progress)?;
             devices.unmixed = true;
         }
         Ok(devices)
+    }
+
+    /// Turns the photographs into the projector's channels.
+    ///
+    /// # Errors
+    /// A photograph's own error.
+    pub(super) fn unmix(
+        &mut self,
+        unmix: Unmix,
+        sequence: &Sequence,
+        progress: &dyn Progress,
+    ) -> Result<(), CaptureError> {
+        self.photographs.unmix(unmix);
+        let known = std::mem::take(&mut self.saturated);
+        self.look(sequence, progress)?;
+        self.keep_saturated(&known);
+        Ok(())
     }
 
     fn read_calibration(

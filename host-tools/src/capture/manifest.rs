@@ -20,7 +20,7 @@ const NEEDED: usize = 4;
 const MAX_BYTES: u64 = 8 << 20;
 
 /// What the pictures of one manifest are shown for.
-pub trait ListedRole: Copy + fmt::Display {
+pub trait ListedRole: Clone + fmt::Display {
     /// Name of the manifest in a capture folder.
     const FILE: &'static str;
 
@@ -95,7 +95,15 @@ impl<R: ListedRole> ManifestOf<R> {
     /// [`CaptureError::Io`] if it cannot be read, otherwise as
     /// [`ManifestOf::parse`].
     pub fn read_if_there(folder: &Path) -> Result<Option<Self>, CaptureError> {
-        let path = folder.join(R::FILE);
+        Self::read_named(folder, R::FILE)
+    }
+
+    /// The same of a manifest with another name.
+    ///
+    /// # Errors
+    /// As [`ManifestOf::read_if_there`].
+    pub fn read_named(folder: &Path, name: &str) -> Result<Option<Self>, CaptureError> {
+        let path = folder.join(name);
         let file = match File::open(&path) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

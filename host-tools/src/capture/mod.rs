@@ -12,6 +12,7 @@
 //!                              place                  where between the cells a pixel lies
 //!                              fine_flood             the flood photograph on a finer grid
 //!                              shot_light             one photograph to look at
+//!                              revisit                cells in pictures that are no patterns
 //! calibration.csv           -> calibration            what measures the devices
 //! reference_T.npy           -> reference              the transport itself, where it is known
 //! ```
@@ -21,11 +22,14 @@
 //! with its place.
 
 pub mod calibration;
+#[cfg(test)]
+mod calibration_tests;
 mod cell_model;
 mod curve;
 mod diagnostics;
 mod drift;
 mod error;
+mod exposed;
 mod file_format;
 mod find;
 mod fine_flood;
@@ -53,6 +57,7 @@ mod refusal_tests;
 mod registration;
 mod regression;
 mod response;
+mod revisit;
 mod role;
 mod sampled;
 mod sequence;
@@ -72,8 +77,10 @@ pub use calibration::{
 pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
+pub use exposed::Exposed;
 pub use file_format::FileFormat;
 pub use find::find_photo;
+pub(crate) use find::pictures_of_stem;
 pub use fine_flood::FineFlood;
 pub use gates::{Evidence, Gate, GateName, Verdict};
 pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
@@ -83,6 +90,7 @@ pub use pattern::Pattern;
 pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
 pub use response::{Declared, Response};
+pub use revisit::{CellPlanes, Revisited, revisit};
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
 pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings};

@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use super::failure::Kind;
+use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
@@ -8,7 +9,9 @@ use crate::scene::{Effect, Fault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Cancels the light that bounces between the surfaces of a projection.
 #[derive(Debug, Parser)]
@@ -31,6 +34,9 @@ pub(super) enum Command {
     Check(Check),
     /// Make a folder of pictures to show and photograph, with the rules for doing so
     Patterns(Patterns),
+    /// Show a folder's slides and photograph each, with a camera on a cable or a person
+    #[command(after_help = CAMERAS)]
+    Capture(Capture),
     /// Learn a scene from its photographs and write its table
     Solve(Solve),
     /// Say what is in a table
@@ -43,6 +49,8 @@ pub(super) enum Command {
     Compare(Compare),
     /// Show what accuracy costs in time, for a scene or a table
     Tradeoff(Tradeoff),
+    /// Prove a table on the wall: test images to photograph, then a verdict
+    Verify(Verify),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -166,6 +174,10 @@ pub(super) struct Patterns {
     /// Pixels to leave black on every side
     #[arg(long, value_name = "PIXELS", default_value_t = 0)]
     pub(super) border: u16,
+    /// How the camera's files follow the light: linear (developed without a curve),
+    /// srgb (JPEG and most 8-bit files), a gamma, or measure
+    #[arg(long, value_name = "RESPONSE", default_value = "linear", value_parser = camera_response)]
+    pub(super) camera: CameraSettings,
     /// Levels of the response ramp, shown in white and in each channel
     #[arg(long, value_name = "LEVELS", default_value_t = 9, value_parser = clap::value_parser!(u16).range(2..=256))]
     pub(super) ramp: u16,
@@ -175,6 +187,57 @@ pub(super) struct Patterns {
     /// Show white and black again after this many other pictures
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
     pub(super) repeat_every: u16,
+}
+
+/// What `iltm capture --help` ends with.
+const CAMERAS: &str = "\
+Commands are run by the shell. These words are replaced, quoted where the shell needs it:
+  {photo}     file to write      {stem}  the same without its ending, for another one
+  {slide}     file that is shown {index} its number    {role}  what it is shown for
+  {exposure}  the fifth column of capture.csv, if there is one
+
+Cameras, each with exposure, white balance and focus set by hand before:
+  --camera 'gphoto2 --force-overwrite --capture-image-and-download --filename {stem}.jpg'
+  --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 --awbgains 2,2 -o {photo}'
+  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 --stream-to={stem}.jpg'
+  --watch ~/Pictures/tethered      whatever fills that folder, or a person at the release
+
+Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command returns
+when the slide is shown. Escape on the slide, or ctrl-C, ends a session; the same command
+goes on with what is missing.";
+
+#[derive(Debug, Args)]
+pub(super) struct Capture {
+    /// Folder that `iltm patterns` made
+    pub(super) capture: PathBuf,
+    /// Display to show slides on, the first is 0; of one that is not there, all are listed
+    #[arg(long, value_name = "N", group = "screen", required_unless_present_any = ["show", "list"])]
+    pub(super) display: Option<u16>,
+    /// Show slides by a command instead, which returns when the slide is shown
+    #[arg(long, value_name = "CMD", group = "screen")]
+    pub(super) show: Option<String>,
+    /// Command that takes one photograph and writes it to {photo}
+    #[arg(long, value_name = "CMD", group = "taker", required_unless_present_any = ["watch", "list"])]
+    pub(super) camera: Option<String>,
+    /// Take the photographs that appear in a folder instead, one a slide
+    #[arg(long, value_name = "FOLDER", group = "taker")]
+    pub(super) watch: Option<PathBuf>,
+    /// Wait this long after each change of the picture; measured with flashes of white
+    /// and black if left out (with --watch: no wait)
+    #[arg(long, value_name = "MS")]
+    pub(super) latency: Option<u32>,
+    /// Wait this long for one photograph
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) timeout: u32,
+    /// Try a photograph that fails so many times more
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(super) retries: u32,
+    /// Take these again although they are there: 7, or 7-12
+    #[arg(long, value_name = "INDEX", num_args = 1.., value_delimiter = ',', value_parser = indices)]
+    pub(super) again: Vec<RangeInclusive<u32>>,
+    /// Say what is missing, and take nothing
+    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency"])]
+    pub(super) list: bool,
 }
 
 #[derive(Debug, Args)]
@@ -201,8 +264,18 @@ pub(super) struct Solve {
     pub(super) lambda: Option<f64>,
     /// Light of reference white in camera units; by default the brightest uniform
     /// grey that every live cell reaches
-    #[arg(long, value_name = "LIGHT")]
+    #[arg(long, value_name = "LIGHT", conflicts_with = "content")]
     pub(super) white: Option<f64>,
+    /// Picture or video (PNG, Y4M) that is going to be shown: reference white is the
+    /// brightest that cuts no more of it than --clip-share; may be repeated
+    #[arg(long, value_name = "FILE")]
+    pub(super) content: Vec<PathBuf>,
+    /// Share of the content's samples that may be cut at the projector's white
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.001, requires = "content")]
+    pub(super) clip_share: f64,
+    /// Folder for a report of the scene: a page with pictures; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub(super) report: Option<PathBuf>,
     /// Sign the table with this key
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
@@ -397,8 +470,45 @@ pub(super) struct Compensate {
     #[arg(long)]
     pub(super) linear: bool,
     /// Tier of the table's accuracy ladder; the most accurate if left out
-    #[arg(long, value_name = "TIER")]
+    #[arg(long, value_name = "TIER", conflicts_with = "budget")]
     pub(super) tier: Option<u8>,
+    /// Look at the table's file while the video runs, and go on with a new table between
+    /// two frames; one that cannot be used changes nothing
+    #[arg(long)]
+    pub(super) watch: bool,
+    /// Milliseconds that computing a frame may take: lower tiers when it takes longer,
+    /// higher ones when there is time, as on the device
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
+    pub(super) budget: Option<Duration>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Verify {
+    /// Table to verify
+    pub(super) table: PathBuf,
+    /// Folder made with --output, with the photographs in it: judge them
+    #[arg(
+        value_name = "FOLDER",
+        required_unless_present = "output",
+        conflicts_with = "output"
+    )]
+    pub(super) capture: Option<PathBuf>,
+    /// Folder to make, with the pictures to project
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(super) output: Option<PathBuf>,
+    /// Resolution of the projector; by default as the patterns of the scene had it, which
+    /// the table remembers, or 1920x1080
+    #[arg(long, value_name = "WxH", value_parser = frame_size, requires = "output")]
+    pub(super) projector: Option<FrameSize>,
+    /// Black pixels on each side; by default as the patterns of the scene had it, or none
+    #[arg(long, value_name = "PIXELS", requires = "output")]
+    pub(super) border: Option<u16>,
+    /// Largest error that passes; by default 1.5 times what is to be expected
+    #[arg(long, value_name = "ERROR", value_parser = error_bound, conflicts_with = "output")]
+    pub(super) bound: Option<f64>,
+    /// Folder for the page and the maps; by default `verdict` in FOLDER
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    pub(super) report: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug, Args)]
@@ -472,11 +582,46 @@ fn device_number(text: &str) -> Result<u64, String> {
     number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
 }
 
+/// A response as `capture.toml` has it.
+fn camera_response(text: &str) -> Result<CameraSettings, String> {
+    let word = match text.parse::<f64>() {
+        Ok(gamma) => toml::Value::Float(gamma),
+        Err(_) => toml::Value::String(text.to_owned()),
+    };
+    let table = toml::Table::from_iter([("response".to_owned(), word)]);
+    let settings = table.try_into::<CameraSettings>();
+    settings.map_err(|error| error.message().to_owned())
+}
+
+/// A number, or two with all between them.
+fn indices(text: &str) -> Result<RangeInclusive<u32>, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let range = first.parse().ok().zip(last.parse().ok());
+    range
+        .filter(|(first, last)| first <= last)
+        .map(|(first, last)| first..=last)
+        .ok_or_else(|| "numbers of slides are written like 7 or 7-12".to_owned())
+}
+
 fn share(text: &str) -> Result<f64, String> {
     let share = text.parse::<f64>().ok();
     share
         .filter(|share| (0.0..1.0).contains(share))
         .ok_or_else(|| "a share is a number from 0 to 1".to_owned())
+}
+
+fn milliseconds(text: &str) -> Result<Duration, String> {
+    let time = text.parse::<f64>().ok();
+    time.filter(|time| (0.001..=60_000.0).contains(time))
+        .map(|time| Duration::from_secs_f64(time / 1e3))
+        .ok_or_else(|| "a budget is a number of milliseconds from 0.001 to 60000".to_owned())
+}
+
+fn error_bound(text: &str) -> Result<f64, String> {
+    let error = text.parse::<f64>().ok();
+    error
+        .filter(|error| *error > 0.0 && *error <= 1.0)
+        .ok_or_else(|| "an error is a number above 0, at most 1".to_owned())
 }
 
 fn frame_size(text: &str) -> Result<FrameSize, String> {

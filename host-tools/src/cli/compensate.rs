@@ -1,5 +1,7 @@
 //! `iltm compensate`
 
+mod live;
+
 use super::args::Compensate;
 use super::failure::{Failure, Kind};
 use super::inspect::check;
@@ -9,7 +11,7 @@ use crate::video::png::PngError;
 use crate::video::y4m::Y4mError;
 use crate::video::{Compensator, Settings, Summary, VideoError, WholeFile};
 use iltm_runtime::pipeline::Encoding;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -24,23 +26,14 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
             "Give a file with --output, or leave --json away.",
         ));
     }
+    if arguments.watch || arguments.budget.is_some() {
+        return live::run(arguments, piped, output);
+    }
     let image = read_file(&arguments.table)?;
     let table = check(&arguments.table, &image)?;
-    let settings = Settings {
-        tier: arguments.tier,
-        encoding: if arguments.linear {
-            Encoding::Linear
-        } else {
-            Encoding::Display
-        },
-        ..Settings::default()
-    };
+    let settings = settings(arguments);
     let compensator = Compensator::new(&table, settings).map_err(|error| failed(&error))?;
-    let input: Box<dyn Read + Send> = if is_pipe(&arguments.input) {
-        Box::new(io::stdin())
-    } else {
-        Box::new(File::open(&arguments.input).map_err(|e| cannot_read(&arguments.input, &e))?)
-    };
+    let input = opened(&arguments.input)?;
     let bars = progress(output);
     let start = Instant::now();
     let summary = if piped {
@@ -58,12 +51,39 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     Ok(())
 }
 
+fn settings(arguments: &Compensate) -> Settings {
+    Settings {
+        tier: arguments.tier,
+        encoding: if arguments.linear {
+            Encoding::Linear
+        } else {
+            Encoding::Display
+        },
+        ..Settings::default()
+    }
+}
+
+/// The input, from its beginning.
+fn opened(input: &Path) -> Result<Box<dyn Read + Send>, Failure> {
+    if is_pipe(input) {
+        return Ok(Box::new(io::stdin()));
+    }
+    let file = File::open(input).map_err(|error| cannot_read(input, &error))?;
+    Ok(Box::new(file))
+}
+
 /// `-` stands for standard input or output.
 fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
 fn report(summary: &Summary, seconds: f64, output: &Output) {
+    let (data, text) = said(summary, seconds);
+    output.result(&data, &text);
+}
+
+/// What was done, for programs and for people.
+fn said(summary: &Summary, seconds: f64) -> (Value, String) {
     let share = 100.0 * summary.clipped as f64 / summary.samples.max(1) as f64;
     let data = json!({
         "width": summary.size.width(),
@@ -81,13 +101,16 @@ fn report(summary: &Summary, seconds: f64, output: &Output) {
         "{frames} of {} in {seconds:.2} s, {share:.2} % of the samples clipped\n",
         summary.size
     );
-    output.result(&data, &text);
+    (data, text)
 }
 
 /// What a failure while frames flow is counted as.
 pub(super) fn failed(error: &VideoError) -> Failure {
     let kind = match error {
-        VideoError::NoSuchTier { .. } | VideoError::Threads { .. } => Kind::Usage,
+        VideoError::NoSuchTier { .. } | VideoError::Threads { .. } | VideoError::Still => {
+            Kind::Usage
+        }
+        VideoError::Table(_) => Kind::Table,
         VideoError::Read { .. } => Kind::Read,
         VideoError::File { .. } => Kind::Write,
         VideoError::Y4m(Y4mError::Write { .. }) | VideoError::Png(PngError::Write { .. }) => {

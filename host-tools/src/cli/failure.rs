@@ -8,6 +8,7 @@ use crate::compile::sign::KeyError;
 use crate::device::DeviceError;
 use crate::device::upload::UploadError;
 use crate::learn::LearnError;
+use crate::session::SessionError;
 use crate::user::ConfigError;
 use iltm_runtime::link::Refusal;
 use iltm_runtime::trust::Rejected;
@@ -77,6 +78,12 @@ pub(super) enum Kind {
     Interrupted = 29,
     /// A scene cannot be simulated as it is described.
     Scene = 30,
+    /// A table does not keep its promise on the wall.
+    Verdict = 31,
+    /// A camera gives no photograph, or none that can be used.
+    Camera = 32,
+    /// Slides cannot be shown.
+    Display = 33,
 }
 
 impl From<&Rejected> for Kind {
@@ -133,7 +140,7 @@ impl From<&UploadError> for Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 29] = [
+    const ALL: [(Self, &'static str, &'static str); 32] = [
         (
             Self::Usage,
             "usage",
@@ -231,6 +238,17 @@ impl Kind {
             "scene",
             "a scene cannot be simulated as it is described",
         ),
+        (
+            Self::Verdict,
+            "verdict",
+            "a table does not keep its promise on the wall",
+        ),
+        (
+            Self::Camera,
+            "camera",
+            "a camera gives no photograph that can be used",
+        ),
+        (Self::Display, "display", "slides cannot be shown"),
     ];
 
     pub(super) const fn code(self) -> u8 {
@@ -283,6 +301,12 @@ impl Failure {
             active: None,
             data: None,
         }
+    }
+
+    /// The same, with what was found out all the same: an object.
+    pub(super) fn with_result(mut self, result: Value) -> Self {
+        self.data = Some(Box::new(result));
+        self
     }
 
     /// The same, with the table that is in use now.
@@ -350,6 +374,24 @@ impl From<LearnError> for Failure {
                  Bernoulli photographs, or average several of each pattern.",
             ),
         }
+    }
+}
+
+impl From<SessionError> for Failure {
+    fn from(error: SessionError) -> Self {
+        let kind = match &error {
+            SessionError::Capture(error) => kind_of(error),
+            SessionError::IndexTwice { .. } => Kind::Capture,
+            SessionError::NoIndex { .. } => Kind::Usage,
+            SessionError::NoSlide { .. } => Kind::Read,
+            SessionError::Display { .. }
+            | SessionError::NoDisplay { .. }
+            | SessionError::DisplaySize { .. } => Kind::Display,
+            SessionError::Camera { .. } | SessionError::Latency { .. } => Kind::Camera,
+            SessionError::Write { .. } => Kind::Write,
+            SessionError::Stopped => Kind::Interrupted,
+        };
+        Self::new(kind, &error, error.next_step())
     }
 }
 

@@ -8,7 +8,7 @@ use super::solve::lines;
 use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
 use crate::device::cure;
-use crate::learn::recovery_in;
+use crate::learn::{recovery_in, white_in};
 use crate::report::steps;
 use ed25519_dalek::VerifyingKey;
 use iltm_runtime::image::{Seal, Table, unseal};
@@ -197,6 +197,9 @@ fn text(path: &Path, table: &Table<'_>) -> String {
         "reference white  {:.4} of the camera's full scale",
         table.reference_white().to_num::<f64>()
     );
+    if let Some(white) = white_in(table.provenance()) {
+        let _ = writeln!(text, "                 {}", white.reason());
+    }
     let _ = match inverse_error(table) {
         Some(error) => writeln!(
             text,

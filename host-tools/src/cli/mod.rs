@@ -7,11 +7,13 @@
 mod active;
 mod args;
 mod bounces;
+mod capture;
 mod check;
 mod compare;
 mod compensate;
 mod connect;
 mod demo;
+mod devices;
 #[cfg(unix)]
 mod emulate;
 mod failure;
@@ -32,6 +34,7 @@ mod solve;
 mod status;
 mod tradeoff;
 mod trial;
+mod verify;
 
 use crate::compare::Meter;
 use args::{Arguments, Command};
@@ -62,12 +65,14 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Simulate(simulate) => simulate::run(simulate, &output),
         Command::Check(check) => check::run(check, &output),
         Command::Patterns(patterns) => patterns::run(patterns, &output),
+        Command::Capture(capture) => capture::run(capture, &output),
         Command::Solve(solve) => solve::run(solve, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
         Command::Bounces(bounces) => bounces::run(bounces, &output),
         Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
+        Command::Verify(verify) => verify::run(verify, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),

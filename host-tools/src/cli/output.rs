@@ -37,7 +37,8 @@ impl Output {
         }
     }
 
-    /// What people read although the command fails; programs get it with the error.
+    /// What people read while a command goes on, or before its failure; programs get it as
+    /// events, or with the failure.
     pub(super) fn people(&self, text: &str) {
         if !self.json {
             let _ = write!(io::stderr(), "{text}");

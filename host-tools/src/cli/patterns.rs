@@ -29,7 +29,8 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     };
     let slides = session::order(grid, &options);
     let bars = progress(output);
-    let made = session::write(&slides, &layout, out, bars.as_ref()).map_err(unmade)?;
+    let made =
+        session::write(&slides, &layout, &arguments.camera, out, bars.as_ref()).map_err(unmade)?;
     let data = json!({
         "capture": out.display().to_string(),
         "rows": grid.rows(),

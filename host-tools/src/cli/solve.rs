@@ -1,17 +1,27 @@
 //! `iltm solve`
 
 use super::args::Solve;
-use super::failure::Failure;
+use super::devices::{ambient_share, device_lines, devices, files, flux, unmeasured};
+use super::failure::{Failure, Kind};
 use super::key::seal;
-use super::output::{Output, write_file};
+use super::output::{Output, cannot_write, write_file};
 use super::progress::progress;
 use crate::capture::{CaptureOptions, Verdict, Why};
 use crate::compile::sign::read_key;
+use crate::compile::wish::WhiteWish;
 use crate::learn::{Learned, learn};
+use crate::progress::Progress;
+use crate::report::LightPicture;
 use crate::solve::{Compensation, SolveOptions, WhyLeftOut};
+use crate::solved::{self, Content};
+use crate::video::sampled_frames;
 use serde_json::{Value, json};
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Frames of each of the user's videos that are looked at.
+const FRAMES: usize = 48;
 
 /// Places that are named before the rest is only counted.
 const MOST_PLACES: usize = 6;
@@ -31,11 +41,21 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
         ..SolveOptions::default()
     };
     let bars = progress(output);
+    let content = content(&arguments.content, bars.as_ref())?;
+    let frames: Vec<LightPicture> = content.iter().flat_map(Content::light).collect();
+    let white = match arguments.white {
+        Some(light) => Some(WhiteWish::Light(light)),
+        None if frames.is_empty() => None,
+        None => Some(WhiteWish::Content {
+            frames: &frames,
+            share: arguments.clip_share,
+        }),
+    };
     let learned = learn(
         &arguments.capture,
         &photographs,
         &options,
-        arguments.white,
+        white,
         bars.as_ref(),
     );
     bars.end();
@@ -46,11 +66,23 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
         None => image.clone(),
     };
     write_file(&arguments.output, &file)?;
+    let page = match &arguments.report {
+        Some(folder) => Some(report(
+            &learned,
+            arguments,
+            &content,
+            folder,
+            bars.as_ref(),
+        )?),
+        None => None,
+    };
+    bars.end();
     let seconds = start.elapsed().as_secs_f64();
     let mut data = summary(&learned);
     data["table"] = json!(arguments.output.display().to_string());
     data["seconds"] = json!(seconds);
     data["signed"] = json!(key.is_some());
+    data["report"] = json!(page.as_ref().map(|page| page.display().to_string()));
     let mut text = text(&learned);
     let _ = writeln!(
         text,
@@ -59,8 +91,65 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
         file.len(),
         if key.is_some() { "signed, " } else { "" },
     );
+    if let Some(page) = &page {
+        let _ = writeln!(text, "report      {}", page.display());
+    }
     output.result(&data, &text);
     Ok(())
+}
+
+/// Some frames of each of the user's files.
+fn content(files: &[PathBuf], bars: &dyn Progress) -> Result<Vec<Content>, Failure> {
+    bars.begin("looking at the content", 0);
+    let read = |path: &PathBuf| {
+        let frames = sampled_frames(path, FRAMES).map_err(|error| {
+            let failure = super::compensate::failed(&error);
+            Failure::new(
+                failure.kind,
+                format!("{}: {}", path.display(), failure.message),
+                failure.next_step,
+            )
+        })?;
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Ok(Content {
+            name: name.to_string_lossy().into_owned(),
+            frames,
+        })
+    };
+    let content = files.iter().map(read).collect();
+    bars.end();
+    content
+}
+
+/// Writes the report; its page.
+fn report(
+    learned: &Learned,
+    arguments: &Solve,
+    content: &[Content],
+    folder: &Path,
+    bars: &dyn Progress,
+) -> Result<PathBuf, Failure> {
+    let report = solved::report(
+        learned,
+        &arguments.capture,
+        &arguments.output,
+        content,
+        bars,
+    );
+    let report = report.map_err(|error| {
+        Failure::new(
+            Kind::Frames,
+            error,
+            "Check the content, or leave --report away: the table has been written.",
+        )
+    })?;
+    std::fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    for file in &report.files {
+        write_file(&folder.join(&file.name).with_extension("png"), &file.png)?;
+    }
+    let page = folder.join("report.html");
+    write_file(&page, report.page.as_bytes())?;
+    Ok(page)
 }
 
 /// What was learned, for programs.
@@ -73,6 +162,11 @@ pub(super) fn summary(learned: &Learned) -> Value {
         "channels": learned.inverse.channels.len(),
         "live_cells": report.live_cells,
         "left_out": left_out(learned),
+        "unmeasured_cells": unmeasured(&learned.measurements),
+        "files": files(&learned.measurements.diagnostics),
+        "devices": devices(&learned.measurements.devices),
+        "ambient_share": ambient_share(&learned.measurements),
+        "flux": flux(&learned.inverse),
         "method": report.method.name(),
         "photographs": {
             "white": report.photographs.white,
@@ -92,6 +186,7 @@ pub(super) fn summary(learned: &Learned) -> Value {
             "compensated": report.prediction.compensated,
         },
         "reference_white": learned.compiled.white.light,
+        "white": learned.white,
         "bytes": learned.compiled.image.len(),
         "tiers": tiers(learned),
     })
@@ -149,6 +244,9 @@ fn unseen(learned: &Learned, cell: usize) -> &'static str {
     let found = diagnostics.left_out.iter().find(|out| out.cell == cell);
     match found.map(|out| out.why) {
         Some(Why::Saturated { .. }) => "saturated in the flood photograph",
+        Some(Why::TooFewPixels { pixels: 0 }) => {
+            "seen by no camera pixel (what they throw on others is accounted for)"
+        }
         _ => "seen alone by too few camera pixels (what they throw on others is accounted for)",
     }
 }
@@ -221,9 +319,16 @@ pub(super) fn text(learned: &Learned) -> String {
     }
     let _ = writeln!(
         text,
-        "scene       condition {:.2}, reference white {:.4} of the camera's full scale",
-        report.condition, learned.compiled.white.light
+        "scene       condition {:.2}\n\
+         white       {:.4} of the camera's full scale: {}",
+        report.condition,
+        learned.white.light,
+        learned.white.reason()
     );
+    let known = device_lines(&learned.measurements);
+    if !known.is_empty() {
+        text += &lines("devices     ", &known);
+    }
     if let Some(recovery) = &report.recovery {
         text += &lines("recovery    ", &recovery.lines());
     }

@@ -3,6 +3,8 @@
 //! | step | file |
 //! |---|---|
 //! | light of the brightest uniform grey | [`white`] |
+//! | which white was asked for, and which it became | [`wish`] |
+//! | a white that suits the user's own content | [`content_white`] |
 //! | what video looks like, for choosing and predicting | [`content`] |
 //! | `K` in the Haar domain, most useful entries first, cut into tiers | [`ladder`] |
 //! | `i16` entries with a power of two a row | [`quantise`] |
@@ -15,6 +17,7 @@
 //! The image is checked by the runtime's own reader before it is returned, so
 //! what leaves here is known to load.
 
+pub mod content_white;
 pub mod cost;
 pub mod gain;
 pub mod image;
@@ -24,6 +27,7 @@ pub mod response;
 pub mod sign;
 mod table;
 pub mod white;
+pub mod wish;
 
 pub use crate::content;
 pub use gain::FineGains;

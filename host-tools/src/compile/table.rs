@@ -66,6 +66,9 @@ pub enum CompileError {
         /// The light asked for.
         light: f64,
     },
+    /// Content to choose the reference white by is grey, and the scene has colours.
+    #[error("the content is grey, but the table drives three colours")]
+    GreyContent,
     /// A predicted error or a tier's target is no error.
     #[error("an error of {error}; an error is a number from 0")]
     Error {
@@ -125,6 +128,9 @@ impl CompileError {
         match self {
             Self::Dark => "Check that the flood photograph shows the projection.",
             Self::ReferenceWhite { .. } => "Leave the reference white to the default.",
+            Self::GreyContent => {
+                "Convert it to colour: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`."
+            }
             Self::Error { .. } => "Solve again: the prediction that was given is not usable.",
             Self::Provenance { .. } => "Shorten the scene's name.",
             Self::NotFinite { .. }

@@ -12,6 +12,7 @@ mod video;
 mod words;
 
 pub use error::DemoError;
+pub(crate) use stills::test_card;
 
 use crate::capture::CaptureOptions;
 use crate::learn::{Learned, learn};

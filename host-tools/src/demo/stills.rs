@@ -49,7 +49,7 @@ fn disc_pattern(along: f64, y: f64) -> Colour {
 }
 
 /// A test card: fine lines, pure colours, a ramp and words.
-pub(super) fn test_card(size: FrameSize) -> Wanted {
+pub(crate) fn test_card(size: FrameSize) -> Wanted {
     let picture = paint(size, card);
     Wanted {
         name: "card",

@@ -1,6 +1,7 @@
 //! What the report says of the sample that photographs cannot.
 
 use crate::report::{Command, Words};
+use crate::solved::quoted;
 use std::path::Path;
 
 /// The words for a demo that was written to `out`.
@@ -37,18 +38,8 @@ pub(super) fn words(out: &Path, seconds: &[(&'static str, f64)]) -> Words {
                 ),
             ),
         ],
+        sections: Vec::new(),
         seconds: seconds.iter().map(|(what, seconds)| ((*what).to_owned(), *seconds)).collect(),
-    }
-}
-
-/// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |letter: char| letter.is_alphanumeric() || "/._-+".contains(letter);
-    if !text.is_empty() && text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
     }
 }
 

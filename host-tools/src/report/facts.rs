@@ -102,7 +102,10 @@ fn of_the_solve(learned: &Learned) -> [Fact; 6] {
         ("condition", condition),
         (
             "reference white",
-            format!("{white} of the camera\u{2019}s full scale"),
+            format!(
+                "{white} of the camera\u{2019}s full scale: {}",
+                learned.white.reason()
+            ),
         ),
     ]
 }

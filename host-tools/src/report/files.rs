@@ -28,6 +28,17 @@ pub struct PictureFile {
     pub png: Vec<u8>,
 }
 
+/// A picture as a file.
+pub(crate) fn picture_file(name: &str, picture: &Picture) -> PictureFile {
+    let mut bytes = Vec::new();
+    // Writing to memory does not fail.
+    let _ = png::write(&mut bytes, picture);
+    PictureFile {
+        name: name.to_owned(),
+        png: bytes,
+    }
+}
+
 /// Encodes all pictures of a report. `summary` is of the first example and has a
 /// palette, since it is made to be small.
 pub(super) fn encode(
@@ -52,12 +63,9 @@ pub(super) fn encode(
             pictures.push((format!("{name}-error"), error));
         }
     }
-    let encoded = pictures.into_par_iter().map(|(name, picture)| {
-        let mut bytes = Vec::new();
-        // Writing to memory does not fail.
-        let _ = png::write(&mut bytes, &picture);
-        PictureFile { name, png: bytes }
-    });
+    let encoded = pictures
+        .into_par_iter()
+        .map(|(name, picture)| picture_file(&name, &picture));
     let mut files: Vec<PictureFile> = encoded.collect();
     let summary = examples
         .first()

@@ -4,7 +4,7 @@ use super::chart::{Axis, Chart, Point};
 use super::colour_scale::number;
 use super::document::document;
 use super::facts::facts;
-use super::{ColourScale, Example, Report, Rung, Shown, Treatment};
+use super::{ColourScale, Example, PictureFile, Report, Rung, Shown, Treatment};
 use crate::solve::{Compensation, Prediction};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -21,6 +21,8 @@ pub struct Words {
     pub commands: Vec<Command>,
     /// Wall-clock seconds by what they were spent on, beside the solve's own.
     pub seconds: Vec<(String, f64)>,
+    /// Sections of this report alone, before how it was solved.
+    pub sections: Vec<Markup>,
 }
 
 /// A line for a terminal.
@@ -46,6 +48,7 @@ impl Report<'_> {
                 (self.bounces())
                 (self.operator())
                 (self.accuracy())
+                @for section in &words.sections { (section) }
                 (self.solve(words))
                 (self.repeat(words))
             }
@@ -261,9 +264,7 @@ impl Report<'_> {
     fn image(&self, name: &str, alt: &str) -> Markup {
         let file = self.files.iter().find(|file| file.name == name);
         html! {
-            @if let Some(file) = file {
-                img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt);
-            }
+            @if let Some(file) = file { (embedded(file, alt)) }
         }
     }
 
@@ -389,6 +390,11 @@ impl Report<'_> {
     }
 }
 
+/// A picture inside of a page.
+pub(crate) fn embedded(file: &PictureFile, alt: &str) -> Markup {
+    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt); }
+}
+
 fn headline(error: f64, what: &str, class: &str) -> Markup {
     html! { div .number .(class) { b { (percent(error)) } span { (what) } } }
 }
@@ -406,7 +412,7 @@ fn clipping(shown: &Shown) -> String {
     }
 }
 
-fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
+pub(crate) fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
     const STOPS: usize = 16;
     let stops: Vec<String> = (0..=STOPS)
         .map(|stop| {

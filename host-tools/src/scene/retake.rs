@@ -5,6 +5,7 @@ use super::shooting::{Photograph, Shooting, Slide};
 use super::simulation::SimulationError;
 use crate::capture::{CALIBRATION_FILE, CaptureError, ListedRole, MANIFEST_FILE, ManifestOf};
 use crate::progress::Progress;
+use crate::verify::VERIFY_FILE;
 use iltm_runtime::Grid;
 use image::{ImageReader, Limits};
 use std::fmt;
@@ -15,7 +16,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
 
 /// Manifests that are looked for.
-const MANIFESTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, "verify.csv"];
+const MANIFESTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, VERIFY_FILE];
 
 /// Why photographs could not be taken.
 #[derive(Debug, Error)]

@@ -146,11 +146,13 @@ mod tests {
         Camera {
             view: View::new(Vector3::zeros(), Vector3::x(), Vector3::y(), 40.0, 1.0).unwrap(),
             size: (1, 1),
+            distortion: [0.0; 2],
             white: 0.8,
             full_well: Some(20_000.0),
             read_noise: 5.0,
             bits: Some(12),
             response: Response::Linear,
+            distortion: [0.0; 2],
         }
     }
 

@@ -2,8 +2,8 @@
 
 use super::{Layout, PatternsError, Purpose, Slide};
 use crate::capture::{
-    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, MANIFEST_FILE, Manifest, Role,
-    SETTINGS_FILE, ShotOf,
+    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CameraSettings, MANIFEST_FILE,
+    Manifest, Role, SETTINGS_FILE, ShotOf,
 };
 use crate::progress::Progress;
 use crate::scene::folder::{beside, put_in_place};
@@ -44,13 +44,14 @@ fn name(folder: &str, index: u32) -> PathBuf {
 }
 
 /// Writes the folder `out`: beside its place first, then renamed, so that it is
-/// whole or not there.
+/// whole or not there. What is known of the `camera` goes into its settings.
 ///
 /// # Errors
 /// [`PatternsError::Folder`] if something is in its place or it cannot be written.
 pub fn write(
     slides: &[Slide],
     layout: &Layout,
+    camera: &CameraSettings,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Made, PatternsError> {
@@ -82,8 +83,8 @@ pub fn write(
     };
     let mut texts = vec![
         (MANIFEST_FILE, scene.to_csv()),
-        (SETTINGS_FILE, filled(SETTINGS, layout, made)),
-        ("README.md", filled(README, layout, made)),
+        (SETTINGS_FILE, filled(SETTINGS, layout, camera, made)),
+        ("README.md", filled(README, layout, camera, made)),
     ];
     if made.calibration > 0 {
         texts.push((CALIBRATION_FILE, calibration.to_csv()));
@@ -133,9 +134,16 @@ fn save(path: &Path, picture: &Picture) -> Result<(), PatternsError> {
 }
 
 /// A text for people with this folder's numbers.
-fn filled(text: &str, layout: &Layout, made: Made) -> String {
+fn filled(text: &str, layout: &Layout, camera: &CameraSettings, made: Made) -> String {
     let (grid, projector) = (layout.grid(), layout.projector());
+    // The key with its value; nothing has no TOML form.
+    let response = toml::Table::try_from(camera).ok();
+    let response = response.and_then(|table| table.get("response").map(ToString::to_string));
     let words = [
+        (
+            "{response}",
+            response.unwrap_or_else(|| "\"linear\"".to_owned()),
+        ),
         ("{rows}", grid.rows().to_string()),
         ("{cols}", grid.cols().to_string()),
         ("{width}", projector.width().to_string()),
@@ -155,7 +163,7 @@ fn filled(text: &str, layout: &Layout, made: Made) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::{self, CaptureOptions, Settings};
+    use crate::capture::{self, CaptureOptions, Response, Settings};
     use crate::progress::Silent;
     use crate::scene::folder::FolderError;
     use crate::session::{OrderOptions, order};
@@ -166,12 +174,19 @@ mod tests {
         Layout::new(Grid::new(5, 7).unwrap(), projector, 3).unwrap()
     }
 
+    fn camera() -> CameraSettings {
+        CameraSettings {
+            response: Response::Gamma(2.2).into(),
+            ..CameraSettings::default()
+        }
+    }
+
     fn made(options: &OrderOptions) -> (tempfile::TempDir, PathBuf, Made) {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("c");
         let layout = layout();
         let slides = order(layout.grid(), options);
-        let made = write(&slides, &layout, &out, &Silent).unwrap();
+        let made = write(&slides, &layout, &camera(), &out, &Silent).unwrap();
         (folder, out, made)
     }
 
@@ -218,12 +233,13 @@ mod tests {
         let settings = Settings::read(&out).unwrap();
         assert_eq!(settings.projector.size, Some([64, 48]));
         assert_eq!(settings.projector.border, 3);
+        assert_eq!(settings.camera, camera());
         let readme = fs::read_to_string(out.join("README.md")).unwrap();
         assert!(readme.contains("64 x 48 pixels"), "{readme}");
         // What is left in braces is for the camera command.
         let words = readme.split('{').skip(1);
         for word in words {
-            assert!(word.starts_with("photo}"), "{word}");
+            assert!(word.starts_with("stem}"), "{word}");
         }
     }
 
@@ -244,7 +260,7 @@ mod tests {
         fs::write(folder.path().join("mine"), "kept").unwrap();
         let layout = layout();
         let slides = order(layout.grid(), &OrderOptions::default());
-        let error = write(&slides, &layout, folder.path(), &Silent).unwrap_err();
+        let error = write(&slides, &layout, &camera(), folder.path(), &Silent).unwrap_err();
         let taken = matches!(error, PatternsError::Folder(FolderError::Taken { .. }));
         assert!(taken, "{error}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);

@@ -68,6 +68,35 @@ impl Layout {
         self.border
     }
 
+    /// Pixels of all cells together: what a border leaves of the projector's.
+    #[must_use]
+    pub const fn inner(&self) -> FrameSize {
+        self.inner
+    }
+
+    /// A picture of [`inner`](Self::inner) with its black border, of the projector's size;
+    /// `None` if it has another size or depth.
+    #[must_use]
+    pub fn framed(&self, picture: &Picture) -> Option<Picture> {
+        let Samples::Eight(samples) = picture.samples() else {
+            return None;
+        };
+        if picture.size() != self.inner {
+            return None;
+        }
+        let channels = picture.channels();
+        let (width, border) = (self.projector.width(), usize::from(self.border));
+        let mut slide = vec![0; self.projector.pixels() * channels];
+        let lines = samples.chunks_exact(self.inner.width() * channels);
+        for (y, line) in lines.enumerate() {
+            let start = ((y + border) * width + border) * channels;
+            slide
+                .get_mut(start..start + line.len())?
+                .copy_from_slice(line);
+        }
+        Picture::new(self.projector, Samples::Eight(slide))
+    }
+
     /// The projector's picture of a picture of one pixel a cell, 8 bits, grey or
     /// RGB.
     ///

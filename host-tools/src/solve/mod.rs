@@ -18,6 +18,7 @@
 //! two_stage, brute_force    forward transport first, then its inverse
 //! forward, held_out     light from an inverse; the photographs it is judged by
 //! content_loop          what clipping makes of natural images
+//! flux                  what of a gain is the projector's, where reciprocity tells
 //! sharpen               undoes the projector's blur as well
 //! recovery              whether the paper's theorem promises anything here
 //! gain_only             what it is judged against, and what remains if it loses
@@ -50,6 +51,7 @@ mod convergence;
 mod data_term;
 mod direct;
 mod error;
+mod flux;
 mod forward;
 mod gain_only;
 mod haar;
@@ -80,6 +82,7 @@ mod two_stage;
 pub use blur::blur;
 pub use convergence::Convergence;
 pub use error::SolveError;
+pub use flux::Flux;
 pub use forward::Inverse;
 pub use gain_only::{GainOnly, gain_only};
 pub use haar::{Basis, Haar};

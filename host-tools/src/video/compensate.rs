@@ -23,6 +23,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 /// How frames are to be compensated.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -66,7 +67,7 @@ pub struct Compensator<'t, 'a> {
     table: &'t Table<'a>,
     tier: u8,
     encoding: Encoding,
-    threads: ThreadPool,
+    threads: Arc<ThreadPool>,
 }
 
 impl<'t, 'a> Compensator<'t, 'a> {
@@ -76,16 +77,20 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// [`VideoError::NoSuchTier`], or [`VideoError::Threads`] if the threads cannot
     /// be started.
     pub fn new(table: &'t Table<'a>, settings: Settings) -> Result<Self, VideoError> {
+        Self::on(table, settings, Arc::new(threads(settings.threads)?))
+    }
+
+    /// The same on threads that are there already.
+    pub(super) fn on(
+        table: &'t Table<'a>,
+        settings: Settings,
+        threads: Arc<ThreadPool>,
+    ) -> Result<Self, VideoError> {
         let top = table.top_tier();
         let tier = settings.tier.unwrap_or(top);
         if tier > top {
             return Err(VideoError::NoSuchTier { tier, top });
         }
-        let threads = ThreadPoolBuilder::new().num_threads(settings.threads);
-        let threads = threads.build().map_err(|error| VideoError::Threads {
-            threads: settings.threads,
-            reason: error.to_string(),
-        })?;
         Ok(Self {
             table,
             tier,
@@ -220,14 +225,22 @@ impl<'t, 'a> Compensator<'t, 'a> {
         let layout = Layout::new(reader.header());
         let mut engine = self.engine::<Planar, C>(work)?;
         let mut clipped = 0;
-        let frames = stream::run(reader, output, |frame| {
-            let mut planar = Planar {
-                layout,
-                frame: std::mem::take(frame),
+        let frames = stream::run(reader, output, |frames| {
+            let mut worked = || {
+                frames.work(|frame| {
+                    let mut planar = Planar {
+                        layout,
+                        frame: std::mem::take(frame),
+                    };
+                    let clipped = engine.compensate(&mut planar)?;
+                    *frame = planar.frame;
+                    Ok(clipped)
+                })
             };
-            clipped += engine.compensate(&mut planar)?;
-            *frame = planar.frame;
-            progress.advance(1);
+            while let Some(more) = worked()? {
+                clipped += more;
+                progress.advance(1);
+            }
             Ok(())
         })?;
         Ok((frames, clipped))
@@ -235,7 +248,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
 
     /// What is to be done to frames of this size and number of colours, if that is
     /// possible.
-    fn work(&self, size: FrameSize, colours: usize) -> Result<Work, VideoError> {
+    pub(super) fn work(&self, size: FrameSize, colours: usize) -> Result<Work, VideoError> {
         if colours < usize::from(self.table.channels()) {
             return Err(VideoError::GreyFrame);
         }
@@ -269,6 +282,15 @@ impl<'t, 'a> Compensator<'t, 'a> {
     }
 }
 
+/// Threads that work on the rows, 0 for one a core.
+pub(super) fn threads(threads: usize) -> Result<ThreadPool, VideoError> {
+    let builder = ThreadPoolBuilder::new().num_threads(threads);
+    builder.build().map_err(|error| VideoError::Threads {
+        threads,
+        reason: error.to_string(),
+    })
+}
+
 fn summary(work: Work, frames: u64, clipped: u64) -> Summary {
     Summary {
         size: work.size,
@@ -279,7 +301,7 @@ fn summary(work: Work, frames: u64, clipped: u64) -> Summary {
 }
 
 /// As many bytes as it takes to know what the input is, or all there are.
-fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
+pub(crate) fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
     let mut first = Vec::new();
     input
         .take(png::SIGNATURE.len() as u64)

@@ -2,6 +2,7 @@
 
 use super::png::PngError;
 use super::y4m::Y4mError;
+use iltm_runtime::image::ImageError;
 use iltm_runtime::pipeline::FrameError;
 use iltm_runtime::{FrameSize, Grid};
 use std::path::PathBuf;
@@ -64,6 +65,12 @@ pub enum VideoError {
         /// What the operating system says.
         reason: String,
     },
+    /// The bytes of a table's file are no table.
+    #[error("the table cannot be used: {0}")]
+    Table(ImageError),
+    /// The input is a picture, and what was asked for is for video.
+    #[error("the input is a still picture: it has no frames between which anything changes")]
+    Still,
     /// The runtime refuses the frame.
     #[error("the runtime refuses the frame: {0}")]
     Runtime(FrameError),
@@ -94,6 +101,8 @@ impl VideoError {
                 "Ask for a tier that `iltm inspect` lists, or for none, to use the top one."
             }
             Self::Threads { .. } => "Ask for fewer threads.",
+            Self::Table(_) => "Copy the table again, or make it anew with `iltm solve`.",
+            Self::Still => "Leave --watch and --budget away.",
             Self::Runtime(_) => {
                 "Please report this with the table and the first frame: it should never get here."
             }

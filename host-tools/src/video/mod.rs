@@ -6,6 +6,7 @@
 //! | video | [`y4m`] |
 //! | YUV to RGB and back | [`yuv`] |
 //! | frames through a table, on all cores | [`compensate`] |
+//! | a table that is replaced while a stream runs, a budget of time | [`live`], [`watch`] |
 //! | a file that is there whole or not at all | [`whole_file`] |
 //! | a moving picture made by arithmetic, to show and test with | [`test_scene`] |
 //!
@@ -33,12 +34,15 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
+pub mod live;
 mod operator_memory;
 pub mod picture;
 mod planar;
 pub mod png;
+mod sampled;
 mod stream;
 pub mod test_scene;
+pub mod watch;
 pub mod whole_file;
 pub mod y4m;
 pub mod yuv;
@@ -47,6 +51,7 @@ pub use compensate::{Compensator, Settings, Summary};
 pub use error::VideoError;
 pub use operator_memory::OperatorMemory;
 pub use picture::{Picture, Samples};
+pub use sampled::sampled_frames;
 pub use whole_file::WholeFile;
 
 /// Most pixels of a frame: twice those of 8K video. A header that says more is

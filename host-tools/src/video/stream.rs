@@ -13,15 +13,55 @@ use std::thread;
 /// Frames that go round: one with each thread, and one waiting between them.
 const FRAMES: usize = 5;
 
-/// Sends every frame of `reader` through `work` to `output`, in order; returns
-/// how many.
+/// The frames of a stream, one after the other.
+pub(super) struct Frames {
+    read: Receiver<Frame>,
+    finished: SyncSender<Frame>,
+    /// Read and not yet worked on.
+    next: Option<Frame>,
+    done: u64,
+}
+
+impl Frames {
+    /// Waits for the next frame; `false` if there is none any more.
+    pub(super) fn wait(&mut self) -> bool {
+        if self.next.is_none() {
+            self.next = self.read.recv().ok();
+        }
+        self.next.is_some()
+    }
+
+    /// Works on the next frame in place and hands it on; what `work` returns, or `None`
+    /// if there is no frame, or nobody takes any.
+    ///
+    /// # Errors
+    /// What `work` returns; the frame is not handed on then.
+    pub(super) fn work<T>(
+        &mut self,
+        work: impl FnOnce(&mut Frame) -> Result<T, VideoError>,
+    ) -> Result<Option<T>, VideoError> {
+        self.wait();
+        let Some(mut frame) = self.next.take() else {
+            return Ok(None);
+        };
+        let worked = work(&mut frame)?;
+        if self.finished.send(frame).is_err() {
+            return Ok(None);
+        }
+        self.done += 1;
+        Ok(Some(worked))
+    }
+}
+
+/// Sends the frames of `reader` through `work`, which takes them one after the other, to
+/// `output`; returns how many.
 ///
 /// # Errors
 /// What reading, `work` or writing returns. What came before it has been written.
 pub(super) fn run<R: Read + Send, W: Write + Send>(
     reader: Reader<R>,
     output: W,
-    mut work: impl FnMut(&mut Frame) -> Result<(), VideoError>,
+    work: impl FnOnce(&mut Frames) -> Result<(), VideoError>,
 ) -> Result<u64, VideoError> {
     let header = reader.header().clone();
     let (free, empty) = sync_channel(FRAMES);
@@ -34,19 +74,19 @@ pub(super) fn run<R: Read + Send, W: Write + Send>(
     thread::scope(|scope| {
         let reading = scope.spawn(move || read_all(reader, &empty, &filled));
         let writing = scope.spawn(move || write_all(output, &header, &done, &free));
-        let mut frames = 0;
-        let mut worked = Ok(());
-        for mut frame in read {
-            worked = work(&mut frame);
-            if worked.is_err() || finished.send(frame).is_err() {
-                break;
-            }
-            frames += 1;
-        }
-        drop(finished);
+        let mut frames = Frames {
+            read,
+            finished,
+            next: None,
+            done: 0,
+        };
+        let worked = work(&mut frames);
+        let count = frames.done;
+        // Both threads end when nobody is at the other end.
+        drop(frames);
         finish(writing.join())?;
         finish(reading.join())?;
-        worked.map(|()| frames)
+        worked.map(|()| count)
     })
 }
 

@@ -7,19 +7,22 @@ mod flash;
 mod gate;
 mod messages;
 pub mod mutate;
+mod pictures;
 mod session;
 mod targets;
 
 pub use flash::flash;
 pub use gate::{contents, gate};
 pub use messages::messages;
+pub use pictures::pictures;
 pub use session::{described, session};
 pub use targets::{TARGETS, Target};
 
 use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{
-    self, CalibrationRole, CaptureOptions, ListedRole, ManifestOf, Role, Settings, parse_reference,
+    self, CalibrationRole, CaptureOptions, ListedRole, ManifestOf, Role, Settings, ShotLight,
+    parse_reference,
 };
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};
@@ -119,7 +122,7 @@ pub fn mesh(bytes: &[u8]) {
     let _ = parse_mesh(bytes);
 }
 
-/// A pattern and a photograph of an otherwise plain capture.
+/// The photographs of an otherwise plain capture, and its patterns.
 pub fn photograph(bytes: &[u8]) {
     static FOLDER: OnceLock<Option<PathBuf>> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -133,7 +136,13 @@ pub fn photograph(bytes: &[u8]) {
     if let Some(folder) = folder
         && fs::write(folder.join("bytes.png"), bytes).is_ok()
     {
-        let _ = capture::read(folder, &CaptureOptions::default(), &Silent);
+        let options = CaptureOptions {
+            min_bernoulli: 0,
+            ..CaptureOptions::default()
+        };
+        let _ = capture::examine(folder, &options, &Silent);
+        // Patterns are PNG; photographs are of many formats.
+        let _ = ShotLight::read(folder, None, &Silent);
     }
 }
 

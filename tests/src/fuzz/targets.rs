@@ -48,12 +48,7 @@ pub const TARGETS: [Target; 14] = [
     target("mesh", super::mesh, || scene("dome.obj"), (0, 1)),
     target("reference", super::reference, arrays, (0, 1)),
     target("frames", super::frames, streams, (0, 1)),
-    target(
-        "photograph",
-        super::photograph,
-        || sample("patterns/020.png"),
-        (0, 1),
-    ),
+    target("photograph", super::photograph, super::pictures, (0, 1)),
 ];
 
 const fn target(

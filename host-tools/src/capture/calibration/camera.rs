@@ -86,6 +86,14 @@ impl CameraFit {
         })
     }
 
+    /// Once the photographs are read with the best response, that is the declared
+    /// one.
+    pub(in crate::capture) fn adopted(mut self) -> Self {
+        self.declared = self.best.clone();
+        self.declared_misfit = self.best_misfit;
+        self
+    }
+
     /// Whether the photographs tell one response from another at all: pixels that
     /// are only black or white add up with any.
     #[must_use]

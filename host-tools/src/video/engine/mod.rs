@@ -71,6 +71,12 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
         })
     }
 
+    /// The same as [`compensate`](Self::compensate) at another tier, from now on.
+    pub(super) fn compensate_at(&mut self, tier: u8, frame: &mut P) -> Result<u64, VideoError> {
+        self.work.tier = tier;
+        self.compensate(frame)
+    }
+
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate(&mut self, frame: &mut P) -> Result<u64, VideoError> {
         let clipped = match &mut self.path {

@@ -2,6 +2,7 @@
 
 mod exactness;
 mod kinds;
+mod live;
 mod reference;
 mod sample_table;
 mod streams;

@@ -1,0 +1,277 @@
+//! `iltm verify`
+
+use super::args::Verify;
+use super::failure::{Failure, Kind};
+use super::inspect::check;
+use super::output::{Output, read_file, write_file};
+use super::progress::progress;
+use super::simulate::unwritten;
+use super::{compensate, failure};
+use crate::learn::settings_in;
+use crate::progress::Progress;
+use crate::session::Layout;
+use crate::verify::{
+    ImageVerdict, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
+    test_images, write,
+};
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+pub(super) fn run(arguments: &Verify, output: &Output) -> Result<(), Failure> {
+    let image = read_file(&arguments.table)?;
+    let table = check(&arguments.table, &image)?;
+    let bars = progress(output);
+    let result = match (&arguments.output, &arguments.capture) {
+        (Some(out), _) => prepare(arguments, &table, out, bars.as_ref(), output),
+        (None, Some(folder)) => verdict(arguments, &table, folder, bars.as_ref(), output),
+        // clap asks for one of the two.
+        (None, None) => Ok(()),
+    };
+    bars.end();
+    result
+}
+
+/// Writes the pictures to project.
+fn prepare(
+    arguments: &Verify,
+    table: &Table<'_>,
+    out: &Path,
+    bars: &dyn Progress,
+    output: &Output,
+) -> Result<(), Failure> {
+    let settings = settings_in(table.provenance()).unwrap_or_default();
+    let own = settings.projector.size;
+    let projector = arguments
+        .projector
+        .or_else(|| own.and_then(|[width, height]| FrameSize::new(width, height)))
+        .or_else(|| FrameSize::new(1920, 1080));
+    let Some(projector) = projector else {
+        unreachable!("sides above zero");
+    };
+    let border = arguments.border.unwrap_or(settings.projector.border);
+    let layout = Layout::new(table.grid(), projector, border)
+        .map_err(|error| failed(VerifyError::Slides(error)))?;
+    let written = write(table, &layout, &settings, out, bars).map_err(failed)?;
+    bars.end();
+    let data = json!({
+        "folder": out.display().to_string(),
+        "pictures": written.pictures,
+        "images": written.images.iter().map(|image| json!({
+            "title": image.title,
+            "clipped": image.clipped,
+        })).collect::<Vec<_>>(),
+        "projector": size(layout.projector()),
+        "border": layout.border(),
+    });
+    let text = format!(
+        "{}: {} pictures to project and photograph ({} test images, each as it is and compensated;\n\
+         white, black and patterns that find the cells). README.md in it says how. Then:\n\
+         iltm verify {} {}\n",
+        out.display(),
+        written.pictures,
+        written.images.len(),
+        arguments.table.display(),
+        out.display(),
+    );
+    output.result(&data, &text);
+    Ok(())
+}
+
+fn size(size: FrameSize) -> Value {
+    json!({ "width": size.width(), "height": size.height() })
+}
+
+/// Judges the photographs of a folder.
+fn verdict(
+    arguments: &Verify,
+    table: &Table<'_>,
+    folder: &Path,
+    bars: &dyn Progress,
+    output: &Output,
+) -> Result<(), Failure> {
+    let session = Session::read(folder, table, bars).map_err(failed)?;
+    let verdict = judge(folder, table, &session, arguments.bound).map_err(failed)?;
+    let images = test_images(table).map_err(|error| compensate::failed(&error))?;
+    let out = arguments
+        .report
+        .clone()
+        .unwrap_or_else(|| folder.join("verdict"));
+    let page = report(table, &session, &verdict, &images, &out)?;
+    bars.end();
+    let data = data(arguments, folder, &verdict, &images, &page);
+    let text = text(&verdict, &images, &page);
+    if verdict.passed {
+        output.result(&data, &text);
+        return Ok(());
+    }
+    output.people(&text);
+    let message = format!(
+        "{} does not keep its promise: error {:.4}, at most {:.4} passes",
+        arguments.table.display(),
+        verdict.error[1],
+        verdict.bound.limit
+    );
+    let next_step = format!(
+        "{} Look at {}, then photograph and solve again, or choose a larger --bound.",
+        reason(&verdict),
+        page.display()
+    );
+    Err(Failure::new(Kind::Verdict, message, next_step).with_result(data))
+}
+
+/// Writes the page and its pictures; the page.
+fn report(
+    table: &Table<'_>,
+    session: &Session,
+    verdict: &Verdict,
+    images: &[TestImage],
+    out: &Path,
+) -> Result<PathBuf, Failure> {
+    std::fs::create_dir_all(out).map_err(|error| super::output::cannot_write(out, &error))?;
+    let files = pictures(table, session, verdict);
+    for file in &files {
+        write_file(&out.join(&file.name).with_extension("png"), &file.png)?;
+    }
+    let page = out.join("verdict.html");
+    write_file(&page, html(table, verdict, images, &files).as_bytes())?;
+    Ok(page)
+}
+
+fn failed(error: VerifyError) -> Failure {
+    let next_step = error.next_step();
+    let kind = match &error {
+        VerifyError::Folder(_) => {
+            let VerifyError::Folder(error) = error else {
+                unreachable!("just matched");
+            };
+            return unwritten(error);
+        }
+        VerifyError::Video(error) => return compensate::failed(error),
+        VerifyError::Slides(_) => Kind::Usage,
+        VerifyError::Capture(error) => failure::kind_of(error),
+        VerifyError::NoManifest { .. } => Kind::Read,
+        VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,
+        VerifyError::OtherTable { .. } | VerifyError::Grid { .. } => Kind::Verdict,
+        VerifyError::Missing { .. }
+        | VerifyError::Unpaired { .. }
+        | VerifyError::NoImages { .. }
+        | VerifyError::Picture { .. }
+        | VerifyError::Channels { .. } => Kind::Capture,
+    };
+    Failure::new(kind, error, next_step)
+}
+
+fn title<'i>(images: &'i [TestImage], image: &ImageVerdict) -> &'i str {
+    let test = images.get(usize::from(image.image));
+    test.map_or("test image", |test| test.title.as_str())
+}
+
+fn data(
+    arguments: &Verify,
+    folder: &Path,
+    verdict: &Verdict,
+    images: &[TestImage],
+    page: &Path,
+) -> Value {
+    let bound = &verdict.bound;
+    let of_image = |image: &ImageVerdict| {
+        json!({
+            "image": image.image,
+            "title": title(images, image),
+            "before": image.error[0],
+            "after": image.error[1],
+            "modelled_before": image.modelled[0],
+            "modelled_after": image.modelled[1],
+            "after_at_table_white": image.at_table_white,
+            "white": image.white,
+            "clipped": images.get(usize::from(image.image)).map(|test| test.clipped),
+        })
+    };
+    let worst = verdict
+        .worst
+        .iter()
+        .map(|cell| json!({ "row": cell.row, "col": cell.col, "error": cell.error }));
+    json!({
+        "table": arguments.table.display().to_string(),
+        "capture": folder.display().to_string(),
+        "passed": verdict.passed,
+        "mean_error": { "before": verdict.error[0], "after": verdict.error[1] },
+        "bound": {
+            "limit": bound.limit,
+            "given": bound.given,
+            "expected": bound.expected,
+            "predicted": bound.predicted,
+            "range": bound.range,
+            "noise": bound.noise,
+        },
+        "images": verdict.images.iter().map(of_image).collect::<Vec<_>>(),
+        "drift": {
+            "level": verdict.drift.level,
+            "shape": verdict.drift.shape,
+            "session": verdict.drift.session,
+        },
+        "worst_cells": worst.collect::<Vec<_>>(),
+        "cells": { "compared": verdict.cells.0, "known": verdict.cells.1 },
+        "page": page.display().to_string(),
+        "map": page.with_file_name("worst-cells.png").display().to_string(),
+    })
+}
+
+fn text(verdict: &Verdict, images: &[TestImage], page: &Path) -> String {
+    let mut text = String::new();
+    let _ = writeln!(text, "test image            before    after");
+    for image in &verdict.images {
+        let title = title(images, image);
+        let [before, after] = image.error;
+        let _ = writeln!(text, "{title:20}  {before:.4}    {after:.4}");
+    }
+    let [before, after] = verdict.error;
+    let _ = writeln!(text, "{:20}  {before:.4}    {after:.4}", "mean");
+    let bound = &verdict.bound;
+    let known =
+        |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |v| format!("{v:.4}"));
+    let why = match (bound.given, bound.expected) {
+        (true, _) => "as asked for".to_owned(),
+        (false, None) => "half of the error before: the table predicts none".to_owned(),
+        (false, Some(expected)) => format!(
+            "1.5 times the {expected:.4} expected: table {}, range and codes {:.4}, noise {}",
+            known(bound.predicted),
+            bound.range,
+            known(bound.noise)
+        ),
+    };
+    let _ = writeln!(text, "bound       {:.4} ({why})", bound.limit);
+    let _ = writeln!(
+        text,
+        "cells       {} of {} compared",
+        verdict.cells.0, verdict.cells.1
+    );
+    let drift = &verdict.drift;
+    let levels: Vec<String> = drift
+        .level
+        .iter()
+        .map(|level| format!("{:.1} %", 100.0 * level))
+        .collect();
+    let _ = writeln!(
+        text,
+        "drift       white is {} of what the table expects, {:.2} % off that from cell to cell",
+        levels.join(", "),
+        100.0 * drift.shape
+    );
+    if let Some(worst) = verdict.worst.first() {
+        let _ = writeln!(
+            text,
+            "worst cell  row {}, column {}: {:.2} % of white",
+            worst.row,
+            worst.col,
+            100.0 * worst.error
+        );
+    }
+    let _ = writeln!(text, "page        {}", page.display());
+    let answer = if verdict.passed { "PASSED" } else { "FAILED" };
+    let _ = writeln!(text, "verdict     {answer}: {}", reason(verdict));
+    text
+}

@@ -1,0 +1,156 @@
+//! The light that a table expects of any projector input, cell by cell.
+//!
+//! The pipeline read backwards, as `report/predict.rs` reads it at full resolution: it
+//! makes `p = g d' - K d'` of the wanted light `d' = d - a`, so the light that an input
+//! `p` makes is the `l` with `l = (p + K l) / g`, which iterating it converges to.
+
+use crate::capture::CellPlanes;
+use crate::video::OperatorMemory;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::stages::correct;
+use iltm_runtime::units::{CORRECTION_GUARD_BITS, Correction, Light};
+
+/// Bounces after which the rest is below rounding for any scene that reflects less than
+/// 97 % of what it receives.
+const MOST_BOUNCES: usize = 400;
+
+/// A cell's light that changes less than this between two bounces, relative to the
+/// brightest cell's, has settled: less than what the runtime rounds to.
+const SETTLED: f64 = 2e-5;
+
+/// The scene as a table has it.
+#[derive(Debug)]
+pub struct Expected<'t, 'a> {
+    table: &'t Table<'a>,
+    memory: OperatorMemory,
+    /// `g`, drive per reference light, one entry a channel; 0 where a cell took no part.
+    gain: CellPlanes,
+    /// `a`, relative to reference white.
+    ambient: CellPlanes,
+}
+
+impl<'t, 'a> Expected<'t, 'a> {
+    /// The scene of `table`.
+    #[must_use]
+    pub fn new(table: &'t Table<'a>) -> Self {
+        let channels = || 0..usize::from(table.channels());
+        let rows = || 0..table.grid().rows();
+        let unit = f64::from(table.gain_fraction()).exp2();
+        let gain = |channel| {
+            let bits = rows().flat_map(|row| table.gain_row(row, channel));
+            bits.map(|gain| f64::from(gain) / unit).collect()
+        };
+        let ambient = |channel| {
+            let own = rows().map(|row| table.ambient_row(row, channel));
+            let light: Vec<f64> = own.flatten().flatten().map(Light::to_num).collect();
+            if light.is_empty() {
+                vec![0.0; table.grid().cells()]
+            } else {
+                light
+            }
+        };
+        Self {
+            table,
+            memory: OperatorMemory::new(table),
+            gain: channels().map(gain).collect(),
+            ambient: channels().map(ambient).collect(),
+        }
+    }
+
+    /// Whether each cell has a gain in every channel, length `N`.
+    #[must_use]
+    pub fn live(&self) -> Vec<bool> {
+        let cells = 0..self.table.grid().cells();
+        let live = |cell| self.gain.iter().all(|gain: &Vec<f64>| gain[cell] > 0.0);
+        cells.map(live).collect()
+    }
+
+    /// The brightest even grey that every cell reaches, relative to reference white: 1 unless
+    /// reference white was chosen otherwise.
+    #[must_use]
+    pub fn even_grey(&mut self) -> f64 {
+        let cells = self.table.grid().cells();
+        let bounced = self.received(&vec![vec![1.0; cells]; self.gain.len()]);
+        let slopes = self.gain.iter().flatten().zip(bounced.iter().flatten());
+        // Where nothing is projected, nothing is asked for.
+        let lit = slopes.filter(|(gain, _)| **gain > 0.0);
+        let steepest = lit
+            .map(|(gain, bounced)| gain - bounced)
+            .fold(0.0, f64::max);
+        if steepest > 0.0 { 1.0 / steepest } else { 1.0 }
+    }
+
+    /// Light under black, relative to reference white.
+    #[must_use]
+    pub const fn ambient(&self) -> &CellPlanes {
+        &self.ambient
+    }
+
+    /// The light of every cell, ambient light included, relative to reference white, of an
+    /// input relative to the projector's white; both one entry a channel.
+    #[must_use]
+    pub fn photograph(&mut self, input: &CellPlanes) -> CellPlanes {
+        let mut light = self.reflect(input, None);
+        for _ in 0..MOST_BOUNCES {
+            let received = self.received(&light);
+            let next = self.reflect(input, Some(&received));
+            let brightest = next.iter().flatten().fold(0.0_f64, |a, b| a.max(*b));
+            let pairs = next.iter().flatten().zip(light.iter().flatten());
+            let change = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            light = next;
+            if change <= SETTLED * brightest {
+                break;
+            }
+        }
+        for (light, ambient) in light.iter_mut().zip(&self.ambient) {
+            light.iter_mut().zip(ambient).for_each(|(l, a)| *l += a);
+        }
+        light
+    }
+
+    /// `(p + K l) / g`; dark where the table knows nothing.
+    fn reflect(&self, input: &CellPlanes, received: Option<&CellPlanes>) -> CellPlanes {
+        let channels = self.gain.iter().zip(input).enumerate();
+        let of_channel = |(channel, (gain, input)): (usize, (&Vec<f64>, &Vec<f64>))| {
+            let cells = gain.iter().zip(input).enumerate();
+            let light = cells.map(|(cell, (gain, input))| {
+                let received = received.map_or(0.0, |received| received[channel][cell]);
+                if *gain > 0.0 {
+                    ((input + received) / gain).max(0.0)
+                } else {
+                    0.0
+                }
+            });
+            light.collect()
+        };
+        channels.map(of_channel).collect()
+    }
+
+    /// `K l`, by the runtime's own operator at the table's top tier.
+    fn received(&mut self, light: &CellPlanes) -> CellPlanes {
+        let brightest = light.iter().flatten().fold(0.0_f64, |a, b| a.max(*b));
+        if brightest <= 0.0 {
+            return light.clone();
+        }
+        // The operator is linear, and its input ends at 1.
+        let one = f64::from(Light::ONE.to_bits());
+        let bits = |light: &f64| (light / brightest * one).round() as i32;
+        let mut cells: Vec<i32> = light.iter().flatten().map(bits).collect();
+        let top = self.table.top_tier();
+        if correct(self.table, top, &mut cells, &mut self.memory.workspace()).is_err() {
+            unreachable!("the memory was sized for this table");
+        }
+        // What `correct` returns is half a step of a drive too large.
+        let half = if self.table.operator().is_some() && top > 0 {
+            1 << (CORRECTION_GUARD_BITS - 1)
+        } else {
+            0
+        };
+        let unit = brightest / f64::from(Correction::FRAC_NBITS).exp2();
+        let count = self.table.grid().cells();
+        let channels = cells.chunks_exact(count);
+        channels
+            .map(|cells| cells.iter().map(|c| f64::from(c - half) * unit).collect())
+            .collect()
+    }
+}

@@ -1,0 +1,126 @@
+//! The pictures of a verdict: maps of the cells, and the test images as the wall showed
+//! them.
+
+use super::judge::{ImageVerdict, over_images};
+use super::{Session, Verdict};
+use crate::capture::CellPlanes;
+use crate::report::{ColourScale, LightPicture, Palette, PictureFile, picture_file};
+use crate::video::{Picture, Samples};
+use iltm_runtime::image::Table;
+use iltm_runtime::{FrameSize, Grid};
+
+/// Pixels that the longer side of a map should have at least.
+const MAP_SIDE: usize = 480;
+
+/// Grey of cells that were not compared.
+const UNKNOWN: [u8; 3] = [88, 92, 100];
+
+/// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `drift`, and
+/// of each test image `K-wanted`, `K-before`, `K-after`.
+#[must_use]
+pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<PictureFile> {
+    let grid = table.grid();
+    let errors = |half| {
+        map(
+            grid,
+            &error_scale(verdict, half),
+            &over_images(&verdict.images, half),
+        )
+    };
+    let drift = drift_scale(verdict);
+    let drifts: Vec<Option<f64>> = verdict
+        .drift
+        .cells
+        .iter()
+        .map(|c| c.map(f64::abs))
+        .collect();
+    let mut files = vec![
+        picture_file("worst-cells", &errors(1)),
+        picture_file("worst-cells-before", &errors(0)),
+        picture_file("drift", &map(grid, &drift, &drifts)),
+    ];
+    for (shown, image) in session.shown.iter().zip(&verdict.images) {
+        let number = image.image;
+        let wall = |half: usize| as_seen(grid, &shown.seen[half], image, &session.live);
+        files.push(picture_file(
+            &format!("{number}-wanted"),
+            &lit(grid, &shown.wanted),
+        ));
+        files.push(picture_file(&format!("{number}-before"), &wall(0)));
+        files.push(picture_file(&format!("{number}-after"), &wall(1)));
+    }
+    files
+}
+
+/// Colours of the map of errors with (1) or without (0) compensation: each has its own, or
+/// nothing would be seen of what is left.
+pub(super) fn error_scale(verdict: &Verdict, half: usize) -> ColourScale {
+    let errors = over_images(&verdict.images, half).into_iter().flatten();
+    ColourScale::linear(Palette::Magma, rounded(errors.fold(0.0, f64::max)))
+}
+
+/// Colours of the map of changes.
+pub(super) fn drift_scale(verdict: &Verdict) -> ColourScale {
+    let cells = verdict.drift.cells.iter().flatten();
+    let largest = cells.fold(0.0_f64, |a, b| a.max(b.abs()));
+    ColourScale::linear(Palette::Viridis, rounded(largest.max(0.01)))
+}
+
+/// The next number up with one digit.
+fn rounded(value: f64) -> f64 {
+    let value = value.max(1e-3);
+    let power = 10_f64.powf(value.log10().floor());
+    (value / power).ceil() * power
+}
+
+fn map(grid: Grid, scale: &ColourScale, cells: &[Option<f64>]) -> Picture {
+    let colour = |cell: &Option<f64>| cell.map_or(UNKNOWN, |value| scale.colour(value));
+    blocks(grid, 3, &cells.iter().flat_map(colour).collect::<Vec<u8>>())
+}
+
+/// A photograph's cells at the brightness that suits the compensated one best, so that
+/// both are as bright as they were beside each other.
+fn as_seen(grid: Grid, seen: &CellPlanes, image: &ImageVerdict, live: &[bool]) -> Picture {
+    let light = |plane: &Vec<f64>| {
+        let cells = plane.iter().zip(live);
+        let relative = cells.map(|(light, live)| {
+            if *live {
+                light / image.white.max(1e-12)
+            } else {
+                0.0
+            }
+        });
+        relative.collect()
+    };
+    lit(grid, &seen.iter().map(light).collect())
+}
+
+/// Light of the cells as a screen shows it.
+fn lit(grid: Grid, light: &CellPlanes) -> Picture {
+    let plane = |plane: &Vec<f64>| plane.iter().map(|light| *light as f32).collect();
+    let planes = light.iter().map(plane).collect();
+    let Some(picture) = LightPicture::new(FrameSize::of_grid(grid), planes) else {
+        unreachable!("one or three values for each cell");
+    };
+    let shown = picture.for_display();
+    match shown.samples() {
+        Samples::Eight(samples) => blocks(grid, shown.channels(), samples),
+        Samples::Sixteen(_) => unreachable!("screens get 8 bits"),
+    }
+}
+
+/// Cells as squares of pixels.
+fn blocks(grid: Grid, channels: usize, samples: &[u8]) -> Picture {
+    let side = MAP_SIDE.div_ceil(grid.rows().max(grid.cols()));
+    let (width, height) = (grid.cols() * side, grid.rows() * side);
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y / side, x / side)));
+    let all = pixels.flat_map(|(row, col)| {
+        let at = (row * grid.cols() + col) * channels;
+        samples[at..at + channels].iter().copied()
+    });
+    let size = FrameSize::new(width as u16, height as u16);
+    match size.and_then(|size| Picture::new(size, Samples::Eight(all.collect()))) {
+        Some(picture) => picture,
+        None => unreachable!("squares of the cells' samples"),
+    }
+}

@@ -1,0 +1,196 @@
+//! Verdicts of `iltm verify` against the truth: the same pictures projected onto the
+//! simulated scene and measured without a camera's noise, in the cells that the table was
+//! learned in.
+
+use iltm::capture::{CaptureOptions, NO_CELL, Registration, Settings, shown};
+use iltm::learn::{Learned, learn};
+use iltm::progress::Silent;
+use iltm::scene::description::Scene;
+use iltm::scene::retake;
+use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
+use iltm::session::Layout;
+use iltm::solve::SolveOptions;
+use iltm::verify::{Session, Verdict, VerifyError, judge, write};
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use nalgebra::DMatrix;
+use std::path::Path;
+
+/// The M-shaped panels as they come with the tools, with some words replaced.
+fn scene(replaced: &[(&str, &str)]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/scenes/m-panels.toml");
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    for (from, to) in replaced {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    Scene::parse(text.as_bytes(), &path).unwrap()
+}
+
+/// A table learned from simulated photographs, and what was learned.
+fn learned(scene: &Scene, place: &Path) -> Learned {
+    let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
+    let capture = place.join("capture");
+    let shooting = Shooting::new(scene, &simulation, 3).unwrap();
+    let patterns = shown(simulation.grid(), 100, 3);
+    folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
+    learn(&capture, &photographs, &solve, None, &Silent).unwrap()
+}
+
+/// A folder to verify `learned` with, photographed in `scene`.
+fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
+    let table = Table::check(&learned.compiled.image).unwrap();
+    let projector = FrameSize::new(320, 200).unwrap();
+    let layout = Layout::new(table.grid(), projector, 4).unwrap();
+    let settings = Settings {
+        camera: learned.measurements.settings.camera.clone(),
+        ..Settings::default()
+    };
+    write(&table, &layout, &settings, folder, &Silent).unwrap();
+    let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
+    let shooting = Shooting::new(scene, &simulation, 11).unwrap();
+    let session = retake::Session::read(folder, simulation.grid()).unwrap();
+    session.take_missing(&shooting, &Silent).unwrap();
+}
+
+fn verdict(learned: &Learned, folder: &Path) -> Result<Verdict, VerifyError> {
+    let table = Table::check(&learned.compiled.image).unwrap();
+    let session = Session::read(folder, &table, &Silent)?;
+    judge(folder, &table, &session, None)
+}
+
+/// Mean errors of plain and compensated pictures on the wall, without noise.
+fn truth(learned: &Learned, scene: &Scene, folder: &Path) -> [f64; 2] {
+    let table = Table::check(&learned.compiled.image).unwrap();
+    let session = Session::read(folder, &table, &Silent).unwrap();
+    let quiet = SimulationOptions {
+        forced: Forced::default().with(Effect::Noise, false),
+        threshold: None,
+    };
+    let simulation = Simulation::new(scene, &quiet, &Silent).unwrap();
+    [0, 1].map(|half| {
+        let inputs: Vec<&Vec<f64>> = session.shown.iter().map(|s| &s.input[half][0]).collect();
+        let inputs = DMatrix::from_fn(inputs[0].len(), inputs.len(), |cell, k| inputs[k][cell]);
+        let exposed = simulation.expose(&inputs).unwrap();
+        let errors = session.shown.iter().enumerate().map(|(k, shown)| {
+            let plane = &simulation.photograph(&exposed, k)[0];
+            let seen = cell_means(&learned.measurements.registration, plane, inputs.nrows());
+            error(&seen, &shown.wanted[0], &session.live)
+        });
+        errors.sum::<f64>() / session.shown.len() as f64
+    })
+}
+
+fn cell_means(registration: &Registration, plane: &[f32], cells: usize) -> Vec<f64> {
+    let (mut sums, mut counts) = (vec![0.0; cells], vec![0.0; cells]);
+    let pixels = registration.cell_of_pixel.iter().enumerate();
+    for (pixel, cell) in pixels.filter(|(_, cell)| **cell != NO_CELL) {
+        sums[*cell as usize] += f64::from(plane[pixel]);
+        counts[*cell as usize] += 1.0;
+    }
+    let mean = |(sum, count): (f64, &f64)| sum / f64::max(*count, 1.0);
+    sums.into_iter().zip(&counts).map(mean).collect()
+}
+
+/// `min_t |t seen - wanted| / |wanted|`.
+fn error(seen: &[f64], wanted: &[f64], live: &[bool]) -> f64 {
+    let pairs = || seen.iter().zip(wanted).zip(live).filter(|(_, live)| **live);
+    let dot = |f: fn(f64, f64) -> f64| pairs().map(|((s, w), _)| f(*s, *w)).sum::<f64>();
+    let scale = dot(|s, w| s * w) / dot(|s, _| s * s);
+    let off: f64 = pairs().map(|((s, w), _)| (scale * s - w).powi(2)).sum();
+    (off / dot(|_, w| w * w)).sqrt()
+}
+
+#[test]
+fn a_good_table_passes_with_the_errors_that_are_really_there_wherever_the_camera_stands() {
+    let place = tempfile::tempdir().unwrap();
+    let original = scene(&[]);
+    let learned = learned(&original, place.path());
+    let moved = scene(&[
+        ("position = [0.6, 0.3, 9.0]", "position = [-0.2, 0.6, 8.6]"),
+        ("field_of_view = 27.0", "field_of_view = 29.0"),
+    ]);
+    for (name, scene) in [("same", &original), ("moved", &moved)] {
+        let folder = place.path().join(name);
+        photographed(&learned, scene, &folder);
+        let verdict = verdict(&learned, &folder).unwrap();
+        let truth = truth(&learned, &original, &folder);
+        println!(
+            "{name}: verdict {:?}, truth {truth:?}, bound {:?}, drift {:?} {:?}",
+            verdict.error, verdict.bound, verdict.drift.level, verdict.drift.shape
+        );
+        assert!(verdict.passed, "{name}");
+        assert!(
+            verdict.cells.0 * 100 >= verdict.cells.1 * 95,
+            "{:?}",
+            verdict.cells
+        );
+        assert!((verdict.error[0] / truth[0] - 1.0).abs() < 0.05, "{name}");
+        // The photographs' noise comes on top of the compensated pictures' small error.
+        let noise = verdict.bound.noise.unwrap();
+        let both = truth[1].hypot(noise);
+        assert!(
+            (verdict.error[1] / both - 1.0).abs() < 0.35,
+            "{name}: {both}"
+        );
+        assert!(verdict.error[1] < 0.1 * verdict.error[0], "{name}");
+        // What the table makes of its own pictures without compensation is no guess.
+        let modelled: f64 = verdict.images.iter().map(|image| image.modelled[0]).sum();
+        let modelled = modelled / verdict.images.len() as f64;
+        assert!(
+            (modelled / verdict.error[0] - 1.0).abs() < 0.05,
+            "{modelled}"
+        );
+        assert!(verdict.drift.shape < 0.02, "{:?}", verdict.drift.shape);
+    }
+}
+
+#[test]
+fn a_table_of_another_scene_fails_and_white_says_that_the_scene_is_another() {
+    let place = tempfile::tempdir().unwrap();
+    let learned = learned(&scene(&[]), place.path());
+    // The inner panels were painted, and the outer ones are not.
+    let painted = scene(&[(
+        "name = \"left inner\"\ncorners = [[-1, 1.25, -1], [0, 1.25, 0], [0, -1.25, 0], [-1, -1.25, -1]]\nalbedo = 0.8",
+        "name = \"left inner\"\ncorners = [[-1, 1.25, -1], [0, 1.25, 0], [0, -1.25, 0], [-1, -1.25, -1]]\nalbedo = 0.5",
+    )]);
+    let folder = place.path().join("other");
+    photographed(&learned, &painted, &folder);
+    let verdict = verdict(&learned, &folder).unwrap();
+    assert!(!verdict.passed, "{:?} {:?}", verdict.error, verdict.bound);
+    assert!(verdict.drift.shape > 0.1, "{:?}", verdict.drift);
+    // The worst cells are on the panel that was painted, or on the one that it lights:
+    // columns 5 to 15 of 21 are the inner two.
+    assert!(
+        (4..=16).contains(&verdict.worst[0].col),
+        "{:?}",
+        verdict.worst
+    );
+}
+
+#[test]
+fn exchanged_photographs_are_named_and_missing_ones_listed() {
+    let place = tempfile::tempdir().unwrap();
+    let original = scene(&[]);
+    let learned = learned(&original, place.path());
+    let folder = place.path().join("folder");
+    photographed(&learned, &original, &folder);
+    let photo = |index: usize| folder.join("photos").join(format!("{index:03}.png"));
+    // White and black, the Gray code, random patterns, white and black again.
+    let first = 2 + 2 * (4 + 5) + 32 + 2;
+    std::fs::rename(photo(first), photo(900)).unwrap();
+    std::fs::rename(photo(first + 3), photo(first)).unwrap();
+    std::fs::rename(photo(900), photo(first + 3)).unwrap();
+    let error = verdict(&learned, &folder).unwrap_err();
+    assert!(matches!(error, VerifyError::Order { .. }), "{error}");
+    assert!(error.to_string().contains("plain-0"), "{error}");
+    std::fs::remove_file(photo(3)).unwrap();
+    std::fs::remove_file(photo(first)).unwrap();
+    let error = verdict(&learned, &folder).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("003.png") && text.contains(&format!("{first:03}.png")),
+        "{text}"
+    );
+}
