@@ -120,8 +120,12 @@ pub fn bounces(
     progress: &dyn Progress,
 ) -> Result<Bounces, BouncesError> {
     // An index that is not there is known before the work, not after it.
-    let photograph = ShotLight::read(folder, options.photograph, progress)?;
+    let mut photograph = ShotLight::read(folder, options.photograph, progress)?;
     let measurements = capture::read(folder, &options.capture, progress)?;
+    let devices = &measurements.devices;
+    if devices.change_light(&measurements.settings) {
+        photograph = ShotLight::read_as(folder, options.photograph, devices, progress)?;
+    }
     let (inverse, report) = solved(&measurements, &options.solve, progress)?;
     let channels = photograph.planes.len();
     let size = photograph.size;

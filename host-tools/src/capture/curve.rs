@@ -269,11 +269,11 @@ mod tests {
     }
 
     #[test]
-    fn seventeen_points_of_a_projectors_curve_give_it_back_within_a_quarter_of_a_step() {
+    fn seventeen_points_of_a_projectors_curve_give_it_back_within_half_a_step() {
         for response in [Response::Srgb, Response::Gamma(2.2), Response::Linear] {
             let curve = Curve::new(&sampled(response, 17)).unwrap();
             let steps = DeviceResponse::from(response).steps_from(&DeviceResponse::Measured(curve));
-            assert!(steps < 0.25, "{response}: {steps}");
+            assert!(steps < 0.5, "{response}: {steps}");
         }
     }
 

@@ -14,7 +14,7 @@ pub enum FileFormat {
     Jpeg,
     /// OpenEXR, floating point, linear by definition.
     OpenExr,
-    /// PGM or PPM (netpbm), 8 or 16 bit, of any full scale.
+    /// PGM, PPM or PAM (netpbm), 8 or 16 bit, of any full scale.
     Netpbm,
 }
 
@@ -46,7 +46,7 @@ impl FileFormat {
             [0x76, 0x2f, 0x31, 0x01, ..] => Some(Self::OpenExr),
             [
                 b'P',
-                b'2' | b'3' | b'5' | b'6',
+                b'2' | b'3' | b'5' | b'6' | b'7',
                 b' ' | b'\t' | b'\r' | b'\n' | b'#',
                 ..,
             ] => Some(Self::Netpbm),

@@ -3,7 +3,7 @@
 
 use super::find;
 use super::photographs::Photographs;
-use super::{CaptureError, MANIFEST_FILE, Manifest, Role, Settings, Shot};
+use super::{CaptureError, Devices, MANIFEST_FILE, Manifest, Role, Settings, Shot};
 use crate::progress::Progress;
 use std::path::Path;
 
@@ -39,6 +39,30 @@ impl ShotLight {
         index: Option<u32>,
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
+        Self::read_by(folder, index, None, progress)
+    }
+
+    /// The same in the light that measured `devices` say: with the camera's measured
+    /// response, and of the projector's channels where the camera mixes them. That is
+    /// the light that an inverse of the capture means.
+    ///
+    /// # Errors
+    /// Those of [`ShotLight::read`].
+    pub fn read_as(
+        folder: &Path,
+        index: Option<u32>,
+        devices: &Devices,
+        progress: &dyn Progress,
+    ) -> Result<Self, CaptureError> {
+        Self::read_by(folder, index, Some(devices), progress)
+    }
+
+    fn read_by(
+        folder: &Path,
+        index: Option<u32>,
+        devices: Option<&Devices>,
+        progress: &dyn Progress,
+    ) -> Result<Self, CaptureError> {
         let mut shots = Manifest::read(folder)?.shots;
         let settings = Settings::read(folder)?;
         let chosen = choose(&shots, index, &folder.join(MANIFEST_FILE))?;
@@ -48,7 +72,14 @@ impl ShotLight {
             let path = folder.join(MANIFEST_FILE);
             return Err(CaptureError::NoBlack { path });
         }
-        let mut photographs = Photographs::new(folder, &shots, &settings.camera.reading())?;
+        let mut reading = settings.camera.reading();
+        if let Some(devices) = devices {
+            reading.response = devices.camera.clone();
+        }
+        let mut photographs = Photographs::new(folder, &shots, &reading)?;
+        if let Some(unmix) = devices.and_then(Devices::unmix) {
+            photographs.unmix(unmix);
+        }
         let count = (chosen.len() + black.len()) as u64;
         progress.begin("reading the photograph", count);
         let (black_light, _) = photographs.mean(&black, progress)?;

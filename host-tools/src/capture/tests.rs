@@ -389,5 +389,5 @@ fn every_step_that_begins_also_ends_and_reaches_its_total() {
     }
     let log = Log::default();
     read(capture(|_, _| {}).path(), &CaptureOptions::default(), &log).unwrap();
-    assert_eq!(log.0.into_inner().unwrap().len(), 4);
+    assert_eq!(log.0.into_inner().unwrap().len(), 6);
 }

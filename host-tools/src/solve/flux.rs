@@ -15,8 +15,8 @@ pub struct Flux {
     /// One a cell, `rows x cols`; `None` for a cell that exchanges no light with
     /// others, or is not live.
     pub cells: Vec<Option<f64>>,
-    /// How far pairs of cells are from agreeing with it: the median of
-    /// `|log(flux_i K_ij / (flux_j K_ji))|` over the strongest pairs.
+    /// How far pairs of cells are from agreeing with it: the root mean square of
+    /// `log(flux_i K_ij / (flux_j K_ji))` over the strongest pairs.
     pub misfit: f64,
     /// The same if all fluxes were equal.
     pub misfit_if_even: f64,
@@ -67,8 +67,8 @@ impl Flux {
         let spread = |log: &dyn Fn(usize) -> f64| {
             let off = pairs
                 .iter()
-                .map(|&(i, j, ratio, _)| (ratio - log(j) + log(i)).abs());
-            median(off.collect())
+                .map(|&(i, j, ratio, _)| (ratio - log(j) + log(i)).powi(2));
+            (off.sum::<f64>() / pairs.len() as f64).sqrt()
         };
         let (misfit, misfit_if_even) = (spread(&|cell| logs[cell]), spread(&|_| 0.0));
         if misfit > BETTER * misfit_if_even {
@@ -111,11 +111,6 @@ fn solve(cells: usize, pairs: &[(usize, usize, f64, f64)]) -> Option<DVector<f64
         wanted[i] -= weight * ratio;
     }
     Some(Cholesky::new(normal)?.solve(&wanted))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

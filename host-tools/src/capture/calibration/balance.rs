@@ -52,27 +52,34 @@ impl Lookup {
 }
 
 impl Balances {
-    /// Groups the balances by their largest value and, among equals, by the
-    /// smallest that is added; `None` if there are too few.
+    /// Groups the balances by how bright they are and, among equals, by how far
+    /// what is added is apart; `None` if there are too few.
+    ///
+    /// Both keys are sums whose noise has nothing to do with that of the balance:
+    /// groups by the brightest value would collect those whose noise is high.
     pub(super) fn new(mut balances: Vec<Balance>) -> Option<Self> {
         if balances.len() < FEWEST {
             return None;
         }
-        let largest = |b: &Balance| b.values.iter().copied().fold(0.0, f32::max);
-        let smallest = |b: &Balance| {
-            let added = b
-                .values
-                .iter()
-                .zip(b.weights)
-                .filter(|(_, weight)| *weight > 0.0);
-            added.map(|(value, _)| *value).fold(f32::INFINITY, f32::min)
+        let brightness = |b: &Balance| {
+            let terms = b.values.iter().zip(b.weights).filter(|term| term.1 != 0.0);
+            terms
+                .map(|(value, weight)| value / weight.abs())
+                .sum::<f32>()
         };
-        balances.sort_by(|a, b| largest(a).total_cmp(&largest(b)));
+        let apart = |b: &Balance| {
+            if b.weights[1] > 0.0 {
+                (b.values[0] - b.values[1]).abs()
+            } else {
+                0.0
+            }
+        };
+        balances.sort_by(|a, b| brightness(a).total_cmp(&brightness(b)));
         let size = balances.len().div_ceil(GROUPS);
         let mut ends = Vec::new();
         let mut begin = 0;
         for group in balances.chunks_mut(size) {
-            group.sort_by(|a, b| smallest(a).total_cmp(&smallest(b)));
+            group.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
             let size = group.len().div_ceil(GROUPS);
             let inner = group.chunks(size).scan(begin, |end, part| {
                 *end += part.len();

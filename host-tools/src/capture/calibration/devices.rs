@@ -1,6 +1,6 @@
 //! What is known of projector and camera, declared or measured.
 
-use super::{CameraFit, Mixing, Probe, Ramp};
+use super::{CameraFit, Mixing, Probe, Ramp, Unmix};
 use crate::capture::{Declared, DeviceResponse, ProjectorResponse, Response, Settings};
 
 /// Projector and camera of a capture.
@@ -79,6 +79,18 @@ impl Devices {
     #[must_use]
     pub fn mixing(&self) -> Option<&Mixing> {
         self.ramp.as_ref()?.mixing.as_ref()
+    }
+
+    /// What turns the camera's channels into the projector's, if photographs were
+    /// turned so.
+    pub(in crate::capture) fn unmix(&self) -> Option<Unmix> {
+        self.mixing().filter(|_| self.unmixed)?.unmix()
+    }
+
+    /// Whether photographs mean another light than `capture.toml` alone says.
+    #[must_use]
+    pub fn change_light(&self, settings: &Settings) -> bool {
+        self.unmixed || self.camera != settings.camera.reading().response
     }
 
     /// What there is to know, a sentence a line, for people.
