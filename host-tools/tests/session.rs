@@ -62,9 +62,10 @@ fn a_folder_of_patterns_says_how_many_slides_it_has() {
         .expect("made")
         .count();
     assert_eq!(data["slides"], slides);
-    // White, black, 9 + 3 * 8 levels, a probe, 2 * (2 + 2) stripes, 150 by chance are
-    // 194; white and black return after every 16 of all but the first two, and last.
-    assert_eq!(slides, 194 + 2 * (192 / 16));
+    // White, black, 9 + 3 * 8 levels, two probes, 2 * (2 + 2) stripes and 150 by chance;
+    // white and black return after every 16 of all but the first two, and last.
+    let others = 33 + 2 + 8 + 150_usize;
+    assert_eq!(slides, 2 + others + 2 * others.div_ceil(16));
     insta::assert_snapshot!(said(&run(folder.path(), &arguments[..7])));
 }
 
