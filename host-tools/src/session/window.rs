@@ -16,6 +16,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 use winit::application::ApplicationHandler;
+use winit::error::EventLoopError;
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop, EventLoopProxy};
 use winit::keyboard::{Key, NamedKey};
@@ -53,8 +54,16 @@ pub fn with_window<T: Send>(
     size: (u32, u32),
     session: impl FnOnce(&mut dyn Screen, &(dyn Fn() -> bool + Sync)) -> Result<T, SessionError> + Send,
 ) -> Result<T, SessionError> {
-    let refuse = |error: winit::error::EventLoopError| SessionError::Display {
-        reason: format!("there is no desktop to show it on: {error}"),
+    let refuse = |error: EventLoopError| {
+        let text = error.to_string();
+        // Without the line of source that an error of the system begins with.
+        let words = match &error {
+            EventLoopError::Os(_) => text.split_once(": ").map_or(&*text, |(_, words)| words),
+            _ => &text,
+        };
+        SessionError::Display {
+            reason: format!("there is no desktop to show it on: {words}"),
+        }
     };
     let events = EventLoop::with_user_event().build().map_err(refuse)?;
     let proxy = events.create_proxy();
