@@ -6,7 +6,9 @@ use crate::capture::{Registration, Role, shown};
 use crate::progress::Silent;
 use crate::scene::coaxial::{Panels, Scene};
 use crate::scene::description::Scene as Described;
-use crate::scene::{Effect, Forced, Simulation, SimulationOptions, folder as simulated};
+use crate::scene::{
+    Effect, Forced, Shooting, Simulation, SimulationOptions, folder as simulated,
+};
 use crate::solve::ChannelInverse;
 use iltm_runtime::Grid;
 use nalgebra::DVector;
@@ -250,7 +252,8 @@ fn direct_light_is_what_the_camera_sees_without_interreflection() {
     let patterns = shown(simulation.grid(), 60, 3);
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
-    simulated::write(&scene, &simulation, &patterns, 3, &capture, &Silent).unwrap();
+    let shooting = Shooting::new(&scene, &simulation, 3).unwrap();
+    simulated::write(&shooting, &patterns, &capture, &Silent).unwrap();
     let light = DMatrix::from_fn(simulation.grid().cells(), patterns.len(), |cell, k| {
         f64::from(u8::from(patterns[k].1.lit[cell]))
     });
