@@ -154,3 +154,72 @@ impl<'t, 'a> Expected<'t, 'a> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::Response;
+    use crate::compile::{CompileOptions, compile};
+    use crate::report::LightPicture;
+    use crate::verify::tests::scene;
+    use crate::verify::{ProjectorCurves, test_images};
+    use crate::video::{Picture, Samples};
+
+    /// Light of 8-bit codes, channel by channel.
+    fn light(picture: &Picture, of: impl Fn(usize, u8) -> f64) -> CellPlanes {
+        let Samples::Eight(samples) = picture.samples() else {
+            panic!("8 bits");
+        };
+        let channels = picture.channels();
+        let plane = |channel: usize| {
+            let codes = samples.iter().skip(channel).step_by(channels);
+            codes.map(|code| of(channel, *code)).collect()
+        };
+        (0..channels).map(plane).collect()
+    }
+
+    fn error(seen: &CellPlanes, wanted: &CellPlanes) -> f64 {
+        let pairs = || seen.iter().flatten().zip(wanted.iter().flatten());
+        let off: f64 = pairs().map(|(s, w)| (s - w).powi(2)).sum();
+        (off / pairs().map(|(_, w)| w * w).sum::<f64>()).sqrt()
+    }
+
+    #[test]
+    fn the_light_of_a_compensated_image_is_the_wanted_one_and_that_of_others_is_not() {
+        for channels in [1, 3] {
+            let options = CompileOptions {
+                projector: Response::Gamma(2.2).into(),
+                ..CompileOptions::default()
+            };
+            let compiled = compile(&scene(channels), None, &options).unwrap();
+            let table = Table::check(&compiled.image).unwrap();
+            let curves = ProjectorCurves::new(&table);
+            let mut expected = Expected::new(&table);
+            assert!(expected.live().iter().all(|live| *live));
+            assert!(
+                (expected.even_grey() - 1.0).abs() < 0.01,
+                "{}",
+                expected.even_grey()
+            );
+            for image in test_images(&table).unwrap() {
+                let decoded = LightPicture::decode(&image.wanted, Response::Srgb);
+                let wanted: CellPlanes = decoded
+                    .planes()
+                    .iter()
+                    .map(|plane| plane.iter().map(|light| f64::from(*light)).collect())
+                    .collect();
+                let drive = |channel, code| curves.drive(channel, code);
+                let seen = expected.photograph(&light(&image.compensated, drive));
+                // Steps of 8-bit codes, and up to .5 % of the samples cut.
+                assert!(
+                    error(&seen, &wanted) < 0.02,
+                    "{}: {}",
+                    image.title,
+                    error(&seen, &wanted)
+                );
+                let plain = expected.photograph(&wanted);
+                assert!(error(&plain, &wanted) > 0.1, "{}", image.title);
+            }
+        }
+    }
+}

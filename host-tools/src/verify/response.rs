@@ -96,7 +96,7 @@ mod tests {
     fn codes_and_drives_of_every_response_are_each_others_inverse() {
         for response in [Response::Linear, Response::Srgb, Response::Gamma(2.2)] {
             let options = CompileOptions {
-                projector: response,
+                projector: response.into(),
                 ..CompileOptions::default()
             };
             let compiled = compile(&scene(1), None, &options).unwrap();
