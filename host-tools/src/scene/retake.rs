@@ -3,7 +3,9 @@
 
 use super::shooting::{Photograph, Shooting, Slide};
 use super::simulation::SimulationError;
-use crate::capture::{CALIBRATION_FILE, CaptureError, ListedRole, MANIFEST_FILE, ManifestOf};
+use crate::capture::{
+    CALIBRATION_FILE, CaptureError, ListedRole, MANIFEST_FILE, ManifestOf, find_photo,
+};
 use crate::progress::Progress;
 use crate::verify::VERIFY_FILE;
 use iltm_runtime::Grid;
@@ -161,7 +163,13 @@ impl Session {
         progress: &dyn Progress,
     ) -> Result<usize, RetakeError> {
         let paths: Vec<PathBuf> = self.photos.iter().map(|p| self.folder.join(p)).collect();
-        let missing: Vec<usize> = (0..paths.len()).filter(|at| !paths[*at].exists()).collect();
+        let mut missing = Vec::new();
+        for (at, photo) in self.photos.iter().enumerate() {
+            // A camera may have written it under another ending.
+            if find_photo(&self.folder, photo)?.is_none() {
+                missing.push(at);
+            }
+        }
         progress.begin("taking photographs", missing.len() as u64);
         let taken = AtomicUsize::new(0);
         shooting.take(&self.slides, &missing, |place, photograph| {

@@ -6,6 +6,7 @@ use crate::capture::{
     pictures_of_stem,
 };
 use crate::progress::Progress;
+use crate::verify::VERIFY_FILE;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Lists that a folder may hold: a capture's, and those of a folder made to verify a
 /// table.
-const LISTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, "verify.csv"];
+const LISTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, VERIFY_FILE];
 
 /// A role by its name alone: whoever photographs need not know more.
 #[derive(Clone, PartialEq, Eq, Debug)]
