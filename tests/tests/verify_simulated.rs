@@ -127,14 +127,15 @@ fn a_good_table_passes_with_the_errors_that_are_really_there_wherever_the_camera
             verdict.cells
         );
         assert!((verdict.error[0] / truth[0] - 1.0).abs() < 0.05, "{name}");
-        // The photographs' noise comes on top of the compensated pictures' small error.
+        // The photographs' noise comes on top of the compensated pictures' small error, and
+        // what a camera elsewhere sees of other parts of the cells.
         let noise = verdict.bound.noise.unwrap();
-        let both = truth[1].hypot(noise);
+        let both = truth[1].hypot(noise).hypot(verdict.bound.viewpoint);
         assert!(
             (verdict.error[1] / both - 1.0).abs() < 0.35,
             "{name}: {both}"
         );
-        assert!(verdict.error[1] < 0.1 * verdict.error[0], "{name}");
+        assert!(verdict.error[1] < 0.15 * verdict.error[0], "{name}");
         // What the table makes of its own pictures without compensation is no guess.
         let modelled: f64 = verdict.images.iter().map(|image| image.modelled[0]).sum();
         let modelled = modelled / verdict.images.len() as f64;

@@ -206,6 +206,7 @@ fn data(
             "predicted": bound.predicted,
             "range": bound.range,
             "noise": bound.noise,
+            "viewpoint": bound.viewpoint,
         },
         "images": verdict.images.iter().map(of_image).collect::<Vec<_>>(),
         "drift": {
@@ -237,10 +238,11 @@ fn text(verdict: &Verdict, images: &[TestImage], page: &Path) -> String {
         (true, _) => "as asked for".to_owned(),
         (false, None) => "half of the error before: the table predicts none".to_owned(),
         (false, Some(expected)) => format!(
-            "1.5 times the {expected:.4} expected: table {}, range and codes {:.4}, noise {}",
+            "1.5 times the {expected:.4} expected: table {}, range and codes {:.4}, noise {}, viewpoint {:.4}",
             known(bound.predicted),
             bound.range,
-            known(bound.noise)
+            known(bound.noise),
+            bound.viewpoint
         ),
     };
     let _ = writeln!(text, "bound       {:.4} ({why})", bound.limit);

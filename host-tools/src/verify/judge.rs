@@ -17,6 +17,9 @@ use std::path::Path;
 /// How much larger than expected an error may be.
 const MARGIN: f64 = 1.5;
 
+/// Largest change of white from cell to cell that a camera standing elsewhere explains.
+pub const MOST_VIEWPOINT: f64 = 0.01;
+
 /// Where the table predicts nothing: share of the error before that may remain.
 const UNPREDICTED: f64 = 0.5;
 
@@ -41,7 +44,11 @@ pub struct Bound {
     /// Error that the noise of these photographs makes, mean over the images; `None` with
     /// a single photograph of white.
     pub noise: Option<f64>,
-    /// The three together: root of the sum of squares, mean over the images.
+    /// Error of finding the cells again: what white differs by from cell to cell, which a
+    /// camera elsewhere sees other parts of; at most [`MOST_VIEWPOINT`], beyond which it is
+    /// a change of the scene.
+    pub viewpoint: f64,
+    /// All of them together: root of the sum of squares, mean over the images.
     pub expected: Option<f64>,
 }
 
@@ -146,8 +153,9 @@ pub fn judge(
         images.iter().map(of).sum::<f64>() / images.len().max(1) as f64
     };
     let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
-    let bound = self::bound(table, session, &images, error[0], bound, &lit);
     let drift = drift(session, &mut expected, white, &lit);
+    let viewpoint = drift.shape.min(MOST_VIEWPOINT);
+    let bound = self::bound(table, session, &images, (error[0], bound), viewpoint, &lit);
     Ok(Verdict {
         passed: error[1] <= bound.limit,
         error,
@@ -233,8 +241,8 @@ fn bound(
     table: &Table<'_>,
     session: &Session,
     images: &[ImageVerdict],
-    before: f64,
-    given: Option<f64>,
+    (before, given): (f64, Option<f64>),
+    viewpoint: f64,
     lit: &LiveCells,
 ) -> Bound {
     let own = table.inverse_error().to_num::<f64>();
@@ -249,6 +257,7 @@ fn bound(
             predicted
                 .hypot(images[image].modelled[1])
                 .hypot(noise_of(image))
+                .hypot(viewpoint)
         })
     });
     let limit = given.or(expected.map(|expected| MARGIN * expected));
@@ -257,6 +266,7 @@ fn bound(
         given: given.is_some(),
         predicted,
         range: mean(&|image| images[image].modelled[1]),
+        viewpoint,
         noise: noise.is_some().then(|| mean(&noise_of)),
         expected,
     }

@@ -73,6 +73,7 @@ fn expectation(verdict: &Verdict) -> Vec<(&'static str, String)> {
             "noise of these photographs makes",
             known(bound.noise, "not known: one photograph of white"),
         ),
+        ("finding the cells again makes", percent(bound.viewpoint)),
         ("expected in all", known(bound.expected, "nothing")),
     ];
     lines.push((
