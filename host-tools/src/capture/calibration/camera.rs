@@ -46,6 +46,10 @@ pub struct CameraFit {
 /// Misfit below which photographs add up: what rounding to 8 bits leaves.
 const GOOD: f64 = 0.005;
 
+/// Responses must differ by this many times the best misfit to be told apart: noise
+/// that is clipped at black alone looks like a little curvature.
+const TELLING: f64 = 4.0;
+
 /// A misfit must be this many times another for the difference to be believed.
 const CLEARLY: f64 = 2.0;
 
@@ -98,7 +102,7 @@ impl CameraFit {
     /// are only black or white add up with any.
     #[must_use]
     pub fn tells(&self) -> bool {
-        self.contrast > CLEARLY * self.best_misfit.max(GOOD)
+        self.contrast > TELLING * self.best_misfit.max(GOOD)
     }
 
     /// Whether another response than the declared one adds up clearly better.
