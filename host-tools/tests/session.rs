@@ -175,7 +175,7 @@ fn a_camera_that_fails_and_a_desktop_that_is_not_there_have_codes_of_their_own()
         "capture",
         "c",
         "--display",
-        "1",
+        "0",
         "--camera",
         "cp now {photo}",
     ];
@@ -324,7 +324,7 @@ fn slides_fill_a_display_pixel_by_pixel() {
         "capture",
         "c",
         "--display",
-        "1",
+        "0",
         "--latency",
         "100",
         "--camera",
