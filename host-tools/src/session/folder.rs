@@ -152,7 +152,7 @@ fn filled(text: &str, layout: &Layout, camera: &CameraSettings, made: Made) -> S
         ("{slides}", made.slides.to_string()),
         (
             "{last}",
-            slide_name(made.slides as u32 - 1).display().to_string(),
+            format!("{:03}.png", made.slides.saturating_sub(1)),
         ),
     ];
     words.iter().fold(text.to_owned(), |text, (word, value)| {
