@@ -152,7 +152,6 @@ mod tests {
             read_noise: 5.0,
             bits: Some(12),
             response: Response::Linear,
-            distortion: [0.0; 2],
         }
     }
 

@@ -18,7 +18,7 @@ use std::path::Path;
 const MARGIN: f64 = 1.5;
 
 /// Largest change of white from cell to cell that a camera standing elsewhere explains.
-pub const MOST_VIEWPOINT: f64 = 0.01;
+pub(super) const MOST_VIEWPOINT: f64 = 0.01;
 
 /// Where the table predicts nothing: share of the error before that may remain.
 const UNPREDICTED: f64 = 0.5;
