@@ -172,7 +172,7 @@ impl Follower {
             .nth(2)
             .expect("the folder is named third");
         let twin = self.folder.path().join("twin");
-        if !self
+        if self
             .folder
             .path()
             .join(capture)
@@ -180,14 +180,14 @@ impl Follower {
             .join(FIRST)
             .exists()
         {
-            let _ = fs::remove_dir_all(&twin);
-            self.succeed(&format!("cp -r {capture} twin"));
-            self.succeed("iltm simulate installation.toml --photograph twin --without drift");
-        } else {
             for name in [FIRST, "005.png", "017.png"] {
                 fs::remove_file(self.folder.path().join(capture).join("photos").join(name))
                     .expect("a photograph");
             }
+        } else {
+            let _ = fs::remove_dir_all(&twin);
+            self.succeed(&format!("cp -r {capture} twin"));
+            self.succeed("iltm simulate installation.toml --photograph twin --without drift");
         }
         let show = "--show 'echo twin/photos/$(basename {slide}) > shown' --latency 0";
         assert!(command.contains("--display 1"), "{command}");

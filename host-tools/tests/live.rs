@@ -79,7 +79,7 @@ impl Stream {
     fn next(&mut self) -> Vec<u8> {
         self.input.write_all(&frame()).expect("a pipe");
         self.input.flush().expect("a pipe");
-        let waited = self.frames.recv_timeout(Duration::from_secs(60));
+        let waited = self.frames.recv_timeout(Duration::from_mins(1));
         waited.expect("a frame for each frame")
     }
 

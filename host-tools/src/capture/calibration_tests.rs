@@ -7,6 +7,7 @@ use crate::progress::Silent;
 use crate::solve::{SolveOptions, solve};
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::DVector;
+use std::fmt::Write;
 use std::fs;
 
 /// Light that each cell throws on every other one, by channel: the walls are
@@ -56,8 +57,10 @@ impl Mixed {
         let ambient = scene().ambient;
         let (width, height) = scene().camera();
         let mut values = Vec::new();
-        for pixel in 0..width * height {
-            let light = [0, 1, 2].map(|p| ambient + lit[p] * (primaries[p][pixel] - ambient));
+        let [red, green, blue] = &primaries;
+        for ((red, green), blue) in red.iter().zip(green).zip(blue) {
+            let own = [*red, *green, *blue];
+            let light = [0, 1, 2].map(|p| ambient + lit[p] * (own[p] - ambient));
             for row in self.mix {
                 let seen: f64 = row.iter().zip(light).map(|(m, l)| m * l).sum();
                 let noisy = seen + scene().noise * self.dice.normal();
@@ -81,7 +84,8 @@ impl Mixed {
             .flat_map(|channel| levels.clone().map(move |level| (channel, level)));
         for (index, (channel, level)) in (100..).zip(all) {
             let role = CalibrationRole::Ramp { channel, level };
-            lines += &format!("{index},{role},calibration/{index:03}.png,photos/{index:03}.png\n");
+            let files = format!("calibration/{index:03}.png,photos/{index:03}.png");
+            writeln!(lines, "{index},{role},{files}").unwrap();
             let input = channel.input(level).map(|code| f64::from(code) / 255.0);
             let lit = [0, 1, 2].map(|p| PROJECTOR[p].light(input[p]));
             self.photograph(index, &white, lit);

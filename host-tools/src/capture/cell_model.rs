@@ -209,10 +209,10 @@ impl Row {
             };
         }
         // Positive definite by the ridge; zeros would only predict nothing.
-        let solver = normal
-            .cholesky()
-            .map(|normal| normal.solve(&known.transpose()))
-            .unwrap_or_else(|| DMatrix::zeros(unknowns, shown.len()));
+        let solver = normal.cholesky().map_or_else(
+            || DMatrix::zeros(unknowns, shown.len()),
+            |normal| normal.solve(&known.transpose()),
+        );
         let leverage = (0..shown.len())
             .map(|at| (known.row(at) * solver.column(at))[(0, 0)])
             .collect();

@@ -35,7 +35,7 @@ impl Curve {
         }
         let mut points = points.to_vec();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let same = points.chunk_by(|a, b| a.0 == b.0);
+        let same = points.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq());
         let mean = |of: &[(f64, f64)]| of.iter().map(|p| p.1).sum::<f64>() / of.len() as f64;
         let (values, light): (Vec<f64>, Vec<f64>) = same.map(|of| (of[0].0, mean(of))).unzip();
         let light = level(&light);

@@ -171,7 +171,7 @@ impl Curve {
         Self::new(
             sequence,
             model.shots.clone(),
-            raw.clone(),
+            &raw,
             model.errors.clone(),
             &Smooth::new(all_points.collect()),
             1.0 / offset - 1.0,
@@ -190,13 +190,13 @@ impl Curve {
         let points = shots.iter().zip(&gains).map(|(&s, &g)| (time(s), g));
         let errors = vec![0.0; shots.len()];
         let smooth = Smooth::new(points.collect());
-        Self::new(sequence, shots, gains, errors, &smooth, 0.0)
+        Self::new(sequence, shots, &gains, errors, &smooth, 0.0)
     }
 
     fn new(
         sequence: &Sequence,
         shots: Vec<usize>,
-        gains: Vec<f64>,
+        gains: &[f64],
         errors: Vec<f64>,
         smooth: &Smooth,
         excess: f64,

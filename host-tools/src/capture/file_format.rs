@@ -12,7 +12,7 @@ pub enum FileFormat {
     Tiff,
     /// JPEG, 8 bit, curved by the camera and compressed with loss.
     Jpeg,
-    /// OpenEXR, floating point, linear by definition.
+    /// `OpenEXR`, floating point, linear by definition.
     OpenExr,
     /// PGM, PPM or PAM (netpbm), 8 or 16 bit, of any full scale.
     Netpbm,

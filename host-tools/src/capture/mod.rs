@@ -216,6 +216,10 @@ pub fn examine(
 }
 
 /// Measures the photographs of a sequence and judges them; `None` if no cell is found.
+#[allow(
+    clippy::too_many_lines,
+    reason = "each gate stands after the step that it judges, which is the order to read in"
+)]
 fn measure_all(
     folder: &Path,
     sequence: &Sequence,

@@ -16,7 +16,7 @@ const SATURATED_VALUE: f64 = 0.98;
 /// How the values of photographs become light.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Reading {
-    /// From a value, of full scale, to light. OpenEXR is linear by definition and
+    /// From a value, of full scale, to light. `OpenEXR` is linear by definition and
     /// does not ask.
     pub(super) response: DeviceResponse,
     /// Value of a floating point file at the camera's full scale.

@@ -48,7 +48,7 @@ enum Decoder {
     /// The image crate.
     Image(Box<dyn ImageDecoder>),
     /// Floating point grey, which the image crate has no type for.
-    GreyFloat(GreyFloat),
+    GreyFloat(Box<GreyFloat>),
 }
 
 /// A floating point grey TIFF.
@@ -140,7 +140,7 @@ impl Opened {
         match &self.decoder {
             Decoder::Image(decoder) => {
                 let colour = decoder.color_type();
-                (8 * colour.bytes_per_pixel() / colour.channel_count()) as u8
+                8 * colour.bytes_per_pixel() / colour.channel_count()
             }
             Decoder::GreyFloat(_) => 32,
         }
@@ -201,7 +201,7 @@ impl Decoder {
         if format == FileFormat::Tiff
             && let Some(grey) = GreyFloat::new(file.try_clone().map_err(|e| e.to_string())?)?
         {
-            return Ok(Self::GreyFloat(grey));
+            return Ok(Self::GreyFloat(Box::new(grey)));
         }
         if format == FileFormat::Jpeg && !jpeg_ends(&file).map_err(|error| error.to_string())? {
             return Err("not a readable JPEG: its end is missing".to_owned());

@@ -207,6 +207,7 @@ when the slide is shown. Escape on the slide, or ctrl-C, ends a session; the sam
 goes on with what is missing.";
 
 #[derive(Debug, Args)]
+#[allow(clippy::struct_field_names, reason = "it is what stands there")]
 pub(super) struct Capture {
     /// Folder that `iltm patterns` made
     pub(super) capture: PathBuf,

@@ -48,7 +48,7 @@ fn collect(
 }
 
 /// Prints the completions of a shell on standard output.
-pub(super) fn completions(arguments: &Completions, output: &Output) -> Result<(), Failure> {
+pub(super) fn completions(arguments: &Completions, output: &Output) {
     let mut script = Vec::new();
     let mut command = Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "iltm", &mut script);
@@ -60,5 +60,4 @@ pub(super) fn completions(arguments: &Completions, output: &Output) -> Result<()
         // A reader that went away has all it wanted.
         let _ = io::stdout().write_all(&script);
     }
-    Ok(())
 }

@@ -80,7 +80,10 @@ pub fn run(meter: Meter) -> ExitCode {
         Command::Rollback(line) => trial::rollback(line, &output),
         Command::Key(key) => key::run(key, &output),
         Command::Man(man) => man::run(man, &output),
-        Command::Completions(completions) => man::completions(completions, &output),
+        Command::Completions(completions) => {
+            man::completions(completions, &output);
+            Ok(())
+        }
         Command::Report(report) => report::run(report, &output),
         Command::Status(status) => status::run(status, &output),
         Command::Monitor(monitor) => monitor::run(monitor, &output),

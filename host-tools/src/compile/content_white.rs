@@ -186,12 +186,13 @@ impl<'i> Headroom<'i> {
         let chosen = self.thresholds.get(frames).unwrap_or_default();
         let part = 1.0 / chosen.len().max(1) as f64;
         for frame in chosen {
-            for at in 0..pixels {
+            let [bright, dark] = &mut maps;
+            for (at, (bright, dark)) in bright.iter_mut().zip(dark).enumerate() {
                 let colours = || frame.iter().skip(at).step_by(pixels);
                 if colours().any(|t| *t >= 0.0 && f64::from(*t) < white) {
-                    maps[0][at] += part;
+                    *bright += part;
                 } else if colours().any(|t| *t < 0.0) {
-                    maps[1][at] += part;
+                    *dark += part;
                 }
             }
         }

@@ -103,15 +103,15 @@ fn mixing(projector: &Projector, threshold: f64, decisions: &mut Decisions) {
 }
 
 fn distortion(camera: &Camera, decisions: &mut Decisions) {
-    if camera.distortion == [0.0; 2] {
+    if camera.distorts() {
+        let pixels = camera.most_displaced();
+        let reason = format!("the lens displaces by up to {} pixels", number(pixels));
+        decisions.decide(Effect::Distortion, pixels >= UNNOTICED_PIXELS, reason);
+    } else {
         decisions.rule_out(
             Effect::Distortion,
             "the lens leaves straight lines straight",
         );
-    } else {
-        let pixels = camera.most_displaced();
-        let reason = format!("the lens displaces by up to {} pixels", number(pixels));
-        decisions.decide(Effect::Distortion, pixels >= UNNOTICED_PIXELS, reason);
     }
 }
 

@@ -280,7 +280,9 @@ fn banded(plane: &mut [f32], width: usize, amplitude: f64, place: usize) {
     for (row, line) in plane.chunks_mut(width).enumerate() {
         let phase = BANDS * row as f64 / height + PHASE * place as f64;
         let gain = (1.0 + amplitude * (TAU * phase).sin()) as f32;
-        line.iter_mut().for_each(|light| *light *= gain);
+        for light in line {
+            *light *= gain;
+        }
     }
 }
 
@@ -341,7 +343,12 @@ mod tests {
     fn a_vivid_projector_keeps_black_and_white_and_bends_the_rest() {
         let fault = [Fault::from(Mishap::Vivid)];
         let vivid = faults(&fault);
-        assert_eq!(vivid.projected([0.0; 3]), [0.0; 3]);
+        assert!(
+            vivid
+                .projected([0.0; 3])
+                .iter()
+                .all(|light| light.abs() < 1e-12)
+        );
         let white = vivid.projected([1.0; 3]);
         assert!(white.iter().all(|light| (light - 1.0).abs() < 1e-12));
         let red = vivid.projected([1.0, 0.0, 0.0]);

@@ -68,10 +68,7 @@ fn natural(grid: Grid, channels: usize) -> Wanted {
     let fine = Grid::new(side(grid.rows()), side(grid.cols())).unwrap_or(grid);
     let images = natural_images(fine);
     let plane = |channel: usize| {
-        let cells = images
-            .column(0)
-            .into_iter()
-            .zip(images.column(1 + channel).into_iter());
+        let cells = images.column(0).into_iter().zip(images.column(1 + channel));
         let light = cells.map(|(common, own)| {
             let light = if channels == 1 {
                 *common

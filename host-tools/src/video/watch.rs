@@ -47,7 +47,8 @@ fn number(_: &fs::Metadata) -> u64 {
 pub struct FileWatch {
     changed: Receiver<Vec<u8>>,
     // Dropped with the watch, which ends the thread.
-    _alive: Sender<()>,
+    #[allow(dead_code, reason = "the watching ends when it is dropped")]
+    alive: Sender<()>,
 }
 
 impl FileWatch {
@@ -63,8 +64,7 @@ impl FileWatch {
         let (alive, ended) = channel();
         let path = path.to_owned();
         thread::spawn(move || watch(&path, stamp, &send, &ended));
-        let _alive = alive;
-        Ok((bytes, Self { changed, _alive }))
+        Ok((bytes, Self { changed, alive }))
     }
 
     /// The file's newest bytes, once, if it has changed and stands still.

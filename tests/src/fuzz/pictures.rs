@@ -1,6 +1,7 @@
 //! A small photograph in every format that is read.
 
 use image::{DynamicImage, ImageBuffer, ImageFormat};
+use std::fmt::Write;
 use std::io::Cursor;
 
 /// A picture of 8 x 6 pixels: grey and colour, 8 and 16 bit and floating point, as
@@ -69,7 +70,10 @@ fn twelve_bits() -> Vec<u8> {
 /// A PPM in figures.
 fn ascii() -> Vec<u8> {
     let mut text = "P3\n# figures\n8 6\n255\n".to_owned();
-    (0..144).for_each(|value| text += &format!("{value} "));
+    for value in 0..144 {
+        // Writing into a string cannot fail.
+        let _ = write!(text, "{value} ");
+    }
     text.into_bytes()
 }
 

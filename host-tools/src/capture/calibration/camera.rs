@@ -165,6 +165,9 @@ fn best_gamma(misfit: impl Fn(f64) -> f64) -> f64 {
 /// Terms of the correction.
 const TERMS: usize = 3;
 
+/// Steps of a corrected response.
+const KNOTS: u32 = 64;
+
 /// `u + u (1 - u) (c0 + c1 u + c2 u^2)` with `u` the light of `plain`, with the
 /// coefficients that add up best; `None` if that does not rise.
 fn corrected(balances: &Balances, plain: Response) -> Option<Curve> {
@@ -185,7 +188,6 @@ fn corrected(balances: &Balances, plain: Response) -> Option<Curve> {
     let light = |value: f64| {
         plain.light(value) + (0..TERMS).map(|k| found[k] * term(k, value)).sum::<f64>()
     };
-    const KNOTS: u32 = 64;
     let points: Vec<(f64, f64)> = (0..=KNOTS)
         .map(|k| f64::from(k) / f64::from(KNOTS))
         .map(|value| (value, light(value)))
@@ -270,9 +272,9 @@ mod tests {
             for _ in 0..50 {
                 let middle = 0.5 * (low + high);
                 if light(middle) < light_wanted {
-                    low = middle
+                    low = middle;
                 } else {
-                    high = middle
+                    high = middle;
                 }
             }
             high

@@ -90,11 +90,11 @@ impl Ramp {
         let response = response(&points, channels, mixing.as_ref());
         let fall = fall(&points);
         Some(Self {
+            points,
             response,
             fall,
             white_excess,
             mixing,
-            points,
         })
     }
 

@@ -103,7 +103,7 @@ impl Taken {
                         });
                     }
                     CalibrationRole::Probe => {
-                        probes.push((at, sum_without(&photo.planes, seen.black)))
+                        probes.push((at, sum_without(&photo.planes, seen.black)));
                     }
                 }
             }
@@ -210,6 +210,9 @@ fn sum_without(planes: &[Vec<f32>], black: &[Vec<f32>]) -> Vec<f32> {
     sum
 }
 
+/// The light of a probe photograph, a value a pixel, and the cells that it lights.
+type Probed = (Vec<f32>, Vec<bool>);
+
 /// The mean of all probe photographs, which must show one pattern: others than the
 /// first one's are left out.
 fn merged_probes(
@@ -217,8 +220,8 @@ fn merged_probes(
     grid: Grid,
     shots: &[CalibrationShot],
     probes: Vec<(usize, Vec<f32>)>,
-) -> Result<Option<(Vec<f32>, Vec<bool>)>, CaptureError> {
-    let mut merged: Option<(Vec<f32>, Vec<bool>)> = None;
+) -> Result<Option<Probed>, CaptureError> {
+    let mut merged: Option<Probed> = None;
     let mut count = 0.0;
     for (at, light) in probes {
         let lit = lit_cells(folder, grid, &shots[at])?;
@@ -234,7 +237,9 @@ fn merged_probes(
         count += 1.0;
     }
     Ok(merged.map(|(mut light, lit)| {
-        light.iter_mut().for_each(|light| *light /= count);
+        for light in &mut light {
+            *light /= count;
+        }
         (light, lit)
     }))
 }
@@ -259,16 +264,16 @@ fn lit_cells(folder: &Path, grid: Grid, shot: &CalibrationShot) -> Result<Vec<bo
     }
     let channels = picture.channels();
     Ok(match picture.decode()? {
-        Samples::Eight(samples) => lit(&samples, channels, 128),
-        Samples::Sixteen(samples) => lit(&samples, channels, 32_768),
-        Samples::Float(samples) => lit(&samples, channels, 0.5),
+        Samples::Eight(samples) => lit(&samples, channels, &128),
+        Samples::Sixteen(samples) => lit(&samples, channels, &32_768),
+        Samples::Float(samples) => lit(&samples, channels, &0.5),
     })
 }
 
-fn lit<T: PartialOrd>(samples: &[T], channels: usize, from: T) -> Vec<bool> {
+fn lit<T: PartialOrd>(samples: &[T], channels: usize, from: &T) -> Vec<bool> {
     let pixels = samples.chunks_exact(channels);
     pixels
-        .map(|pixel| pixel.iter().any(|value| *value >= from))
+        .map(|pixel| pixel.iter().any(|value| value >= from))
         .collect()
 }
 

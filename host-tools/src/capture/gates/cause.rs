@@ -50,7 +50,7 @@ impl Cause {
 struct Pairs {
     white: Vec<f64>,
     black: Vec<f64>,
-    pairs: Vec<(Vec<f64>, Vec<f64>)>,
+    both: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
 /// Finds the cause; `channels` are the light of all cells in all photographs,
@@ -76,11 +76,11 @@ pub(crate) fn find(
     let pairs = Pairs {
         white: mean(&sequence.white().shots),
         black: mean(&sequence.black),
-        pairs: (sequence.code_pairs().into_iter())
+        both: (sequence.code_pairs().into_iter())
             .map(|(a, b)| (mean(&views[a].shots), mean(&views[b].shots)))
             .collect(),
     };
-    if pairs.pairs.is_empty() {
+    if pairs.both.is_empty() {
         return Cause::Unknown;
     }
     let before = pairs.misfit(1.0);
@@ -109,7 +109,7 @@ impl Pairs {
                 .filter(|(l, w)| *l > &(0.5 * *w));
             median(lit.map(|(light, white)| light / white).collect())
         };
-        let each = self.pairs.iter().flat_map(|(a, b)| [ratio(a), ratio(b)]);
+        let each = self.both.iter().flat_map(|(a, b)| [ratio(a), ratio(b)]);
         let ratios: Vec<f64> = each.flatten().collect();
         let brighter = ratios.iter().filter(|ratio| **ratio > OUTSHINE).count();
         2 * brighter > ratios.len()
@@ -119,7 +119,7 @@ impl Pairs {
     fn misfit(&self, power: f64) -> f64 {
         let raise = |light: &f64| light.max(0.0).powf(power);
         let (mut off, mut all) = (0.0, 0.0);
-        for (a, b) in &self.pairs {
+        for (a, b) in &self.both {
             for (cell, (a, b)) in a.iter().zip(b).enumerate() {
                 let (white, black) = (raise(&self.white[cell]), raise(&self.black[cell]));
                 off += (raise(a) + raise(b) - white - black).powi(2);
@@ -141,7 +141,7 @@ impl Pairs {
     /// A factor for each photograph, and the misfit that they leave.
     fn best_factors(&self) -> (Vec<f64>, f64) {
         let (mut factors, mut off, mut all) = (Vec::new(), 0.0, 0.0);
-        for (a, b) in &self.pairs {
+        for (a, b) in &self.both {
             let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
             let row = |cell: usize| {
                 let black = self.black[cell];

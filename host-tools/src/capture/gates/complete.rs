@@ -22,12 +22,11 @@ pub(crate) fn judge(folder: &Path, frames: &mut Vec<Frame>) -> Result<Gate, Capt
     let all: usize = frames.iter().map(|frame| frame.shots.len()).sum();
     for frame in &mut *frames {
         for at in (0..frame.shots.len()).rev() {
-            match find_photo(folder, &frame.shots[at].photo)? {
-                Some(found) => frame.shots[at].photo = found,
-                None => {
-                    missing.push(frame.shots.remove(at));
-                    frame.times.remove(at);
-                }
+            if let Some(found) = find_photo(folder, &frame.shots[at].photo)? {
+                frame.shots[at].photo = found;
+            } else {
+                missing.push(frame.shots.remove(at));
+                frame.times.remove(at);
             }
         }
     }

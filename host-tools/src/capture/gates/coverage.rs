@@ -84,7 +84,7 @@ fn region(grid: Grid, cells: &[usize]) -> String {
         .map(|k| (counts[k / 3][k % 3], names[k / 3][k % 3]))
         .filter(|(count, _)| *count > 0)
         .collect();
-    parts.sort_by(|a, b| b.0.cmp(&a.0));
+    parts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     let named: Vec<String> = parts
         .iter()
         .map(|(count, name)| format!("{count} {name}"))

@@ -3,6 +3,7 @@
 use super::super::drift::Steadiness;
 use super::super::sequence::Sequence;
 use super::{Evidence, Gate, GateName, Verdict};
+use std::fmt::Write;
 
 /// Change over the session from which it is worth a word.
 const WARN: f64 = 0.1;
@@ -30,7 +31,9 @@ pub(crate) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
         format!("brightness is steady within {:.1} %", 100.0 * size)
     };
     if steadiness.dark > 0.02 {
-        what += &format!(
+        // Writing into a string cannot fail.
+        let _ = write!(
+            what,
             "; ambient light changed by {:.0} %",
             100.0 * steadiness.dark
         );

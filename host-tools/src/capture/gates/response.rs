@@ -27,7 +27,7 @@ pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
     let complaints = devices
         .ramp
         .as_ref()
-        .map_or_else(Vec::new, |r| r.complaints());
+        .map_or_else(Vec::new, super::super::calibration::ramp::Ramp::complaints);
     let gate = |verdict, number, limit, unit, what, next_step| Gate {
         name,
         verdict,

@@ -39,7 +39,7 @@ pub(crate) struct Clipped {
     /// Pixels that the projector lights.
     lit: usize,
     /// Those of them that are clipped.
-    clipped: usize,
+    count: usize,
     /// Highest value, of full scale, if light is cut off below full scale.
     ceiling: Option<f32>,
 }
@@ -83,7 +83,7 @@ pub(crate) fn find(
     }
     Ok(Clipped {
         lit: lit.len(),
-        clipped: lit.iter().filter(|&&at| saturated[at]).count(),
+        count: lit.iter().filter(|&&at| saturated[at]).count(),
         ceiling,
     })
 }
@@ -128,7 +128,7 @@ fn cuts_off(
 pub(crate) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gate {
     let is_saturated = |out: &&LeftOut| matches!(out.why, Why::Saturated { .. });
     let lost = left_out.iter().filter(is_saturated).count();
-    let pixels = clipped.clipped as f64 / clipped.lit.max(1) as f64;
+    let pixels = clipped.count as f64 / clipped.lit.max(1) as f64;
     let cells = lost as f64 / (live + lost).max(1) as f64;
     let verdict = Verdict::of(pixels, WARN, MOST_PIXELS).max(Verdict::of(cells, WARN, MOST_CELLS));
     let ceiling = clipped.ceiling.map_or_else(
@@ -140,13 +140,13 @@ pub(crate) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gat
             )
         },
     );
-    let what = if clipped.clipped == 0 {
+    let what = if clipped.count == 0 {
         "white is clipped nowhere".to_owned()
     } else {
         format!(
             "white is overexposed: {} of {} lit pixels are clipped at {ceiling}, and {lost} of {} \
              cells are lost by it",
-            clipped.clipped,
+            clipped.count,
             clipped.lit,
             live + lost
         )

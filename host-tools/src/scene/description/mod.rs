@@ -127,6 +127,12 @@ impl Camera {
         [across, down].map(|place| 0.5 + (place - 0.5) * farther)
     }
 
+    /// Whether the lens displaces anything.
+    #[must_use]
+    pub fn distorts(&self) -> bool {
+        self.distortion.iter().any(|term| term.abs() > 0.0)
+    }
+
     /// Most pixels by which the lens displaces anything in the photograph.
     #[must_use]
     pub fn most_displaced(&self) -> f64 {

@@ -177,7 +177,7 @@ fn a_budget_too_small_stays_at_gain_only_and_says_how_often_it_was_over() {
 fn a_large_budget_climbs_to_the_top_tier_and_every_frame_is_its_tier_s() {
     let [image, _] = tables();
     let input = stream(LINE, 60);
-    let (output, summary, events) = live(&image, Some(Duration::from_secs(60)), &[], &input);
+    let (output, summary, events) = live(&image, Some(Duration::from_mins(1)), &[], &input);
     assert_eq!(summary.overruns, 0);
     assert_eq!(summary.tiers.len(), 3);
     assert_eq!(summary.tiers.iter().sum::<u64>(), 60);
