@@ -245,7 +245,11 @@ fn follow(page: &str) -> Follower {
 fn the_technicians_guide_is_followed_from_the_first_to_the_last_command() {
     let follower = follow("guide.md");
     let place = follower.folder.path();
-    for page in ["foyer-check/index.html", "foyer-report/index.html"] {
+    for page in [
+        "foyer-check/check.html",
+        "foyer-report/report.html",
+        "foyer-verify/verdict/verdict.html",
+    ] {
         assert!(place.join(page).exists(), "{page}");
     }
     let played = fs::read(place.join("played.y4m")).expect("the player got a video");

@@ -65,19 +65,27 @@ impl<'t, 'a> Expected<'t, 'a> {
         cells.map(live).collect()
     }
 
-    /// The brightest even grey that every cell reaches, relative to reference white: 1 unless
-    /// reference white was chosen otherwise.
+    /// The brightest even grey, ambient light included, that every cell reaches, relative
+    /// to reference white: 1 unless reference white was chosen otherwise.
     #[must_use]
     pub fn even_grey(&mut self) -> f64 {
         let cells = self.table.grid().cells();
-        let bounced = self.received(&vec![vec![1.0; cells]; self.gain.len()]);
-        let slopes = self.gain.iter().flatten().zip(bounced.iter().flatten());
-        // Where nothing is projected, nothing is asked for.
-        let lit = slopes.filter(|(gain, _)| **gain > 0.0);
-        let steepest = lit
-            .map(|(gain, bounced)| gain - bounced)
-            .fold(0.0, f64::max);
-        if steepest > 0.0 { 1.0 / steepest } else { 1.0 }
+        let even = self.received(&vec![vec![1.0; cells]; self.gain.len()]);
+        let ambient = self.ambient.clone();
+        let bounced = self.received(&ambient);
+        let mut least = f64::INFINITY;
+        for channel in 0..self.gain.len() {
+            for cell in 0..cells {
+                let gain = self.gain[channel][cell];
+                let slope = gain - even[channel][cell];
+                // Where nothing is projected, nothing is asked for.
+                if gain > 0.0 && slope > 0.0 {
+                    let free = gain * ambient[channel][cell] - bounced[channel][cell];
+                    least = least.min((1.0 + free) / slope);
+                }
+            }
+        }
+        if least.is_finite() { least } else { 1.0 }
     }
 
     /// Light under black, relative to reference white.

@@ -1,7 +1,7 @@
 //! The pictures of a verdict: maps of the cells, and the test images as the wall showed
 //! them.
 
-use super::judge::{ImageVerdict, over_images};
+use super::judge::over_images;
 use super::{Session, Verdict};
 use crate::capture::CellPlanes;
 use crate::report::{ColourScale, LightPicture, Palette, PictureFile, picture_file};
@@ -41,7 +41,7 @@ pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<
     ];
     for (shown, image) in session.shown.iter().zip(&verdict.images) {
         let number = image.image;
-        let wall = |half: usize| as_seen(grid, &shown.seen[half], image, &session.live);
+        let wall = |half: usize| as_seen(grid, &shown.seen[half], &shown.wanted, &session.live);
         files.push(picture_file(
             &format!("{number}-wanted"),
             &lit(grid, &shown.wanted),
@@ -78,19 +78,21 @@ fn map(grid: Grid, scale: &ColourScale, cells: &[Option<f64>]) -> Picture {
     blocks(grid, 3, &cells.iter().flat_map(colour).collect::<Vec<u8>>())
 }
 
-/// A photograph's cells at the brightness that suits the compensated one best, so that
-/// both are as bright as they were beside each other.
-fn as_seen(grid: Grid, seen: &CellPlanes, image: &ImageVerdict, live: &[bool]) -> Picture {
+/// A photograph's cells at the brightness that suits the wanted image best, as its error is
+/// taken.
+fn as_seen(grid: Grid, seen: &CellPlanes, wanted: &CellPlanes, live: &[bool]) -> Picture {
+    let pairs = || {
+        let planes = seen.iter().zip(wanted);
+        let cells = planes.flat_map(|(seen, wanted)| seen.iter().zip(wanted).zip(live));
+        cells.filter(|(_, live)| **live).map(|(pair, _)| pair)
+    };
+    let both: f64 = pairs().map(|(seen, wanted)| seen * wanted).sum();
+    let own: f64 = pairs().map(|(seen, _)| seen * seen).sum();
+    let scale = if own > 0.0 { both / own } else { 0.0 };
     let light = |plane: &Vec<f64>| {
         let cells = plane.iter().zip(live);
-        let relative = cells.map(|(light, live)| {
-            if *live {
-                light / image.white.max(1e-12)
-            } else {
-                0.0
-            }
-        });
-        relative.collect()
+        let scaled = cells.map(|(light, live)| if *live { scale * light } else { 0.0 });
+        scaled.collect()
     };
     lit(grid, &seen.iter().map(light).collect())
 }

@@ -139,7 +139,7 @@ fn pictures(verdict: &Verdict, images: &[TestImage], files: &[PictureFile]) -> M
     };
     html! { section {
         h2 { "On the wall" }
-        p { "The cells' mean light in the photographs, at one brightness for both of a pair." }
+        p { "The cells' mean light in the photographs, each at the brightness that suits it best." }
         @for image in &verdict.images {
             div .example {
                 h3 { (title(image).unwrap_or("Test image")) }

@@ -89,9 +89,13 @@ pub(crate) fn find(
     let middle = median(factors.clone()).unwrap_or(1.0);
     let off = median(factors.iter().map(|f| (f - middle).abs()).collect()).unwrap_or(0.0);
     let follows = followed < EXPLAINED * before && (middle - 1.0).abs() > STEADY * off;
-    if pairs.outshine() || follows && followed < 1.2 * curved {
+    let bent = curved < EXPLAINED * before;
+    // A curve that brightens explains as much as a factor does where the scene is even;
+    // but it leaves nothing brighter than white.
+    let either = middle > 1.0 && bent;
+    if pairs.outshine() || follows && !either && followed < 1.2 * curved {
         ambient(sequence, sampled)
-    } else if curved < EXPLAINED * before {
+    } else if bent {
         Cause::Curve { gamma }
     } else {
         Cause::Unknown

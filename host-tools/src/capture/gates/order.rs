@@ -34,6 +34,10 @@ const OTHER: f64 = 1.5;
 /// no pattern is shown; one half is another random pattern's.
 const NONE: f64 = 0.2;
 
+/// The same, in those of the session's other photographs: where cells are a few pixels
+/// wide or light each other much, all patterns look a little unlike themselves.
+const STRANGE: f64 = 3.0;
+
 /// What a photograph shows instead of its own pattern.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Wrong {
@@ -49,6 +53,8 @@ pub(crate) struct Order {
     pub(crate) wrong: Vec<Wrong>,
     /// Distance of each photograph to its own pattern.
     distances: Vec<f64>,
+    /// Distance from which no pattern is shown.
+    none: f64,
 }
 
 /// Compares every photograph with every pattern; `None` if there are too few, or too
@@ -189,6 +195,8 @@ impl Assigned {
             of.sum::<f64>() / pixels
         };
         let distances: Vec<f64> = (0..shots).map(|s| distance(s, &patterns[s])).collect();
+        let typical = super::superposition::median(distances.clone()).unwrap_or(0.0);
+        let none = NONE.max(STRANGE * typical);
         let wrong = (0..shots).filter_map(|shot| {
             let own = distances[shot];
             // What fits well needs no comparison.
@@ -200,7 +208,7 @@ impl Assigned {
             let other = patterns[best] != patterns[shot] && own > OTHER * least && least < NONE;
             // White is brighter than any sum of its parts, and black darker.
             let even = patterns[shot].iter().all(|lit| *lit == patterns[shot][0]);
-            match (other, own > NONE && !even) {
+            match (other, own > none && !even) {
                 (true, _) => Some(Wrong {
                     shot,
                     shows: Some(best),
@@ -215,7 +223,11 @@ impl Assigned {
         if strange > (shots / 10).max(2) {
             wrong.retain(|wrong| wrong.shows.is_some());
         }
-        Order { wrong, distances }
+        Order {
+            wrong,
+            distances,
+            none,
+        }
     }
 }
 
@@ -241,7 +253,7 @@ pub(crate) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
             values: shown
                 .map(|(shot, distance)| (sequence.shots[shot].index, *distance))
                 .collect(),
-            limit: Some(NONE),
+            limit: Some(order.none),
         },
     };
     let photo = |shot: usize| sequence.shots[shot].photo.display();

@@ -116,7 +116,8 @@ fn a_new_table_of_another_grid_and_of_one_channel_takes_over_too() {
     let [first, _] = tables();
     let second = SampleTable::random(grid(4, 6), 1, 3, 9).image();
     let input = stream(LINE, 6);
-    let (output, _, _) = live(&first, None, &[(3, &second), (4, &first)], &input);
+    // The frame that a table takes over at is asked for twice, before and after.
+    let (output, _, _) = live(&first, None, &[(3, &second), (5, &first)], &input);
     let (one, other) = (fixed(&first, None, &input), fixed(&second, None, &input));
     let (output, one, other) = (
         frames(LINE, &output),
