@@ -7,12 +7,11 @@ cd "$(dirname "$0")"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p gallery
-: > "$work/figures"
-for scene in installation painted-corner m-panels-painted dome; do
+for scene in installation painted-corner m-panels-painted; do
     file=../host-tools/scenes/$scene.toml
     iltm simulate "$file" -o "$work/$scene" --photos 80
     iltm solve "$work/$scene" -o "$work/$scene.iltm"
-    iltm verify "$work/$scene.iltm" -o "$work/$scene-verify" --projector 640x480
+    iltm verify "$work/$scene.iltm" -o "$work/$scene-verify"
     iltm simulate "$file" --photograph "$work/$scene-verify" --without drift
     # The verdict may be that the table errs more than it should: shown all the same.
     iltm verify "$work/$scene.iltm" "$work/$scene-verify" --report "$work/$scene-verdict" ||
