@@ -201,7 +201,12 @@ fn ambient(sequence: &Sequence, sampled: &Sampled) -> Cause {
         .sum();
     let error = (left / rows.len().max(1) as f64 * inverse[(1, 1)]).sqrt();
     let followed = (factors[1] - 1.0) / (factors[0] - 1.0);
-    if !followed.is_finite() || error > 0.2 * (factors[0] - 1.0).abs() {
+    // A camera that exposes for the picture exposes black longest of all: then black has
+    // more ambient light than the pairs, or looks like white.
+    let total = |squares: &[f64]| squares.iter().sum::<f64>();
+    if total(&black) > 0.5 * total(&white) || followed < -0.2 {
+        Cause::Exposure
+    } else if !followed.is_finite() || error > 0.2 * (factors[0] - 1.0).abs() {
         Cause::Either
     } else if followed > 0.6 {
         Cause::Exposure

@@ -23,6 +23,9 @@ const MOST_SHIFT: isize = 2;
 /// Correlation of a pixel's series with its cell's from which it is used.
 const LEAST_ALIKE: f64 = 0.5;
 
+/// The same where enough pixels have as much: what only bounces to a pixel follows no cell.
+const WELL_ALIKE: f64 = 0.8;
+
 /// Pixels that must be left.
 const LEAST_PIXELS: usize = 24;
 
@@ -154,7 +157,11 @@ impl Assigned {
             }
             (pixel, cell, f64::from(most))
         });
-        let best: Vec<(usize, usize, f64)> = best.filter(|b| b.2 > LEAST_ALIKE).collect();
+        let mut best: Vec<(usize, usize, f64)> = best.filter(|b| b.2 > LEAST_ALIKE).collect();
+        let well = |b: &&(usize, usize, f64)| b.2 > WELL_ALIKE;
+        if best.iter().filter(well).count() >= 4 * LEAST_PIXELS {
+            best.retain(|b| b.2 > WELL_ALIKE);
+        }
         Self {
             shift,
             alike: best.iter().map(|b| b.2).sum(),
@@ -205,7 +212,8 @@ impl Assigned {
             }
             let all = (0..shots).map(|other| (other, distance(shot, &patterns[other])));
             let (best, least) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-            let other = patterns[best] != patterns[shot] && own > OTHER * least && least < NONE;
+            let near = NONE.max(OTHER * typical);
+            let other = patterns[best] != patterns[shot] && own > OTHER * least && least < near;
             // White is brighter than any sum of its parts, and black darker.
             let even = patterns[shot].iter().all(|lit| *lit == patterns[shot][0]);
             match (other, own > none && !even) {
