@@ -125,7 +125,8 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (Learned, [f64; 2])
     photographed(&simulated(scene, Forced::default()), scene, &[], &folder);
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
     let learned = learn(&folder, &photographs, &solve, None, &Silent).unwrap();
-    let table = Table::check(&learned.compiled.image).unwrap();
+    let image = learned.compiled.image.clone();
+    let table = Table::check(&image).unwrap();
     let size = FrameSize::new(PROJECTOR.0, PROJECTOR.1).unwrap();
     let layout = Layout::new(table.grid(), size, 0).unwrap();
     let settings = Settings {

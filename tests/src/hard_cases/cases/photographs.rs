@@ -63,7 +63,7 @@ pub(super) const CASES: [Case; 8] = [
     Case {
         name: "gamma of 2.2 that nobody declared",
         reason: "light does not add up: superposition fails",
-        theory: "superposition must hold to 5 %",
+        theory: "superposition must hold to 3 %",
         run: |_| {
             let camera = Camera {
                 gamma: 2.2,
