@@ -2,8 +2,8 @@
 //! own content, as a page that a browser shows without network.
 //!
 //! [`Report`] draws what every report has; here are the images for a scene nobody knows
-//! ([`wanted`]), where the cells are ([`registered`]) and how bright white may be
-//! ([`headroom`]).
+//! (`wanted`), where the cells are (`registered`) and how bright white may be
+//! (`headroom`).
 
 mod headroom;
 mod registered;

@@ -45,7 +45,7 @@ pub struct Bound {
     /// a single photograph of white.
     pub noise: Option<f64>,
     /// Error of finding the cells again: what white differs by from cell to cell, which a
-    /// camera elsewhere sees other parts of; at most [`MOST_VIEWPOINT`], beyond which it is
+    /// camera elsewhere sees other parts of; at most 1 %, beyond which it is
     /// a change of the scene.
     pub viewpoint: f64,
     /// All of them together: root of the sum of squares, mean over the images.
