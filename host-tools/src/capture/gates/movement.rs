@@ -22,7 +22,7 @@ const MOST: f64 = 0.06;
 const FLOOR: f64 = 0.15;
 
 /// How many times the shifts' own scatter a step must be: far light tilts the borders of
-/// wide stripes, on curved scenes by half a pixel, each another way.
+/// wide stripes, on curved scenes by half a pixel, each another way. Twice the limit is a bump whatever the scatter.
 const SURE: f64 = 4.0;
 
 /// Photographs that must lie on each side of a bump.
@@ -222,7 +222,7 @@ pub(crate) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
         (WARN * moved.cell).max(FLOOR),
         (MOST * moved.cell).max(2.0 * FLOOR),
     );
-    let verdict = if bump.size < SURE * bump.scatter {
+    let verdict = if bump.size < (SURE * bump.scatter).min(2.0 * limit) {
         Verdict::Pass
     } else {
         Verdict::of(bump.size, warn, limit)

@@ -33,9 +33,12 @@ const LEAST_PIXELS: usize = 24;
 /// is shown.
 const OTHER: f64 = 1.5;
 
-/// Distance to the own pattern, of the range between dark and lit squared, from which
-/// no pattern is shown; one half is another random pattern's.
+/// Distance to a pattern, of the range between dark and lit squared, below which it may
+/// be the one that is shown; one half is another random pattern's.
 const NONE: f64 = 0.2;
+
+/// Distance to the own pattern from which no pattern is shown.
+const UNLIKE: f64 = 0.35;
 
 /// The same, in those of the session's other photographs: where cells are a few pixels
 /// wide or light each other much, all patterns look a little unlike themselves.
@@ -203,7 +206,7 @@ impl Assigned {
         };
         let distances: Vec<f64> = (0..shots).map(|s| distance(s, &patterns[s])).collect();
         let typical = super::superposition::median(distances.clone()).unwrap_or(0.0);
-        let none = NONE.max(STRANGE * typical);
+        let none = UNLIKE.max(STRANGE * typical);
         let wrong = (0..shots).filter_map(|shot| {
             let own = distances[shot];
             // What fits well needs no comparison.
