@@ -67,7 +67,7 @@ pub(super) fn decode(
     let mut margin = vec![f32::INFINITY; light.len()];
     let mut code = [vec![0_u32; light.len()], vec![0_u32; light.len()]];
     for (axis, code) in code.iter_mut().enumerate() {
-        for bit in 0..sequence.bits[axis] {
+        for bit in 0..sequence.codes[axis].bits {
             let difference = bit_difference(sequence, photographs, axis, bit, &middle, progress)?;
             for (pixel, (code, &d)) in code.iter_mut().zip(&difference).enumerate() {
                 *code = *code << 1 | u32::from(d > 0.0);
@@ -84,11 +84,14 @@ pub(super) fn decode(
         .zip(&row)
         .zip(&lit)
         .map(|((&col, &row), &lit)| {
-            let (col, row) = (binary(col) as usize, binary(row) as usize);
-            if lit && row < rows && col < cols {
-                (row * cols + col) as u32
-            } else {
-                NO_CELL
+            let at = |axis: usize, gray: u32| {
+                (binary(gray) as usize).checked_sub(sequence.codes[axis].offset)
+            };
+            match (at(0, col), at(1, row)) {
+                (Some(col), Some(row)) if lit && row < rows && col < cols => {
+                    (row * cols + col) as u32
+                }
+                _ => NO_CELL,
             }
         });
     Ok(GrayLabels {

@@ -25,6 +25,7 @@ pub mod calibration;
 #[cfg(test)]
 mod calibration_tests;
 mod cell_model;
+mod code;
 mod curve;
 mod diagnostics;
 mod drift;
@@ -115,6 +116,9 @@ pub struct CaptureOptions {
     pub bernoulli: Option<usize>,
     /// Fewer Bernoulli photographs than this are refused.
     pub min_bernoulli: usize,
+    /// Of stripes finer than a table or the camera can have, without Bernoulli
+    /// patterns, the finest are left out, so that a cell is a block of the patterns'.
+    pub coarsen: bool,
     /// Gates that may fail: [`read`] goes on despite them, as far as it can.
     pub ignore: Vec<GateName>,
 }
@@ -124,6 +128,7 @@ impl Default for CaptureOptions {
         Self {
             bernoulli: None,
             min_bernoulli: MIN_BERNOULLI,
+            coarsen: false,
             ignore: Vec::new(),
         }
     }
@@ -265,12 +270,13 @@ fn measure_all(
     let registered = registration::register(sequence, &mut photographs, &gray, progress)?;
     progress.end();
 
-    let cells = CellPixels::choose(&registered.registration, &saturated);
+    let cells = CellPixels::choose(&registered.registration, &saturated, &flood, &black);
     let counts = cells.counts();
     let live = cells.live.iter().filter(|live| **live).count();
     gates.push(gates::saturation::judge(&clipped, &cells.left_out, live));
     gates.push(gates::coverage::judge(
         sequence.grid,
+        sequence.coarser,
         &cells.live,
         &counts,
         &cells.left_out,

@@ -1,5 +1,6 @@
 //! Projected patterns: which cells are lit.
 
+use super::code::Code;
 use super::picture::{Opened, Samples, Source};
 use super::{CaptureError, FileFormat, Role};
 use iltm_runtime::Grid;
@@ -30,9 +31,8 @@ impl Pattern {
     #[must_use]
     pub fn of_role(grid: Grid, role: Role, column_bits: u8, row_bits: u8) -> Option<Self> {
         let (rows, cols) = (grid.rows(), grid.cols());
-        let stripe = |index: usize, bit: u8, bits: u8, inverse: bool| {
-            let shift = u32::from(bits.checked_sub(bit + 1)?);
-            Some(((index ^ (index >> 1)) >> shift) & 1 == usize::from(!inverse))
+        let stripe = |at: usize, bit: u8, bits: u8, inverse: bool| {
+            Code { bits, offset: 0 }.lit(at, bit, inverse)
         };
         let lit = (0..rows * cols).map(|cell| match role {
             Role::White => Some(true),
@@ -49,12 +49,12 @@ impl Pattern {
     }
 
     /// Reads a pattern: a PNG of one pixel a cell with 8 bits or fewer, grey or
-    /// with equal colours, every value 0 or 255.
+    /// with equal colours, every value 0 or 255, of at most `most` cells.
     ///
     /// # Errors
     /// [`CaptureError::PatternValue`] with the first cell that is neither, or
     /// what [`Opened`] returns.
-    pub(super) fn read(source: Source<'_>) -> Result<Self, CaptureError> {
+    pub(super) fn read(source: Source<'_>, most: u64) -> Result<Self, CaptureError> {
         let picture = Opened::open(source)?;
         // What `iltm patterns` writes and scripts beside this tool read.
         if picture.format() != FileFormat::Png {
@@ -66,12 +66,12 @@ impl Pattern {
         let (width, height) = picture.size();
         let channels = picture.channels();
         // More cells than any grid: refused before its pixels are decoded.
-        if u64::from(width) * u64::from(height) > Grid::MAX_CELLS as u64 {
+        if u64::from(width) * u64::from(height) > most {
             return Err(CaptureError::TooLarge {
                 path: source.path.to_owned(),
                 width,
                 height,
-                limit: Grid::MAX_CELLS as u64,
+                limit: most,
             });
         }
         let refuse = |at: usize, value: String| CaptureError::PatternValue {
@@ -103,6 +103,16 @@ impl Pattern {
             lit,
         })
     }
+
+    /// The same at some rows and columns only.
+    pub(super) fn sampled(&self, rows: &[usize], cols: &[usize]) -> Self {
+        let at = |&row: &usize| cols.iter().map(move |&col| row * self.cols + col);
+        Self {
+            rows: rows.len(),
+            cols: cols.len(),
+            lit: rows.iter().flat_map(at).map(|at| self.lit[at]).collect(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -115,7 +125,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.png");
         picture.into().save(&path).unwrap();
-        Pattern::read(source(&path))
+        Pattern::read(source(&path), Grid::MAX_CELLS as u64)
     }
 
     #[test]

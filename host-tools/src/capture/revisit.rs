@@ -89,15 +89,14 @@ pub fn revisit(
     progress.begin("finding the cells", 0);
     let gray = gray_code::decode(&sequence, &mut photographs, &flood, &black, progress)?;
     let registered = registration::register(&sequence, &mut photographs, &gray, progress)?;
-    let cells = CellPixels::choose(&registered.registration, &saturated);
+    let cells = CellPixels::choose(&registered.registration, &saturated, &flood, &black);
     progress.end();
 
     progress.begin("measuring cells", pictures.len() as u64);
     let mut measure = |frames: &[usize]| -> Result<Vec<CellPlanes>, CaptureError> {
         let mut light = Vec::with_capacity(frames.len());
         photographs.for_batches(frames, progress, |photos| {
-            let planes = photos.iter().map(|(_, photo)| &photo.planes);
-            light.extend(planes.map(|planes| planes.iter().map(|p| cells.mean(p)).collect()));
+            light.extend(photos.iter().map(|(_, photo)| cells.light(&photo.planes)));
         })?;
         Ok(light)
     };
@@ -107,7 +106,7 @@ pub fn revisit(
     Ok(Revisited {
         grid: sequence.grid,
         channels: black.len(),
-        black: black.iter().map(|plane| cells.mean(plane)).collect(),
+        black: cells.light(&black),
         live: cells.live,
         left_out: cells.left_out,
         registration: registered.registration,

@@ -1,6 +1,7 @@
 //! The patterns that were shown, checked against each other before any
 //! photograph is decoded.
 
+use super::code::{Code, Stripes};
 use super::frame::{self, Frame};
 use super::manifest::MANIFEST_FILE;
 use super::picture::Source;
@@ -22,6 +23,12 @@ pub const MIN_BERNOULLI: usize = 10;
 /// by chance, one in 16 million pairs is. On fewer cells chance draws patterns
 /// twice, and each draw counts.
 const FEWEST_FOR_REPEATS: usize = 24;
+
+/// Pixels of the largest projector whose patterns are looked at more coarsely.
+const MOST_PROJECTOR_PIXELS: usize = 4096 * 2160;
+
+/// Memory that patterns may take while they are looked at more coarsely.
+const MOST_BYTES: usize = 1 << 30;
 
 /// One axis of the grid.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -67,8 +74,10 @@ pub(super) struct Sequence {
     pub(super) black: Vec<usize>,
     /// The white view, then the Gray code, then the Bernoulli patterns.
     pub(super) views: Vec<View>,
-    /// Bits of the column code and of the row code.
-    pub(super) bits: [u8; 2],
+    /// The column code and the row code.
+    pub(super) codes: [Code; 2],
+    /// Columns and rows of the patterns that each cell stands for, as a power of 2.
+    pub(super) coarser: u8,
     /// Where the Gray code ends and the Bernoulli patterns begin in `views`.
     bernoulli_from: usize,
 }
@@ -79,6 +88,8 @@ pub(super) struct Chosen {
     pub(super) frames: Vec<Frame>,
     /// The longest exposure, if exposures are given.
     longest: Option<f64>,
+    /// [`CaptureOptions::coarsen`], if there is nothing that forbids it.
+    coarsen: bool,
 }
 
 impl Chosen {
@@ -95,12 +106,20 @@ impl Chosen {
         let manifest = folder.join(MANIFEST_FILE);
         check_levels(shots, &manifest)?;
         let longest = frame::longest(shots, &manifest)?;
+        // Stripes may be looked at by fewer bits; a Bernoulli pattern is what it is.
+        let coarsen = options.coarsen && shots.iter().all(|shot| shot.role != Role::Bernoulli);
         let frames = match longest {
-            Some(longest) => frame::bracketed(shots, &read_patterns(folder, shots)?, longest),
+            Some(longest) => {
+                frame::bracketed(shots, &read_patterns(folder, shots, coarsen)?, longest)
+            }
             None => Frame::of_each(shots, None),
         };
         let frames = chosen(frames, options, &manifest)?;
-        Ok(Self { frames, longest })
+        Ok(Self {
+            frames,
+            longest,
+            coarsen,
+        })
     }
 }
 
@@ -111,31 +130,67 @@ impl Sequence {
     /// What [`CaptureError`] says about roles and patterns.
     pub(super) fn read(folder: &Path, chosen: Chosen) -> Result<Self, CaptureError> {
         let manifest = folder.join(MANIFEST_FILE);
-        let Chosen { frames, longest } = chosen;
-        let shots: Vec<Shot> = frames.iter().map(|frame| frame.shots[0].clone()).collect();
+        let Chosen {
+            mut frames,
+            longest,
+            coarsen,
+        } = chosen;
+        let first = |frame: &Frame| frame.shots[0].clone();
+        let mut shots: Vec<Shot> = frames.iter().map(first).collect();
         check_levels(&shots, &manifest)?;
-        let patterns = read_patterns(folder, &shots)?;
-        let grid = common_grid(folder, &shots, &patterns)?;
-        let bits = [
-            code_bits(Axis::Column, grid.cols(), &shots, &manifest)?,
-            code_bits(Axis::Row, grid.rows(), &shots, &manifest)?,
-        ];
-        for (shot, pattern) in shots.iter().zip(&patterns) {
-            check_role(folder, shot, pattern, grid, bits)?;
+        let mut patterns = read_patterns(folder, &shots, coarsen)?;
+        let (rows, cols) = common_size(folder, &shots, &patterns)?;
+        let sides = [(Axis::Column, cols), (Axis::Row, rows)];
+        let mut given = [0; 2];
+        for (given, (axis, _)) in given.iter_mut().zip(sides) {
+            *given = code_bits(axis, &shots, &manifest)?;
         }
-        let mut sequence = Self::grouped(grid, bits, frames, shots, patterns);
+        let mut codes: [Code; 2] = std::array::from_fn(|k| {
+            let (axis, cells) = sides[k];
+            Code::find(&stripes(axis, &shots, &patterns), given[k], cells)
+        });
+        let missing = |k: usize| codes[k].bits - given[k];
+        if let (Some(k), false) = ((0..2).find(|&k| missing(k) > 0), coarsen) {
+            return Err(CaptureError::GridNotCovered {
+                path: manifest,
+                axis: sides[k].0,
+                cells: sides[k].1,
+                needed: codes[k].bits,
+                given: given[k],
+            });
+        }
+        for (shot, pattern) in shots.iter().zip(&patterns) {
+            check_role(folder, shot, pattern, codes)?;
+        }
+        let fewest = missing(0).max(missing(1));
+        let blocks = |steps: u8| {
+            let [cols, rows] = [0, 1].map(|k| codes[k].firsts(steps, sides[k].1).len());
+            rows * cols
+        };
+        let fits = |steps: &u8| blocks(*steps) <= Grid::MAX_CELLS;
+        let coarser = (fewest..Role::MAX_BITS).find(fits).unwrap_or(fewest);
+        if coarser > 0 {
+            let firsts = [0, 1].map(|k| codes[k].firsts(coarser, sides[k].1));
+            codes = codes.map(|code| code.coarser(coarser));
+            patterns = patterns
+                .iter()
+                .map(|pattern| pattern.sampled(&firsts[1], &firsts[0]))
+                .collect();
+            let told: Vec<bool> = shots.iter().map(|shot| told_by(shot.role, codes)).collect();
+            keep(&mut frames, &told);
+            keep(&mut shots, &told);
+            keep(&mut patterns, &told);
+        }
+        let grid = grid_of(folder, &shots, &patterns)?;
+        let mut sequence = Self::grouped(grid, frames, shots, patterns);
+        sequence.codes = codes;
+        sequence.coarser = coarser;
         sequence.longest = longest;
         Ok(sequence)
     }
 
     /// Puts photographs of one pattern together.
-    fn grouped(
-        grid: Grid,
-        bits: [u8; 2],
-        frames: Vec<Frame>,
-        shots: Vec<Shot>,
-        patterns: Vec<Pattern>,
-    ) -> Self {
+    fn grouped(grid: Grid, frames: Vec<Frame>, shots: Vec<Shot>, patterns: Vec<Pattern>) -> Self {
         let mut black = Vec::new();
         let mut coded: Vec<View> = Vec::new();
         let mut bernoulli: Vec<View> = Vec::new();
@@ -171,7 +226,8 @@ impl Sequence {
             shots,
             black,
             views: coded,
-            bits,
+            codes: [Code::default(); 2],
+            coarser: 0,
             bernoulli_from,
         }
     }
@@ -211,13 +267,25 @@ impl Sequence {
     }
 }
 
-fn read_patterns(folder: &Path, shots: &[Shot]) -> Result<Vec<Pattern>, CaptureError> {
+/// Reads patterns of as many cells as a table may have; of more where they may be
+/// looked at more coarsely.
+fn read_patterns(
+    folder: &Path,
+    shots: &[Shot],
+    coarsen: bool,
+) -> Result<Vec<Pattern>, CaptureError> {
+    let most = if coarsen {
+        (MOST_BYTES / shots.len().max(1)).clamp(Grid::MAX_CELLS, MOST_PROJECTOR_PIXELS)
+    } else {
+        Grid::MAX_CELLS
+    };
     let read = |shot: &Shot| {
-        Pattern::read(Source {
+        let source = Source {
             path: &folder.join(&shot.pattern),
             what: "pattern",
             line: shot.line,
-        })
+        };
+        Pattern::read(source, most as u64)
     };
     let patterns: Vec<_> = shots.par_iter().map(read).collect();
     patterns.into_iter().collect()
@@ -272,35 +340,73 @@ fn chosen(
     Ok(frames.into_iter().filter(|frame| wanted(frame)).collect())
 }
 
-/// The grid that all patterns share.
-fn common_grid(folder: &Path, shots: &[Shot], patterns: &[Pattern]) -> Result<Grid, CaptureError> {
+/// Rows and columns that all patterns have.
+fn common_size(
+    folder: &Path,
+    shots: &[Shot],
+    patterns: &[Pattern],
+) -> Result<(usize, usize), CaptureError> {
     let path = |at: usize| -> PathBuf { folder.join(&shots[at].pattern) };
     let size = |pattern: &Pattern| (pattern.rows as u32, pattern.cols as u32);
     let expected = size(&patterns[0]);
-    if let Some(at) = patterns.iter().position(|p| size(p) != expected) {
-        return Err(CaptureError::PatternSize {
+    match patterns.iter().position(|p| size(p) != expected) {
+        Some(at) => Err(CaptureError::PatternSize {
             path: path(at),
             found: size(&patterns[at]),
             first: path(0),
             expected,
-        });
+        }),
+        None => Ok((patterns[0].rows, patterns[0].cols)),
     }
+}
+
+/// The grid of patterns that have one size.
+fn grid_of(folder: &Path, shots: &[Shot], patterns: &[Pattern]) -> Result<Grid, CaptureError> {
     // A pattern of at most `Grid::MAX_CELLS` cells has sides that fit 16 bits.
-    let side = |cells: u32| u16::try_from(cells).unwrap_or(u16::MAX);
-    Grid::new(side(expected.0), side(expected.1)).map_err(|source| CaptureError::Grid {
-        path: path(0),
+    let side = |cells: usize| u16::try_from(cells).unwrap_or(u16::MAX);
+    let (rows, cols) = (patterns[0].rows, patterns[0].cols);
+    Grid::new(side(rows), side(cols)).map_err(|source| CaptureError::Grid {
+        path: folder.join(&shots[0].pattern),
         source,
     })
 }
 
-/// Bits of the Gray code of one axis, all of which were photographed, as a
-/// pattern or as its inverse.
-fn code_bits(
-    axis: Axis,
-    cells: usize,
-    shots: &[Shot],
-    manifest: &Path,
-) -> Result<u8, CaptureError> {
+/// The Gray code patterns of one axis, along it.
+fn stripes(axis: Axis, shots: &[Shot], patterns: &[Pattern]) -> Vec<Stripes> {
+    let of_shot = |(shot, pattern): (&Shot, &Pattern)| {
+        let (bit, inverse, lit) = match (axis, shot.role) {
+            (Axis::Column, Role::Column { bit, inverse }) => {
+                (bit, inverse, pattern.lit[..pattern.cols].to_vec())
+            }
+            (Axis::Row, Role::Row { bit, inverse }) => {
+                let first = pattern.lit.iter().step_by(pattern.cols);
+                (bit, inverse, first.copied().collect())
+            }
+            _ => return None,
+        };
+        Some(Stripes { bit, inverse, lit })
+    };
+    shots.iter().zip(patterns).filter_map(of_shot).collect()
+}
+
+/// Whether the codes, perhaps coarser than the patterns', still have what a role shows.
+fn told_by(role: Role, codes: [Code; 2]) -> bool {
+    match role {
+        Role::Column { bit, .. } => bit < codes[0].bits,
+        Role::Row { bit, .. } => bit < codes[1].bits,
+        Role::White | Role::Black | Role::Bernoulli => true,
+    }
+}
+
+/// Keeps the items that have `true` at their place.
+fn keep<T>(items: &mut Vec<T>, wanted: &[bool]) {
+    let mut wanted = wanted.iter();
+    items.retain(|_| wanted.next() == Some(&true));
+}
+
+/// Bits of the Gray code of one axis that were photographed, as a pattern or as its
+/// inverse.
+fn code_bits(axis: Axis, shots: &[Shot], manifest: &Path) -> Result<u8, CaptureError> {
     let mut seen = [false; Role::MAX_BITS as usize];
     for shot in shots {
         match (axis, shot.role) {
@@ -311,25 +417,15 @@ fn code_bits(
         }
     }
     let given = seen.iter().rposition(|&seen| seen).map_or(0, |bit| bit + 1);
-    if let Some(bit) = seen[..given].iter().position(|&seen| !seen) {
-        return Err(CaptureError::MissingBit {
+    match seen[..given].iter().position(|&seen| !seen) {
+        Some(bit) => Err(CaptureError::MissingBit {
             path: manifest.to_owned(),
             axis,
             bit: bit as u8,
             last: given as u8 - 1,
-        });
+        }),
+        None => Ok(given as u8),
     }
-    let needed = cells.next_power_of_two().trailing_zeros() as u8;
-    if (given as u8) < needed {
-        return Err(CaptureError::GridNotCovered {
-            path: manifest.to_owned(),
-            axis,
-            cells,
-            needed,
-            given: given as u8,
-        });
-    }
-    Ok(given as u8)
 }
 
 /// Refuses a pattern that lights other cells than its role says.
@@ -337,23 +433,26 @@ fn check_role(
     folder: &Path,
     shot: &Shot,
     pattern: &Pattern,
-    grid: Grid,
-    bits: [u8; 2],
+    codes: [Code; 2],
 ) -> Result<(), CaptureError> {
-    let Some(expected) = Pattern::of_role(grid, shot.role, bits[0], bits[1]) else {
-        return Ok(());
+    let expected = |cell: usize| {
+        let (row, col) = (cell / pattern.cols, cell % pattern.cols);
+        match shot.role {
+            Role::White => Some(true),
+            Role::Black => Some(false),
+            Role::Column { bit, inverse } => codes[0].lit(col, bit, inverse),
+            Role::Row { bit, inverse } => codes[1].lit(row, bit, inverse),
+            Role::Bernoulli => None,
+        }
     };
-    let wrong = expected
-        .lit
-        .iter()
-        .zip(&pattern.lit)
-        .position(|(a, b)| a != b);
+    let wrong = |(cell, lit): (usize, &bool)| expected(cell).is_some_and(|e| e != *lit);
+    let wrong = pattern.lit.iter().enumerate().position(wrong);
     wrong.map_or(Ok(()), |cell| {
         Err(CaptureError::PatternRole {
             path: folder.join(&shot.pattern),
             role: shot.role,
-            row: (cell / grid.cols()) as u32,
-            col: (cell % grid.cols()) as u32,
+            row: (cell / pattern.cols) as u32,
+            col: (cell % pattern.cols) as u32,
         })
     })
 }

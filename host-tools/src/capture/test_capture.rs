@@ -1,6 +1,7 @@
 //! Small simulated captures for tests: a flat grid in front of a camera that
 //! does not line up with it, with bounced light, ambient light and noise.
 
+use super::code::Code;
 use super::{CaptureOptions, Manifest, Measurements, Pattern, Role, Shot};
 use crate::progress::Silent;
 use iltm_runtime::Grid;
@@ -50,6 +51,8 @@ pub(super) struct TestCapture {
     pub(super) bernoulli: usize,
     /// Photographs of white and of black each.
     pub(super) repeats: usize,
+    /// Number of the first column and of the first row in the Gray code.
+    pub(super) offset: [usize; 2],
     /// Gain of each channel, 1 or 3.
     pub(super) gains: Vec<f64>,
     /// Full scale of the files, 255 or 65535.
@@ -74,6 +77,7 @@ impl Default for TestCapture {
             noise: 0.004,
             bernoulli: 30,
             repeats: 1,
+            offset: [0; 2],
             gains: vec![1.0],
             full_scale: u16::MAX,
             encode: |light| light,
@@ -105,18 +109,28 @@ impl TestCapture {
     /// Every pattern with its role, in the order it is shown.
     pub(super) fn patterns(&self) -> Vec<(Role, Pattern)> {
         let grid = self.grid();
-        let bits = |cells: usize| cells.next_power_of_two().trailing_zeros() as u8;
-        let (column_bits, row_bits) = (bits(self.cols), bits(self.rows));
+        let code = |cells: usize, offset: usize| Code {
+            bits: (cells + offset).next_power_of_two().trailing_zeros() as u8,
+            offset,
+        };
+        let [column, row] = [
+            code(self.cols, self.offset[0]),
+            code(self.rows, self.offset[1]),
+        ];
         let mut roles = [Role::White, Role::Black].repeat(self.repeats);
         for inverse in [false, true] {
-            roles.extend((0..column_bits).map(|bit| Role::Column { bit, inverse }));
-            roles.extend((0..row_bits).map(|bit| Role::Row { bit, inverse }));
+            roles.extend((0..column.bits).map(|bit| Role::Column { bit, inverse }));
+            roles.extend((0..row.bits).map(|bit| Role::Row { bit, inverse }));
         }
         let coded = roles.into_iter().map(|role| {
-            (
-                role,
-                Pattern::of_role(grid, role, column_bits, row_bits).unwrap(),
-            )
+            let lit = (0..grid.cells()).map(|cell| match role {
+                Role::Column { bit, inverse } => column.lit(cell % self.cols, bit, inverse),
+                Role::Row { bit, inverse } => row.lit(cell / self.cols, bit, inverse),
+                role => Some(role == Role::White),
+            });
+            let lit = lit.collect::<Option<_>>().unwrap();
+            let (rows, cols) = (self.rows, self.cols);
+            (role, Pattern { rows, cols, lit })
         });
         let mut dice = Dice::new(1);
         let random = (0..self.bernoulli).map(|_| {

@@ -48,6 +48,20 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
     let channel = &measured.channels[0];
     assert_eq!(measured.roles[Measurements::WHITE], Role::White);
     assert_eq!(measured.patterns.ncols(), 1 + 6 + 6 + 30);
+    let mean = |light: &[f64], pixels: &[usize]| {
+        pixels
+            .iter()
+            .map(|&pixel| light[pixel] - scene.ambient)
+            .sum::<f64>()
+            / pixels.len() as f64
+    };
+    let inside = measured.registration.inside();
+    let pixels_of = |map: &[u32], cell: usize, counts: &dyn Fn(usize) -> bool| -> Vec<usize> {
+        (0..map.len())
+            .filter(|&pixel| map[pixel] == cell as u32 && counts(pixel))
+            .collect()
+    };
+    let white = scene.light(&scene.patterns()[0].1);
     let mut chi = 0.0;
     let shown: Vec<_> = scene
         .patterns()
@@ -65,13 +79,11 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
         assert_eq!(lit, pattern.lit);
         let light = scene.light(pattern);
         for cell in 0..30 {
-            let of_cell = measured.registration.cell_of_pixel.iter().zip(&light);
-            let seen: Vec<f64> = of_cell
-                .filter(|(c, _)| **c == cell as u32)
-                .map(|(_, l)| *l)
-                .collect();
-            assert_eq!(seen.len(), measured.pixels[cell] as usize);
-            let truth = seen.iter().sum::<f64>() / seen.len() as f64 - scene.ambient;
+            let registration = &measured.registration;
+            let chosen = pixels_of(&registration.cell_of_pixel, cell, &|_| true);
+            assert_eq!(chosen.len(), measured.pixels[cell] as usize);
+            let whole = pixels_of(&registration.seen_cell, cell, &|pixel| inside[pixel]);
+            let truth = mean(&light, &chosen) * mean(&white, &whole) / mean(&white, &chosen);
             let found = channel.observations[(cell, view)];
             chi += ((found - truth) / channel.noise[cell]).powi(2) / (30.0 * 43.0);
         }
@@ -390,4 +402,78 @@ fn every_step_that_begins_also_ends_and_reaches_its_total() {
     let log = Log::default();
     read(capture(|_, _| {}).path(), &CaptureOptions::default(), &log).unwrap();
     assert_eq!(log.0.into_inner().unwrap().len(), 6);
+}
+
+/// The share of registered pixels that lie in another cell than `cell_of` says for the
+/// cell that really lights them most.
+fn misplaced(
+    capture: &TestCapture,
+    measured: &Measurements,
+    cell_of: impl Fn(usize, usize) -> usize,
+) -> f64 {
+    let (width, _) = capture.camera();
+    let index = |at: usize, cells: usize| {
+        (0..cells).max_by(|a, b| capture.overlap(at, *a).total_cmp(&capture.overlap(at, *b)))
+    };
+    let found = || {
+        let cells = measured.registration.cell_of_pixel.iter().enumerate();
+        cells.filter(|(_, cell)| **cell != NO_CELL)
+    };
+    let wrong = |(pixel, cell): &(usize, &u32)| {
+        let row = index(pixel / width, capture.rows).unwrap();
+        let col = index(pixel % width, capture.cols).unwrap();
+        **cell as usize != cell_of(row, col)
+    };
+    found().filter(wrong).count() as f64 / found().count() as f64
+}
+
+#[test]
+fn a_gray_code_that_others_centred_is_registered() {
+    let capture = TestCapture {
+        offset: [1, 2],
+        ..TestCapture::default()
+    };
+    let measured = capture.read();
+    assert!(measured.live.iter().all(|live| *live));
+    assert!(misplaced(&capture, &measured, |row, col| row * 6 + col) < 1e-9);
+}
+
+#[test]
+fn stripes_without_the_finest_bits_tell_blocks_of_cells() {
+    let capture = TestCapture {
+        rows: 8,
+        cols: 12,
+        bounced: 0.002,
+        bernoulli: 0,
+        ..TestCapture::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut manifest = capture.write(folder.path());
+    let finest =
+        |role: Role| matches!(role, Role::Column { bit: 3, .. } | Role::Row { bit: 2, .. });
+    manifest.shots.retain(|shot| !finest(shot.role));
+    std::fs::write(folder.path().join(MANIFEST_FILE), manifest.to_csv()).unwrap();
+    let options = CaptureOptions {
+        min_bernoulli: 0,
+        ..CaptureOptions::default()
+    };
+    let refused = examine(folder.path(), &options, &Silent).unwrap_err();
+    assert!(
+        matches!(refused, CaptureError::GridNotCovered { .. }),
+        "{refused}"
+    );
+    let options = CaptureOptions {
+        coarsen: true,
+        ..options
+    };
+    let examined = examine(folder.path(), &options, &Silent).unwrap();
+    let coverage = examined
+        .gates
+        .iter()
+        .find(|gate| gate.name == GateName::Coverage);
+    let what = &coverage.unwrap().what;
+    assert!(what.contains("4 x 6 blocks of 2 x 2 pixels"), "{what}");
+    let measured = examined.measurements.unwrap();
+    assert!(measured.live.iter().all(|live| *live));
+    assert!(misplaced(&capture, &measured, |row, col| row / 2 * 6 + col / 2) < 1e-9);
 }

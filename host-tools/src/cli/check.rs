@@ -20,6 +20,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         bernoulli: arguments.photos,
         // A few stripes are enough to say whether a rig is in order.
         min_bernoulli: 0,
+        coarsen: true,
         ..CaptureOptions::default()
     };
     let bars = progress(output);

@@ -3,22 +3,16 @@
 
 use super::shooting::{Photograph, Shooting, Slide};
 use super::simulation::SimulationError;
-use crate::capture::{
-    CALIBRATION_FILE, CaptureError, ListedRole, MANIFEST_FILE, ManifestOf, find_photo,
-};
+use crate::capture::{CaptureError, find_photo};
 use crate::progress::Progress;
-use crate::verify::VERIFY_FILE;
+use crate::session::listed;
 use iltm_runtime::Grid;
 use image::{ImageReader, Limits};
-use std::fmt;
 use std::fs;
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
-
-/// Manifests that are looked for.
-const MANIFESTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, VERIFY_FILE];
 
 /// Why photographs could not be taken.
 #[derive(Debug, Error)]
@@ -78,33 +72,6 @@ impl RetakeError {
     }
 }
 
-/// Any role: what a slide is shown for does not change its light.
-#[derive(Clone, Copy, PartialEq, Debug)]
-struct AnyRole;
-
-impl fmt::Display for AnyRole {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("any")
-    }
-}
-
-impl ListedRole for AnyRole {
-    const FILE: &'static str = MANIFEST_FILE;
-
-    fn from_name(_: &str) -> Option<Self> {
-        Some(Self)
-    }
-
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
-        // Never asked for: every name is taken.
-        CaptureError::UnknownRole {
-            path: path.to_owned(),
-            line,
-            role: role.to_owned(),
-        }
-    }
-}
-
 /// What a folder calls for, in the order in which it is shown.
 #[derive(Clone, Debug)]
 pub struct Session {
@@ -121,21 +88,8 @@ impl Session {
     /// # Errors
     /// [`RetakeError`] with the manifest's line or the pattern.
     pub fn read(folder: &Path, grid: Grid) -> Result<Self, RetakeError> {
-        let mut shots = Vec::new();
-        for name in MANIFESTS {
-            let path = folder.join(name);
-            match fs::read(&path) {
-                Ok(bytes) => {
-                    shots.extend(ManifestOf::<AnyRole>::parse(&bytes, &path)?.shots);
-                }
-                Err(error) if error.kind() == ErrorKind::NotFound => {}
-                Err(source) => return Err(RetakeError::Io { path, source }),
-            }
-        }
-        if shots.is_empty() {
-            let path = folder.join(MANIFEST_FILE);
-            return Err(CaptureError::NoManifest { path }.into());
-        }
+        // What a slide is shown for does not change its light.
+        let mut shots: Vec<_> = listed(folder)?.into_iter().map(|(_, shot)| shot).collect();
         shots.sort_by_key(|shot| shot.index);
         // Exposures are relative to the longest, which white is exposed for.
         let longest = shots.iter().filter_map(|s| s.exposure).fold(0.0, f64::max);

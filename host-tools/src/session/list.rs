@@ -1,46 +1,12 @@
 //! What is to be photographed, and what is still missing.
 
+use super::lists::listed;
 use super::{SLIDES_FOLDER, SessionError};
-use crate::capture::{
-    CALIBRATION_FILE, CaptureError, Exposed, ListedRole, MANIFEST_FILE, ManifestOf, find_photo,
-    pictures_of_stem,
-};
+use crate::capture::{CaptureError, Exposed, find_photo, pictures_of_stem};
 use crate::progress::Progress;
-use crate::verify::VERIFY_FILE;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
-
-/// Lists that a folder may hold: a capture's, and those of a folder made to verify a
-/// table.
-const LISTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, VERIFY_FILE];
-
-/// A role by its name alone: whoever photographs need not know more.
-#[derive(Clone, PartialEq, Eq, Debug)]
-struct NameOnly(String);
-
-impl fmt::Display for NameOnly {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl ListedRole for NameOnly {
-    const FILE: &'static str = MANIFEST_FILE;
-
-    fn from_name(name: &str) -> Option<Self> {
-        (!name.is_empty()).then(|| Self(name.to_owned()))
-    }
-
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
-        CaptureError::ManifestLine {
-            path: path.to_owned(),
-            line,
-            reason: format!("the role \"{role}\" is no name"),
-        }
-    }
-}
 
 /// A picture to show and the photograph to take of it.
 #[derive(Clone, PartialEq, Debug)]
@@ -80,33 +46,24 @@ pub fn planned(folder: &Path) -> Result<Vec<Planned>, SessionError> {
         source,
     })?;
     let mut all: BTreeMap<u32, (&str, Planned)> = BTreeMap::new();
-    for list in LISTS {
-        let Some(manifest) = ManifestOf::<NameOnly>::read_named(&root, list)? else {
-            continue;
+    for (list, shot) in listed(&root)? {
+        // A pattern that is listed twice, for a bracket, has one slide.
+        let name = shot.pattern.file_name().unwrap_or_default();
+        let planned = Planned {
+            index: shot.index,
+            role: shot.role.0,
+            slide: root.join(SLIDES_FOLDER).join(name),
+            photo: root.join(&shot.photo),
+            exposure: shot.exposure,
         };
-        for shot in manifest.shots {
-            // A pattern that is listed twice, for a bracket, has one slide.
-            let name = shot.pattern.file_name().unwrap_or_default();
-            let planned = Planned {
-                index: shot.index,
-                role: shot.role.0,
-                slide: root.join(SLIDES_FOLDER).join(name),
-                photo: root.join(&shot.photo),
-                exposure: shot.exposure,
-            };
-            let index = planned.index;
-            if let Some((first, _)) = all.insert(index, (list, planned)) {
-                return Err(SessionError::IndexTwice {
-                    folder: folder.to_owned(),
-                    index,
-                    lists: [first, list],
-                });
-            }
+        let index = planned.index;
+        if let Some((first, _)) = all.insert(index, (list, planned)) {
+            return Err(SessionError::IndexTwice {
+                folder: folder.to_owned(),
+                index,
+                lists: [first, list],
+            });
         }
-    }
-    if all.is_empty() {
-        let path = folder.join(MANIFEST_FILE);
-        return Err(CaptureError::NoManifest { path }.into());
     }
     Ok(all.into_values().map(|(_, planned)| planned).collect())
 }

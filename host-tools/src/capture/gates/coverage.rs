@@ -10,8 +10,15 @@ const LEAST: f64 = 0.1;
 /// Share of missing cells from which it is worth a word.
 const WARN: f64 = 0.1;
 
-/// Judges the cells that were found.
-pub(crate) fn judge(grid: Grid, live: &[bool], pixels: &[u32], left_out: &[LeftOut]) -> Gate {
+/// Judges the cells that were found, each of which stands for 2^`coarser` columns and
+/// rows of the patterns.
+pub(crate) fn judge(
+    grid: Grid,
+    coarser: u8,
+    live: &[bool],
+    pixels: &[u32],
+    left_out: &[LeftOut],
+) -> Gate {
     let cells = grid.cells();
     let found = live.iter().filter(|live| **live).count();
     let missing = (cells - found) as f64 / cells as f64;
@@ -31,6 +38,17 @@ pub(crate) fn judge(grid: Grid, live: &[bool], pixels: &[u32], left_out: &[LeftO
         (_, false) => format!(
             "{found} of {cells} cells were found; the camera does not see the others alone: {}",
             region(grid, &unseen)
+        ),
+    };
+    let what = match coarser {
+        0 => what,
+        steps => format!(
+            "{what} ({} x {} blocks of {side} x {side} pixels: finer stripes are left out, a \
+             table has at most {} cells)",
+            grid.rows(),
+            grid.cols(),
+            Grid::MAX_CELLS,
+            side = 1_u32 << steps,
         ),
     };
     let value = |cell: usize| {

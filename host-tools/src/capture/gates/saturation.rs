@@ -151,11 +151,17 @@ pub(crate) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gat
             live + lost
         )
     };
+    // Whichever is closer to its limit.
+    let (number, limit) = if cells / MOST_CELLS > pixels / MOST_PIXELS {
+        (cells, MOST_CELLS)
+    } else {
+        (pixels, MOST_PIXELS)
+    };
     Gate {
         name: GateName::Saturation,
         verdict,
-        number: 100.0 * pixels.max(cells * MOST_PIXELS / MOST_CELLS).min(1.0),
-        limit: 100.0 * MOST_PIXELS,
+        number: 100.0 * number,
+        limit: 100.0 * limit,
         unit: "%",
         what,
         next_step: match verdict {
