@@ -130,6 +130,13 @@ impl Candidate {
     pub(super) fn direct(&self) -> f32 {
         self.weights.iter().sum()
     }
+
+    /// Light from the brightest 2 x 2 of them: no more cells meet in a pixel.
+    pub(super) fn nearest(&self) -> f32 {
+        let squares = [[0, 1, 3, 4], [1, 2, 4, 5], [3, 4, 6, 7], [4, 5, 7, 8]];
+        let light = |square: [usize; 4]| square.iter().map(|&k| self.weights[k].max(0.0)).sum();
+        squares.map(light).into_iter().fold(0.0, f32::max)
+    }
 }
 
 /// Registers the camera pixels, by regression if there are enough photographs.
@@ -160,6 +167,7 @@ pub(super) fn register(
         regress(sequence, photographs, &mut candidates, progress)?;
         candidates.retain(|c| c.weights[4] > LEAST_OWN * gray.light[c.pixel as usize]);
         sharing::drop_unlit(&mut candidates, grid, camera);
+        sharing::drop_indirect(&mut candidates, &gray.light);
         sharing::judge(&mut candidates, grid, camera);
         RegistrationMethod::Regression { photographs: taken }
     };

@@ -7,9 +7,11 @@
 //! excess over that pixel counts. "A little" is an eighth of a cell, so that a
 //! blurred border of many pixels is judged like a sharp one of a single pixel.
 
+use super::gray_code::percentile;
 use super::registration::Candidate;
 use super::regression::axis_sums;
 use iltm_runtime::Grid;
+use std::collections::BTreeMap;
 
 /// Part of a second cell, relative to the pixel's own, from which a pixel counts
 /// as shared.
@@ -23,6 +25,13 @@ const BEYOND: f32 = 0.45;
 /// Direct light, relative to the brightest of the eight neighbours, below which
 /// a pixel lies beyond the border of the projection.
 const OUTSIDE: f32 = 0.25;
+
+/// Share of a pixel's light that comes from its own and the next cells, relative to that
+/// of the cell's bright pixels, from which it is lit directly.
+const INDIRECT: f32 = 0.85;
+
+/// Which of a cell's pixels count as bright.
+const BRIGHT: f64 = 0.9;
 
 /// Distance, in cells, of the pixels that a pixel is compared with.
 const REACH: f64 = 0.125;
@@ -54,6 +63,37 @@ pub(super) fn drop_unlit(candidates: &mut Vec<Candidate>, grid: Grid, camera: (u
     let keep: Vec<bool> = candidates.iter().map(lit).collect();
     let mut keep = keep.into_iter();
     candidates.retain(|_| keep.next() == Some(true));
+}
+
+/// Removes candidates that get their cell's light from other surfaces only, as beyond
+/// the border of the projection beside a crease: much darker than the cell's other
+/// pixels, and not for a dark paint, which darkens light from everywhere alike. `light`
+/// is the flood light of each camera pixel.
+pub(super) fn drop_indirect(candidates: &mut Vec<Candidate>, light: &[f32]) {
+    let seen = |candidate: &Candidate| {
+        let nearest = candidate.nearest();
+        (nearest, nearest / light[candidate.pixel as usize])
+    };
+    let mut of_cell: BTreeMap<u32, Vec<(f32, f32)>> = BTreeMap::new();
+    for candidate in &*candidates {
+        of_cell
+            .entry(candidate.cell)
+            .or_default()
+            .push(seen(candidate));
+    }
+    let usual = |pixels: &Vec<(f32, f32)>| {
+        let (light, share): (Vec<f32>, Vec<f32>) = pixels.iter().copied().unzip();
+        (percentile(&light, BRIGHT), percentile(&share, BRIGHT))
+    };
+    let usual: BTreeMap<u32, (f32, f32)> = of_cell
+        .iter()
+        .map(|(cell, pixels)| (*cell, usual(pixels)))
+        .collect();
+    candidates.retain(|candidate| {
+        let (nearest, share) = seen(candidate);
+        let (bright, direct) = usual[&candidate.cell];
+        nearest >= OUTSIDE * bright || share >= INDIRECT * direct
+    });
 }
 
 /// Sets [`Candidate::shared`] of every candidate of an image of `camera` (width

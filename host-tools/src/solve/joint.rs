@@ -27,6 +27,8 @@ const WEIGHT_BASE: f64 = 1.3;
 const STRONGEST: f64 = 0.032;
 /// Most weights tried.
 const MOST_TRIALS: i32 = 8;
+/// Weights after which a search ends that has found nothing better than what is known.
+const FEW_TRIALS: usize = 3;
 /// `lambda` while the channels' scales are looked for.
 const FALLBACK_LAMBDA: f64 = 0.008;
 /// Solves on the way to `lambda` need not be closer than this.
@@ -138,7 +140,7 @@ impl<'p> Solver<'p> {
                 .map(|k| strongest / f64::from(1 << k))
                 .collect(),
         };
-        let mut found = self.search(&mut folds, &from(STRONGEST), progress);
+        let mut found = self.search(&mut folds, &from(STRONGEST), f64::INFINITY, progress);
         self.sign = Sign::Free;
         let signed: Vec<_> = (folds.iter_mut())
             .map(|fold| {
@@ -146,7 +148,7 @@ impl<'p> Solver<'p> {
                 (fold.best.take(), consensus)
             })
             .collect();
-        let free = self.search(&mut folds, &from(2.0 * found.lambda), progress);
+        let free = self.search(&mut folds, &from(2.0 * found.lambda), found.least, progress);
         let signless = free.least < UNSIGNED * found.least && self.physical(&folds);
         found.trials.extend(free.trials);
         if signless {
@@ -181,12 +183,13 @@ impl<'p> Solver<'p> {
         choice
     }
 
-    /// Tries the weights of `path` until the held-out misfit has risen; each fold keeps
-    /// its best solution.
+    /// Tries the weights of `path` until the held-out misfit has risen, or some of them if
+    /// it does not come below `known`; each fold keeps its best solution.
     fn search(
         &mut self,
         folds: &mut [Fold<'p, '_>],
         path: &[f64],
+        known: f64,
         progress: &dyn Progress,
     ) -> Found {
         let light = |fold: &Fold<'_, '_>| squared_light(self.prepared, &fold.split.held_out);
@@ -222,6 +225,9 @@ impl<'p> Solver<'p> {
                     fold.best = Some(solution);
                 }
             } else if misfit > ENOUGH * found.least {
+                break;
+            }
+            if found.trials.len() >= FEW_TRIALS && found.least > known {
                 break;
             }
         }
