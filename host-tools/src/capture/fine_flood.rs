@@ -6,6 +6,7 @@
 //! it does where the surface has a crease, and it does not reach across an edge
 //! where the surface ends.
 
+use super::registration::NO_CELL;
 use super::{Measurements, Registration};
 use iltm_runtime::Grid;
 
@@ -104,16 +105,29 @@ fn scaled(samples: &[Option<f32>], flood: f64) -> Vec<f32> {
 struct Surface<'a> {
     grid: Grid,
     registration: &'a Registration,
-    /// [`Registration::inside`].
+    /// Whether a pixel and its four neighbours all belong to the projection: a
+    /// pixel at its very border is only partly lit.
     inner: Vec<bool>,
 }
 
 impl<'a> Surface<'a> {
     fn new(grid: Grid, registration: &'a Registration) -> Self {
+        let (width, height) = registration.camera;
+        let lit = |x: usize, y: usize| registration.seen_cell[y * width + x] != NO_CELL;
+        let inner = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            (1..width - 1).contains(&x)
+                && (1..height - 1).contains(&y)
+                && lit(x, y)
+                && lit(x - 1, y)
+                && lit(x + 1, y)
+                && lit(x, y - 1)
+                && lit(x, y + 1)
+        };
         Self {
             grid,
             registration,
-            inner: registration.inside(),
+            inner: (0..width * height).map(inner).collect(),
         }
     }
 

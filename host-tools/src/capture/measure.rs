@@ -25,27 +25,14 @@ pub(super) struct CellPixels {
     pixels: Vec<u32>,
     /// Where each cell's pixels begin in `pixels`, length `N + 1`.
     begin: Vec<usize>,
-    /// Light of the whole cell under white over that of its `pixels`: one entry a
-    /// channel, in each one a cell.
-    whole: Vec<Vec<f64>>,
     pub(super) live: Vec<bool>,
     pub(super) left_out: Vec<LeftOut>,
 }
 
 impl CellPixels {
     /// Chooses the pixels to average: registered ones that are not `saturated`
-    /// under white. `flood` and `black` are the photographs of white and of black.
-    ///
-    /// Which pixels see one cell alone is a matter of chance at its border, and light
-    /// falls off across a cell. Under white all neighbours are lit as well, so that
-    /// border pixels count there: a cell's light is that of all of it under white,
-    /// and its chosen pixels only say how other patterns compare.
-    pub(super) fn choose(
-        registration: &Registration,
-        saturated: &[bool],
-        flood: &[Vec<f32>],
-        black: &[Vec<f32>],
-    ) -> Self {
+    /// under white.
+    pub(super) fn choose(registration: &Registration, saturated: &[bool]) -> Self {
         let cells = registration.centre.len();
         let mut of_cell: Vec<Vec<u32>> = vec![Vec::new(); cells];
         let mut lost = vec![0_u32; cells];
@@ -85,50 +72,12 @@ impl CellPixels {
             }
             begin.push(pixels.len());
         }
-        let mut chosen = Self {
+        Self {
             pixels,
             begin,
-            whole: Vec::new(),
             live,
             left_out,
-        };
-        let inside = registration.inside();
-        let counts = |pixel: usize| inside[pixel] && !saturated[pixel];
-        let of_channel = |(flood, black): (&Vec<f32>, &Vec<f32>)| {
-            let light = |pixel: usize| f64::from(flood[pixel] - black[pixel]);
-            chosen.whole_cells(&registration.seen_cell, counts, light)
-        };
-        chosen.whole = flood.iter().zip(black).map(of_channel).collect();
-        chosen
-    }
-
-    /// Mean `light` of all pixels of a cell that count over that of the chosen ones; 1
-    /// where either is none.
-    fn whole_cells(
-        &self,
-        seen_cell: &[u32],
-        counts: impl Fn(usize) -> bool,
-        light: impl Fn(usize) -> f64,
-    ) -> Vec<f64> {
-        let mut sums = vec![(0.0, 0.0); self.cells()];
-        for (pixel, &cell) in seen_cell.iter().enumerate() {
-            if let Some((sum, count)) = sums.get_mut(cell as usize)
-                && counts(pixel)
-            {
-                *sum += light(pixel);
-                *count += 1.0;
-            }
         }
-        let of_cell = |(pixels, (sum, count)): (&[u32], (f64, f64))| {
-            let own: f64 = pixels.iter().map(|&pixel| light(pixel as usize)).sum();
-            let whole = sum / count * pixels.len() as f64 / own;
-            if whole.is_finite() && whole > 0.0 {
-                whole
-            } else {
-                1.0
-            }
-        };
-        self.of_cells().zip(sums).map(of_cell).collect()
     }
 
     /// Number of cells.
@@ -147,17 +96,13 @@ impl CellPixels {
         self.of_cells().map(|pixels| pixels.len() as u32).collect()
     }
 
-    /// Light of each cell in the planes of a photograph, one entry a channel; 0 for a
-    /// cell that is not live.
-    pub(super) fn light(&self, planes: &[Vec<f32>]) -> Vec<Vec<f64>> {
-        let of_plane = |(plane, whole): (&Vec<f32>, &Vec<f64>)| {
-            let light = |(pixels, whole): (&[u32], &f64)| {
-                let sum: f64 = pixels.iter().map(|&p| f64::from(plane[p as usize])).sum();
-                whole * sum / pixels.len().max(1) as f64
-            };
-            self.of_cells().zip(whole).map(light).collect()
+    /// Mean of a plane over each cell; 0 for a cell that is not live.
+    pub(super) fn mean(&self, plane: &[f32]) -> Vec<f64> {
+        let mean = |pixels: &[u32]| {
+            let sum: f64 = pixels.iter().map(|&p| f64::from(plane[p as usize])).sum();
+            sum / pixels.len().max(1) as f64
         };
-        planes.iter().zip(&self.whole).map(of_plane).collect()
+        self.of_cells().map(mean).collect()
     }
 }
 
@@ -185,7 +130,7 @@ pub(super) fn observe(
     photographs.for_batches(&shots, progress, |photos| {
         let means: Vec<Vec<Vec<f64>>> = photos
             .par_iter()
-            .map(|(_, photo)| cells.light(&photo.planes))
+            .map(|(_, photo)| photo.planes.iter().map(|p| cells.mean(p)).collect())
             .collect();
         for ((shot, photo), means) in photos.iter().zip(means) {
             for (light, mean) in channels.iter_mut().zip(means) {

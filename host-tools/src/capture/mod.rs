@@ -270,7 +270,7 @@ fn measure_all(
     let registered = registration::register(sequence, &mut photographs, &gray, progress)?;
     progress.end();
 
-    let cells = CellPixels::choose(&registered.registration, &saturated, &flood, &black);
+    let cells = CellPixels::choose(&registered.registration, &saturated);
     let counts = cells.counts();
     let live = cells.live.iter().filter(|live| **live).count();
     gates.push(gates::saturation::judge(&clipped, &cells.left_out, live));

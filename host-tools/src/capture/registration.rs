@@ -51,26 +51,6 @@ pub struct Registration {
     pub centre: Vec<Option<[f64; 2]>>,
 }
 
-impl Registration {
-    /// Whether each camera pixel and its four neighbours all belong to the projection: a
-    /// pixel at its very border is only partly lit.
-    pub(super) fn inside(&self) -> Vec<bool> {
-        let (width, height) = self.camera;
-        let lit = |x: usize, y: usize| self.seen_cell[y * width + x] != NO_CELL;
-        let inside = |at: usize| {
-            let (x, y) = (at % width, at / width);
-            (1..width - 1).contains(&x)
-                && (1..height - 1).contains(&y)
-                && lit(x, y)
-                && lit(x - 1, y)
-                && lit(x + 1, y)
-                && lit(x, y - 1)
-                && lit(x, y + 1)
-        };
-        (0..width * height).map(inside).collect()
-    }
-}
-
 /// How pixels were registered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RegistrationMethod {

@@ -89,14 +89,15 @@ pub fn revisit(
     progress.begin("finding the cells", 0);
     let gray = gray_code::decode(&sequence, &mut photographs, &flood, &black, progress)?;
     let registered = registration::register(&sequence, &mut photographs, &gray, progress)?;
-    let cells = CellPixels::choose(&registered.registration, &saturated, &flood, &black);
+    let cells = CellPixels::choose(&registered.registration, &saturated);
     progress.end();
 
     progress.begin("measuring cells", pictures.len() as u64);
     let mut measure = |frames: &[usize]| -> Result<Vec<CellPlanes>, CaptureError> {
         let mut light = Vec::with_capacity(frames.len());
         photographs.for_batches(frames, progress, |photos| {
-            light.extend(photos.iter().map(|(_, photo)| cells.light(&photo.planes)));
+            let planes = photos.iter().map(|(_, photo)| &photo.planes);
+            light.extend(planes.map(|planes| planes.iter().map(|p| cells.mean(p)).collect()));
         })?;
         Ok(light)
     };
@@ -106,7 +107,7 @@ pub fn revisit(
     Ok(Revisited {
         grid: sequence.grid,
         channels: black.len(),
-        black: cells.light(&black),
+        black: black.iter().map(|plane| cells.mean(plane)).collect(),
         live: cells.live,
         left_out: cells.left_out,
         registration: registered.registration,

@@ -48,20 +48,6 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
     let channel = &measured.channels[0];
     assert_eq!(measured.roles[Measurements::WHITE], Role::White);
     assert_eq!(measured.patterns.ncols(), 1 + 6 + 6 + 30);
-    let mean = |light: &[f64], pixels: &[usize]| {
-        pixels
-            .iter()
-            .map(|&pixel| light[pixel] - scene.ambient)
-            .sum::<f64>()
-            / pixels.len() as f64
-    };
-    let inside = measured.registration.inside();
-    let pixels_of = |map: &[u32], cell: usize, counts: &dyn Fn(usize) -> bool| -> Vec<usize> {
-        (0..map.len())
-            .filter(|&pixel| map[pixel] == cell as u32 && counts(pixel))
-            .collect()
-    };
-    let white = scene.light(&scene.patterns()[0].1);
     let mut chi = 0.0;
     let shown: Vec<_> = scene
         .patterns()
@@ -79,11 +65,13 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
         assert_eq!(lit, pattern.lit);
         let light = scene.light(pattern);
         for cell in 0..30 {
-            let registration = &measured.registration;
-            let chosen = pixels_of(&registration.cell_of_pixel, cell, &|_| true);
-            assert_eq!(chosen.len(), measured.pixels[cell] as usize);
-            let whole = pixels_of(&registration.seen_cell, cell, &|pixel| inside[pixel]);
-            let truth = mean(&light, &chosen) * mean(&white, &whole) / mean(&white, &chosen);
+            let of_cell = measured.registration.cell_of_pixel.iter().zip(&light);
+            let seen: Vec<f64> = of_cell
+                .filter(|(c, _)| **c == cell as u32)
+                .map(|(_, l)| *l)
+                .collect();
+            assert_eq!(seen.len(), measured.pixels[cell] as usize);
+            let truth = seen.iter().sum::<f64>() / seen.len() as f64 - scene.ambient;
             let found = channel.observations[(cell, view)];
             chi += ((found - truth) / channel.noise[cell]).powi(2) / (30.0 * 43.0);
         }

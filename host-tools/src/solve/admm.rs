@@ -43,17 +43,6 @@ const MOST_PACKS: usize = 16;
 /// Least number of blocks, for as many threads.
 const LEAST_BLOCKS: usize = 4;
 
-/// What is known of the sign of `K` off its diagonal.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Sign<'f> {
-    /// `K_ij >= 0`: light bounces, and every pixel sees its own cell.
-    NonNegative,
-    /// `K_ij >= floor_ij`.
-    AtLeast(&'f DMatrix<f64>),
-    /// Nothing.
-    Free,
-}
-
 /// The state of the iteration. It survives a change of `lambda` and of the data,
 /// which then start from the last solution.
 #[derive(Debug)]
@@ -77,7 +66,12 @@ impl<'h> Consensus<'h> {
     /// `weights` are those of the coefficients, in the order of `haar`. Rows and
     /// columns of cells that are not `live` have no photographs to fit; the
     /// other two blocks alone decide on them.
-    pub(super) fn new(haar: &'h Haar, weights: &[f64], live: &[bool], sign: Sign<'_>) -> Self {
+    pub(super) fn new(
+        haar: &'h Haar,
+        weights: &[f64],
+        live: &[bool],
+        floor: Option<&DMatrix<f64>>,
+    ) -> Self {
         let cells = live.len();
         let mut by_place = vec![0.0_f32; cells];
         for (place, weight) in haar.places().iter().zip(weights) {
@@ -89,17 +83,14 @@ impl<'h> Consensus<'h> {
             .collect();
         let rows = row_ranges(cells)
             .into_iter()
-            .map(|(start, width)| RowBlock::new(start, width, live, sign))
+            .map(|(start, width)| RowBlock::new(start, width, live, floor))
             .collect();
         Self {
             haar,
             rows,
             columns,
             weights: by_place,
-            floor_norm: match sign {
-                Sign::AtLeast(floor) => floor.norm_squared(),
-                Sign::NonNegative | Sign::Free => 0.0,
-            },
+            floor_norm: floor.map_or(0.0, DMatrix::norm_squared),
             rho: None,
             lambda: 0.0,
         }
@@ -299,8 +290,7 @@ mod tests {
             };
             let (wanted, _) = reference.solve(0.4, 6000);
             let data = DataTerm::new(light, vec![patterns.clone(); channels], &weights);
-            let mut consensus =
-                Consensus::new(&haar, &coefficient_weights, &[true; 20], Sign::NonNegative);
+            let mut consensus = Consensus::new(&haar, &coefficient_weights, &[true; 20], None);
             let end = consensus.run(&data, lambda, TIGHT, &|| {});
             assert!(end.converged, "{end:?}");
             let error = (consensus.operator() - &wanted).norm() / wanted.norm();
@@ -316,7 +306,7 @@ mod tests {
         let least = least_penalty(&haar, &weights, &light, &patterns);
         let equal = patterns.map(|_| 1.0);
         let data = DataTerm::new(vec![light], vec![patterns], &equal);
-        let mut consensus = Consensus::new(&haar, &weights, &[true; 6], Sign::NonNegative);
+        let mut consensus = Consensus::new(&haar, &weights, &[true; 6], None);
         for lambda in [1e-2, 1e-3, 1e-4, 1e-5] {
             consensus.run(&data, lambda, TIGHT, &|| {});
         }

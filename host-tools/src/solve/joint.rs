@@ -2,14 +2,13 @@
 //! channels, from every photograph.
 //!
 //! 1. `lambda`, by held-out photographs, from strong to weak, each solve starting
-//!    from the last one's answer; the same again without the sign that bouncing light
-//!    gives `K`, which mirrors, gloss and a blur that nobody stated take from it.
+//!    from the last one's answer.
 //! 2. The solve of all photographs.
 //! 3. The gains once more by least squares, free of the l1 term's pull.
 //! 4. With three channels, each one's deviation from the shared operator: cells
 //!    that straddle two albedos reflect a colour that no gain describes.
 
-use super::admm::{Consensus, Sign};
+use super::admm::Consensus;
 use super::convergence::{Convergence, Stop};
 use super::data_term::DataTerm;
 use super::forward::product;
@@ -27,8 +26,6 @@ const WEIGHT_BASE: f64 = 1.3;
 const STRONGEST: f64 = 0.032;
 /// Most weights tried.
 const MOST_TRIALS: i32 = 8;
-/// Weights after which a search ends that has found nothing better than what is known.
-const FEW_TRIALS: usize = 3;
 /// `lambda` while the channels' scales are looked for.
 const FALLBACK_LAMBDA: f64 = 0.008;
 /// Solves on the way to `lambda` need not be closer than this.
@@ -38,9 +35,6 @@ const TRIAL: Stop = Stop {
 };
 /// A misfit that exceeds the least one by this factor ends the search.
 const ENOUGH: f64 = 1.01;
-/// Held-out misfit without a sign, relative to that with one, from which the sign is
-/// given up: it is what tells noise and light apart, and chance must not take it away.
-const UNSIGNED: f64 = 0.9;
 /// `lambda` of a channel's deviation, in those of the shared operator.
 const DEVIATION_RATIO: f64 = 4.0;
 /// Rounds of fitting the channels' scales at most.
@@ -56,8 +50,6 @@ pub(super) struct Solver<'p> {
     weights: Vec<f64>,
     haar: &'p Haar,
     consensus: Consensus<'p>,
-    /// [`Sign::NonNegative`] or [`Sign::Free`].
-    sign: Sign<'static>,
     /// What the shared operator is multiplied by in each channel.
     scales: Vec<f64>,
     iterations: u32,
@@ -66,10 +58,7 @@ pub(super) struct Solver<'p> {
 /// What the search for `lambda` found.
 pub(super) struct Choice<'s> {
     pub(super) lambda: f64,
-    /// Every weight tried with a sign, then those without.
     pub(super) trials: Vec<LambdaTrial>,
-    /// Whether the operator may have negative elements.
-    pub(super) signless: bool,
     /// The best inverses found without held-out photographs, one entry a split;
     /// none if no solve gave any.
     pub(super) judged: Vec<Judged<'s>>,
@@ -84,14 +73,6 @@ struct Fold<'h, 's> {
     best: Option<Solution>,
 }
 
-/// The best of some weights.
-struct Found {
-    lambda: f64,
-    /// Its held-out misfit.
-    least: f64,
-    trials: Vec<LambdaTrial>,
-}
-
 impl<'p> Solver<'p> {
     pub(super) fn new(prepared: &'p Prepared, haar: &'p Haar, stop: Stop) -> Self {
         let weight = |fineness: &f64| WEIGHT_BASE.powf(fineness / 2.0);
@@ -99,8 +80,7 @@ impl<'p> Solver<'p> {
         Self {
             prepared,
             stop,
-            consensus: Consensus::new(haar, &weights, &prepared.live, Sign::NonNegative),
-            sign: Sign::NonNegative,
+            consensus: Consensus::new(haar, &weights, &prepared.live, None),
             weights,
             haar,
             scales: vec![1.0; prepared.light.len()],
@@ -108,8 +88,8 @@ impl<'p> Solver<'p> {
         }
     }
 
-    /// Finds `lambda`, and whether `K` has a sign, by the held-out photographs of all
-    /// `splits`; with a `lambda` that is given, the sign alone.
+    /// Finds `lambda` by the held-out photographs of all `splits`, or judges the
+    /// one that is given.
     pub(super) fn choose<'s>(
         &mut self,
         splits: &'s [Split],
@@ -127,45 +107,58 @@ impl<'p> Solver<'p> {
                 split,
                 data: self.data(&photographs),
                 photographs,
-                consensus: self.start(),
+                consensus: Consensus::new(self.haar, &self.weights, &self.prepared.live, None),
                 best: None,
             });
         }
         if let Some(first) = folds.first_mut() {
             std::mem::swap(&mut first.consensus, &mut self.consensus);
         }
-        let from = |strongest: f64| match given {
+        let path = match given {
             Some(lambda) => vec![lambda],
             None => (0..MOST_TRIALS)
-                .map(|k| strongest / f64::from(1 << k))
+                .map(|k| STRONGEST / f64::from(1 << k))
                 .collect(),
         };
-        let mut found = self.search(&mut folds, &from(STRONGEST), f64::INFINITY, progress);
-        self.sign = Sign::Free;
-        let signed: Vec<_> = (folds.iter_mut())
-            .map(|fold| {
-                let consensus = std::mem::replace(&mut fold.consensus, self.start());
-                (fold.best.take(), consensus)
-            })
-            .collect();
-        let free = self.search(&mut folds, &from(2.0 * found.lambda), found.least, progress);
-        let signless = free.least < UNSIGNED * found.least && self.physical(&folds);
-        found.trials.extend(free.trials);
-        if signless {
-            found.lambda = free.lambda;
-        } else {
-            self.sign = Sign::NonNegative;
-            for (fold, (best, consensus)) in folds.iter_mut().zip(signed) {
-                fold.best = best;
-                fold.consensus = consensus;
-            }
-        }
+        let total: f64 = splits
+            .iter()
+            .map(|s| squared_light(self.prepared, &s.held_out))
+            .sum();
         let mut choice = Choice {
-            lambda: found.lambda,
-            trials: found.trials,
-            signless,
+            lambda: path[0],
+            trials: Vec::new(),
             judged: Vec::new(),
         };
+        let mut least = f64::INFINITY;
+        for lambda in path {
+            let mut squared = 0.0;
+            let mut found = Vec::new();
+            for fold in &mut folds {
+                std::mem::swap(&mut fold.consensus, &mut self.consensus);
+                self.run(&fold.data, lambda, TRIAL, progress);
+                let solution = self.found(&fold.photographs);
+                std::mem::swap(&mut fold.consensus, &mut self.consensus);
+                squared += squared_misfit(
+                    self.prepared,
+                    &solution.candidates(&self.prepared.live),
+                    &fold.split.held_out,
+                );
+                found.push(solution);
+            }
+            // Without light to predict, or without forward transport, nothing is told.
+            let misfit = Some((squared / total).sqrt()).filter(|misfit| misfit.is_finite());
+            let misfit = misfit.unwrap_or(f64::INFINITY);
+            choice.trials.push(LambdaTrial { lambda, misfit });
+            if misfit < least || choice.trials.len() == 1 {
+                least = misfit;
+                choice.lambda = lambda;
+                for (fold, solution) in folds.iter_mut().zip(found) {
+                    fold.best = Some(solution);
+                }
+            } else if misfit > ENOUGH * least {
+                break;
+            }
+        }
         for fold in &mut folds {
             if let Some(mut best) = fold.best.take() {
                 self.add_deviations(&mut best, &fold.photographs, choice.lambda, TRIAL, progress);
@@ -181,71 +174,6 @@ impl<'p> Solver<'p> {
         }
         progress.end();
         choice
-    }
-
-    /// Tries the weights of `path` until the held-out misfit has risen, or some of them if
-    /// it does not come below `known`; each fold keeps its best solution.
-    fn search(
-        &mut self,
-        folds: &mut [Fold<'p, '_>],
-        path: &[f64],
-        known: f64,
-        progress: &dyn Progress,
-    ) -> Found {
-        let light = |fold: &Fold<'_, '_>| squared_light(self.prepared, &fold.split.held_out);
-        let total: f64 = folds.iter().map(light).sum();
-        let mut found = Found {
-            lambda: path[0],
-            least: f64::INFINITY,
-            trials: Vec::new(),
-        };
-        for &lambda in path {
-            let mut squared = 0.0;
-            let mut solutions = Vec::new();
-            for fold in &mut *folds {
-                std::mem::swap(&mut fold.consensus, &mut self.consensus);
-                self.run(&fold.data, lambda, TRIAL, progress);
-                let solution = self.found(&fold.photographs);
-                std::mem::swap(&mut fold.consensus, &mut self.consensus);
-                squared += squared_misfit(
-                    self.prepared,
-                    &solution.candidates(&self.prepared.live),
-                    &fold.split.held_out,
-                );
-                solutions.push(solution);
-            }
-            // Without light to predict, or without forward transport, nothing is told.
-            let misfit = Some((squared / total).sqrt()).filter(|misfit| misfit.is_finite());
-            let misfit = misfit.unwrap_or(f64::INFINITY);
-            found.trials.push(LambdaTrial { lambda, misfit });
-            if misfit < found.least || found.trials.len() == 1 {
-                found.least = misfit;
-                found.lambda = lambda;
-                for (fold, solution) in folds.iter_mut().zip(solutions) {
-                    fold.best = Some(solution);
-                }
-            } else if misfit > ENOUGH * found.least {
-                break;
-            }
-            if found.trials.len() >= FEW_TRIALS && found.least > known {
-                break;
-            }
-        }
-        found
-    }
-
-    /// Whether the best solutions could be the inverses of real scenes, which a sign makes
-    /// sure of.
-    fn physical(&self, folds: &[Fold<'_, '_>]) -> bool {
-        let live = &self.prepared.live;
-        let solutions = folds.iter().filter_map(|fold| fold.best.as_ref());
-        let mut candidates = solutions.flat_map(|solution| solution.candidates(live));
-        candidates.all(|candidate| candidate.inverse.flaw(live).is_none())
-    }
-
-    /// A consensus that knows nothing yet.
-    fn start(&self) -> Consensus<'p> {
-        Consensus::new(self.haar, &self.weights, &self.prepared.live, self.sign)
     }
 
     /// Iterations of all solves so far.
@@ -308,9 +236,7 @@ impl<'p> Solver<'p> {
     /// The consensus' operator with gains fitted to `photographs`.
     fn found(&self, photographs: &Photographs) -> Solution {
         let mut shared = self.consensus.operator();
-        if let Sign::NonNegative = self.sign {
-            shared.apply(|value| *value = value.max(0.0));
-        }
+        shared.apply(|value| *value = value.max(0.0));
         shared.fill_diagonal(0.0);
         drop_dead_rows(&mut shared, &self.prepared.live);
         let channels = photographs.channels().zip(&self.scales);
@@ -382,19 +308,13 @@ impl<'p> Solver<'p> {
             let target = &photographs.patterns + product(&own, sources);
             let data = DataTerm::new(vec![sources.clone()], vec![target], &photographs.weights);
             let floor = -&own;
-            let sign = match self.sign {
-                Sign::Free => Sign::Free,
-                _ => Sign::AtLeast(&floor),
-            };
-            let mut consensus = Consensus::new(self.haar, &self.weights, &self.prepared.live, sign);
+            let mut consensus =
+                Consensus::new(self.haar, &self.weights, &self.prepared.live, Some(&floor));
             let end = consensus.run(&data, DEVIATION_RATIO * lambda, stop, &|| {
                 progress.advance(1);
             });
             self.iterations += end.iterations;
-            let mut deviation = consensus.operator();
-            if let Sign::AtLeast(floor) = sign {
-                deviation = deviation.zip_map(floor, f64::max);
-            }
+            let mut deviation = consensus.operator().zip_map(&floor, f64::max);
             deviation.fill_diagonal(0.0);
             drop_dead_rows(&mut deviation, &self.prepared.live);
             let reflected = product(&(&own + &deviation), sources);

@@ -204,7 +204,6 @@ pub fn solve_observed(
         cells: prepared.cells(),
         lambda: outcome.lambda,
         lambda_path: outcome.trials,
-        signless: outcome.signless,
         convergence: outcome.solution.convergence,
         iterations: outcome.iterations,
         coefficients: outcome.solution.coefficients,
@@ -237,7 +236,6 @@ struct Outcome<'t> {
     solution: Solution,
     lambda: f64,
     trials: Vec<LambdaTrial>,
-    signless: bool,
     iterations: u32,
     /// Inverses that have not seen the held-out photographs.
     judged: Vec<Judged<'t>>,
@@ -256,7 +254,6 @@ impl<'t> Task<'t> {
             solution,
             lambda,
             trials: choice.trials,
-            signless: choice.signless,
             iterations,
             judged: choice.judged,
         }
@@ -301,7 +298,6 @@ impl<'t> Task<'t> {
         Ok(Outcome {
             lambda: 0.0,
             trials: Vec::new(),
-            signless: true,
             iterations: iterations + solution.convergence.iterations,
             judged,
             solution,

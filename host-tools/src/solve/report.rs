@@ -25,13 +25,8 @@ pub struct SolveReport {
     /// Weight of the l1 term, light scaled so that a mean flood photograph is 1.
     /// 0 for [`Method::Direct`], which has no such weight.
     pub lambda: f64,
-    /// Every weight tried, largest first, with non-negative operators and then with any;
-    /// empty for [`Method::Direct`].
+    /// Every weight tried, largest first; empty for [`Method::Direct`].
     pub lambda_path: Vec<LambdaTrial>,
-    /// Whether the operator may have negative elements: where held-out photographs ask
-    /// for it, as mirrors, gloss and a blur that nobody stated make them; always but for
-    /// [`Method::Joint`].
-    pub signless: bool,
     /// How the last solve ended.
     pub convergence: Convergence,
     /// Iterations of all solves together.

@@ -5,7 +5,6 @@
 //! the product with the shared matrix is one call. `width` is the number of
 //! rows rounded up to whole packs; rows beyond the last stay zero.
 
-use super::admm::Sign;
 use super::column_block::ColumnBlock;
 use super::convergence::Residuals;
 use super::data_term::{DataTerm, Factor, Shrink, Slack};
@@ -60,7 +59,12 @@ struct Terms {
 
 impl RowBlock {
     /// Rows `start..start + rows` of the matrix of `live.len()` rows.
-    pub(super) fn new(start: usize, width: usize, live: &[bool], sign: Sign<'_>) -> Self {
+    pub(super) fn new(
+        start: usize,
+        width: usize,
+        live: &[bool],
+        floor: Option<&DMatrix<f64>>,
+    ) -> Self {
         let cells = live.len();
         let rows = width.min(cells - start);
         let size = width * cells;
@@ -68,11 +72,10 @@ impl RowBlock {
         for (lane, live) in lanes.iter_mut().zip(&live[start..start + rows]) {
             *lane = f32::from(u8::from(*live));
         }
-        let mut floor = match sign {
-            Sign::NonNegative => vec![0.0; size],
-            Sign::AtLeast(floor) => rows_of(floor, start, rows, width),
-            Sign::Free => vec![f32::NEG_INFINITY; size],
-        };
+        let mut floor = floor.map_or_else(
+            || vec![0.0; size],
+            |floor| rows_of(floor, start, rows, width),
+        );
         for row in 0..rows {
             floor[(start + row) * width + row] = f32::NEG_INFINITY;
         }

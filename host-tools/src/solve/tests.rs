@@ -451,7 +451,7 @@ fn what_an_unseen_cell_throws_on_others_does_not_disturb_their_inverse() {
 }
 
 #[test]
-fn a_blur_is_undone_whether_it_is_stated_or_takes_the_sign_away() {
+fn a_stated_blur_is_undone() {
     let grid = Grid::new(6, 8).unwrap();
     let scene = corner(6, 8);
     let mut capture = Capture::new(&scene, (6, 8), 100);
@@ -467,14 +467,11 @@ fn a_blur_is_undone_whether_it_is_stated_or_takes_the_sign_away() {
             blur: deviation,
             ..capture.observed()
         };
-        let (found, report) = solve_observed(&observed, &SolveOptions::default(), &Silent).unwrap();
-        let error = relative(&light(&(inverse(&found, 0) * &wanted)), &wanted);
-        (error, report.signless)
+        let (found, _) = solve_observed(&observed, &SolveOptions::default(), &Silent).unwrap();
+        relative(&light(&(inverse(&found, 0) * &wanted)), &wanted)
     };
-    let (stated, _) = error(0.5);
-    assert!(stated < 2e-3, "{stated}");
-    let (unstated, signless) = error(0.0);
-    assert!(unstated < 2e-3 && signless, "{unstated} {signless}");
+    assert!(error(0.5) < 2e-3, "{}", error(0.5));
+    assert!(error(0.0) > 5.0 * error(0.5), "{}", error(0.0));
 }
 
 #[test]

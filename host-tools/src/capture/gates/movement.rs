@@ -222,11 +222,9 @@ pub(crate) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
         (WARN * moved.cell).max(FLOOR),
         (MOST * moved.cell).max(2.0 * FLOOR),
     );
-    let verdict = if bump.size < (SURE * bump.scatter).min(2.0 * limit) {
-        Verdict::Pass
-    } else {
-        Verdict::of(bump.size, warn, limit)
-    };
+    let sure = (SURE * bump.scatter).min(2.0 * limit);
+    let (warn, limit) = (warn.max(sure), limit.max(sure));
+    let verdict = Verdict::of(bump.size, warn, limit);
     let photo = |at: usize| sequence.shots[moved.shifts[at].0].photo.display();
     let what = match verdict {
         Verdict::Pass => format!(
