@@ -166,7 +166,10 @@ fn an_8_bit_session_comes_close_to_one_with_a_linear_16_bit_camera() {
         as_found[1], ideal[1]
     );
     assert!(as_found[1] < 1.5 * ideal[1], "{as_found:?} {ideal:?}");
-    assert!(as_found[1] < 0.2 * as_found[0], "{as_found:?}");
+    // What held-out photographs predict, codes of 8 bits and a little for the second
+    // registration.
+    let predicted = learned.report.predicted_error();
+    assert!(as_found[1] < 2.0 * predicted, "{as_found:?} {predicted}");
     // Nobody said which response the projector has: the ramps do.
     let projector = learned.measurements.devices.projector.channel(0);
     for value in [0.25, 0.5, 0.75_f64] {

@@ -1,6 +1,7 @@
 //! The site's pages: those made from the source are up to date, links lead somewhere, every
 //! page is in the table of contents, and the table format says what the reader does.
 
+use iltm::capture::{CalibrationRole, Role, SETTINGS_FILE, Settings};
 use iltm_runtime::image::layout::{SectionKind, header, meta, tier};
 use iltm_runtime::image::seal::field;
 use iltm_tests::reference_pages::{pages, root};
@@ -155,4 +156,35 @@ fn the_table_format_is_the_one_of_the_reader() {
             field::SIGNATURE
         ]
     );
+}
+
+#[test]
+fn roles_and_settings_on_the_page_of_captures_are_those_that_are_read() {
+    let page = read(&root().join("docs/captures.md"));
+    let settings = page.split("```toml").nth(1).unwrap();
+    let settings = settings.split("```").next().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join(SETTINGS_FILE), settings).unwrap();
+    let settings = Settings::read(folder.path()).unwrap();
+    assert_eq!(settings.scene.name.as_deref(), Some("north corner"));
+    // The names in the first column, with numbers for their letters.
+    let names = |heading: &str| -> Vec<String> {
+        let rows = rows(&page, heading);
+        let cells = rows.into_iter().flat_map(|row| row[0].split(", "));
+        cells
+            .map(|name| {
+                name.trim_matches('`')
+                    .replace("-B", "-3")
+                    .replace("LLL", "128")
+            })
+            .collect()
+    };
+    let (roles, calibration) = (names("## capture.csv"), names("## calibration.csv"));
+    assert_eq!((roles.len(), calibration.len()), (7, 5));
+    for name in roles {
+        assert!(Role::from_name(&name).is_some(), "{name}");
+    }
+    for name in calibration {
+        assert!(CalibrationRole::from_name(&name).is_some(), "{name}");
+    }
 }

@@ -217,3 +217,46 @@ fn excess(weights: [f32; 3], within: [f32; 3], own: u32, other: u32) -> f32 {
     // No light from its own cell at all: nothing of the pixel is its own.
     relative(weights).map_or(1.0, |part| part - relative(within).unwrap_or(0.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pixel of cell 5 with light from it and from the cell on its right, and from far.
+    fn pixel(own: f32, next: f32, far: f32) -> (Candidate, f32) {
+        let mut weights = [0.0; 9];
+        weights[4] = own;
+        weights[5] = next;
+        let candidate = Candidate {
+            pixel: 0,
+            cell: 5,
+            weights,
+            shared: 0.0,
+        };
+        (candidate, own + next + far)
+    }
+
+    #[test]
+    fn light_from_other_surfaces_only_is_dropped_and_dark_paint_is_not() {
+        let lit = pixel(0.4, 0.05, 0.05);
+        let shared = pixel(0.2, 0.2, 0.05);
+        let painted = pixel(0.04, 0.005, 0.005);
+        let indirect = pixel(0.03, 0.015, 0.04);
+        let kinds = [lit, lit, lit, lit, shared, painted, indirect, lit];
+        let (mut candidates, light): (Vec<_>, Vec<_>) = kinds.into_iter().unzip();
+        for (at, candidate) in candidates.iter_mut().enumerate() {
+            candidate.pixel = at as u32;
+        }
+        drop_indirect(&mut candidates, &light);
+        let kept: Vec<u32> = candidates.iter().map(|candidate| candidate.pixel).collect();
+        assert_eq!(kept, [0, 1, 2, 3, 4, 5, 7]);
+    }
+
+    #[test]
+    fn a_cell_that_is_seen_by_other_surfaces_only_keeps_its_pixels() {
+        let (candidate, light) = pixel(0.03, 0.015, 0.04);
+        let mut candidates = vec![candidate; 3];
+        drop_indirect(&mut candidates, &[light]);
+        assert_eq!(candidates.len(), 3);
+    }
+}

@@ -1,6 +1,6 @@
 //! Whole captures, read from folders.
 
-use super::test_capture::TestCapture;
+use super::test_capture::{TestCapture, save_pattern};
 use super::*;
 use crate::progress::Silent;
 use std::fs;
@@ -464,4 +464,63 @@ fn stripes_without_the_finest_bits_tell_blocks_of_cells() {
     let measured = examined.measurements.unwrap();
     assert!(measured.live.iter().all(|live| *live));
     assert!(misplaced(&capture, &measured, |row, col| row / 2 * 6 + col / 2) < 1e-9);
+}
+
+#[test]
+fn patterns_of_more_cells_than_a_table_has_are_looked_at_in_blocks() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rows, cols) = (192, 256);
+    assert!(rows * cols > iltm_runtime::Grid::MAX_CELLS);
+    fs::create_dir(folder.path().join("patterns")).unwrap();
+    let mut roles = vec![Role::White, Role::Black];
+    let stripes = |bit| {
+        [
+            Role::Column {
+                bit,
+                inverse: false,
+            },
+            Role::Row {
+                bit,
+                inverse: false,
+            },
+        ]
+    };
+    roles.extend((0..8).flat_map(stripes));
+    let codes = [code::Code { bits: 8, offset: 0 }; 2];
+    let mut shots = Vec::new();
+    for (index, role) in (0..).zip(roles) {
+        let lit = |cell: usize| match role {
+            Role::Column { bit, inverse } => codes[0].lit(cell % cols, bit, inverse),
+            Role::Row { bit, inverse } => codes[1].lit(cell / cols, bit, inverse),
+            role => Some(role == Role::White),
+        };
+        let lit = (0..rows * cols).map(lit).collect::<Option<_>>().unwrap();
+        let shot = Shot {
+            index,
+            role,
+            pattern: format!("patterns/{index:03}.png").into(),
+            photo: "none".into(),
+            exposure: None,
+            line: u64::from(index) + 2,
+        };
+        save_pattern(
+            &Pattern { rows, cols, lit },
+            &folder.path().join(&shot.pattern),
+        );
+        shots.push(shot);
+    }
+    let read = |coarsen| {
+        let options = CaptureOptions {
+            min_bernoulli: 0,
+            coarsen,
+            ..CaptureOptions::default()
+        };
+        Sequence::read(folder.path(), Chosen::new(folder.path(), &shots, &options)?)
+    };
+    assert!(matches!(read(false), Err(CaptureError::TooLarge { .. })));
+    let sequence = read(true).unwrap();
+    assert_eq!((sequence.grid.rows(), sequence.grid.cols()), (96, 128));
+    assert_eq!(sequence.coarser, 1);
+    // White, and seven bits of either axis.
+    assert_eq!(sequence.views.len(), 15);
 }
