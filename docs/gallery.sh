@@ -7,7 +7,7 @@ cd "$(dirname "$0")"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p gallery
-for scene in installation painted-corner m-panels-painted; do
+for scene in installation painted-corner m-panels-painted dome; do
     file=../host-tools/scenes/$scene.toml
     iltm simulate "$file" -o "$work/$scene" --photos 80
     iltm solve "$work/$scene" -o "$work/$scene.iltm"

@@ -177,14 +177,15 @@ fn data(
     page: &Path,
 ) -> Value {
     let bound = &verdict.bound;
+    let white = verdict.drift.white.as_ref();
     let of_image = |image: &ImageVerdict| {
         json!({
             "image": image.image,
             "title": title(images, image),
             "before": image.error[0],
             "after": image.error[1],
-            "modelled_before": image.modelled[0],
-            "modelled_after": image.modelled[1],
+            "modelled_before": image.modelled.map(|modelled| modelled[0]),
+            "modelled_after": image.modelled.map(|modelled| modelled[1]),
             "after_at_table_white": image.at_table_white,
             "white": image.white,
             "clipped": images.get(usize::from(image.image)).map(|test| test.clipped),
@@ -210,8 +211,8 @@ fn data(
         },
         "images": verdict.images.iter().map(of_image).collect::<Vec<_>>(),
         "drift": {
-            "level": verdict.drift.level,
-            "shape": verdict.drift.shape,
+            "level": white.map(|white| &white.level),
+            "shape": white.map(|white| white.shape),
             "session": verdict.drift.session,
         },
         "worst_cells": worst.collect::<Vec<_>>(),
@@ -238,9 +239,9 @@ fn text(verdict: &Verdict, images: &[TestImage], page: &Path) -> String {
         (true, _) => "as asked for".to_owned(),
         (false, None) => "half of the error before: the table predicts none".to_owned(),
         (false, Some(expected)) => format!(
-            "1.5 times the {expected:.4} expected: table {}, range and codes {:.4}, noise {}, viewpoint {:.4}",
+            "1.5 times the {expected:.4} expected: table {}, range and codes {}, noise {}, viewpoint {:.4}",
             known(bound.predicted),
-            bound.range,
+            known(bound.range),
             known(bound.noise),
             bound.viewpoint
         ),
@@ -251,18 +252,21 @@ fn text(verdict: &Verdict, images: &[TestImage], page: &Path) -> String {
         "cells       {} of {} compared",
         verdict.cells.0, verdict.cells.1
     );
-    let drift = &verdict.drift;
-    let levels: Vec<String> = drift
-        .level
-        .iter()
-        .map(|level| format!("{:.1} %", 100.0 * level))
-        .collect();
-    let _ = writeln!(
-        text,
-        "drift       white is {} of what the table expects, {:.2} % off that from cell to cell",
-        levels.join(", "),
-        100.0 * drift.shape
-    );
+    match &verdict.drift.white {
+        None => {
+            text += "drift       not known: the table does not tell what light comes of an input\n";
+        }
+        Some(white) => {
+            let percent = |level: &f64| format!("{:.1} %", 100.0 * level);
+            let levels: Vec<String> = white.level.iter().map(percent).collect();
+            let _ = writeln!(
+                text,
+                "drift       white is {} of what the table expects, {:.2} % off that from cell to cell",
+                levels.join(", "),
+                100.0 * white.shape
+            );
+        }
+    }
     if let Some(worst) = verdict.worst.first() {
         let _ = writeln!(
             text,

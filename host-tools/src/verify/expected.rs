@@ -95,10 +95,13 @@ impl<'t, 'a> Expected<'t, 'a> {
     }
 
     /// The light of every cell, ambient light included, relative to reference white, of an
-    /// input relative to the projector's white; both one entry a channel.
+    /// input relative to the projector's white; both one entry a channel. `None` if the
+    /// table's bounces do not fade: it may compensate what is projected, but it does not
+    /// tell what light comes of an input.
     #[must_use]
-    pub fn photograph(&mut self, input: &CellPlanes) -> CellPlanes {
+    pub fn photograph(&mut self, input: &CellPlanes) -> Option<CellPlanes> {
         let mut light = self.reflect(input, None);
+        let mut settled = false;
         for _ in 0..MOST_BOUNCES {
             let received = self.received(&light);
             let next = self.reflect(input, Some(&received));
@@ -107,13 +110,17 @@ impl<'t, 'a> Expected<'t, 'a> {
             let change = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             light = next;
             if change <= SETTLED * brightest {
+                settled = true;
                 break;
             }
+        }
+        if !settled {
+            return None;
         }
         for (light, ambient) in light.iter_mut().zip(&self.ambient) {
             light.iter_mut().zip(ambient).for_each(|(l, a)| *l += a);
         }
-        light
+        Some(light)
     }
 
     /// `(p + K l) / g`; dark where the table knows nothing.
@@ -217,7 +224,9 @@ mod tests {
                     .map(|plane| plane.iter().map(|light| f64::from(*light)).collect())
                     .collect();
                 let drive = |channel, code| curves.drive(channel, code);
-                let seen = expected.photograph(&light(&image.compensated, drive));
+                let seen = expected
+                    .photograph(&light(&image.compensated, drive))
+                    .unwrap();
                 // Steps of 8-bit codes, and up to .5 % of the samples cut.
                 assert!(
                     error(&seen, &wanted) < 0.02,
@@ -225,9 +234,20 @@ mod tests {
                     image.title,
                     error(&seen, &wanted)
                 );
-                let plain = expected.photograph(&wanted);
+                let plain = expected.photograph(&wanted).unwrap();
                 assert!(error(&plain, &wanted) > 0.1, "{}", image.title);
             }
         }
+    }
+
+    #[test]
+    fn bounces_that_do_not_fade_tell_no_light() {
+        let mut inverse = scene(1);
+        inverse.shared *= 6.0;
+        let compiled = compile(&inverse, None, &CompileOptions::default()).unwrap();
+        let table = Table::check(&compiled.image).unwrap();
+        let mut expected = Expected::new(&table);
+        let cells = table.grid().cells();
+        assert_eq!(expected.photograph(&vec![vec![1.0; cells]]), None);
     }
 }

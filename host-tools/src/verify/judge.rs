@@ -39,8 +39,9 @@ pub struct Bound {
     /// Error that the table predicts of itself at its top tier; `None` if it predicts
     /// none.
     pub predicted: Option<f64>,
-    /// Error that cut samples and the steps of 8-bit codes leave, mean over the images.
-    pub range: f64,
+    /// Error that cut samples and the steps of 8-bit codes leave, mean over the images;
+    /// `None` if the table does not tell what light comes of an input.
+    pub range: Option<f64>,
     /// Error that the noise of these photographs makes, mean over the images; `None` with
     /// a single photograph of white.
     pub noise: Option<f64>,
@@ -59,8 +60,9 @@ pub struct ImageVerdict {
     pub image: u8,
     /// Error without and with compensation.
     pub error: [f64; 2],
-    /// Both as the table read backwards would have them, without its own error.
-    pub modelled: [f64; 2],
+    /// Both as the table read backwards would have them, without its own error; `None` if
+    /// it cannot be.
+    pub modelled: Option<[f64; 2]>,
     /// Error with compensation if the table's own reference white is the scale: right
     /// only where camera and exposure are the ones of the table's photographs.
     pub at_table_white: f64,
@@ -72,9 +74,19 @@ pub struct ImageVerdict {
     pub cells: [Vec<Option<f64>>; 2],
 }
 
-/// What has changed since the table was made.
+/// What has changed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Drift {
+    /// White since the table was made; `None` if the table does not tell what light comes
+    /// of an input.
+    pub white: Option<WhiteChange>,
+    /// Largest change of white from its first photograph in this session to another.
+    pub session: f64,
+}
+
+/// How white differs from what the table expects.
+#[derive(Clone, PartialEq, Debug)]
+pub struct WhiteChange {
     /// Light of white now, relative to what the table expects, each channel: the median
     /// over the cells. Other exposures and cameras change it too.
     pub level: Vec<f64>,
@@ -82,8 +94,6 @@ pub struct Drift {
     pub shape: f64,
     /// Of each cell, mean over the channels; `None` where it was not compared.
     pub cells: Vec<Option<f64>>,
-    /// Largest change of white from its first photograph in this session to another.
-    pub session: f64,
 }
 
 /// A cell with a large error.
@@ -131,30 +141,35 @@ pub fn judge(
     let mut expected = Expected::new(table);
     let known = expected.live().iter().filter(|live| **live).count();
     let lit = LiveCells::new(&session.live);
-    let models: Vec<[CellPlanes; 2]> = session
-        .shown
-        .iter()
+    let models: Option<Vec<[CellPlanes; 2]>> = (session.shown.iter())
         .map(|shown| {
-            shown
-                .input
-                .each_ref()
-                .map(|input| expected.photograph(input))
+            let [plain, compensated] = &shown.input;
+            Some([
+                expected.photograph(plain)?,
+                expected.photograph(compensated)?,
+            ])
         })
         .collect();
-    check_order(folder, session, &models, &lit)?;
+    if let Some(models) = &models {
+        check_order(folder, session, models, &lit)?;
+    }
     let white = table.reference_white().to_num::<f64>();
     let images: Vec<ImageVerdict> = session
         .shown
         .iter()
-        .zip(&models)
-        .map(|(shown, models)| image(shown, models, white, &lit))
+        .enumerate()
+        .map(|(at, shown)| {
+            let models = models.as_ref().map(|models| &models[at]);
+            image(shown, models, white, &lit)
+        })
         .collect();
     let mean = |of: &dyn Fn(&ImageVerdict) -> f64| {
         images.iter().map(of).sum::<f64>() / images.len().max(1) as f64
     };
     let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
     let drift = drift(session, &mut expected, white, &lit);
-    let viewpoint = drift.shape.min(MOST_VIEWPOINT);
+    let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
+    let viewpoint = shape.min(MOST_VIEWPOINT);
     let bound = self::bound(table, session, &images, (error[0], bound), viewpoint, &lit);
     Ok(Verdict {
         passed: error[1] <= bound.limit,
@@ -205,15 +220,19 @@ impl LiveCells {
     }
 }
 
-fn image(shown: &Shown, models: &[CellPlanes; 2], white: f64, lit: &LiveCells) -> ImageVerdict {
+fn image(
+    shown: &Shown,
+    models: Option<&[CellPlanes; 2]>,
+    white: f64,
+    lit: &LiveCells,
+) -> ImageVerdict {
     let cells = shown.wanted[0].len();
     let compared = shown
         .seen
         .each_ref()
         .map(|seen| lit.compare(seen, &shown.wanted));
-    let modelled = models
-        .each_ref()
-        .map(|model| lit.compare(model, &shown.wanted).error);
+    let error = |model| lit.compare(model, &shown.wanted).error;
+    let modelled = models.map(|models| models.each_ref().map(error));
     let scale = compared[1].scale;
     ImageVerdict {
         image: shown.image,
@@ -252,10 +271,12 @@ fn bound(
     let count = images.len().max(1) as f64;
     let mean = |of: &dyn Fn(usize) -> f64| (0..images.len()).map(of).sum::<f64>() / count;
     let noise_of = |image: usize| noise.as_ref().map_or(0.0, |noise| noise[image]);
+    let range_of = |image: usize| images[image].modelled.map_or(0.0, |modelled| modelled[1]);
+    let modelled = images.iter().all(|image| image.modelled.is_some());
     let expected = predicted.map(|predicted| {
         mean(&|image| {
             predicted
-                .hypot(images[image].modelled[1])
+                .hypot(range_of(image))
                 .hypot(noise_of(image))
                 .hypot(viewpoint)
         })
@@ -265,7 +286,7 @@ fn bound(
         limit: limit.unwrap_or(UNPREDICTED * before),
         given: given.is_some(),
         predicted,
-        range: mean(&|image| images[image].modelled[1]),
+        range: modelled.then(|| mean(&range_of)),
         viewpoint,
         noise: noise.is_some().then(|| mean(&noise_of)),
         expected,
@@ -337,29 +358,9 @@ fn check_order(
     Ok(())
 }
 
-/// White now against the white that the table expects.
+/// White now against the white that the table expects, and against its first photograph.
 fn drift(session: &Session, expected: &mut Expected<'_, '_>, white: f64, lit: &LiveCells) -> Drift {
-    let cells = session.live.len();
-    let channels = session.revisited.channels;
-    let flood = expected.photograph(&vec![vec![1.0; cells]; channels]);
     let seen = &session.revisited.white;
-    let mut level = Vec::new();
-    let mut change = vec![0.0; lit.0.len()];
-    let mut square = 0.0;
-    for (channel, flood) in flood.iter().enumerate() {
-        let mean = |cell: &usize| {
-            seen.iter().map(|light| light[channel][*cell]).sum::<f64>() / seen.len().max(1) as f64
-        };
-        let ratio = |cell: &usize| mean(cell) / (white * flood[*cell]).max(1e-12);
-        let ratios: Vec<f64> = lit.0.iter().map(ratio).collect();
-        let median = median(ratios.clone());
-        for (change, ratio) in change.iter_mut().zip(&ratios) {
-            let off = ratio / median.max(1e-12) - 1.0;
-            *change += off / channels as f64;
-            square += off * off;
-        }
-        level.push(median);
-    }
     let total = |light: &CellPlanes| {
         light
             .iter()
@@ -367,13 +368,39 @@ fn drift(session: &Session, expected: &mut Expected<'_, '_>, white: f64, lit: &L
             .sum::<f64>()
     };
     let first = seen.first().map_or(0.0, total).max(1e-12);
-    let session = seen.iter().map(|light| (total(light) / first - 1.0).abs());
-    let change: Vec<f32> = change.into_iter().map(|change| change as f32).collect();
+    let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
+    let ones = vec![vec![1.0; session.live.len()]; session.revisited.channels];
+    let flood = expected.photograph(&ones);
     Drift {
+        white: flood.map(|flood| white_change(session, &flood, white, lit)),
+        session: changes.fold(0.0, f64::max),
+    }
+}
+
+fn white_change(session: &Session, flood: &CellPlanes, white: f64, lit: &LiveCells) -> WhiteChange {
+    let seen = &session.revisited.white;
+    let mut level = Vec::new();
+    let mut change = vec![0.0; lit.0.len()];
+    let mut square = 0.0;
+    for (channel, plane) in flood.iter().enumerate() {
+        let mean = |cell: &usize| {
+            seen.iter().map(|light| light[channel][*cell]).sum::<f64>() / seen.len().max(1) as f64
+        };
+        let ratio = |cell: &usize| mean(cell) / (white * plane[*cell]).max(1e-12);
+        let ratios: Vec<f64> = lit.0.iter().map(ratio).collect();
+        let median = median(ratios.clone());
+        for (change, ratio) in change.iter_mut().zip(&ratios) {
+            let off = ratio / median.max(1e-12) - 1.0;
+            *change += off / flood.len() as f64;
+            square += off * off;
+        }
+        level.push(median);
+    }
+    let change: Vec<f32> = change.into_iter().map(|change| change as f32).collect();
+    WhiteChange {
         level,
-        shape: (square / (lit.0.len() * channels).max(1) as f64).sqrt(),
-        cells: lit.among(cells, &change),
-        session: session.fold(0.0, f64::max),
+        shape: (square / (lit.0.len() * flood.len()).max(1) as f64).sqrt(),
+        cells: lit.among(session.live.len(), &change),
     }
 }
 

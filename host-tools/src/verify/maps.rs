@@ -27,18 +27,15 @@ pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<
             &over_images(&verdict.images, half),
         )
     };
-    let drift = drift_scale(verdict);
-    let drifts: Vec<Option<f64>> = verdict
-        .drift
-        .cells
-        .iter()
-        .map(|c| c.map(f64::abs))
-        .collect();
     let mut files = vec![
         picture_file("worst-cells", &errors(1)),
         picture_file("worst-cells-before", &errors(0)),
-        picture_file("drift", &map(grid, &drift, &drifts)),
     ];
+    if let Some(white) = &verdict.drift.white {
+        let change: Vec<Option<f64>> = white.cells.iter().map(|c| c.map(f64::abs)).collect();
+        let change = map(grid, &drift_scale(verdict), &change);
+        files.push(picture_file("drift", &change));
+    }
     for (shown, image) in session.shown.iter().zip(&verdict.images) {
         let number = image.image;
         let wall = |half: usize| as_seen(grid, &shown.seen[half], &shown.wanted, &session.live);
@@ -61,7 +58,8 @@ pub(super) fn error_scale(verdict: &Verdict, half: usize) -> ColourScale {
 
 /// Colours of the map of changes.
 pub(super) fn drift_scale(verdict: &Verdict) -> ColourScale {
-    let cells = verdict.drift.cells.iter().flatten();
+    let white = verdict.drift.white.iter();
+    let cells = white.flat_map(|white| white.cells.iter().flatten());
     let largest = cells.fold(0.0_f64, |a, b| a.max(b.abs()));
     ColourScale::linear(Palette::Viridis, rounded(largest.max(0.01)))
 }

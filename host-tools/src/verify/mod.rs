@@ -30,7 +30,7 @@ pub use error::VerifyError;
 pub use expected::Expected;
 pub use folder::{Written, write};
 pub use images::{TestImage, test_images};
-pub use judge::{Bound, Drift, ImageVerdict, Verdict, WorstCell, judge};
+pub use judge::{Bound, Drift, ImageVerdict, Verdict, WhiteChange, WorstCell, judge};
 pub use maps::pictures;
 pub use page::html;
 pub(crate) use page::reason;

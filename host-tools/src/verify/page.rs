@@ -58,6 +58,9 @@ fn opening(answer: &str, verdict: &Verdict) -> Markup {
     } }
 }
 
+/// Where the table's bounces do not fade, [`Expected::photograph`](super::Expected::photograph).
+const UNTOLD: &str = "not known: the table does not tell what light comes of an input";
+
 /// What the bound is made of, name and value.
 fn expectation(verdict: &Verdict) -> Vec<(&'static str, String)> {
     let bound = &verdict.bound;
@@ -68,7 +71,10 @@ fn expectation(verdict: &Verdict) -> Vec<(&'static str, String)> {
             "the table predicts of itself",
             known(bound.predicted, "nothing"),
         ),
-        ("cut samples and 8-bit codes leave", percent(bound.range)),
+        (
+            "cut samples and 8-bit codes leave",
+            known(bound.range, UNTOLD),
+        ),
         (
             "noise of these photographs makes",
             known(bound.noise, "not known: one photograph of white"),
@@ -97,19 +103,24 @@ pub(crate) fn reason(verdict: &Verdict) -> String {
             before / after.max(1e-9)
         );
     }
-    let levels = &drift.level;
+    let Some(white) = &drift.white else {
+        return "The table does not tell how bright white should be, so that nothing says whether the \
+                scene has changed since it was made."
+            .to_owned();
+    };
+    let levels = &white.level;
     let colour = levels.iter().fold(0.0_f64, |a, b| a.max(*b))
         / levels
             .iter()
             .fold(f64::INFINITY, |a, b| a.min(*b))
             .max(1e-12)
         - 1.0;
-    let changed = if drift.shape > 2.0 * verdict.bound.limit.max(0.01) {
+    let changed = if white.shape > 2.0 * verdict.bound.limit.max(0.01) {
         format!(
             "White now differs from what the table expects by {} from cell to cell: the projector, \
              its picture mode, the scene or something in it has moved or changed since the table \
              was made, or it is a table of another scene.",
-            percent(drift.shape)
+            percent(white.shape)
         )
     } else if colour > 0.03 {
         format!(
@@ -175,8 +186,15 @@ fn worst(verdict: &Verdict, files: &[PictureFile]) -> Markup {
 }
 
 fn drift(verdict: &Verdict, files: &[PictureFile]) -> Markup {
-    let drift = &verdict.drift;
-    let levels: Vec<String> = drift.level.iter().map(|level| percent(*level)).collect();
+    let session = percent(verdict.drift.session);
+    let Some(white) = &verdict.drift.white else {
+        return html! { section {
+            h2 { "What has changed since the table was made" }
+            p { "This is " (UNTOLD) "." }
+            p .quiet { "During this session white changed by " (session) "." }
+        } };
+    };
+    let levels: Vec<String> = white.level.iter().map(|level| percent(*level)).collect();
     html! { section .split {
         figure {
             (picture(files, "drift", "Change of white since the table was made"))
@@ -186,14 +204,14 @@ fn drift(verdict: &Verdict, files: &[PictureFile]) -> Markup {
             h2 { "What has changed since the table was made" }
             p {
                 "White now is " (levels.join(", ")) " of what the table expects"
-                @if drift.level.len() == 3 { " (red, green, blue)" }
+                @if white.level.len() == 3 { " (red, green, blue)" }
                 ". Where camera and exposure are the same, that is how the lamp has aged; otherwise it says nothing."
             }
             p {
-                "From cell to cell white differs by " b { (percent(drift.shape)) }
+                "From cell to cell white differs by " b { (percent(white.shape)) }
                 " from that: the map shows where. A bump that moved the projector, new furniture or a change of focus shows as a pattern."
             }
-            p .quiet { "During this session white changed by " (percent(drift.session)) "." }
+            p .quiet { "During this session white changed by " (session) "." }
         }
     } }
 }
