@@ -113,6 +113,10 @@ const HOPELESS: f64 = 0.05;
 /// together: random patterns that have nothing to do with the light are off by
 /// 0.5 to 0.7.
 const UNPREDICTABLE: f64 = 0.4;
+/// Predicted error up to which no other method is tried.
+const GOOD: f64 = 0.01;
+/// Another method's predicted error, relative to `joint`'s, from which it is taken.
+const BETTER: f64 = 0.8;
 /// Photographs below which no scene of more cells can be told.
 const LEAST_PHOTOGRAPHS: usize = 8;
 
@@ -164,7 +168,10 @@ pub fn solve_observed(
         progress,
     };
     let outcome = match options.method {
-        Method::Joint => task.joint(options.lambda, &mut seconds, &mut clock),
+        Method::Joint => {
+            let joint = task.joint(options.lambda, &mut seconds, &mut clock);
+            task.or_two_stage(joint, &mut seconds, &mut clock)
+        }
         other => task.by_rows(other, &mut seconds, &mut clock)?,
     };
     let candidates = outcome.solution.candidates(&prepared.live);
@@ -197,8 +204,8 @@ pub fn solve_observed(
     let recovery = recovery(&prepared, &haar, &candidates);
     seconds.recovery = clock.lap();
     let report = SolveReport {
-        method: options.method,
-        photographs: count(&prepared, options.method, &splits),
+        method: outcome.method,
+        photographs: count(&prepared, outcome.method, &splits),
         left_out: prepared.left_out.clone(),
         live_cells: prepared.live_cells(),
         cells: prepared.cells(),
@@ -233,6 +240,7 @@ struct Task<'t> {
 
 /// What a method returns beside its answer.
 struct Outcome<'t> {
+    method: Method,
     solution: Solution,
     lambda: f64,
     trials: Vec<LambdaTrial>,
@@ -251,11 +259,51 @@ impl<'t> Task<'t> {
         seconds.solve = clock.lap();
         let iterations = solver.iterations();
         Outcome {
+            method: Method::Joint,
             solution,
             lambda,
             trials: choice.trials,
             iterations,
             judged: choice.judged,
+        }
+    }
+
+    /// The two-stage answer where held-out photographs say that `joint` errs and that the
+    /// other errs less: where cells differ much in light, or each lights several places, `K`
+    /// is not what `joint` takes it for, and the transport itself is easier to find.
+    fn or_two_stage(
+        &self,
+        joint: Outcome<'t>,
+        seconds: &mut Seconds,
+        clock: &mut Clock,
+    ) -> Outcome<'t> {
+        let error = predict(self.prepared, &joint.judged).compensated;
+        // Written so that what is not a number asks for another answer.
+        let good = error <= GOOD;
+        // Few photographs are held out in turns, which takes as many solves.
+        if good || self.splits.len() > 1 {
+            return joint;
+        }
+        let spent = *seconds;
+        let other = self.by_rows(Method::TwoStage, seconds, clock);
+        seconds.choose += spent.choose;
+        seconds.solve += spent.solve;
+        let live = &self.prepared.live;
+        let sound = |other: &Outcome<'_>| {
+            let candidates = other.solution.candidates(live);
+            let near = other.solution.convergence.residual() <= HOPELESS;
+            near && candidates.iter().all(|c| c.inverse.flaw(live).is_none())
+        };
+        match other {
+            Ok(other) if sound(&other) => {
+                let instead = predict(self.prepared, &other.judged).compensated;
+                if instead < BETTER * error {
+                    other
+                } else {
+                    joint
+                }
+            }
+            _ => joint,
         }
     }
 
@@ -296,6 +344,7 @@ impl<'t> Task<'t> {
         let solution = solve(&usable, "solving")?;
         seconds.solve = clock.lap();
         Ok(Outcome {
+            method,
             lambda: 0.0,
             trials: Vec::new(),
             iterations: iterations + solution.convergence.iterations,

@@ -12,7 +12,8 @@ use super::recovery::Recovery;
 /// channels and held-out photographs.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SolveReport {
-    /// How it was found.
+    /// How it was found: as asked for, or [`Method::TwoStage`] where held-out photographs
+    /// say that [`Method::Joint`] errs more.
     pub method: Method,
     /// Photographs it was found from.
     pub photographs: PhotographCounts,
