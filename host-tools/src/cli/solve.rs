@@ -12,7 +12,7 @@ use crate::compile::wish::WhiteWish;
 use crate::learn::{Learned, learn};
 use crate::progress::Progress;
 use crate::report::LightPicture;
-use crate::solve::{Compensation, SolveOptions, WhyLeftOut};
+use crate::solve::{Compensation, Method, SolveOptions, WhyLeftOut};
 use crate::solved::{self, Content};
 use crate::video::sampled_frames;
 use serde_json::{Value, json};
@@ -298,6 +298,10 @@ pub(super) fn text(learned: &Learned) -> String {
         "photographs {} white, {} Gray code, {} Bernoulli",
         photographs.white, photographs.gray_code, photographs.bernoulli
     );
+    // The default one needs no mention.
+    if report.method != Method::Joint {
+        let _ = writeln!(text, "method      {}", report.method.name());
+    }
     let _ = writeln!(
         text,
         "cells       {} of {} ({})",
