@@ -4,6 +4,11 @@
 //! is number 128 of 1024, or leave away the finest stripes, which their camera cannot
 //! see. Which of these it is, the patterns say.
 
+use super::gray_code::binary;
+
+/// Finest bits that may be missing where a code does not begin at 0.
+const MOST_MISSING: u8 = 8;
+
 /// A stripe pattern along its axis.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct Stripes {
@@ -28,9 +33,15 @@ impl Code {
     pub(super) fn find(stripes: &[Stripes], given: u8, cells: usize) -> Self {
         let needed = cells.next_power_of_two().trailing_zeros() as u8;
         let least = needed.max(given);
+        // The first column's own stripes say where the code begins, but for bits that
+        // nobody photographed.
+        let first = (0..given).fold(0, |word, bit| word << 1 | first_bit(stripes, bit));
         let codes = (least..=least + 1).flat_map(|bits| {
-            let free = (1_usize << bits) - cells;
-            (0..=free).map(move |offset| Self { bits, offset })
+            let missing = (bits - given).min(MOST_MISSING);
+            let from = (binary(first) as usize) << missing;
+            (from..from + (1 << missing))
+                .filter(move |offset| offset + cells <= 1 << bits)
+                .map(move |offset| Self { bits, offset })
         });
         let shows = |code: &Self| {
             (stripes.iter()).all(|s| {
@@ -69,6 +80,13 @@ impl Code {
     }
 }
 
+/// A bit of the first column's word; 0 if nothing says it.
+fn first_bit(stripes: &[Stripes], bit: u8) -> u32 {
+    let of_bit = stripes.iter().find(|stripes| stripes.bit == bit);
+    let lit = of_bit.and_then(|s| s.lit.first().map(|lit| *lit != s.inverse));
+    u32::from(lit == Some(true))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -92,6 +110,15 @@ mod tests {
             offset: 128,
         };
         assert_eq!(Code::find(&shown(code, 768, 10), 10, 768), code);
+    }
+
+    #[test]
+    fn a_centred_code_is_recognised_without_its_finest_bits() {
+        let code = Code {
+            bits: 10,
+            offset: 128,
+        };
+        assert_eq!(Code::find(&shown(code, 768, 7), 7, 768), code);
     }
 
     #[test]

@@ -135,7 +135,7 @@ fn bit_difference(
 }
 
 /// The number that a Gray code word stands for.
-fn binary(gray: u32) -> u32 {
+pub(super) fn binary(gray: u32) -> u32 {
     let mut number = gray;
     for shift in [1, 2, 4, 8, 16] {
         number ^= number >> shift;

@@ -138,6 +138,7 @@ pub fn photograph(bytes: &[u8]) {
     {
         let options = CaptureOptions {
             min_bernoulli: 0,
+            coarsen: true,
             ..CaptureOptions::default()
         };
         let _ = capture::examine(folder, &options, &Silent);
