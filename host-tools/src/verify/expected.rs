@@ -18,6 +18,9 @@ const MOST_BOUNCES: usize = 400;
 /// brightest cell's, has settled: less than what the runtime rounds to.
 const SETTLED: f64 = 2e-5;
 
+/// The same for light that does not grow: rounding may keep it from settling.
+const FADING: f64 = 1e-3;
+
 /// The scene as a table has it.
 #[derive(Debug)]
 pub struct Expected<'t, 'a> {
@@ -101,7 +104,7 @@ impl<'t, 'a> Expected<'t, 'a> {
     #[must_use]
     pub fn photograph(&mut self, input: &CellPlanes) -> Option<CellPlanes> {
         let mut light = self.reflect(input, None);
-        let mut settled = false;
+        let mut fading = false;
         for _ in 0..MOST_BOUNCES {
             let received = self.received(&light);
             let next = self.reflect(input, Some(&received));
@@ -109,12 +112,12 @@ impl<'t, 'a> Expected<'t, 'a> {
             let pairs = next.iter().flatten().zip(light.iter().flatten());
             let change = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             light = next;
+            fading = change <= FADING * brightest;
             if change <= SETTLED * brightest {
-                settled = true;
                 break;
             }
         }
-        if !settled {
+        if !fading {
             return None;
         }
         for (light, ambient) in light.iter_mut().zip(&self.ambient) {
