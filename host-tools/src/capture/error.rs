@@ -55,7 +55,7 @@ pub enum CaptureError {
         first_line: u64,
     },
     /// A pattern or photograph is looked for outside of the capture folder.
-    #[error("{}, line {line}: \"{file}\" is not a relative path inside the capture", path.display())]
+    #[error("{}, line {line}: {file:?} is not a relative path inside the capture without \\ : \" % {{ }} or control characters", path.display())]
     OutsideFolder {
         /// The `capture.csv`.
         path: PathBuf,

@@ -289,10 +289,12 @@ fn exposure(text: &str) -> Option<f64> {
     (1e-9..=1e9).contains(&exposure).then_some(exposure)
 }
 
-/// The path if it stays inside the folder it is relative to, on any system:
-/// a capture made on one is read on another.
+/// The path if it stays inside the folder it is relative to, on any system: a capture
+/// made on one is read on another. Names are also put into shell commands: quotes,
+/// percent signs, braces and control characters, which no quoting makes safe on every
+/// system, are refused.
 fn inside_folder(file: &str) -> Option<PathBuf> {
-    let foreign = file.contains(['\\', '\0', ':']);
+    let foreign = file.contains(['\\', ':', '"', '%', '{', '}']) || file.contains(char::is_control);
     let path = Path::new(file);
     let mut normal = 0;
     for component in path.components() {
@@ -422,6 +424,10 @@ mod tests {
             "",
             ".",
             "a\\..\\x",
+            "{stem};touch x;#.png",
+            "%PATH%.png",
+            "\"\"&calc&.png",
+            "x\u{1b}[2J.png",
         ] {
             let text = refusal(&format!("0,white,p.png,\"{file}\"\n"));
             assert!(
@@ -444,7 +450,7 @@ mod tests {
 
         #[test]
         fn a_written_manifest_is_read_back(
-            names in proptest::collection::vec("[a-z ,\"é]{0,5}[a-z]", 1..9),
+            names in proptest::collection::vec("[a-z ,'é]{0,5}[a-z]", 1..9),
             exposed: bool,
         ) {
             let shots = names.iter().enumerate().map(|(i, name)| Shot {

@@ -30,7 +30,8 @@ pub(super) enum Ran {
 
 /// Puts what a command is about in the place of `{photo}`, `{stem}`, `{slide}`,
 /// `{index}`, `{role}` and `{exposure}`, quoted for the shell where that is needed.
-/// Other words in braces are the shell's.
+/// Other words in braces are the shell's. What was put in is not looked at again: a
+/// file name that holds one of these words stays a file name.
 pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> String {
     let stem = photo.with_extension("");
     let exposure = planned.exposure.map(|exposure| exposure.to_string());
@@ -42,8 +43,18 @@ pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> String {
         ("{role}", planned.role.clone()),
         ("{exposure}", exposure.unwrap_or_default()),
     ];
-    let fill = |text: String, (word, value): &(&str, String)| text.replace(word, &quoted(value));
-    words.iter().fold(command.to_owned(), fill)
+    let mut text = String::new();
+    let mut rest = command;
+    while let Some(brace) = rest.find('{') {
+        let (before, from_brace) = rest.split_at(brace);
+        text.push_str(before);
+        let word = words.iter().find(|(word, _)| from_brace.starts_with(word));
+        let length = word.map_or(1, |(word, _)| word.len());
+        let own = &from_brace[..length];
+        text.push_str(&word.map_or(own.to_owned(), |(_, value)| quoted(value)));
+        rest = &from_brace[length..];
+    }
+    text + rest
 }
 
 /// A word for the shell.
@@ -177,6 +188,24 @@ mod tests {
             text,
             r"snap -o '/it'\''s/007.png' --raw '/it'\''s/007'.raw -n 7 -t 0.25 row-1-inverse ${HOME} {x,y}"
         );
+    }
+
+    #[test]
+    fn a_name_that_holds_words_in_braces_runs_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let written = folder.path().join("written");
+        let name = format!("{{stem}};touch {};#{{index}}.png", written.display());
+        let hostile = Planned {
+            photo: name.clone().into(),
+            ..planned()
+        };
+        let command = filled("echo {photo} {index}", &hostile, &hostile.photo);
+        let ran = run(&command, Duration::from_secs(20), &|| false).unwrap();
+        let Ran::Ended(status, words) = ran else {
+            panic!("{ran:?}")
+        };
+        assert!(status.success() && !written.exists(), "{command}");
+        assert_eq!(words, format!("{name} 7"));
     }
 
     #[test]
