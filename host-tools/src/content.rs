@@ -5,8 +5,7 @@
 //! Mumford and Huang, *Occlusion models for natural images*, 2001). The seed is
 //! fixed, so a table comes out the same every time.
 
-use iltm_runtime::Grid;
-use iltm_runtime::pipeline::srgb;
+use iltm_runtime::{Grid, pipeline::srgb};
 use nalgebra::DMatrix;
 
 /// Images in a set.

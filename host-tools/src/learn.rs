@@ -3,10 +3,10 @@
 use crate::capture::{self, CaptureError, CaptureOptions, FineFlood, Measurements, Settings};
 use crate::compile::wish::{ChosenWhite, WhiteWish};
 use crate::compile::{self, CompileError, CompileOptions, Compiled};
-use crate::progress::Progress;
 use crate::solve::{
     self, Compensation, InverseTransport, Recovery, SolveError, SolveOptions, SolveReport,
 };
+use iltm_picture::progress::Progress;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use thiserror::Error;

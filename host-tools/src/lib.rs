@@ -16,7 +16,6 @@ pub mod content;
 pub mod demo;
 pub mod device;
 pub mod learn;
-pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod session;
@@ -26,3 +25,6 @@ pub mod tradeoff;
 pub mod user;
 pub mod verify;
 pub mod video;
+
+pub use iltm_picture as picture;
+pub use iltm_picture::progress;

@@ -1,12 +1,15 @@
 //! The firmware in the emulator, and tables for it.
 
 use crate::wedge;
-use iltm::capture::Response;
 use iltm::compile::{CompileOptions, FineGains, compile};
 use iltm::device::emulator::Board;
 use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
-use iltm::video::{Compensator, Picture, Samples, Settings};
+use iltm::picture::Response;
+use iltm::{
+    picture::{Picture, Samples},
+    video::{Compensator, Settings},
+};
 use iltm_runtime::exchange::{Format, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};

@@ -7,7 +7,6 @@
 mod like_a_scene;
 
 use crate::firmware::{counted, elf, order};
-use iltm::capture::{CaptureOptions, Response};
 use iltm::compile::content::natural_images;
 use iltm::compile::{CompileOptions, compile};
 use iltm::device::emulator::Board;
@@ -15,6 +14,7 @@ use iltm::device::memory::Memory;
 use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::solve::{ChannelInverse, SolveOptions};
+use iltm::{capture::CaptureOptions, picture::Response};
 use iltm_runtime::exchange::psram;
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};

@@ -18,8 +18,8 @@ pub mod slots;
 pub mod socket;
 pub mod stages;
 
-use iltm::capture::Response;
 use iltm::compile::{CompileOptions, compile};
+use iltm::picture::Response;
 use iltm::solve::{ChannelInverse, InverseTransport};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;

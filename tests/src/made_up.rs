@@ -2,9 +2,9 @@
 //! scene behind them.
 
 use fixed::types::U1F15;
-use iltm::capture::Response;
 use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
 use iltm::compile::response;
+use iltm::picture::Response;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::{SectionKind, meta, tier};

@@ -1,8 +1,8 @@
 //! The demo from its photographs to its page.
 
 use iltm::demo::{self, DemoError};
+use iltm::picture::png;
 use iltm::progress::Silent;
-use iltm::video::png;
 use iltm::video::y4m::{Frame, Reader};
 use iltm_runtime::image::Table;
 use std::fs::{self, File};

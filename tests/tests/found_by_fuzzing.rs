@@ -1,7 +1,7 @@
 //! What the session fuzzer found (`docs/fuzzing.md`), each as it happens to a device.
 
 use ed25519_dalek::{Signer, SigningKey};
-use iltm::capture::Response as Projector;
+use iltm::picture::Response as Projector;
 use iltm_runtime::fault::{ERASE_STAGES, NorSimulator, Violations};
 use iltm_runtime::image::Seal;
 use iltm_runtime::link::{Refusal, Request, Response, SlotState};

@@ -1,6 +1,6 @@
 //! A table image survives nothing but itself.
 
-use iltm::capture::Response;
+use iltm::picture::Response;
 use iltm::video::OperatorMemory;
 use iltm_runtime::image::{ImageError, Table};
 use iltm_runtime::pipeline::{Encoding, GridPipeline};

@@ -9,8 +9,8 @@
 //! `cargo test --release -p iltm-tests --test power_cuts -- --include-ignored --nocapture`.
 
 use ed25519_dalek::SigningKey;
-use iltm::capture::Response;
 use iltm::compile::sign::{SealTerms, sign};
+use iltm::picture::Response;
 use iltm_runtime::fault::Violations;
 use iltm_runtime::link::{Refusal, Request};
 use iltm_tests::slots::{SimDevice, Step};

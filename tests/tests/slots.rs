@@ -1,8 +1,8 @@
 //! What a device does with tables in its slots, request by request.
 
 use ed25519_dalek::SigningKey;
-use iltm::capture::Response as Projector;
 use iltm::compile::sign::{SealTerms, sign};
+use iltm::picture::Response as Projector;
 use iltm_runtime::fault::NorSimulator;
 use iltm_runtime::link::{PassThrough, Refusal, Request, Response, SlotState, Slots};
 use iltm_runtime::store::{Map, MapError};

@@ -12,13 +12,11 @@
 use super::Bounces;
 use super::separate::{Layer, LayerKind, Separated};
 use super::sheet::sheet;
-use crate::scene::folder::{FolderError, beside, put_in_place};
-use crate::video::{Picture, Samples, png};
+use iltm_picture::{FolderError, Picture, Samples, WholeFolder, png};
 use iltm_runtime::FrameSize;
 use npyz::WriterBuilder;
 use rayon::prelude::*;
 use std::fmt::Write;
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -63,31 +61,31 @@ pub struct Written {
 /// # Errors
 /// [`FolderError`] if something is in its place or it cannot be written.
 pub fn write(bounces: &Bounces, out: &Path) -> Result<Written, FolderError> {
-    let made = beside(out)?;
+    let made = WholeFolder::create(out)?;
     let separated = &bounces.separated;
     let mut files = Vec::new();
-    let mut add = |name: &str, what, bytes: io::Result<Vec<u8>>| {
-        let path = made.path().join(name);
-        let written = bytes.and_then(|bytes| fs::write(&path, bytes));
+    let mut add = |name: &str, what, bytes: Vec<u8>| {
         files.push(FileOf {
             name: name.to_owned(),
             what,
         });
-        // The folder's final name says more than its temporary one.
-        let path = out.join(name);
-        written.map_err(|source| FolderError::Io { path, source })
+        made.file(name, bytes)
     };
     if let Some(sheet) = sheet(bounces) {
-        add("bounces.png", "all pictures, labelled", encoded(&sheet))?;
+        add("bounces.png", "all pictures, labelled", png::encode(&sheet))?;
     }
     add(
         "bounces.csv",
         "shares and brightness",
-        Ok(csv(bounces).into_bytes()),
+        csv(bounces).into_bytes(),
     )?;
-    add("bounces.npy", "the layers as numbers", npy(separated))?;
+    add(
+        "bounces.npy",
+        "the layers as numbers",
+        npy(separated).map_err(FolderError::io(&out.join("bounces.npy")))?,
+    )?;
     let (photograph, _) = sixteen_bits(separated.size, &separated.photograph)?;
-    add("photograph.png", "the photograph", encoded(&photograph))?;
+    add("photograph.png", "the photograph", png::encode(&photograph))?;
     let mut sums = vec![0.0_f64; photograph.samples().len()];
     let pictures: Vec<_> = separated
         .layers
@@ -100,9 +98,9 @@ pub fn write(bounces: &Bounces, out: &Path) -> Result<Written, FolderError> {
             *sum += light;
         }
         let name = format!("{}.png", layer.kind.name());
-        add(&name, described(layer), encoded(&picture))?;
+        add(&name, described(layer), png::encode(&picture))?;
     }
-    put_in_place(made, out)?;
+    made.finish()?;
     Ok(Written {
         files,
         largest_gap_of_pictures: gap(&separated.photograph, &sums),
@@ -116,14 +114,6 @@ fn described(layer: &Layer) -> &'static str {
         LayerKind::Bounce(_) => "light reflected so many times",
         LayerKind::Rest => "all further bounces",
         LayerKind::Unseparated => "light where no cell was solved for",
-    }
-}
-
-fn encoded(picture: &Picture) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    match png::write(&mut bytes, picture) {
-        Ok(()) => Ok(bytes),
-        Err(error) => Err(io::Error::other(error)),
     }
 }
 

@@ -31,9 +31,8 @@ pub(crate) use sheet::{percent, sheet, times};
 pub use wall::Wall;
 
 use crate::capture::{self, CaptureError, CaptureOptions, Measurements, Shot, ShotLight};
-use crate::progress::Progress;
-use crate::scene::folder::FolderError;
 use crate::solve::{self, InverseTransport, Observed, SolveError, SolveOptions, SolveReport};
+use iltm_picture::{FolderError, progress::Progress};
 use nalgebra::DMatrix;
 use std::path::Path;
 use thiserror::Error;

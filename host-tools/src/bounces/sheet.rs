@@ -4,9 +4,10 @@
 use super::Bounces;
 use super::folder::frame_size;
 use super::separate::LayerKind;
-use crate::report::LightPicture;
-use crate::report::canvas::{BACKGROUND, Canvas, INK, QUIET, Type};
-use crate::video::Picture;
+use iltm_picture::{
+    LightPicture, Picture,
+    canvas::{BACKGROUND, Canvas, INK, QUIET, Type},
+};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 
 /// Pixels between pictures and around them.

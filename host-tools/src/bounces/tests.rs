@@ -3,11 +3,11 @@
 
 use super::*;
 use crate::capture::{Registration, Role, shown};
-use crate::progress::Silent;
 use crate::scene::coaxial::{Panels, Scene};
 use crate::scene::description::Scene as Described;
 use crate::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder as simulated};
 use crate::solve::ChannelInverse;
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::DVector;
 

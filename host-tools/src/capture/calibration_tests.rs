@@ -3,8 +3,8 @@
 
 use super::test_capture::{Dice, TestCapture, save_pattern};
 use super::*;
-use crate::progress::Silent;
 use crate::solve::{SolveOptions, solve};
+use iltm_picture::progress::Silent;
 use image::{ImageBuffer, Luma, Rgb};
 use nalgebra::DVector;
 use std::fmt::Write;

@@ -3,7 +3,7 @@
 
 use super::test_capture::{Dice, TestCapture};
 use super::*;
-use crate::progress::Silent;
+use iltm_picture::progress::Silent;
 use image::{ImageBuffer, Luma};
 use std::fs;
 use std::path::PathBuf;

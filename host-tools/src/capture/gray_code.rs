@@ -8,7 +8,7 @@ use super::photographs::Photographs;
 use super::registration::NO_CELL;
 use super::sequence::Sequence;
 use super::{CaptureError, Role};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 
 /// Flood light of a pixel, as a share of the 95th percentile of all pixels,
 /// below which it is not looked at: it only sees light from elsewhere.

@@ -8,8 +8,11 @@ use super::gates::saturation::{self, Clipped};
 use super::photo::Reading;
 use super::photographs::Photographs;
 use super::sequence::Sequence;
-use super::{CaptureError, Declared, SETTINGS_FILE, Settings};
-use crate::progress::{Progress, Silent};
+use super::{CaptureError, SETTINGS_FILE, Settings};
+use iltm_picture::{
+    Declared,
+    progress::{Progress, Silent},
+};
 use std::path::Path;
 
 /// Photographs and the two that all others are seen against.

@@ -78,6 +78,31 @@ pub struct ManifestOf<R> {
 /// All lines of a `capture.csv`, ordered by index.
 pub type Manifest = ManifestOf<Role>;
 
+/// File with a number in a folder of a capture: `FOLDER/007.png`.
+#[must_use]
+pub fn numbered(folder: &str, index: u32) -> PathBuf {
+    Path::new(folder).join(format!("{index:03}.png"))
+}
+
+impl<R> ManifestOf<R> {
+    /// The manifest of pictures whose files have their indices as names, in the folder
+    /// `patterns`; their photographs are in `photos`.
+    pub fn numbered(patterns: &str, roles: impl IntoIterator<Item = (u32, R)>) -> Self {
+        let shot = |((index, role), line)| ShotOf {
+            index,
+            role,
+            pattern: numbered(patterns, index),
+            photo: numbered("photos", index),
+            exposure: None,
+            line,
+        };
+        // The header is the first line.
+        Self {
+            shots: roles.into_iter().zip(2..).map(shot).collect(),
+        }
+    }
+}
+
 impl<R: ListedRole> ManifestOf<R> {
     /// Reads the manifest of a capture folder.
     ///

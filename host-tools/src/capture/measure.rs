@@ -8,7 +8,7 @@ use super::sequence::Sequence;
 use super::{
     CaptureError, ChannelMeasurements, LeftOut, Measurements, NoiseModel, NoiseSource, Why,
 };
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

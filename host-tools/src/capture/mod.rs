@@ -26,7 +26,6 @@ pub mod calibration;
 mod calibration_tests;
 mod cell_model;
 mod code;
-mod curve;
 mod diagnostics;
 mod drift;
 mod error;
@@ -57,7 +56,6 @@ mod reference;
 mod refusal_tests;
 mod registration;
 mod regression;
-mod response;
 mod revisit;
 mod role;
 mod sampled;
@@ -75,7 +73,6 @@ pub use calibration::{
     CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CalibrationShot, Devices, Probe,
     RampChannel,
 };
-pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use diagnostics::{Diagnostics, LeftOut, Why};
 pub use error::CaptureError;
 pub use exposed::Exposed;
@@ -84,13 +81,12 @@ pub use find::find_photo;
 pub(crate) use find::pictures_of_stem;
 pub use fine_flood::FineFlood;
 pub use gates::{Evidence, Gate, GateName, Verdict};
-pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf};
+pub use manifest::{ListedRole, MANIFEST_FILE, Manifest, ManifestOf, Shot, ShotOf, numbered};
 pub use measurements::{ChannelMeasurements, Measurements};
 pub use noise::{NoiseModel, NoiseSource};
 pub use pattern::Pattern;
 pub use reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
 pub use registration::{MIN_REGRESSION, NO_CELL, PixelCount, Registration, RegistrationMethod};
-pub use response::{Declared, Response};
 pub use revisit::{CellPlanes, Revisited, revisit};
 pub use role::Role;
 pub use sequence::{Axis, MIN_BERNOULLI};
@@ -98,9 +94,9 @@ pub use settings::{CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettin
 pub use shot_light::ShotLight;
 pub use shown::{columns, shown};
 
-use crate::progress::Progress;
 use gates::cause;
 use gates::superposition::Sums;
+use iltm_picture::progress::Progress;
 use light::Light;
 use measure::CellPixels;
 use nalgebra::DMatrix;

@@ -1,7 +1,8 @@
 //! One photograph in linear light.
 
 use super::picture::{Opened, Samples, Source};
-use super::{CaptureError, DeviceResponse, FileFormat};
+use super::{CaptureError, FileFormat};
+use iltm_picture::DeviceResponse;
 use std::path::PathBuf;
 
 /// Pixels a photograph is kept at. A larger one is averaged over squares of
@@ -226,9 +227,9 @@ fn light_table(response: &DeviceResponse, full_scale: u16) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Response;
     use super::super::picture_tests::source;
     use super::*;
+    use iltm_picture::Response;
     use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 
     fn read(picture: impl Into<DynamicImage>, response: Response) -> Result<Photo, CaptureError> {

@@ -5,7 +5,7 @@ use super::frame::{self, Frame};
 use super::photo::{Photo, PhotoFormat, Reading};
 use super::picture::Source;
 use super::{CaptureError, Shot};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -221,10 +221,10 @@ fn source<'p>(path: &'p Path, shot: &Shot) -> Source<'p> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Manifest;
     use super::super::test_capture::TestCapture;
-    use super::super::{Manifest, Response};
     use super::*;
-    use crate::progress::Silent;
+    use iltm_picture::{Response, progress::Silent};
 
     #[test]
     fn photographs_too_large_to_be_kept_are_read_again_with_the_same_result() {

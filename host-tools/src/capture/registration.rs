@@ -13,7 +13,7 @@ use super::photographs::Photographs;
 use super::regression::regress;
 use super::sequence::Sequence;
 use super::sharing::{self, SHARED};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 
 /// What [`Registration`] holds for a camera pixel without a cell.

@@ -10,7 +10,7 @@ use super::photo::Photo;
 use super::photographs::Photographs;
 use super::registration::{Candidate, NO_CELL};
 use super::sequence::Sequence;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use nalgebra::SMatrix;
 use rayon::prelude::*;
@@ -264,9 +264,9 @@ impl Shown<'_> {
 mod tests {
     use super::super::sequence::Chosen;
     use super::super::test_capture::TestCapture;
-    use super::super::{CaptureOptions, Manifest, Response};
+    use super::super::{CaptureOptions, Manifest};
     use super::*;
-    use crate::progress::Silent;
+    use iltm_picture::{Response, progress::Silent};
 
     #[test]
     fn weights_are_the_light_of_each_cell_and_wrong_cells_are_corrected() {

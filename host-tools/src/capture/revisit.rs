@@ -10,7 +10,7 @@ use super::{
     CaptureError, CaptureOptions, LeftOut, Registration, Settings, Shot, find, gray_code,
     registration,
 };
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use std::path::Path;
 

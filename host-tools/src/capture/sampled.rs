@@ -3,7 +3,7 @@
 
 use super::CaptureError;
 use super::photographs::Photographs;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 
 /// Pixels along a square's side.
 pub(super) const SIDE: usize = 16;

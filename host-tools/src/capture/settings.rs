@@ -1,7 +1,8 @@
 //! `capture.toml`: what photographs cannot say about themselves.
 
+use super::CaptureError;
 use super::photo::Reading;
-use super::{CaptureError, Declared};
+use iltm_picture::Declared;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fs::File;
@@ -184,8 +185,8 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Response;
     use super::*;
+    use iltm_picture::Response;
     use proptest::prelude::*;
 
     fn parse(text: &str) -> Result<Settings, String> {

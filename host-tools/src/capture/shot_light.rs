@@ -4,7 +4,7 @@
 use super::find;
 use super::photographs::Photographs;
 use super::{CaptureError, Devices, MANIFEST_FILE, Manifest, Role, Settings, Shot};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use std::path::Path;
 
 /// The light of one photograph, or of all photographs of white.

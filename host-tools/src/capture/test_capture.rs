@@ -3,7 +3,7 @@
 
 use super::code::Code;
 use super::{CaptureOptions, Manifest, Measurements, Pattern, Role, Shot};
-use crate::progress::Silent;
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use image::{ImageBuffer, Luma, Rgb};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::test_capture::{TestCapture, save_pattern};
 use super::*;
-use crate::progress::Silent;
+use iltm_picture::progress::Silent;
 use std::fs;
 use std::sync::Mutex;
 use tempfile::TempDir;

@@ -10,7 +10,7 @@ use crate::bounces::{
 };
 use crate::capture::CaptureOptions;
 use crate::learn::LearnError;
-use crate::scene::folder::check_free;
+use iltm_picture::check_free;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::time::Instant;

@@ -6,11 +6,11 @@ use super::interrupt;
 use super::output::Output;
 use super::progress::progress;
 use crate::capture::{Exposed, MANIFEST_FILE, Role};
-use crate::progress::Progress;
 use crate::session::{
     Camera, CommandCamera, CommandScreen, Event, Screen, Session, SessionError, SessionOptions,
     State, Summary, WatchedFolder, ranges, with_window,
 };
+use iltm_picture::progress::Progress;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::time::Duration;

@@ -10,7 +10,7 @@ use crate::compare::page::Contest;
 use crate::compare::paper::{self, Condition, File};
 use crate::compare::{Meter, table};
 use crate::learn::LearnError;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::fs;
@@ -196,7 +196,7 @@ fn dark(error: LightError) -> Failure {
         }
         LightError::Scene(error) => super::simulate::unreadable(&error),
         LightError::Simulation(error) => super::simulate::unsimulated(&error),
-        LightError::Folder(error) => super::simulate::unwritten(error),
+        LightError::Folder(error) => super::simulate::untaken(error),
         LightError::Room(error) => cannot_write(&std::env::temp_dir(), &error),
         LightError::TooLarge { .. } => Failure::new(
             Kind::Usage,

@@ -7,9 +7,9 @@ use super::failure::{Failure, Kind};
 use super::inspect::check;
 use super::output::{Output, cannot_read, read_file};
 use super::progress::progress;
-use crate::video::png::PngError;
 use crate::video::y4m::Y4mError;
-use crate::video::{Compensator, Settings, Summary, VideoError, WholeFile};
+use crate::video::{Compensator, Settings, Summary, VideoError};
+use iltm_picture::{WholeFile, png::PngError};
 use iltm_runtime::pipeline::Encoding;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -41,10 +41,12 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
         summary.map_err(|error| failed(&error))?
     } else {
         let mut whole =
-            WholeFile::create(&arguments.output).map_err(|e| of_kind(Kind::Write, &e))?;
+            WholeFile::create(&arguments.output).map_err(|e| of_kind(Kind::Write, &e.into()))?;
         let summary = compensator.stream(input, whole.file(), bars.as_ref());
         let summary = summary.map_err(|error| failed(&error))?;
-        whole.finish().map_err(|e| of_kind(Kind::Write, &e))?;
+        whole
+            .finish()
+            .map_err(|e| of_kind(Kind::Write, &e.into()))?;
         summary
     };
     report(&summary, start.elapsed().as_secs_f64(), output);

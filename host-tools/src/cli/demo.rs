@@ -35,7 +35,7 @@ fn failed(error: DemoError) -> Failure {
             };
             Failure::new(Kind::Write, error, next_step)
         }
-        DemoError::Write { path, source } => cannot_write(&path, &source),
+        DemoError::Write(error) => cannot_write(&error.path, &error.source),
         DemoError::Learn(error) => error.into(),
         DemoError::Video(error) => compensate::failed(&error),
         DemoError::Report(error) => Failure::new(

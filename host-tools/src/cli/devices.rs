@@ -40,8 +40,8 @@ fn camera_fit(fit: &CameraFit) -> Value {
 }
 
 /// The power that a response is nearest to; `null` for a formula that is none.
-fn gamma(response: &crate::capture::DeviceResponse) -> Option<f64> {
-    use crate::capture::{DeviceResponse, Response};
+fn gamma(response: &iltm_picture::DeviceResponse) -> Option<f64> {
+    use iltm_picture::{DeviceResponse, Response};
     match response {
         DeviceResponse::Measured(curve) => Some(curve.gamma()),
         DeviceResponse::Known(Response::Gamma(gamma)) => Some(*gamma),

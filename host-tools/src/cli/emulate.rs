@@ -14,10 +14,12 @@ use crate::device::playback::{Playback, PlaybackError};
 use crate::user::Folders;
 use crate::user::emulated::register;
 use crate::video::VideoError;
-use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::{Format, psram};
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::Encoding;
+use iltm_runtime::{
+    FrameSize,
+    exchange::{Format, psram},
+    image::Table,
+    pipeline::Encoding,
+};
 use serde_json::json;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

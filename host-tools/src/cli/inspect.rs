@@ -11,9 +11,11 @@ use crate::device::cure;
 use crate::learn::{recovery_in, white_in};
 use crate::report::steps;
 use ed25519_dalek::VerifyingKey;
-use iltm_runtime::image::{Seal, Table, unseal};
-use iltm_runtime::operator::{Bounds, Operator};
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::{
+    image::{Seal, Table, unseal},
+    operator::{Bounds, Operator},
+    trust::Rejected,
+};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::active::Active;
 use super::failure::{Failure, Kind};
-use crate::video::{VideoError, WholeFile};
+use iltm_picture::whole_file;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{self, IsTerminal, Write};
@@ -97,19 +97,7 @@ impl Output {
 
 /// Writes a file whole or not at all: beside its place, then renamed.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let write = || {
-        let mut whole = WholeFile::create(path)?;
-        let written = whole.file().write_all(bytes);
-        written.map_err(|source| VideoError::File {
-            path: path.to_owned(),
-            source,
-        })?;
-        whole.finish()
-    };
-    write().map_err(|error| match error {
-        VideoError::File { path, source } => cannot_write(&path, &source),
-        other => Failure::new(Kind::Write, &other, other.next_step()),
-    })
+    whole_file::write(path, bytes).map_err(|error| cannot_write(&error.path, &error.source))
 }
 
 pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {

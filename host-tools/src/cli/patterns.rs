@@ -5,7 +5,6 @@ use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::progress::progress;
 use super::simulate::unwritten;
-use crate::scene::folder;
 use crate::session::{self, Layout, OrderOptions, PatternsError};
 use iltm_runtime::Grid;
 use serde_json::json;
@@ -13,7 +12,7 @@ use serde_json::json;
 pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> {
     let out = &arguments.output;
     // A folder that is in the way is known before the work, not after it.
-    folder::check_free(out).map_err(unwritten)?;
+    iltm_picture::check_free(out).map_err(unwritten)?;
     let grid = Grid::new(arguments.rows, arguments.cols).map_err(|error| unmade(error.into()))?;
     let layout = Layout::new(grid, arguments.projector, arguments.border).map_err(unmade)?;
     let options = OrderOptions {

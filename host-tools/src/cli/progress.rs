@@ -1,7 +1,7 @@
 //! Progress bars, on a terminal only.
 
 use super::output::Output;
-use crate::progress::{Progress, Silent};
+use iltm_picture::progress::{Progress, Silent};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;

@@ -5,14 +5,14 @@ use super::failure::{Failure, Kind, kind_of};
 use super::output::{Output, cannot_write};
 use super::progress::progress;
 use crate::capture::shown;
-use crate::progress::Progress;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::{Scene, SceneError};
-use crate::scene::folder::{self, FolderError, Written};
+use crate::scene::folder::{self, CaptureFolderError, Written};
 use crate::scene::retake::{RetakeError, Session};
 use crate::scene::{
     Decision, Effect, Forced, Shooting, Simulation, SimulationError, SimulationOptions, percent,
 };
+use iltm_picture::{FolderError, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -23,7 +23,7 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     let scene = Scene::read(&arguments.scene).map_err(|error| unreadable(&error))?;
     // A folder that is in the way is known before the work, not after it.
     if let (Some(out), None) = (&arguments.output, &arguments.photograph) {
-        folder::check_free(out).map_err(unwritten)?;
+        iltm_picture::check_free(out).map_err(unwritten)?;
     }
     let mut forced = Forced::default();
     let wanted = |effects: &[Effect], on| {
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
         } else if let Some(out) = &arguments.output {
             let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
             let done = folder::write(&shooting, &patterns, out, bars.as_ref());
-            written = Some(done.map_err(unwritten)?);
+            written = Some(done.map_err(untaken)?);
         }
     }
     let ablated = if arguments.ablate {
@@ -245,6 +245,13 @@ pub(super) fn unsimulated(error: &SimulationError) -> Failure {
     Failure::new(Kind::Scene, error, error.next_step())
 }
 
+pub(super) fn untaken(error: CaptureFolderError) -> Failure {
+    match error {
+        CaptureFolderError::Simulation(error) => unsimulated(&error),
+        CaptureFolderError::Folder(error) => unwritten(error),
+    }
+}
+
 pub(super) fn unwritten(error: FolderError) -> Failure {
     match error {
         FolderError::Taken { .. } => Failure::new(
@@ -252,7 +259,6 @@ pub(super) fn unwritten(error: FolderError) -> Failure {
             error,
             "Choose another folder, or move that one away.",
         ),
-        FolderError::Simulation(error) => unsimulated(&error),
         FolderError::Io { path, source } => cannot_write(&path, &source),
     }
 }

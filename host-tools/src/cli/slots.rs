@@ -1,8 +1,10 @@
 //! The table slots of a device, in words.
 
 use super::status::table_name;
-use iltm_runtime::link::{SlotInfo, SlotState, Slots, TableName};
-use iltm_runtime::trust::KEY_ID;
+use iltm_runtime::{
+    link::{SlotInfo, SlotState, Slots, TableName},
+    trust::KEY_ID,
+};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -8,14 +8,13 @@ use super::progress::progress;
 use super::simulate::unwritten;
 use super::{compensate, failure};
 use crate::learn::settings_in;
-use crate::progress::Progress;
 use crate::session::Layout;
 use crate::verify::{
     ImageVerdict, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
     test_images, write,
 };
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use iltm_picture::progress::Progress;
+use iltm_runtime::{FrameSize, image::Table};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

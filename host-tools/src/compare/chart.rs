@@ -1,6 +1,6 @@
 //! Charts as SVG files.
 
-use crate::report::decades;
+use iltm_picture::numbers::decades;
 use plotters::coord::Shift;
 use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::prelude::*;
@@ -237,5 +237,5 @@ fn around(values: impl Iterator<Item = f64>) -> Range<f64> {
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // plotters wants a reference.
 fn label(value: &f64) -> String {
-    crate::report::number(*value)
+    iltm_picture::numbers::number(*value)
 }

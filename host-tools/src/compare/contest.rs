@@ -3,8 +3,8 @@
 use super::acquisition::{self, Acquisition};
 use super::inversion::{self, Inversion, Known};
 use super::{Answer, Errors, Found, Meter, Rig, Source, Truth, Unfit};
-use crate::progress::{Progress, Silent};
 use crate::solve::inverted;
+use iltm_picture::progress::{Progress, Silent};
 use std::time::Instant;
 
 /// What one method did.

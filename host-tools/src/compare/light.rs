@@ -10,11 +10,11 @@ use crate::capture::{
     self, CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, read_reference,
     shown,
 };
-use crate::progress::Progress;
 use crate::scene::description::{Scene, SceneError};
-use crate::scene::folder::{self, FolderError};
+use crate::scene::folder::{self, CaptureFolderError};
 use crate::scene::{Shooting, Simulation, SimulationError, SimulationOptions};
 use crate::solve::{SolveError, SolveOptions, solve};
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -63,7 +63,7 @@ pub enum LightError {
     Simulation(#[from] SimulationError),
     /// The scene's photographs could not be written.
     #[error(transparent)]
-    Folder(#[from] FolderError),
+    Folder(#[from] CaptureFolderError),
     /// There is no room for the scene's photographs.
     #[error("there is no room for temporary photographs: {0}")]
     Room(#[from] std::io::Error),

@@ -4,9 +4,9 @@ use super::contest::{Done, Row};
 use super::light::Light;
 use super::sheet::{Tile, encoded, sheet};
 use super::table::{COLUMNS, cells};
-use crate::report::{ColourScale, Palette, document};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use iltm_picture::{ColourScale, Palette, html::document};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
 

@@ -1,8 +1,10 @@
 //! Pictures of one value a cell, side by side with captions and one colour bar.
 
-use crate::report::canvas::{BACKGROUND, Canvas, Colour, INK, QUIET, Type};
-use crate::report::{ColourScale, LightPicture, SHADES};
-use crate::video::{Picture, Samples, png};
+use iltm_picture::{
+    ColourScale, LightPicture, Picture, SHADES, Samples,
+    canvas::{BACKGROUND, Canvas, Colour, INK, QUIET, Type},
+    png,
+};
 use iltm_runtime::{FrameSize, Grid};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 use std::collections::BTreeSet;
@@ -241,7 +243,7 @@ mod tests {
     #[test]
     fn a_palette_changes_no_pixel() {
         let grid = Grid::new(6, 9).unwrap();
-        let scale = ColourScale::linear(crate::report::Palette::Magma, 1.0);
+        let scale = ColourScale::linear(iltm_picture::Palette::Magma, 1.0);
         let values = || (0..54).map(|at| f64::from(at) / 53.0);
         let size = FrameSize::of_grid(grid);
         let tiles = vec![

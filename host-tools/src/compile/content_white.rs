@@ -7,9 +7,8 @@
 //! is cut: the answer is a quantile, and needs no search.
 
 use super::FineGains;
-use crate::report::LightPicture;
-use crate::report::resample::Lattice;
 use crate::solve::InverseTransport;
+use iltm_picture::{Lattice, LightPicture};
 use iltm_runtime::FrameSize;
 use nalgebra::{DMatrix, DVector};
 

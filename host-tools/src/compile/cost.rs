@@ -19,9 +19,11 @@
 //! Instructions are not cycles: a Cortex-M7 can do two at once, and waits for memory.
 //! [`BUDGET`] takes one cycle for each.
 
-use iltm_runtime::image::Table;
-use iltm_runtime::operator::{Channels, Segment};
-use iltm_runtime::{FrameSize, Grid};
+use iltm_runtime::{
+    FrameSize, Grid,
+    image::Table,
+    operator::{Channels, Segment},
+};
 
 /// Cycles a second of the part that shares of a frame's time are given for.
 pub const CLOCK: u64 = 216_000_000;

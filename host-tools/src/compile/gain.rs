@@ -2,8 +2,7 @@
 
 use crate::capture::FineFlood;
 use crate::solve::InverseTransport;
-use iltm_runtime::FrameSize;
-use iltm_runtime::resample::interpolation::Axis;
+use iltm_runtime::{FrameSize, resample::interpolation::Axis};
 
 /// Gains on a grid finer than the cells.
 #[derive(Clone, Debug)]

@@ -2,9 +2,9 @@
 
 use super::ladder::Part;
 use super::quantise::Quantised;
-use iltm_runtime::image::crc32;
-use iltm_runtime::image::layout::{
-    ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, segment,
+use iltm_runtime::image::{
+    crc32,
+    layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, segment},
 };
 use std::ops::Range;
 

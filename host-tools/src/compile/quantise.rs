@@ -8,9 +8,11 @@
 
 use super::image::StoredRow;
 use super::ladder::{Entry, Part};
-use iltm_runtime::haar::{Basis, Function};
-use iltm_runtime::operator::{Bounds, Segment};
-use iltm_runtime::units::{CORRECTION_GUARD_BITS, INPUT_COEFFICIENT_MAX};
+use iltm_runtime::{
+    haar::{Basis, Function},
+    operator::{Bounds, Segment},
+    units::{CORRECTION_GUARD_BITS, INPUT_COEFFICIENT_MAX},
+};
 
 /// The entries of one tier in one operator, as they are stored.
 #[derive(Clone, Debug)]

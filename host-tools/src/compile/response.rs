@@ -1,6 +1,6 @@
 //! Projector codes at the knots of a table's response section.
 
-use crate::capture::{DeviceResponse, ProjectorResponse};
+use iltm_picture::{DeviceResponse, ProjectorResponse};
 use iltm_runtime::pipeline::{
     CODES, RESPONSE_KNOTS, Response as RuntimeResponse, codes, knot_drive,
 };
@@ -41,7 +41,7 @@ pub fn codes(knots: &[u16]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
+    use iltm_picture::Response;
 
     #[test]
     fn knots_rise_from_dark_to_white() {

@@ -7,14 +7,18 @@ use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
 use super::response;
 use super::white::{ReferenceWhite, reference_white};
-use crate::capture::ProjectorResponse;
 use crate::solve::InverseTransport;
 use fixed::types::{U0F32, U1F15, U8F24};
-use iltm_runtime::haar::Basis;
-use iltm_runtime::image::layout::{MAX_PROVENANCE, SectionKind, fine_gain, meta, tier};
-use iltm_runtime::image::{ImageError, Table};
-use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
-use iltm_runtime::units::Light;
+use iltm_picture::ProjectorResponse;
+use iltm_runtime::{
+    haar::Basis,
+    image::{
+        ImageError, Table,
+        layout::{MAX_PROVENANCE, SectionKind, fine_gain, meta, tier},
+    },
+    operator::{Bounds, Channels, Operator, OperatorError, Segment},
+    units::Light,
+};
 use std::ops::Range;
 use thiserror::Error;
 

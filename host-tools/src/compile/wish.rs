@@ -3,8 +3,8 @@
 use super::content_white::Headroom;
 use super::white::reference_white;
 use super::{CompileError, FineGains};
-use crate::report::LightPicture;
 use crate::solve::InverseTransport;
+use iltm_picture::LightPicture;
 use serde::{Deserialize, Serialize};
 
 /// What reference white is asked for, if not the brightest even grey that every live cell

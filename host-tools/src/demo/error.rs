@@ -3,6 +3,7 @@
 use crate::learn::LearnError;
 use crate::report::ReportError;
 use crate::video::VideoError;
+use iltm_picture::FileError;
 use std::path::PathBuf;
 
 /// What went wrong.
@@ -17,13 +18,8 @@ pub enum DemoError {
         source: std::io::Error,
     },
     /// A file could not be written.
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
+    #[error("{}: cannot be written: {}", .0.path.display(), .0.source)]
+    Write(#[from] FileError),
     /// The sample did not become a table.
     #[error(transparent)]
     Learn(#[from] LearnError),

@@ -16,10 +16,10 @@ pub(crate) use stills::test_card;
 
 use crate::capture::CaptureOptions;
 use crate::learn::{Learned, learn};
-use crate::progress::Progress;
 use crate::report::{Example, Report, Wanted};
 use crate::solve::SolveOptions;
 use crate::video::Summary;
+use iltm_picture::progress::Progress;
 use iltm_runtime::FrameSize;
 use sample::{make_folder, write_bytes};
 use std::path::{Path, PathBuf};

@@ -1,10 +1,9 @@
 //! The capture that the program carries with it.
 
 use super::DemoError;
-use crate::video::WholeFile;
+use iltm_picture::whole_file;
 use include_dir::{Dir, File, include_dir};
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 
 /// 60 photographs of coloured M-shaped panels, 16 x 24 cells: 1 white, 1 black,
@@ -42,13 +41,7 @@ fn write_file(path: &Path, file: &File<'_>) -> Result<(), DemoError> {
 
 /// Writes a file whole or not at all.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), DemoError> {
-    let mut whole = WholeFile::create(path)?;
-    let written = whole.file().write_all(bytes);
-    written.map_err(|source| DemoError::Write {
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(whole.finish()?)
+    Ok(whole_file::write(path, bytes)?)
 }
 
 /// Makes a folder and those that it lies in.

@@ -3,9 +3,11 @@
 //! Drawn by arithmetic at any size, in linear light, each pixel the mean of
 //! several samples, so edges are smooth.
 
-use crate::report::canvas::{Canvas, Type};
-use crate::report::{LightPicture, Wanted};
-use crate::video::Picture;
+use crate::report::Wanted;
+use iltm_picture::{
+    LightPicture, Picture,
+    canvas::{Canvas, Type},
+};
 use iltm_runtime::FrameSize;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 use std::f64::consts::TAU;
@@ -155,8 +157,7 @@ fn paint(size: FrameSize, light: impl Fn(f64, f64) -> Colour) -> Picture {
     let place = |pixel: usize, sample: usize, length: usize| {
         (pixel as f64 + (sample as f64 + 0.5) / SAMPLES as f64) / length as f64
     };
-    let mut planes = vec![Vec::new(); 3];
-    for at in 0..size.pixels() {
+    let pixel = |at: usize| {
         let (col, row) = (at % size.width(), at / size.width());
         let mut sums = [0.0; 3];
         for sample in 0..SAMPLES * SAMPLES {
@@ -166,17 +167,15 @@ fn paint(size: FrameSize, light: impl Fn(f64, f64) -> Colour) -> Picture {
                 *sum += light / (SAMPLES * SAMPLES) as f64;
             }
         }
-        for (plane, sum) in planes.iter_mut().zip(sums) {
-            plane.push(sum as f32);
-        }
-    }
-    LightPicture { size, planes }.for_display()
+        sums.map(|sum| sum as f32)
+    };
+    LightPicture::of_pixels(size, pixel).for_display()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::video::Samples;
+    use iltm_picture::Samples;
 
     #[test]
     fn stills_are_drawn_at_any_size_and_span_the_range_of_light() {

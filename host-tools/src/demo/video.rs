@@ -1,14 +1,12 @@
 //! A moving picture to compensate.
 
 use super::DemoError;
-use crate::capture::Response;
-use crate::progress::Progress;
-use crate::report::{LightPicture, ReportError};
+use crate::report::ReportError;
 use crate::video::test_scene::TestScene;
 use crate::video::y4m::{Frame, Header, Range, Sampling, Writer, Y4mError};
-use crate::video::{Compensator, Picture, Settings, Summary, VideoError, WholeFile};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use crate::video::{Compensator, Settings, Summary, VideoError};
+use iltm_picture::{LightPicture, Picture, Response, WholeFile, progress::Progress};
+use iltm_runtime::{FrameSize, image::Table};
 use std::io::BufWriter;
 use std::path::Path;
 
@@ -61,7 +59,8 @@ pub(super) fn write(
     }
     progress.end();
     writer.finish().map_err(wrap)?;
-    Ok(whole.finish()?)
+    whole.finish()?;
+    Ok(())
 }
 
 fn wrap(error: Y4mError) -> DemoError {

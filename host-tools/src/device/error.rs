@@ -1,7 +1,9 @@
 //! Why a device could not be spoken to.
 
-use iltm_runtime::link::{PROTOCOL_VERSION, Refusal};
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::{
+    link::{PROTOCOL_VERSION, Refusal},
+    trust::Rejected,
+};
 use std::io;
 
 /// Why a device could not be spoken to. [`DeviceError::next_step`] says what to

@@ -1,8 +1,9 @@
 //! Wanted frames for a board: the test scene, a picture, or a video over and over.
 
+use crate::video::VideoError;
 use crate::video::test_scene::TestScene;
 use crate::video::y4m::{Frame, Reader, Y4mError};
-use crate::video::{Picture, Samples, VideoError, png};
+use iltm_picture::{Picture, Samples, png};
 use iltm_runtime::FrameSize;
 use std::fs::File;
 use std::io::{Read, Seek};

@@ -4,9 +4,10 @@
 //! read and written through the file rather than mapped, since the system calls
 //! cost little beside a frame and need no unsafe code.
 
-use iltm_runtime::exchange::layout::CONTROL_WORDS;
-use iltm_runtime::exchange::{ControlWords, psram};
-use iltm_runtime::store::identity_record;
+use iltm_runtime::{
+    exchange::{ControlWords, layout::CONTROL_WORDS, psram},
+    store::identity_record,
+};
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::ops::Range;

@@ -122,9 +122,11 @@ const fn within_memory(range: &Range<usize>) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use iltm_runtime::FrameSize;
-    use iltm_runtime::exchange::{Presenter, Receiver};
-    use iltm_runtime::pipeline::Encoding;
+    use iltm_runtime::{
+        FrameSize,
+        exchange::{Presenter, Receiver},
+        pipeline::Encoding,
+    };
 
     #[test]
     fn frames_go_through_the_file_to_a_board_and_back() {

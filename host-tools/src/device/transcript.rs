@@ -1,8 +1,10 @@
 //! What is said on a line, in words, for support.
 
 use super::Line;
-use iltm_runtime::link::{Channel, Decoder, Event, Frame, Request, Response};
-use iltm_runtime::trust::KEY_ID;
+use iltm_runtime::{
+    link::{Channel, Decoder, Event, Frame, Request, Response},
+    trust::KEY_ID,
+};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};

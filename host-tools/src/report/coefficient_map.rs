@@ -1,8 +1,7 @@
 //! The operator in the Haar domain, as a picture.
 
-use super::colour_scale::{ColourScale, Palette};
 use crate::solve::{Basis, Haar, InverseTransport};
-use crate::video::Picture;
+use iltm_picture::{ColourScale, Palette, Picture};
 use iltm_runtime::FrameSize;
 use nalgebra::DMatrix;
 
@@ -98,7 +97,7 @@ fn levels(fineness: &[f64]) -> Vec<Level> {
 mod tests {
     use super::*;
     use crate::solve::ChannelInverse;
-    use crate::video::Samples;
+    use iltm_picture::Samples;
     use iltm_runtime::Grid;
 
     /// An inverse with this shared operator and nothing else of interest.

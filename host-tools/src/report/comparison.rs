@@ -1,6 +1,6 @@
 //! How far a photograph is from the wanted image.
 
-use super::LightPicture;
+use iltm_picture::LightPicture;
 
 /// A photograph compared with the wanted image at the scale that flatters it
 /// most: what matters on the wall is contrast and colour, not the projector's

@@ -1,8 +1,8 @@
 //! One wanted image, and what becomes of it on the wall.
 
-use super::{Comparison, LightPicture, Projection};
-use crate::capture::{ProjectorResponse, Response};
-use crate::video::{Compensator, Picture, Settings, VideoError};
+use super::{Comparison, Projection};
+use crate::video::{Compensator, Settings, VideoError};
+use iltm_picture::{LightPicture, Picture, ProjectorResponse, Response};
 use iltm_runtime::image::Table;
 
 /// An image to be projected.

@@ -1,9 +1,8 @@
 //! What a capture and its solve say about themselves, line by line.
 
-use super::colour_scale::number;
-use super::page::{grouped, percent};
 use crate::capture::{Measurements, NoiseSource, RegistrationMethod};
 use crate::learn::Learned;
+use iltm_picture::numbers::{grouped, number, percent};
 
 /// One line: its name and what there is to say.
 pub(super) type Fact = (&'static str, String);

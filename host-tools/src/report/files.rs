@@ -1,8 +1,11 @@
 //! The report's pictures as PNG files.
 
-use super::{CoefficientMap, ColourScale, Example, summary};
-use crate::video::{Picture, Samples, png};
+use super::{CoefficientMap, Example, summary};
 use color_quant::NeuQuant;
+use iltm_picture::{
+    ColourScale, Picture, Samples,
+    html::{PictureFile, picture_file},
+};
 use rayon::prelude::*;
 
 /// Colours of a picture with a palette.
@@ -18,26 +21,6 @@ const BAYER: [[i16; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15,
 /// Codes from the lowest to the highest threshold: about the distance of
 /// neighbouring colours of a palette.
 const DITHER: i16 = 12;
-
-/// A picture, encoded.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct PictureFile {
-    /// Name without extension: lower-case letters and `-`.
-    pub name: String,
-    /// Contents of the PNG file.
-    pub png: Vec<u8>,
-}
-
-/// A picture as a file.
-pub(crate) fn picture_file(name: &str, picture: &Picture) -> PictureFile {
-    let mut bytes = Vec::new();
-    // Writing to memory does not fail.
-    let _ = png::write(&mut bytes, picture);
-    PictureFile {
-        name: name.to_owned(),
-        png: bytes,
-    }
-}
 
 /// Encodes all pictures of a report. `summary` is of the first example and has a
 /// palette, since it is made to be small.

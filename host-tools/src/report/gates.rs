@@ -1,12 +1,10 @@
 //! What the gates say of a capture, as a page: a card for each, what explains others
 //! first, with what its number was taken from.
 
-use super::colour_scale::{ColourScale, Palette, number};
-use super::document;
 use crate::capture::{Evidence, Gate, Verdict};
-use crate::video::png;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use iltm_picture::{ColourScale, Palette, html::document, numbers::number, png};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
 use std::ops::RangeInclusive;
@@ -175,7 +173,7 @@ fn map(what: &str, rows: usize, cols: usize, values: &[f64]) -> Markup {
         .fold(0.0, f64::max)
         .max(1e-6);
     let scale = ColourScale::linear(Palette::Viridis, high);
-    let mut canvas = super::canvas::Canvas::new(size, super::canvas::QUIET);
+    let mut canvas = iltm_picture::canvas::Canvas::new(size, iltm_picture::canvas::QUIET);
     for (at, value) in sizes().enumerate().filter(|(_, value)| value.is_finite()) {
         canvas.set(at % cols, at / cols, scale.colour(value));
     }

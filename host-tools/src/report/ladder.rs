@@ -2,10 +2,14 @@
 
 use super::microseconds;
 use crate::compile::cost::{self, BUDGET};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::layout::{ALIGNMENT, entry, tier};
-use iltm_runtime::image::{Table, TierInfo};
-use iltm_runtime::pipeline::FrameError;
+use iltm_runtime::{
+    FrameSize,
+    image::{
+        Table, TierInfo,
+        layout::{ALIGNMENT, entry, tier},
+    },
+    pipeline::FrameError,
+};
 
 /// One tier as its table has it: nothing is measured.
 #[derive(Clone, Copy, PartialEq, Debug)]

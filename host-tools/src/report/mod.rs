@@ -2,59 +2,48 @@
 //!
 //! | what | file |
 //! |---|---|
-//! | light instead of codes | `light_picture.rs` |
-//! | what a photograph of a projection would show | `predict.rs`, `resample.rs` |
+//! | what a photograph of a projection would show | `predict.rs` |
 //! | how far it is from what was wanted | `comparison.rs` |
 //! | a wanted image with and without compensation | `example.rs` |
 //! | the operator in the Haar domain | `coefficient_map.rs` |
 //! | what each tier costs | `ladder.rs`, `timing.rs` |
-//! | numbers as colours, lines, words | `colour_scale.rs`, `chart.rs`, `canvas.rs` |
 //! | one picture of it all | `summary.rs` |
-//! | pictures as PNG files | `files.rs` |
+//! | pictures as PNG files, one of a few colours | `files.rs` |
 //! | what the solve says about itself | `facts.rs` |
 //! | what the gates say, a page of its own | `gates.rs`, `gates.css` |
-//! | the page | `page.rs`, `document.rs`, `style.css` |
+//! | the page | `page.rs` |
 
-pub(crate) mod canvas;
-mod chart;
 mod coefficient_map;
-pub(crate) mod colour_scale;
 mod comparison;
-mod document;
 mod example;
 mod facts;
 mod files;
 pub mod gates;
 mod ladder;
-mod light_picture;
 pub(crate) mod page;
 mod predict;
-pub(crate) mod resample;
 mod summary;
 mod timing;
 
 pub use coefficient_map::{CoefficientMap, Level};
-pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
-pub(crate) use colour_scale::{decades, number};
 pub use comparison::Comparison;
-pub(crate) use document::document;
 pub use example::{Example, Shown, Treatment, Wanted};
-pub use files::PictureFile;
-pub(crate) use files::picture_file;
 pub use ladder::{Rung, Step, ladder, steps};
-pub use light_picture::LightPicture;
-pub(crate) use page::colour_bar;
 pub use page::{Command, Words};
 pub use predict::Projection;
 pub use summary::summary;
 pub use timing::{microseconds, microseconds_at};
 
 use crate::learn::Learned;
-use crate::progress::Progress;
-use crate::video::{Picture, VideoError};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::{ImageError, Table};
-use iltm_runtime::pipeline::FrameError;
+use crate::video::VideoError;
+use iltm_picture::{
+    ColourScale, LightPicture, Palette, Picture, html::PictureFile, progress::Progress,
+};
+use iltm_runtime::{
+    FrameSize,
+    image::{ImageError, Table},
+    pipeline::FrameError,
+};
 
 /// Share of the flood photograph's pixels that may be brighter than the white of
 /// its picture: glints would otherwise darken all else.

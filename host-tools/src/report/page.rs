@@ -1,13 +1,13 @@
 //! The page: one HTML file with everything inside.
 
-use super::chart::{Axis, Chart, Point};
-use super::colour_scale::number;
-use super::document::document;
 use super::facts::facts;
-use super::{ColourScale, Example, PictureFile, Report, Rung, Shown, Treatment};
+use super::{Example, Report, Rung, Shown, Treatment};
 use crate::solve::{Compensation, Prediction};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use iltm_picture::{
+    chart::{Axis, Chart, Point},
+    html::{colour_bar, document, embedded},
+    numbers::{grouped, number, percent},
+};
 use maud::{Markup, html};
 
 /// What the page says that photographs cannot.
@@ -390,11 +390,6 @@ impl Report<'_> {
     }
 }
 
-/// A picture inside of a page.
-pub(crate) fn embedded(file: &PictureFile, alt: &str) -> Markup {
-    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt); }
-}
-
 fn headline(error: f64, what: &str, class: &str) -> Markup {
     html! { div .number .(class) { b { (percent(error)) } span { (what) } } }
 }
@@ -410,57 +405,4 @@ fn clipping(shown: &Shown) -> String {
         _ if shown.clipped == 0.0 => "Nothing clipped".to_owned(),
         _ => format!("{} of the samples clipped", percent(shown.clipped)),
     }
-}
-
-pub(crate) fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
-    const STOPS: usize = 16;
-    let stops: Vec<String> = (0..=STOPS)
-        .map(|stop| {
-            let [red, green, blue] = scale.colour_at(stop as f64 / STOPS as f64);
-            format!("#{red:02x}{green:02x}{blue:02x}")
-        })
-        .collect();
-    let ticks = scale.ticks();
-    html! {
-        div .bar role="img" aria-label="Colour scale" {
-            div .colours style=(format!("background:linear-gradient(to right,{})", stops.join(","))) {}
-            div .ticks {
-                @for tick in &ticks {
-                    @let end = tick.place > 0.95;
-                    span .end[end] style=(format!("left:{:.1}%", 100.0 * tick.place)) {
-                        (tick.label) @if end && open { " +" }
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// A share as a percentage: tenths from 10 up, hundredths from 1 up, two digits
-/// below.
-pub(crate) fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    let places = match percent {
-        10.0.. => 1,
-        1.0.. => 2,
-        _ if percent > 0.0 => 1 - percent.log10().floor() as i32,
-        _ => 0,
-    };
-    format!("{percent:.0$}\u{202f}%", places.clamp(0, 6) as usize)
-}
-
-/// A whole number with its thousands apart.
-pub(crate) fn grouped(value: u64) -> String {
-    let digits = value.to_string();
-    let first = digits.len() % 3;
-    let mut groups: Vec<&str> = Vec::new();
-    if first > 0 {
-        groups.push(&digits[..first]);
-    }
-    groups.extend(
-        (first..digits.len())
-            .step_by(3)
-            .map(|start| &digits[start..start + 3]),
-    );
-    groups.join("\u{202f}")
 }

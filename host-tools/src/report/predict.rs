@@ -14,12 +14,13 @@
 //! and nothing that the photographs did not show. How wrong the learned
 //! transport itself is, only photographs can say: `SolveReport::prediction`.
 
-use super::LightPicture;
-use super::resample::Lattice;
 use crate::solve::InverseTransport;
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FullPipeline, Row};
+use iltm_picture::{Lattice, LightPicture};
+use iltm_runtime::{
+    FrameSize,
+    image::Table,
+    pipeline::{FullPipeline, Row},
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Bounces after which the rest is below rounding for any scene that reflects
@@ -147,13 +148,7 @@ impl Projection {
     ) -> LightPicture {
         let same = picture.size() == self.size && picture.planes().len() == self.channels.len();
         assert!(same, "the picture has another size or number of channels");
-        let planes = self.channels.iter().zip(picture.planes());
-        LightPicture {
-            size: self.size,
-            planes: planes
-                .map(|(channel, given)| plane(channel, given))
-                .collect(),
-        }
+        picture.with_planes(|channel, given| plane(&self.channels[channel], given))
     }
 }
 
@@ -197,10 +192,10 @@ fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
     use crate::compile::{CompileOptions, FineGains, compile};
     use crate::solve::ChannelInverse;
-    use crate::video::{Compensator, Picture, Samples, Settings};
+    use crate::video::{Compensator, Settings};
+    use iltm_picture::{Picture, Response, Samples};
     use iltm_runtime::Grid;
 
     /// A textured scene whose cells light each other the more the nearer they are.

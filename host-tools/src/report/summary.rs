@@ -1,10 +1,11 @@
 //! One picture that tells the story: wanted, photographed without compensation,
 //! photographed with it, and both errors.
 
-use super::canvas::{BACKGROUND, Canvas, INK, QUIET, Type};
-use super::colour_scale::ColourScale;
 use super::{Example, Treatment};
-use crate::video::Picture;
+use iltm_picture::{
+    ColourScale, Picture,
+    canvas::{BACKGROUND, Canvas, INK, QUIET, Type},
+};
 use iltm_runtime::FrameSize;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 

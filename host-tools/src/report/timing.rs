@@ -1,13 +1,15 @@
 //! What a tier costs on the machine that writes the report.
 
-use crate::capture::Response;
 use crate::compile::content::natural_images;
 use crate::video::OperatorMemory;
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{
-    Encoding, FlatMemory, FrameError, Halfword, Row, compensate_cells, compensate_pixels,
+use iltm_picture::Response;
+use iltm_runtime::{
+    FrameSize, Grid,
+    image::Table,
+    pipeline::{
+        Encoding, FlatMemory, FrameError, Halfword, Row, compensate_cells, compensate_pixels,
+    },
 };
-use iltm_runtime::{FrameSize, Grid};
 use std::time::Instant;
 
 /// Runs of which the median counts: odd, and few enough to take no time.

@@ -5,7 +5,7 @@ use super::effects::Effect;
 use super::simulation::{Simulation, SimulationError, SimulationOptions};
 use crate::capture::columns;
 use crate::capture::shown;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use std::time::Instant;
 
 /// Bernoulli patterns among those that are photographed for a comparison.

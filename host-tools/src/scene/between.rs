@@ -6,7 +6,7 @@ use super::exchange::{Exchange, ExchangeError, ExchangeOptions, Occlusion};
 use super::facets::Facets;
 use super::patches::Patch;
 use super::specular::{Specular, Surfaces, TooGlossy};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use std::time::Instant;
 
 /// Light between patches, with what was found on the way.

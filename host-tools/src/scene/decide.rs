@@ -5,7 +5,7 @@ use super::effects::{Decisions, Effect};
 use super::estimate::{self, Estimate};
 use super::facets::Facets;
 use super::sensor::Sensor;
-use crate::capture::Response;
+use iltm_picture::Response;
 
 /// Effects that change a photograph by less than this share of white are left out,
 /// where the camera has no noise that would hide more.

@@ -4,8 +4,8 @@
 use super::shooting::{Photograph, Shooting, Slide};
 use super::simulation::SimulationError;
 use crate::capture::{CaptureError, find_photo};
-use crate::progress::Progress;
 use crate::session::listed;
+use iltm_picture::{progress::Progress, whole_file};
 use iltm_runtime::Grid;
 use image::{ImageReader, Limits};
 use std::fs;
@@ -161,33 +161,19 @@ impl Session {
     }
 }
 
-/// Writes a photograph beside its place and renames it.
+/// Writes a photograph whole or not at all.
 fn write(photograph: &Photograph, path: &Path) -> Result<(), RetakeError> {
-    let io = |source| RetakeError::Io {
+    let write = || {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        whole_file::write(path, &photograph.png()?)?;
+        Ok(())
+    };
+    write().map_err(|source: io::Error| RetakeError::Io {
         path: path.to_owned(),
         source,
-    };
-    let folder = match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(folder).map_err(io)?;
-    let beside = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
-    photograph.save(beside.path()).map_err(io)?;
-    let file = beside.persist(path).map_err(|error| io(error.error))?;
-    open_to_all(&file).map_err(io)
-}
-
-/// A temporary file is for its owner only; a photograph is like any other file.
-#[cfg(unix)]
-fn open_to_all(file: &fs::File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn open_to_all(_file: &fs::File) -> io::Result<()> {
-    Ok(())
+    })
 }
 
 /// Input codes of every cell in a picture of one pixel a cell.

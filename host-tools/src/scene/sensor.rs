@@ -1,7 +1,7 @@
 //! From light to the values in a photograph: exposure, noise, converter, response.
 
 use super::description::Camera;
-use crate::capture::Response;
+use iltm_picture::Response;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64Mcg;

@@ -5,13 +5,14 @@ use super::description::Scene;
 use super::fault::{Fault, Faults, Mishap};
 use super::sensor::Sensor;
 use super::simulation::{Simulation, SimulationError};
-use crate::capture::{Pattern, Response};
+use crate::capture::Pattern;
+use iltm_picture::Response;
 use iltm_runtime::Grid;
-use image::{ColorType, ImageFormat};
+use image::codecs::png::PngEncoder;
+use image::{ColorType, ImageEncoder};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::io;
-use std::path::Path;
 
 /// Photographs that are exposed together: their light is held in memory.
 const TOGETHER: usize = 64;
@@ -47,11 +48,11 @@ pub struct Photograph {
 }
 
 impl Photograph {
-    /// Writes a PNG of 8 or 16 bit, grey or in colour.
+    /// The bytes of a PNG of 8 or 16 bits, grey or in colour.
     ///
     /// # Errors
-    /// What the system says.
-    pub fn save(&self, path: &Path) -> io::Result<()> {
+    /// What the encoder says.
+    pub fn png(&self) -> io::Result<Vec<u8>> {
         let eight = self.scale == 255;
         let mut bytes = Vec::new();
         for pixel in 0..self.values[0].len() {
@@ -69,22 +70,21 @@ impl Photograph {
             (_, true) => ColorType::Rgb8,
             (_, false) => ColorType::Rgb16,
         };
-        save(path, &bytes, self.size, kind)
+        png(&bytes, self.size, kind)
     }
 }
 
-/// Writes a PNG.
-pub(super) fn save(
-    path: &Path,
-    bytes: &[u8],
+/// The bytes of a PNG with these samples.
+pub(super) fn png(
+    samples: &[u8],
     (width, height): (u32, u32),
     kind: ColorType,
-) -> io::Result<()> {
-    let saved = image::save_buffer_with_format(path, bytes, width, height, kind, ImageFormat::Png);
-    saved.map_err(|error| match error {
-        image::ImageError::IoError(source) => source,
-        other => io::Error::other(other),
-    })
+) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new(&mut bytes);
+    let written = encoder.write_image(samples, width, height, kind.into());
+    written.map_err(io::Error::other)?;
+    Ok(bytes)
 }
 
 /// A camera set up before a scene, exposed for white.

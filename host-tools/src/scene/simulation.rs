@@ -14,7 +14,7 @@ use super::sensor::{Readout, Sensor};
 use super::sight::{Looks, Sight};
 use super::sparse::Rows;
 use super::specular::{Specular, Surfaces, TooGlossy};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use std::time::Instant;

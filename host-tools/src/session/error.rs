@@ -1,8 +1,7 @@
 //! Why a folder of pictures to show could not be made, or not be photographed.
 
 use crate::capture::CaptureError;
-use crate::scene::folder::FolderError;
-use crate::video::MAX_PIXELS;
+use iltm_picture::{FolderError, MAX_PIXELS};
 use iltm_runtime::{FrameSize, Grid, GridError};
 use std::io;
 use std::path::PathBuf;
@@ -48,12 +47,6 @@ pub enum PatternsError {
 }
 
 impl PatternsError {
-    /// A file that could not be written.
-    pub(super) fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
-        let path = path.into();
-        move |source| Self::Folder(FolderError::Io { path, source })
-    }
-
     /// What to do about it, one sentence.
     #[must_use]
     pub const fn next_step(&self) -> &'static str {

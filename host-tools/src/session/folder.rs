@@ -2,14 +2,11 @@
 
 use super::{Layout, PatternsError, Purpose, Slide};
 use crate::capture::{
-    CALIBRATION_FILE, CalibrationManifest, CalibrationRole, CameraSettings, MANIFEST_FILE,
-    Manifest, Role, SETTINGS_FILE, ShotOf,
+    CALIBRATION_FILE, CalibrationManifest, CameraSettings, MANIFEST_FILE, Manifest, SETTINGS_FILE,
+    numbered,
 };
-use crate::progress::Progress;
-use crate::scene::folder::{beside, put_in_place};
-use crate::video::{Picture, png};
+use iltm_picture::{WholeFolder, progress::Progress};
 use rayon::prelude::*;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folder of the pictures to show, in the projector's own pixels.
@@ -36,11 +33,7 @@ pub struct Made {
 /// File of the slide with this index, relative to the capture folder.
 #[must_use]
 pub fn slide_name(index: u32) -> PathBuf {
-    name(SLIDES_FOLDER, index)
-}
-
-fn name(folder: &str, index: u32) -> PathBuf {
-    Path::new(folder).join(format!("{index:03}.png"))
+    numbered(SLIDES_FOLDER, index)
 }
 
 /// Writes the folder `out`: beside its place first, then renamed, so that it is
@@ -55,11 +48,9 @@ pub fn write(
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Made, PatternsError> {
-    let beside = beside(out)?;
-    let folder = beside.path();
+    let folder = WholeFolder::create(out)?;
     for name in FOLDERS {
-        let path = folder.join(name);
-        fs::create_dir(&path).map_err(PatternsError::io(&path))?;
+        folder.folder(name)?;
     }
     progress.begin("drawing slides", slides.len() as u64);
     slides.par_iter().enumerate().try_for_each(|(at, slide)| {
@@ -68,11 +59,8 @@ pub fn write(
             Purpose::Scene(_) => "patterns",
             Purpose::Calibration(_) => "calibration",
         };
-        save(&folder.join(name(pattern, index)), &slide.cells)?;
-        save(
-            &folder.join(slide_name(index)),
-            &layout.slide(&slide.cells)?,
-        )?;
+        folder.picture(numbered(pattern, index), &slide.cells)?;
+        folder.picture(slide_name(index), &layout.slide(&slide.cells)?)?;
         progress.advance(1);
         Ok::<(), PatternsError>(())
     })?;
@@ -81,56 +69,32 @@ pub fn write(
         slides: slides.len(),
         calibration: calibration.shots.len(),
     };
-    let mut texts = vec![
-        (MANIFEST_FILE, scene.to_csv()),
-        (SETTINGS_FILE, filled(SETTINGS, layout, camera, made)),
-        ("README.md", filled(README, layout, camera, made)),
-    ];
+    folder.file(MANIFEST_FILE, scene.to_csv())?;
+    folder.file(SETTINGS_FILE, filled(SETTINGS, layout, camera, made))?;
+    folder.file("README.md", filled(README, layout, camera, made))?;
     if made.calibration > 0 {
-        texts.push((CALIBRATION_FILE, calibration.to_csv()));
+        folder.file(CALIBRATION_FILE, calibration.to_csv())?;
     }
-    for (name, text) in texts {
-        let path = folder.join(name);
-        fs::write(&path, text).map_err(PatternsError::io(&path))?;
-    }
-    put_in_place(beside, out)?;
+    folder.finish()?;
     progress.end();
     Ok(made)
 }
 
 /// The lists of a folder with these slides.
 fn lists(slides: &[Slide]) -> (Manifest, CalibrationManifest) {
-    let (mut scene, mut calibration) = (Vec::new(), Vec::new());
-    for (slide, index) in slides.iter().zip(0..) {
-        match slide.purpose {
-            Purpose::Scene(role) => scene.push(shot::<Role>(index, role, "patterns", &scene)),
-            Purpose::Calibration(role) => {
-                let shot = shot::<CalibrationRole>(index, role, "calibration", &calibration);
-                calibration.push(shot);
-            }
-        }
-    }
-    let calibration = CalibrationManifest { shots: calibration };
-    (Manifest { shots: scene }, calibration)
-}
-
-/// The line that follows `before`.
-fn shot<R>(index: u32, role: R, folder: &str, before: &[ShotOf<R>]) -> ShotOf<R> {
-    ShotOf {
-        index,
-        role,
-        pattern: name(folder, index),
-        photo: name("photos", index),
-        exposure: None,
-        line: before.len() as u64 + 2,
-    }
-}
-
-fn save(path: &Path, picture: &Picture) -> Result<(), PatternsError> {
-    let mut bytes = Vec::new();
-    // Writing to memory does not fail.
-    let _ = png::write(&mut bytes, picture);
-    fs::write(path, bytes).map_err(PatternsError::io(path))
+    let slides = || (0..).zip(slides.iter().map(|slide| slide.purpose));
+    let scene = slides().filter_map(|(index, purpose)| match purpose {
+        Purpose::Scene(role) => Some((index, role)),
+        Purpose::Calibration(_) => None,
+    });
+    let calibration = slides().filter_map(|(index, purpose)| match purpose {
+        Purpose::Calibration(role) => Some((index, role)),
+        Purpose::Scene(_) => None,
+    });
+    (
+        Manifest::numbered("patterns", scene),
+        CalibrationManifest::numbered("calibration", calibration),
+    )
 }
 
 /// A text for people with this folder's numbers.
@@ -163,10 +127,9 @@ fn filled(text: &str, layout: &Layout, camera: &CameraSettings, made: Made) -> S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::{self, CaptureOptions, Response, Settings};
-    use crate::progress::Silent;
-    use crate::scene::folder::FolderError;
+    use crate::capture::{self, CaptureOptions, Settings};
     use crate::session::{OrderOptions, order};
+    use iltm_picture::{FolderError, Response, progress::Silent};
     use iltm_runtime::{FrameSize, Grid};
 
     fn layout() -> Layout {

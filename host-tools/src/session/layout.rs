@@ -1,9 +1,8 @@
 //! Where the cells lie on the projector's pixels.
 
 use super::PatternsError;
-use crate::video::{MAX_PIXELS, Picture, Samples};
-use iltm_runtime::resample::area::AreaAverage;
-use iltm_runtime::{FrameSize, Grid};
+use iltm_picture::{MAX_PIXELS, Picture, Samples};
+use iltm_runtime::{FrameSize, Grid, resample::area::AreaAverage};
 
 /// How pictures of one pixel a cell become pictures of the projector's size: by the
 /// rule by which the runtime averages a frame over the cells, so that a cell is lit

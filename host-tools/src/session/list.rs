@@ -3,7 +3,7 @@
 use super::lists::listed;
 use super::{SLIDES_FOLDER, SessionError};
 use crate::capture::{CaptureError, Exposed, find_photo, pictures_of_stem};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

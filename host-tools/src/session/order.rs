@@ -2,7 +2,7 @@
 
 use super::{probe, ramp};
 use crate::capture::{CalibrationRole, Role, shown};
-use crate::video::{Picture, Samples};
+use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid};
 
 /// What a picture is shown for: which list it stands in.

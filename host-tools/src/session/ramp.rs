@@ -1,7 +1,7 @@
 //! Even light of many levels in each channel: how projector and camera respond.
 
 use crate::capture::{CalibrationRole, RampChannel};
-use crate::video::{Picture, Samples};
+use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid};
 
 /// Input values that a ramp of `levels` levels has, as far apart as can be: first

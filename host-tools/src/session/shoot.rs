@@ -5,7 +5,7 @@ use super::list::{self, Planned, State, endings, unlike};
 use super::shell;
 use super::{Camera, Latency, Screen, SessionError, measure, states};
 use crate::capture::{Exposed, Role};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -3,8 +3,7 @@
 
 use super::*;
 use crate::capture::{CameraSettings, Exposed};
-use crate::progress::Silent;
-use crate::video::png;
+use iltm_picture::{png, progress::Silent};
 use iltm_runtime::{FrameSize, Grid};
 use std::cell::Cell;
 use std::fs;

@@ -6,7 +6,7 @@
 use super::SessionError;
 use super::list::Planned;
 use super::screen::Screen;
-use crate::video::{Picture, Samples, png};
+use iltm_picture::{Picture, Samples, png};
 use std::fs::File;
 use std::io::BufReader;
 use std::num::NonZeroU32;

@@ -11,7 +11,7 @@ use super::haar::Haar;
 use super::observed::CellNoise;
 use super::prepare::Prepared;
 use super::solution::Solution;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// Solves from the photographs `chosen`. The convergence is that of the worst channel.

@@ -17,7 +17,7 @@ use super::held_out::{Judged, Split, squared_light, squared_misfit};
 use super::prepare::Prepared;
 use super::report::LambdaTrial;
 use super::solution::{Channel, Solution, drop_dead_rows};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Penalty ratio of one level to the next coarser one.

@@ -97,10 +97,10 @@ pub use report::{
 pub use two_stage::inverted;
 
 use crate::capture::{Measurements, Role};
-use crate::progress::Progress;
 use content_loop::ContentLoop;
 use convergence::Stop;
 use held_out::{Judged, Split, predict};
+use iltm_picture::progress::Progress;
 use joint::Solver;
 use prepare::Prepared;
 use sharpen::sharpen;

@@ -5,7 +5,7 @@
 
 use super::test_scene::{Corner, add_noise, patterns};
 use super::*;
-use crate::progress::Silent;
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 

@@ -6,11 +6,13 @@ use crate::compile::content_white::Headroom;
 use crate::compile::gain::fine_gains;
 use crate::compile::wish::headroom;
 use crate::learn::Learned;
-use crate::report::page::{embedded, percent};
-use crate::report::{LightPicture, PictureFile, picture_file};
-use crate::video::{Compensator, Picture, Samples, Settings};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use crate::video::{Compensator, Settings};
+use iltm_picture::{
+    LightPicture, Picture, Samples,
+    html::{PictureFile, embedded, picture_file},
+    numbers::percent,
+};
+use iltm_runtime::{FrameSize, image::Table};
 use maud::{Markup, html};
 use std::ops::Range;
 

@@ -10,9 +10,8 @@ mod registered;
 mod wanted;
 
 use crate::learn::Learned;
-use crate::progress::Progress;
-use crate::report::{Command, LightPicture, PictureFile, Report, ReportError, Words};
-use crate::video::Picture;
+use crate::report::{Command, Report, ReportError, Words};
+use iltm_picture::{LightPicture, Picture, html::PictureFile, progress::Progress};
 use iltm_runtime::image::Table;
 use std::path::Path;
 
@@ -29,7 +28,7 @@ impl Content {
     /// Its frames as light relative to white.
     #[must_use]
     pub fn light(&self) -> Vec<LightPicture> {
-        let decode = |picture| LightPicture::decode(picture, crate::capture::Response::Srgb);
+        let decode = |picture| LightPicture::decode(picture, iltm_picture::Response::Srgb);
         self.frames.iter().map(decode).collect()
     }
 }

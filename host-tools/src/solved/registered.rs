@@ -2,9 +2,11 @@
 
 use crate::capture::NO_CELL;
 use crate::learn::Learned;
-use crate::report::canvas::Canvas;
-use crate::report::page::{embedded, percent};
-use crate::report::{PictureFile, picture_file};
+use iltm_picture::{
+    canvas::Canvas,
+    html::{PictureFile, embedded, picture_file},
+    numbers::percent,
+};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
 

@@ -3,10 +3,9 @@
 use super::Content;
 use crate::content::natural_images;
 use crate::demo::test_card;
-use crate::report::{LightPicture, Wanted};
-use crate::video::Picture;
-use iltm_runtime::image::Table;
-use iltm_runtime::{FrameSize, Grid};
+use crate::report::Wanted;
+use iltm_picture::{LightPicture, Picture};
+use iltm_runtime::{FrameSize, Grid, image::Table};
 
 /// Names for the user's own pictures; no more are shown.
 const OWN: [&str; 3] = ["content-1", "content-2", "content-3"];
@@ -96,7 +95,7 @@ fn natural(grid: Grid, channels: usize) -> Wanted {
 
 /// The picture, half as large until a page can hold it.
 fn halved(picture: &Picture, grid: Grid) -> Picture {
-    let mut light = LightPicture::decode(picture, crate::capture::Response::Srgb);
+    let mut light = LightPicture::decode(picture, iltm_picture::Response::Srgb);
     while light.size().width() > 2 * SIDE {
         let half = light.halved();
         if !half.size().holds(grid) || half.size() == light.size() {
@@ -112,7 +111,7 @@ fn of_channels(picture: Picture, channels: usize) -> Picture {
     if picture.channels() == channels {
         return picture;
     }
-    let light = LightPicture::decode(&picture, crate::capture::Response::Srgb);
+    let light = LightPicture::decode(&picture, iltm_picture::Response::Srgb);
     let pixels = 0..light.size().pixels();
     let mean = |pixel: usize| {
         let colours = light.planes().iter().map(|plane| plane[pixel]);

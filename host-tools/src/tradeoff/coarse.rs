@@ -6,8 +6,8 @@
 //! the original grid.
 
 use crate::compile::FineGains;
-use crate::report::resample::Lattice;
 use crate::solve::{ChannelInverse, InverseTransport};
+use iltm_picture::Lattice;
 use iltm_runtime::{FrameSize, Grid};
 use nalgebra::DMatrix;
 use rayon::prelude::*;

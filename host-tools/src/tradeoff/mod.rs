@@ -36,11 +36,13 @@ use crate::capture::ReferenceError;
 use crate::compile::CompileError;
 use crate::compile::cost::BUDGET;
 use crate::learn::LearnError;
-use crate::progress::Progress;
-use iltm_runtime::Grid;
-use iltm_runtime::image::{ImageError, Table};
-use iltm_runtime::operator::OperatorError;
-use iltm_runtime::pipeline::FrameError;
+use iltm_picture::progress::Progress;
+use iltm_runtime::{
+    Grid,
+    image::{ImageError, Table},
+    operator::OperatorError,
+    pipeline::FrameError,
+};
 use std::path::Path;
 
 /// What is varied.

@@ -2,7 +2,7 @@
 
 use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Sweep, Tradeoff, TradeoffError};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::image::Table;
 
 /// See [`Tradeoff::of_table`].

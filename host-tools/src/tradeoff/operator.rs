@@ -4,13 +4,15 @@
 //! Light is relative to reference white, drives to the projector's white. Ambient light
 //! is left out: what is wanted is wanted above it.
 
-use crate::report::resample::Lattice;
 use crate::solve::{Basis, Haar};
-use iltm_runtime::haar::Function;
-use iltm_runtime::image::Table;
-use iltm_runtime::operator::{Channels, Operator, Row, Segment};
-use iltm_runtime::units::CORRECTION_GUARD_BITS;
-use iltm_runtime::{FrameSize, Grid};
+use iltm_picture::Lattice;
+use iltm_runtime::{
+    FrameSize, Grid,
+    haar::Function,
+    image::Table,
+    operator::{Channels, Operator, Row, Segment},
+    units::CORRECTION_GUARD_BITS,
+};
 use nalgebra::DMatrix;
 
 /// Bounces that are followed at most.

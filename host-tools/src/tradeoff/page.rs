@@ -4,8 +4,10 @@ use super::advice::{fraction, share};
 use super::picture::{colour, title};
 use super::{Point, Sweep, Tradeoff};
 use crate::compile::cost::{CLOCK, RATE};
-use crate::report::document;
-use crate::report::page::{grouped, percent};
+use iltm_picture::{
+    html::document,
+    numbers::{grouped, percent},
+};
 use maud::{Markup, PreEscaped, html};
 
 impl Tradeoff {

@@ -5,11 +5,10 @@ use super::judge::{Truth, of_change};
 use super::operator::Numbers;
 use super::{Point, Sweep, TradeoffError};
 use crate::compile::cost::Shape;
-use crate::progress::Progress;
 use crate::report::{microseconds, steps};
 use crate::solve::SolveReport;
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use iltm_picture::progress::Progress;
+use iltm_runtime::{FrameSize, image::Table};
 
 /// What the points of one table have in common.
 pub(super) struct Common {

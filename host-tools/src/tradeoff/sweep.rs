@@ -11,12 +11,13 @@ use crate::compile::cost;
 use crate::compile::ladder::TARGETS;
 use crate::compile::{CompileOptions, compile, gain};
 use crate::learn::{LearnError, Learned, learn_measured};
-use crate::progress::Progress;
 use crate::report::{microseconds_at, steps};
 use crate::solve::{Method, SolveOptions};
-use iltm_runtime::image::Table;
-use iltm_runtime::image::layout::fine_gain;
-use iltm_runtime::{FrameSize, Grid};
+use iltm_picture::progress::Progress;
+use iltm_runtime::{
+    FrameSize, Grid,
+    image::{Table, layout::fine_gain},
+};
 use std::path::Path;
 
 /// Numbers of Bernoulli photographs that are tried, and all.

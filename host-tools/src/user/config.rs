@@ -10,10 +10,10 @@
 
 use super::Folders;
 use glob::Pattern;
+use iltm_picture::whole_file;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
-use tempfile::NamedTempFile;
 use toml_edit::DocumentMut;
 
 /// What the file is called.
@@ -148,10 +148,8 @@ impl Config {
         let write = || {
             let folder = path.parent().unwrap_or(Path::new("."));
             fs::create_dir_all(folder)?;
-            // Beside its place, then renamed: never half a file.
-            let beside = NamedTempFile::new_in(folder)?;
-            fs::write(beside.path(), document.to_string())?;
-            beside.persist(&path).map_err(|error| error.error)
+            whole_file::write(&path, document.to_string().as_bytes())?;
+            Ok(())
         };
         write().map_err(|source| ConfigError::Io {
             path: path.clone(),

@@ -5,6 +5,7 @@
 //! over from a process that was killed.
 
 use super::Folders;
+use iltm_picture::WholeFile;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read, Write};
@@ -43,18 +44,17 @@ pub fn register(folders: &Folders, port: &str, board: &str) -> io::Result<Regist
         port: port.to_owned(),
         board: board.to_owned(),
     };
-    // Locked before it has its name: whoever sees it finds it locked.
-    let mut beside = tempfile::Builder::new()
-        .prefix(".new-")
-        .tempfile_in(&folder)?;
-    beside.as_file().lock()?;
-    beside.write_all(serde_json::to_string(&entry)?.as_bytes())?;
     let name = format!("{}-{:08x}.json", std::process::id(), fastrand::u32(..));
     let path = folder.join(name);
-    let file = beside.persist(&path).map_err(|error| error.error)?;
+    // Locked before it has its name: whoever sees it finds it locked.
+    let mut whole = WholeFile::create(&path)?;
+    whole.file().lock()?;
+    whole
+        .file()
+        .write_all(serde_json::to_string(&entry)?.as_bytes())?;
     Ok(Registration {
         path,
-        _locked: file,
+        _locked: whole.finish()?,
     })
 }
 

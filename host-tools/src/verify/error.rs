@@ -1,9 +1,9 @@
 //! Why there is no verdict.
 
 use crate::capture::CaptureError;
-use crate::scene::folder::FolderError;
 use crate::session::PatternsError;
 use crate::video::VideoError;
+use iltm_picture::FolderError;
 use std::path::{Path, PathBuf};
 
 /// Photographs that are named before the rest is only counted.

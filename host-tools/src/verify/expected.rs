@@ -6,9 +6,11 @@
 
 use crate::capture::CellPlanes;
 use crate::video::OperatorMemory;
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::stages::correct;
-use iltm_runtime::units::{CORRECTION_GUARD_BITS, Correction, Light};
+use iltm_runtime::{
+    image::Table,
+    pipeline::stages::correct,
+    units::{CORRECTION_GUARD_BITS, Correction, Light},
+};
 
 /// Bounces after which the rest is below rounding for any scene that reflects less than
 /// 97 % of what it receives.
@@ -176,12 +178,10 @@ impl<'t, 'a> Expected<'t, 'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
     use crate::compile::{CompileOptions, compile};
-    use crate::report::LightPicture;
     use crate::verify::tests::scene;
     use crate::verify::{ProjectorCurves, test_images};
-    use crate::video::{Picture, Samples};
+    use iltm_picture::{LightPicture, Picture, Response, Samples};
 
     /// Light of 8-bit codes, channel by channel.
     fn light(picture: &Picture, of: impl Fn(usize, u8) -> f64) -> CellPlanes {

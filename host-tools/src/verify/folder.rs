@@ -2,17 +2,14 @@
 
 use super::images::test_images;
 use super::response::ProjectorCurves;
-use super::role::{VERIFY_FILE, VerifyManifest, VerifyRole, VerifyShot};
+use super::role::{VERIFY_FILE, VerifyManifest, VerifyRole};
 use super::{TestImage, VerifyError};
-use crate::capture::{Pattern, Role, SETTINGS_FILE, Settings, shown};
-use crate::progress::Progress;
-use crate::scene::folder::{FolderError, beside, put_in_place};
-use crate::session::Layout;
-use crate::video::{Compensator, Picture, Samples, VideoError, png};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use crate::capture::{Pattern, Role, SETTINGS_FILE, Settings, numbered, shown};
+use crate::session::{Layout, slide_name};
+use crate::video::Compensator;
+use iltm_picture::{Picture, Samples, WholeFolder, progress::Progress};
+use iltm_runtime::{FrameSize, image::Table};
 use rayon::prelude::*;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What stands in the folder for whoever takes the photographs.
@@ -57,52 +54,29 @@ pub fn write(
     progress: &dyn Progress,
 ) -> Result<Written, VerifyError> {
     let images = test_images(table)?;
-    let folder = beside(out)?;
+    let folder = WholeFolder::create(out)?;
     for name in ["patterns", "slides", "photos", "wanted"] {
-        let path = folder.path().join(name);
-        fs::create_dir(&path).map_err(|source| FolderError::Io { path, source })?;
+        folder.folder(name)?;
     }
     let slides = slides(table, layout, &images)?;
     progress.begin("writing the pictures", slides.len() as u64);
     let written = slides.par_iter().enumerate().map(|(index, slide)| {
-        let [pattern, shown, _] = names(index);
-        save(&folder.path().join(pattern), &slide.cells)?;
-        save(&folder.path().join(shown), &slide.full)?;
+        folder.picture(numbered("patterns", index as u32), &slide.cells)?;
+        folder.picture(slide_name(index as u32), &slide.full)?;
         progress.advance(1);
         Ok(())
     });
     written.collect::<Result<Vec<()>, VerifyError>>()?;
     for (image, test) in images.iter().enumerate() {
-        save(&folder.path().join(wanted_file(image as u8)), &test.wanted)?;
+        folder.picture(wanted_file(image as u8), &test.wanted)?;
     }
-    let shots = slides.iter().enumerate().map(|(index, slide)| {
-        let [pattern, _, photo] = names(index);
-        VerifyShot {
-            index: index as u32,
-            role: slide.role,
-            pattern,
-            photo,
-            exposure: None,
-            line: index as u64 + 2,
-        }
-    });
-    let manifest = VerifyManifest {
-        shots: shots.collect(),
-    };
-    let texts = [
-        (VERIFY_FILE, manifest.to_csv()),
-        // Numbers and strings always have a TOML form.
-        (SETTINGS_FILE, toml::to_string(settings).unwrap_or_default()),
-        (
-            "README.md",
-            README.replace("PHOTOGRAPHS", &slides.len().to_string()),
-        ),
-    ];
-    for (name, text) in texts {
-        let path = folder.path().join(name);
-        fs::write(&path, text).map_err(|source| FolderError::Io { path, source })?;
-    }
-    put_in_place(folder, out)?;
+    let manifest = VerifyManifest::numbered("patterns", (0..).zip(slides.iter().map(|s| s.role)));
+    folder.file(VERIFY_FILE, manifest.to_csv())?;
+    // Numbers and strings always have a TOML form.
+    folder.file(SETTINGS_FILE, toml::to_string(settings).unwrap_or_default())?;
+    let readme = README.replace("PHOTOGRAPHS", &slides.len().to_string());
+    folder.file("README.md", readme)?;
+    folder.finish()?;
     progress.end();
     Ok(Written {
         pictures: slides.len(),
@@ -113,11 +87,6 @@ pub fn write(
 /// Where the wanted light of a test image stands, relative to the folder: sRGB codes.
 pub(super) fn wanted_file(image: u8) -> PathBuf {
     Path::new("wanted").join(format!("{image}.png"))
-}
-
-/// Pattern, slide and photograph of an index, relative to the folder.
-fn names(index: usize) -> [PathBuf; 3] {
-    ["patterns", "slides", "photos"].map(|name| Path::new(name).join(format!("{index:03}.png")))
 }
 
 /// All pictures in the order in which they are shown: white and black also in the middle
@@ -177,7 +146,7 @@ fn slides(
 /// relative to the projector's own white.
 pub(super) fn plain(wanted: &Picture, curves: &ProjectorCurves) -> Picture {
     let channels = wanted.channels();
-    let light = crate::report::LightPicture::decode(wanted, crate::capture::Response::Srgb);
+    let light = iltm_picture::LightPicture::decode(wanted, iltm_picture::Response::Srgb);
     let pixels = 0..wanted.size().pixels();
     let samples = pixels.flat_map(|pixel| {
         let planes = light.planes().iter().enumerate();
@@ -209,15 +178,4 @@ fn eight(size: FrameSize, samples: Vec<u8>) -> Picture {
         Some(picture) => picture,
         None => unreachable!("samples were made pixel by pixel"),
     }
-}
-
-fn save(path: &Path, picture: &Picture) -> Result<(), VerifyError> {
-    let io = |source| FolderError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let mut bytes = Vec::new();
-    png::write(&mut bytes, picture).map_err(VideoError::Png)?;
-    fs::write(path, bytes).map_err(io)?;
-    Ok(())
 }

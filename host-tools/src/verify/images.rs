@@ -8,9 +8,9 @@
 use super::Expected;
 use crate::capture::CellPlanes;
 use crate::content::wanted_images;
-use crate::video::{Compensator, Picture, Samples, Settings, VideoError};
-use iltm_runtime::image::Table;
-use iltm_runtime::{FrameSize, Grid};
+use crate::video::{Compensator, Settings, VideoError};
+use iltm_picture::{Picture, Samples};
+use iltm_runtime::{FrameSize, Grid, image::Table};
 
 /// Natural images among the test images.
 const NATURAL: usize = 3;
@@ -138,7 +138,7 @@ fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellPlanes)> {
 fn codes(grid: Grid, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Picture {
     let code = |shape: f64| {
         let light = dark + (bright - dark) * shape;
-        (crate::capture::Response::Srgb.value(light) * 255.0).round() as u8
+        (iltm_picture::Response::Srgb.value(light) * 255.0).round() as u8
     };
     let cells = 0..grid.cells();
     let samples = cells.flat_map(|cell| shape.iter().map(move |plane| code(plane[cell])));

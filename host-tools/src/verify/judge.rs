@@ -9,9 +9,9 @@
 use super::session::Shown;
 use super::{Expected, Session, VerifyError};
 use crate::capture::CellPlanes;
-use crate::report::{Comparison, LightPicture, steps};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use crate::report::{Comparison, steps};
+use iltm_picture::LightPicture;
+use iltm_runtime::{FrameSize, image::Table};
 use std::path::Path;
 
 /// How much larger than expected an error may be.

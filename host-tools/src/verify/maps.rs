@@ -4,10 +4,11 @@
 use super::judge::over_images;
 use super::{Session, Verdict};
 use crate::capture::CellPlanes;
-use crate::report::{ColourScale, LightPicture, Palette, PictureFile, picture_file};
-use crate::video::{Picture, Samples};
-use iltm_runtime::image::Table;
-use iltm_runtime::{FrameSize, Grid};
+use iltm_picture::{
+    ColourScale, LightPicture, Palette, Picture, Samples,
+    html::{PictureFile, picture_file},
+};
+use iltm_runtime::{FrameSize, Grid, image::Table};
 
 /// Pixels that the longer side of a map should have at least.
 const MAP_SIDE: usize = 480;

@@ -2,10 +2,12 @@
 
 use super::maps::{drift_scale, error_scale};
 use super::{ImageVerdict, TestImage, Verdict};
-use crate::report::page::percent;
-use crate::report::{PictureFile, colour_bar, document};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use iltm_picture::{
+    html::{PictureFile, colour_bar, document},
+    numbers::percent,
+};
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
 

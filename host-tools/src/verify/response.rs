@@ -1,8 +1,10 @@
 //! Between light and the codes that a projector is sent, by a table's response.
 
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::codes::{INDEX_SHIFT, at, proportional};
-use iltm_runtime::units::Drive;
+use iltm_runtime::{
+    image::Table,
+    pipeline::codes::{INDEX_SHIFT, at, proportional},
+    units::Drive,
+};
 
 /// The 8-bit codes of a table's projector, both ways, one curve a channel.
 #[derive(Clone, Debug)]
@@ -88,9 +90,9 @@ fn drives(codes: &[u8]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
     use crate::compile::{CompileOptions, compile};
     use crate::verify::tests::scene;
+    use iltm_picture::Response;
 
     #[test]
     fn codes_and_drives_of_every_response_are_each_others_inverse() {

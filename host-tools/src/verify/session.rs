@@ -4,15 +4,11 @@ use super::folder::{plain, wanted_file};
 use super::response::ProjectorCurves;
 use super::role::{VERIFY_FILE, VerifyManifest, VerifyRole, VerifyShot};
 use super::{Expected, VerifyError};
-use crate::capture::{
-    CaptureError, CellPlanes, Response, Revisited, Settings, Shot, find_photo, revisit,
-};
+use crate::capture::{CaptureError, CellPlanes, Revisited, Settings, Shot, find_photo, revisit};
 use crate::learn::mixing_in;
-use crate::progress::Progress;
-use crate::report::LightPicture;
-use crate::video::{Compensator, Picture, Samples, VideoError, png};
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
+use crate::video::{Compensator, VideoError};
+use iltm_picture::{LightPicture, Picture, Response, Samples, png, progress::Progress};
+use iltm_runtime::{FrameSize, image::Table};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind};

@@ -11,14 +11,12 @@
 
 use super::bands::Bands;
 use super::engine::{Engine, Work};
-use super::picture::Interleaved;
 use super::planar::{Layout, Planar};
 use super::y4m::Reader;
-use super::{Picture, Samples, VideoError, WholeFile, png, stream};
-use crate::progress::Progress;
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::Encoding;
+use super::{VideoError, stream};
+use crate::video::interleaved::Interleaved;
+use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
+use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::fs::File;
 use std::io::{Read, Write};

@@ -11,9 +11,11 @@
     reason = "compiled into `engine::rows`, which chooses the processor's instructions"
 )]
 
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, Sample};
-use iltm_runtime::units::{Drive, Light};
+use iltm_runtime::{
+    image::Table,
+    pipeline::{Encoding, Sample},
+    units::{Drive, Light},
+};
 
 /// Elements of a table.
 const VALUES: usize = 1 << 16;

@@ -1,10 +1,8 @@
 //! Why frames could not be compensated.
 
-use super::png::PngError;
 use super::y4m::Y4mError;
-use iltm_runtime::image::ImageError;
-use iltm_runtime::pipeline::FrameError;
-use iltm_runtime::{FrameSize, Grid};
+use iltm_picture::{FileError, png::PngError};
+use iltm_runtime::{FrameSize, Grid, image::ImageError, pipeline::FrameError};
 use std::path::PathBuf;
 
 /// Why frames could not be compensated. Every case carries its place;
@@ -74,6 +72,12 @@ pub enum VideoError {
     /// The runtime refuses the frame.
     #[error("the runtime refuses the frame: {0}")]
     Runtime(FrameError),
+}
+
+impl From<FileError> for VideoError {
+    fn from(FileError { path, source }: FileError) -> Self {
+        Self::File { path, source }
+    }
 }
 
 impl VideoError {

@@ -10,10 +10,11 @@ use super::planar::{Layout, Planar};
 use super::stream::{self, Frames};
 use super::y4m::Reader;
 use super::{Compensator, Settings, Summary, VideoError};
-use crate::progress::Progress;
-use iltm_runtime::governor::{Change, Governor, Reason};
-use iltm_runtime::image::layout::MAX_TIERS;
-use iltm_runtime::image::{ImageError, Table, unseal};
+use iltm_picture::progress::Progress;
+use iltm_runtime::{
+    governor::{Change, Governor, Reason},
+    image::{ImageError, Table, layout::MAX_TIERS, unseal},
+};
 use rayon::ThreadPool;
 use std::io::{Read, Write};
 use std::sync::Arc;

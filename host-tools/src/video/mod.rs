@@ -2,12 +2,10 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | still pictures | [`png`], [`picture`] |
 //! | video | [`y4m`] |
 //! | YUV to RGB and back | [`yuv`] |
 //! | frames through a table, on all cores | [`compensate`] |
 //! | a table that is replaced while a stream runs, a budget of time | [`live`], [`watch`] |
-//! | a file that is there whole or not at all | [`whole_file`] |
 //! | a moving picture made by arithmetic, to show and test with | [`test_scene`] |
 //!
 //! The pixels are worked on by [`iltm_runtime::pipeline`], so that every frame
@@ -34,29 +32,21 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
+mod interleaved;
 pub mod live;
 mod operator_memory;
-pub mod picture;
 mod planar;
-pub mod png;
 mod sampled;
 mod stream;
 pub mod test_scene;
 pub mod watch;
-pub mod whole_file;
 pub mod y4m;
 pub mod yuv;
 
 pub use compensate::{Compensator, Settings, Summary};
 pub use error::VideoError;
 pub use operator_memory::OperatorMemory;
-pub use picture::{Picture, Samples};
 pub use sampled::sampled_frames;
-pub use whole_file::WholeFile;
-
-/// Most pixels of a frame: twice those of 8K video. A header that says more is
-/// refused before any memory is taken.
-pub const MAX_PIXELS: usize = 1 << 26;
 
 #[cfg(test)]
 mod tests;

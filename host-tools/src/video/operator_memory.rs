@@ -1,8 +1,6 @@
 //! Memory for the operator that is sized once and used for every frame.
 
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::Workspace;
-use iltm_runtime::units::InputCoefficient;
+use iltm_runtime::{image::Table, pipeline::Workspace, units::InputCoefficient};
 
 /// What the runtime's [`Workspace`] borrows.
 #[derive(Clone, Debug)]

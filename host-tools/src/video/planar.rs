@@ -6,9 +6,10 @@
 )]
 
 use super::bands::{Band, Bands, STRIP};
-use super::picture::{Interleaved, Picture, Samples};
 use super::y4m::{Frame, Header, Sampling};
 use super::yuv::{Conversion, Standard, repeat_pairs, sum_squares};
+use crate::video::interleaved::Interleaved;
+use iltm_picture::{Picture, Samples};
 
 /// How the planes of every frame of a stream are laid out and converted.
 #[derive(Clone, Copy, Debug)]

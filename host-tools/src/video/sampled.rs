@@ -1,7 +1,8 @@
 //! A few frames of a picture or a video, evenly spread over its length.
 
 use super::y4m::{Frame, Reader};
-use super::{Picture, VideoError, compensate::first_bytes, png};
+use super::{VideoError, compensate::first_bytes};
+use iltm_picture::{Picture, png};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -53,7 +54,7 @@ pub fn sampled_frames(path: &Path, most: usize) -> Result<Vec<Picture>, VideoErr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::video::Samples;
+    use iltm_picture::Samples;
 
     /// Grey frames, each of its own brightness.
     fn video(frames: u8) -> Vec<u8> {

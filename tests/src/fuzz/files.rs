@@ -3,7 +3,7 @@
 
 use crate::wedge_table_for;
 use ed25519_dalek::{Signer, SigningKey};
-use iltm::capture::Response;
+use iltm::picture::Response;
 use iltm_runtime::link::Digest;
 use iltm_runtime::trust::Rejected;
 use sha2::{Digest as _, Sha512};

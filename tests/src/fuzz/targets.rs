@@ -2,7 +2,7 @@
 
 use super::{files, session};
 use crate::{wedge_table, wedge_table_for};
-use iltm::capture::Response;
+use iltm::picture::Response;
 use std::path::Path;
 
 /// What is fuzzed.

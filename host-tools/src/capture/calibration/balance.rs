@@ -6,7 +6,7 @@
 //! and not for the values of a curved camera. Averages over pixels of similar
 //! values tell curvature from noise.
 
-use crate::capture::DeviceResponse;
+use iltm_picture::DeviceResponse;
 
 /// Values of one pixel and the weights with which their light adds up to nothing.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,7 @@
 //! has the same two conditions: no light at 0 and full light at 1.
 
 use super::balance::{Balance, Balances, Lookup};
-use crate::capture::{Curve, DeviceResponse, Response};
+use iltm_picture::{Curve, DeviceResponse, Response};
 use nalgebra::{DMatrix, DVector};
 
 /// What a camera's response was recovered from.

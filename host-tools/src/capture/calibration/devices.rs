@@ -1,7 +1,8 @@
 //! What is known of projector and camera, declared or measured.
 
 use super::{CameraFit, Mixing, Probe, Ramp, Unmix};
-use crate::capture::{Declared, DeviceResponse, ProjectorResponse, Response, Settings};
+use crate::capture::Settings;
+use iltm_picture::{Declared, DeviceResponse, ProjectorResponse, Response};
 
 /// Projector and camera of a capture.
 #[derive(Clone, PartialEq, Debug)]

@@ -1,7 +1,7 @@
 //! The projector's response: its light at several levels of each channel.
 
 use super::{Mixing, RampChannel};
-use crate::capture::{Curve, DeviceResponse, ProjectorResponse};
+use iltm_picture::{Curve, DeviceResponse, ProjectorResponse};
 
 /// Levels that a curve needs at least, full level among them.
 const LEAST_LEVELS: usize = 4;
@@ -227,7 +227,7 @@ fn fall(points: &[RampPoint]) -> Option<Fall> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
+    use iltm_picture::Response;
 
     /// A projector of three responses seen by a camera that mixes, with a white
     /// segment.

@@ -5,8 +5,8 @@ use super::{CameraFit, CameraSource};
 use crate::capture::photo::Reading;
 use crate::capture::photographs::Photographs;
 use crate::capture::sequence::Sequence;
-use crate::capture::{CaptureError, DeviceResponse, gray_code};
-use crate::progress::Silent;
+use crate::capture::{CaptureError, gray_code};
+use iltm_picture::{DeviceResponse, progress::Silent};
 
 /// Pixels that a pair of photographs is compared in.
 const PIXELS: usize = 4096;

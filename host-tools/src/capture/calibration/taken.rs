@@ -7,7 +7,7 @@ use crate::capture::photo::Reading;
 use crate::capture::photographs::Photographs;
 use crate::capture::picture::{Opened, Samples, Source};
 use crate::capture::{CALIBRATION_FILE, CaptureError, Role, Shot};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use std::path::Path;
 

@@ -6,7 +6,7 @@ use super::super::photographs::Photographs;
 use super::super::sequence::Sequence;
 use super::super::{CaptureError, LeftOut, Why};
 use super::{Evidence, Gate, GateName, Verdict};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 
 /// Share of the lit pixels or of the cells from which clipping is worth a word.
 const WARN: f64 = 0.01;

@@ -6,10 +6,10 @@ use super::super::inspect::check;
 use super::super::output::{Output, cannot_read};
 use super::super::progress::progress;
 use super::{failed, of_kind, opened, said, settings};
-use crate::progress::Progress;
+use crate::video::VideoError;
 use crate::video::live::{Event, Live, LiveSummary, words};
 use crate::video::watch::FileWatch;
-use crate::video::{VideoError, WholeFile};
+use iltm_picture::{WholeFile, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::{self, Read, Write};
@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &Compensate, piped: bool, output: &Output) -> Resul
         )
     } else {
         let mut whole =
-            WholeFile::create(&arguments.output).map_err(|e| of_kind(Kind::Write, &e))?;
+            WholeFile::create(&arguments.output).map_err(|e| of_kind(Kind::Write, &e.into()))?;
         let file = whole.file();
         let summary = stream(
             arguments,
@@ -46,7 +46,9 @@ pub(super) fn run(arguments: &Compensate, piped: bool, output: &Output) -> Resul
             output,
         );
         if summary.is_ok() {
-            whole.finish().map_err(|e| of_kind(Kind::Write, &e))?;
+            whole
+                .finish()
+                .map_err(|e| of_kind(Kind::Write, &e.into()))?;
         }
         summary
     };
@@ -66,7 +68,7 @@ fn stream<W: Write + Send>(
     let mut input = opened(&arguments.input)?;
     let read = |source| failed(&VideoError::Read { source });
     let first = crate::video::compensate::first_bytes(&mut input).map_err(read)?;
-    if first.starts_with(&crate::video::png::SIGNATURE) {
+    if first.starts_with(&iltm_picture::png::SIGNATURE) {
         return Err(failed(&VideoError::Still));
     }
     let live = Live {

@@ -4,10 +4,11 @@ use super::super::failure::{Failure, Kind};
 use super::super::inspect::check_sealed;
 use super::super::slots::{key_id, uses};
 use crate::device::cure;
-use iltm_runtime::image::Seal;
-use iltm_runtime::image::layout::FORMAT_VERSION;
-use iltm_runtime::link::{Hello, Slots, TableName};
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::{
+    image::{Seal, layout::FORMAT_VERSION},
+    link::{Hello, Slots, TableName},
+    trust::Rejected,
+};
 use std::path::{Path, PathBuf};
 
 /// A table's file, checked.

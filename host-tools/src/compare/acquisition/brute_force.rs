@@ -2,7 +2,7 @@
 
 use super::Acquisition;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// Lights one cell after the other: each photograph is a column of `T`.
@@ -43,7 +43,7 @@ impl Acquisition for BruteForce {
 mod tests {
     use super::*;
     use crate::capture::NoiseModel;
-    use crate::progress::Silent;
+    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
 
     #[test]

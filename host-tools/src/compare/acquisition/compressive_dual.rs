@@ -3,7 +3,7 @@
 use super::Acquisition;
 use super::sensing::Sensing;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use rayon::prelude::*;
 
 /// Sen and Darabi's paper, which two ways to photograph share: this greedy one and the

@@ -4,8 +4,8 @@ use super::Acquisition;
 use super::greedy::Estimate;
 use super::sensing::Sensing;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::Haar;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

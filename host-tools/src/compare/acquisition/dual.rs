@@ -2,7 +2,7 @@
 
 use super::Acquisition;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// Starts with the whole frame and divides blocks in four.

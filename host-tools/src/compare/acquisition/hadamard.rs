@@ -2,7 +2,7 @@
 
 use super::Acquisition;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// Multiplexing by the S-matrix of quadratic residues.

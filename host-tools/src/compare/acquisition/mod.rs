@@ -30,13 +30,13 @@ mod test_scenes;
 mod tests;
 
 use super::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::Method;
 pub use brute_force::BruteForce;
 pub use compressive_dual::CompressiveDual;
 pub use compressive_sensing::CompressiveSensing;
 pub use dual::DualPhotography;
 pub use hadamard::Hadamard;
+use iltm_picture::progress::Progress;
 pub use nystrom::Nystrom;
 pub use sparse::Sparse;
 pub use stripes::Stripes;

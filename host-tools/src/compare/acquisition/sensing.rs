@@ -169,8 +169,8 @@ mod tests {
     use super::super::{Acquisition, CompressiveDual, CompressiveSensing};
     use crate::capture::NoiseModel;
     use crate::compare::Unfit;
-    use crate::progress::Silent;
     use crate::solve::{Basis, Haar};
+    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
     use nalgebra::DMatrix;
 

@@ -4,8 +4,8 @@ use super::Acquisition;
 use super::compressive_dual::SEN_DARABI;
 use crate::capture::{Role, columns, shown};
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::{CellNoise, Method, Observed, ObservedChannel, SolveOptions, solve_observed};
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// [`solve_observed`] on photographs of a rig.

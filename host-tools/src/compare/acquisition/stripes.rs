@@ -2,7 +2,7 @@
 
 use super::Acquisition;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
@@ -83,7 +83,7 @@ mod tests {
     use super::super::test_scenes::{forward, m_scene, rig};
     use super::*;
     use crate::capture::NoiseModel;
-    use crate::progress::Silent;
+    use iltm_picture::progress::Silent;
 
     #[test]
     fn a_separable_response_is_found_exactly() {

@@ -3,8 +3,8 @@
 use super::Acquisition;
 use crate::capture::NoiseModel;
 use crate::compare::{Found, Rig};
-use crate::progress::Silent;
 use crate::scene::coaxial::{Panels, Scene};
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 

@@ -3,7 +3,7 @@
 use super::test_scenes::m_scene;
 use super::*;
 use crate::capture::NoiseModel;
-use crate::progress::Silent;
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 

@@ -15,8 +15,8 @@ use super::gain_only::diagonal;
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::inverted;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Albedo of every cell up to one factor, as [`albedo`] finds it.

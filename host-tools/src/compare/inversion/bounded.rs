@@ -4,7 +4,7 @@ use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Project, Source, Unfit};
 use crate::content::wanted_images;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of one frame at most.

@@ -3,8 +3,8 @@
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::inverted;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// `C1 = F1 T^-1` with `F1 = diag(T^-1)^-1` takes a wanted picture to its direct light;
@@ -75,8 +75,8 @@ fn operator(inverse: &DMatrix<f64>, live: &[bool]) -> Result<DMatrix<f64>, Unfit
 mod tests {
     use super::super::test_scene::Before;
     use super::*;
-    use crate::progress::Silent;
     use crate::scene::coaxial::{Panels, Scene};
+    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
     use nalgebra::DVector;
 

@@ -3,7 +3,7 @@
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// Blocks of limited size, inverted one by one.

@@ -2,8 +2,8 @@
 
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::inverted;
+use iltm_picture::progress::Progress;
 
 /// `T^-1` by LU factorisation.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,8 @@ use super::wavelet_inverse::haar_multiplications;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Project, Source, Unfit};
 use crate::content::natural_images;
-use crate::progress::Progress;
 use crate::solve::{Basis, Haar, inverted};
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// The largest Haar coefficients of each frame go through the operator's columns.
@@ -179,7 +179,7 @@ impl Inversion for StoredElements {
 mod tests {
     use super::super::test_scene::Before;
     use super::*;
-    use crate::progress::Silent;
+    use iltm_picture::progress::Silent;
 
     #[test]
     fn with_everything_kept_both_are_the_inverse() {

@@ -2,7 +2,7 @@
 
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Project, Rig, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 
@@ -165,8 +165,8 @@ fn gmres(
 mod tests {
     use super::super::test_scene::Before;
     use super::*;
-    use crate::progress::Silent;
     use crate::solve::inverted;
+    use iltm_picture::progress::Silent;
 
     fn wanted(cells: usize) -> DVector<f64> {
         DVector::from_fn(cells, |cell, _| 0.2 + 0.1 * ((cell * 7) % 5) as f64)

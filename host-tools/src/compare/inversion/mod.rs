@@ -26,7 +26,6 @@ mod tikhonov;
 mod wavelet_inverse;
 
 use super::{Answer, Rig, Source, Unfit};
-use crate::progress::Progress;
 pub use albedo::{Albedo, AlbedoAlone, albedo};
 pub use bounded::Bounded;
 pub use cancellation::Cancellation;
@@ -34,6 +33,7 @@ pub use clustered::Clustered;
 pub use exact::Exact;
 pub use gain_only::{FloodGain, Uncompensated};
 pub use haar_input::{LargestInputs, StoredElements};
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 pub use krylov::Optical;
 use nalgebra::DMatrix;

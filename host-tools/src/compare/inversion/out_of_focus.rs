@@ -3,8 +3,8 @@
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Project, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::blur;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// A method that is given the transport `T B` of a projector out of focus, photographed
@@ -92,7 +92,7 @@ mod tests {
     use super::super::test_scene::Before;
     use super::super::{Bounded, Exact, Neumann, Tikhonov};
     use super::*;
-    use crate::progress::Silent;
+    use iltm_picture::progress::Silent;
 
     fn through(method: impl Inversion + 'static) -> OutOfFocus {
         OutOfFocus {

@@ -4,7 +4,7 @@ use super::gain_only::diagonal;
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Gains `g = diag(T^-1)` by probing: cells that light each other get different colours,

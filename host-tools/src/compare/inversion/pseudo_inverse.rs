@@ -3,7 +3,7 @@
 use super::live::{LiveTransport, finite};
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Regularisation that only keeps rounding from deciding, of the mean eigenvalue.

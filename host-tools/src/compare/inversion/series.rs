@@ -3,7 +3,7 @@
 use super::live::{LiveTransport, convergence, finite, spectral_radius};
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// `T^-1 = F1^-1 sum_k (I - T F1^-1)^k` up to `k = order`, around the direct light
@@ -70,7 +70,7 @@ pub(super) fn radius(transport: &DMatrix<f64>, own: &DVector<f64>) -> f64 {
 mod tests {
     use super::super::test_scene::Before;
     use super::*;
-    use crate::progress::Silent;
+    use iltm_picture::progress::Silent;
 
     /// Cells of a sphere get `r / (1 - r)` times their own light from all others.
     #[test]

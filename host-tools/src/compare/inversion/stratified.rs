@@ -3,7 +3,7 @@
 use super::live::{LiveTransport, convergence, finite};
 use super::{Inversion, Inverted, Known, series};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 
 /// `T = (I + S) F1`: strata `(-S)^k` are multiplied out and added up, elements below

@@ -3,7 +3,7 @@
 use super::live::{LiveTransport, convergence, finite, spectral_radius};
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Which values of the other cells a sweep uses.

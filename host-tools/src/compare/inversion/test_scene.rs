@@ -3,9 +3,9 @@
 use super::{Inversion, Known};
 use crate::capture::NoiseModel;
 use crate::compare::{Answer, Rig, Truth};
-use crate::progress::Silent;
 use crate::scene::coaxial::{Panels, Scene};
 use crate::solve::inverted;
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
 

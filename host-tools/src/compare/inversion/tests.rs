@@ -5,8 +5,8 @@ use super::{Cancellation, Clustered, Exact, Inversion, Known, StoredElements, al
 use crate::capture::NoiseModel;
 use crate::compare::contest::invert;
 use crate::compare::{Answer, Rig, Unfit};
-use crate::progress::Silent;
 use crate::solve::inverted;
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
 

@@ -7,7 +7,7 @@ use super::{Inversion, Inverted, Known};
 use crate::capture::NoiseModel;
 use crate::compare::{Answer, Rig, Source, Unfit};
 use crate::content::wanted_images;
-use crate::progress::Progress;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// Weights that are tried, each twice the one before.
@@ -140,8 +140,8 @@ mod tests {
     use super::super::{Exact, FloodGain};
     use super::*;
     use crate::compare::Truth;
-    use crate::progress::Silent;
     use crate::scene::coaxial::{Panels, Scene};
+    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
 
     #[test]

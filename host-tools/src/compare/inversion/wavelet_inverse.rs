@@ -7,8 +7,8 @@
 use super::live::{LiveTransport, finite};
 use super::{Inversion, Inverted, Known};
 use crate::compare::{Answer, Source, Unfit};
-use crate::progress::Progress;
 use crate::solve::{Basis, Haar};
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 
 /// The sparse matrix `M` in Haar that brings `T^ M` nearest to the identity, column by

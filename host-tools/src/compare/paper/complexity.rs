@@ -2,10 +2,10 @@
 
 use super::scenes::{grid, panels};
 use crate::capture::{Role, columns, shown};
-use crate::progress::{Progress, Silent};
 use crate::solve::{
     CellNoise, Method, Observed, ObservedChannel, SolveOptions, inverted, solve_observed,
 };
+use iltm_picture::progress::{Progress, Silent};
 use iltm_runtime::Grid;
 use std::time::Instant;
 

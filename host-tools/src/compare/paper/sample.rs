@@ -6,8 +6,8 @@ use super::results::PaperError;
 use crate::bounces::{self, BouncesOptions};
 use crate::compare::sheet::encoded;
 use crate::demo::sample;
-use crate::progress::Progress;
 use crate::tradeoff::Tradeoff;
+use iltm_picture::progress::Progress;
 
 /// The files, and what they say in a line.
 #[derive(Debug)]

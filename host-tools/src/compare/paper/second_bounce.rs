@@ -4,10 +4,8 @@ use super::scenes::Condition;
 use crate::compare::acquisition::{Acquisition, Sparse};
 use crate::compare::sheet::{Tile, sheet};
 use crate::compare::{Found, Rig, Truth};
-use crate::progress::Silent;
-use crate::report::{ColourScale, Palette};
 use crate::solve::{Method, inverted};
-use crate::video::Picture;
+use iltm_picture::{ColourScale, Palette, Picture, progress::Silent};
 use iltm_runtime::FrameSize;
 use nalgebra::{DMatrix, DVector};
 

@@ -4,8 +4,8 @@
 use super::scenes::Condition;
 use crate::compare::acquisition::{Acquisition, Sparse};
 use crate::compare::{Answer, Found};
-use crate::progress::{Progress, Silent};
 use crate::solve::{Method, inverted};
+use iltm_picture::progress::{Progress, Silent};
 
 /// Draws of everything that is random.
 pub const SEEDS: u64 = 20;

@@ -2,9 +2,8 @@
 
 use super::scenes::Condition;
 use crate::compare::sheet::{Tile, sheet};
-use crate::report::{ColourScale, Palette};
 use crate::solve::{Basis, Haar};
-use crate::video::Picture;
+use iltm_picture::{ColourScale, Palette, Picture};
 use iltm_runtime::FrameSize;
 use nalgebra::DMatrix;
 

@@ -2,8 +2,10 @@
 
 use super::UploadError;
 use crate::device::{Client, DeviceError, Line};
-use iltm_runtime::image::crc32;
-use iltm_runtime::link::{Digest, Slots};
+use iltm_runtime::{
+    image::crc32,
+    link::{Digest, Slots},
+};
 use sha2::{Digest as _, Sha512};
 use std::collections::BTreeSet;
 

@@ -3,11 +3,11 @@
 
 use super::Scene;
 use crate::capture::{Pattern, Role};
-use crate::progress::Silent;
 use crate::solve::{
     CellNoise, InverseTransport, Observed, ObservedChannel, SolveError, SolveOptions, SolveReport,
     solve_observed,
 };
+use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 

@@ -1,7 +1,7 @@
 //! A scene file as it is written: TOML, every key named, unknown ones refused.
 
 use super::Projector;
-use crate::capture::Response;
+use iltm_picture::Response;
 use serde::Deserialize;
 use std::path::PathBuf;
 

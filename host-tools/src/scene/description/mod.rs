@@ -23,7 +23,7 @@ pub use texture::Texture;
 
 use super::geometry::Polygon;
 use super::view::View;
-use crate::capture::Response;
+use iltm_picture::Response;
 use iltm_runtime::Grid;
 use nalgebra::{Vector2, Vector3};
 

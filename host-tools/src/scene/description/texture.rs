@@ -1,6 +1,6 @@
 //! Albedo from a picture.
 
-use crate::capture::Response;
+use iltm_picture::Response;
 use image::{ImageReader, Limits};
 use nalgebra::Vector2;
 use std::path::Path;

@@ -47,10 +47,10 @@ pub use radiosity::{How, Plan, Radiosity, RadiosityError, Stop, radiosity};
 pub use report::{ExchangeReport, FacetPair};
 
 use super::geometry::{Obstacles, Polygon};
-use crate::progress::Progress;
 use blocks::{Block, Content, Planner};
 use cluster::Clusters;
 use entries::Entries;
+use iltm_picture::progress::Progress;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::time::Instant;

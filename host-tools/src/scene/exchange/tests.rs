@@ -1,7 +1,7 @@
 //! The exchange of whole scenes against closed forms, and blocks against one matrix.
 
 use super::*;
-use crate::progress::Silent;
+use iltm_picture::progress::Silent;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 

@@ -3,8 +3,10 @@
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;
 use super::{OperatorMemory, Work};
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FrameError, GridPipeline};
+use iltm_runtime::{
+    image::Table,
+    pipeline::{FrameError, GridPipeline},
+};
 
 /// Compensates frames of the grid's own size.
 pub(super) struct Cells<'t, 'a, S, const C: usize> {

@@ -2,8 +2,7 @@
 
 use super::super::bands::STRIP;
 use super::Work;
-use iltm_runtime::pipeline::Row;
-use iltm_runtime::units::Drive;
+use iltm_runtime::{pipeline::Row, units::Drive};
 use std::sync::{Mutex, PoisonError};
 
 /// What one thread needs beside the frame.

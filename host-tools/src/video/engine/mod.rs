@@ -17,9 +17,11 @@ mod rows;
 use super::bands::Bands;
 use super::{OperatorMemory, VideoError};
 use cells::Cells;
-use iltm_runtime::FrameSize;
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, FrameError};
+use iltm_runtime::{
+    FrameSize,
+    image::Table,
+    pipeline::{Encoding, FrameError},
+};
 use rayon::ThreadPool;
 use rows::FullFrames;
 

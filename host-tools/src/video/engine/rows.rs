@@ -9,9 +9,11 @@ use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
 use super::memory::{BandMemory, Memories, RowMemory};
 use super::{OperatorMemory, Work};
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FrameError, FullPipeline};
-use iltm_runtime::units::Light;
+use iltm_runtime::{
+    image::Table,
+    pipeline::{FrameError, FullPipeline},
+    units::Light,
+};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::ThreadPool;
 use rayon::prelude::*;

@@ -17,9 +17,9 @@ mod shore;
 mod sky;
 mod water;
 
-use super::{Picture, Samples};
 use balloon::Balloon;
 use colour::{Colour, Tone};
+use iltm_picture::{Picture, Samples};
 use iltm_runtime::FrameSize;
 use land::Land;
 use noise::Noise;

@@ -1,9 +1,7 @@
 //! Which frames go with which tables.
 
 use super::*;
-use crate::progress::Silent;
-use crate::video::png;
-use crate::video::png::PngError;
+use iltm_picture::{png, png::PngError, progress::Silent};
 use std::io::Cursor;
 
 #[test]

@@ -1,10 +1,10 @@
 //! Tables replaced while a stream runs, and tiers that follow a budget.
 
 use super::*;
-use crate::progress::Silent;
 use crate::video::live::{Event, Live, LiveSummary};
 use crate::video::watch::FileWatch;
 use crate::video::y4m::Header;
+use iltm_picture::progress::Silent;
 use std::collections::VecDeque;
 use std::time::Duration;
 

@@ -9,10 +9,9 @@ mod streams;
 
 use crate::compile::image::{ImageWriter, StoredRow, segment_bytes};
 use crate::compile::response::codes as response_codes;
-use crate::video::{Picture, Samples, VideoError};
-use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::Encoding;
-use iltm_runtime::{FrameSize, Grid};
+use crate::video::VideoError;
+use iltm_picture::{Picture, Samples};
+use iltm_runtime::{FrameSize, Grid, image::Table, pipeline::Encoding};
 use sample_table::SampleTable;
 
 use super::{Compensator, Settings, Summary};

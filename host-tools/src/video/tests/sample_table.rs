@@ -5,11 +5,13 @@
 
 use super::{ImageWriter, StoredRow, response_codes, segment_bytes};
 use fixed::types::U1F15;
-use iltm_runtime::Grid;
-use iltm_runtime::haar::Basis;
-use iltm_runtime::image::layout::{SectionKind, meta, tier};
-use iltm_runtime::operator::{Channels, Operator, Segment};
-use iltm_runtime::pipeline::{RESPONSE_KNOTS, knot_drive};
+use iltm_runtime::{
+    Grid,
+    haar::Basis,
+    image::layout::{SectionKind, meta, tier},
+    operator::{Channels, Operator, Segment},
+    pipeline::{RESPONSE_KNOTS, knot_drive},
+};
 use std::ops::Range;
 
 /// What a table is to hold.

@@ -1,9 +1,9 @@
 //! Video from end to end.
 
 use super::*;
-use crate::progress::Progress;
 use crate::video::test_scene::TestScene;
 use crate::video::y4m::{Frame, Header, Reader, Y4mError};
+use iltm_picture::progress::Progress;
 use proptest::prelude::*;
 use std::io::{ErrorKind, Read, Write};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,6 +1,6 @@
 //! Everything that can be wrong with a Y4M stream.
 
-use super::super::MAX_PIXELS;
+use iltm_picture::MAX_PIXELS;
 
 /// Why a Y4M stream could not be read or written. Offsets are bytes from its
 /// start; the first frame is 1.

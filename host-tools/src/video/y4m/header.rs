@@ -1,7 +1,7 @@
 //! The stream header: one line of tags.
 
-use super::super::MAX_PIXELS;
 use super::Y4mError;
+use iltm_picture::MAX_PIXELS;
 use iltm_runtime::FrameSize;
 
 /// First bytes of every stream.

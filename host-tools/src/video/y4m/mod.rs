@@ -6,7 +6,7 @@
 //!
 //! | read | what it must be |
 //! |---|---|
-//! | `W`, `H` | 1 to 65,535 each, at most [`MAX_PIXELS`](super::MAX_PIXELS) together |
+//! | `W`, `H` | 1 to 65,535 each, at most [`MAX_PIXELS`](iltm_picture::MAX_PIXELS) together |
 //! | `C` | `420`, `420jpeg`, `420mpeg2`, `420paldv`, `444`, `mono`; `420` if absent |
 //! | `I` | `p`, `?` or absent: rows of one field have nothing between them to average with |
 //! | `XCOLORRANGE` | `LIMITED` or `FULL`; if absent limited, and full for `mono`, as `FFmpeg` has it |

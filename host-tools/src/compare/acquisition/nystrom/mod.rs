@@ -7,8 +7,8 @@ mod separation;
 
 use super::Acquisition;
 use crate::compare::{Found, Rig, Source, Unfit};
-use crate::progress::Progress;
 use fit::{Fit, Model};
+use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 use samples::Samples;
 use separation::{PHOTOGRAPHS, Separation};
@@ -152,7 +152,7 @@ mod tests {
     use super::super::test_scenes::{forward, m_scene, rig};
     use super::*;
     use crate::capture::NoiseModel;
-    use crate::progress::Silent;
+    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
 
     /// Rank 3, smooth, positive; cells 0 and 17 dead.

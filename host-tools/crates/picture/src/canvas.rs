@@ -1,43 +1,49 @@
-//! A picture to compose others and a few words on.
+//! Canvas: RGB pixels to compose pictures and a few words on.
 
-use super::light_picture::picture;
-use crate::video::{Picture, Samples};
+use crate::light_picture::picture;
+use crate::{Picture, Samples};
 use iltm_runtime::FrameSize;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 /// An sRGB colour.
-pub(crate) type Colour = [u8; 3];
+pub type Colour = [u8; 3];
 
-/// Background of composed pictures, and letters on it that are to be read first and
-/// next.
-pub(crate) const BACKGROUND: Colour = [18, 20, 24];
-pub(crate) const INK: Colour = [232, 234, 238];
-pub(crate) const QUIET: Colour = [160, 166, 176];
+/// Background of composed pictures.
+pub const BACKGROUND: Colour = [18, 20, 24];
+/// Letters that are to be read first.
+pub const INK: Colour = [232, 234, 238];
+/// Letters that are to be read next.
+pub const QUIET: Colour = [160, 166, 176];
 
 /// How letters look.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Type {
-    pub(crate) height: RasterHeight,
-    pub(crate) weight: FontWeight,
-    pub(crate) colour: Colour,
+pub struct Type {
+    /// Height of a line, pixels.
+    pub height: RasterHeight,
+    /// Regular or bold.
+    pub weight: FontWeight,
+    /// Colour where a letter covers a pixel.
+    pub colour: Colour,
 }
 
 impl Type {
     /// Width of a text in pixels: all letters are equally wide.
-    pub(crate) fn width(self, text: &str) -> usize {
+    pub fn width(self, text: &str) -> usize {
         text.chars().count() * get_raster_width(self.weight, self.height)
     }
 }
 
 /// RGB pixels that can be drawn on. What would lie outside is left out.
 #[derive(Clone, Debug)]
-pub(crate) struct Canvas {
+pub struct Canvas {
     size: FrameSize,
     samples: Vec<u8>,
 }
 
 impl Canvas {
-    pub(crate) fn new(size: FrameSize, background: Colour) -> Self {
+    /// An empty canvas.
+    #[must_use]
+    pub fn new(size: FrameSize, background: Colour) -> Self {
         Self {
             size,
             samples: background.repeat(size.pixels()),
@@ -45,7 +51,7 @@ impl Canvas {
     }
 
     /// Begins from a picture; `None` if it is not 8-bit RGB.
-    pub(crate) fn over(picture: &Picture) -> Option<Self> {
+    pub fn over(picture: &Picture) -> Option<Self> {
         match (picture.channels(), picture.samples()) {
             (3, Samples::Eight(samples)) => Some(Self {
                 size: picture.size(),
@@ -55,7 +61,9 @@ impl Canvas {
         }
     }
 
-    pub(crate) fn finish(self) -> Picture {
+    /// What was drawn.
+    #[must_use]
+    pub fn finish(self) -> Picture {
         picture(self.size, self.samples)
     }
 
@@ -68,21 +76,22 @@ impl Canvas {
     }
 
     /// The colour at a place; black outside.
-    pub(crate) fn get(&self, x: usize, y: usize) -> Colour {
+    pub fn get(&self, x: usize, y: usize) -> Colour {
         let (pixels, _) = self.samples.as_chunks::<3>();
         let inside = x < self.size.width() && y < self.size.height();
         let pixel = inside.then(|| pixels.get(y * self.size.width() + x));
         pixel.flatten().copied().unwrap_or_default()
     }
 
-    pub(crate) fn set(&mut self, x: usize, y: usize, colour: Colour) {
+    /// Colours a pixel.
+    pub fn set(&mut self, x: usize, y: usize, colour: Colour) {
         if let Some(pixel) = self.pixel(x, y) {
             *pixel = colour;
         }
     }
 
     /// Copies an 8-bit picture, grey or RGB, with its top left corner at `x`, `y`.
-    pub(crate) fn place(&mut self, x: usize, y: usize, picture: &Picture) {
+    pub fn place(&mut self, x: usize, y: usize, picture: &Picture) {
         let Samples::Eight(samples) = picture.samples() else {
             return;
         };
@@ -98,7 +107,7 @@ impl Canvas {
     }
 
     /// Writes a line of basic Latin with its top left corner at `x`, `y`.
-    pub(crate) fn write(&mut self, x: usize, y: usize, text: &str, letters: Type) {
+    pub fn write(&mut self, x: usize, y: usize, text: &str, letters: Type) {
         let advance = get_raster_width(letters.weight, letters.height);
         for (index, letter) in text.chars().enumerate() {
             let Some(raster) = get_raster(letter, letters.weight, letters.height) else {

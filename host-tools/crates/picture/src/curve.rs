@@ -1,6 +1,6 @@
 //! A measured response: light at some values, monotone and smooth between them.
 
-use super::Response;
+use crate::Response;
 use std::fmt;
 
 /// A rising curve through measured points, value and light both from 0 to 1.

@@ -1,10 +1,11 @@
-//! From numbers to colours, and the bar that says which is which.
+//! Colour scales: from numbers to colours, and the ticks that say which is which.
 //!
 //! The colours are magma and viridis: their lightness rises evenly, so that more
 //! looks like more, also in grey and to eyes that see fewer colours.
 
-use super::light_picture::picture;
-use crate::video::Picture;
+use crate::Picture;
+use crate::light_picture::picture;
+use crate::numbers::{decades, number, steps};
 use iltm_runtime::FrameSize;
 
 /// Colours of a picture: more than an eye tells apart in it, and few enough to make
@@ -130,51 +131,10 @@ impl ColourScale {
     }
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten in a range, at most `most + 1`.
-pub(super) fn steps(low: f64, high: f64, most: usize) -> Vec<f64> {
-    let width = (high - low) / most.max(1) as f64;
-    if !(width.is_finite() && width > 0.0) {
-        return vec![low];
-    }
-    let power = 10_f64.powf(width.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power);
-    // A width that is a step itself may differ from it by rounding.
-    let step = step.into_iter().find(|step| *step >= width * (1.0 - 1e-9));
-    let step = step.unwrap_or(width);
-    let first = (low / step - 1e-9).ceil() as i64;
-    let last = (high / step + 1e-9).floor() as i64;
-    (first..=last).map(|count| count as f64 * step).collect()
-}
-
-/// Powers of ten in a range.
-pub(crate) fn decades(low: f64, high: f64) -> Vec<f64> {
-    let first = (low.log10() - 1e-9).ceil() as i32;
-    let last = (high.log10() + 1e-9).floor() as i32;
-    (first..=last).map(|power| 10_f64.powi(power)).collect()
-}
-
-/// A number of about three digits, without zeros at its end.
-pub(crate) fn number(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let magnitude = value.abs().log10().floor() as i32;
-    if magnitude < -4 {
-        return format!("{value:.0e}").replace('-', "\u{2212}");
-    }
-    let places = (2 - magnitude).max(0) as usize;
-    let text = format!("{value:.places$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::Response;
+    use crate::Response;
 
     /// CIE 1976 L* of an sRGB colour, from its relative luminance (IEC 61966-2-1,
     /// CIE 15).

@@ -1,4 +1,4 @@
-//! How long work tells whoever waits for it how far it is.
+//! Progress of long work, told to whoever waits for it.
 //!
 //! The library only reports; whether that becomes a bar on a terminal, an event
 //! in a JSON stream or nothing is decided in `cli/`.

@@ -1,4 +1,4 @@
-//! Between pixels and cells in floating point: the runtime's `A` and `U`.
+//! Resampling between pixels and cells in floating point: the runtime's `A` and `U`.
 
 use iltm_runtime::resample::interpolation::Axis;
 use iltm_runtime::{FrameSize, Grid};
@@ -13,7 +13,7 @@ struct Share {
 
 /// The grid laid over a frame.
 #[derive(Clone, Debug)]
-pub(crate) struct Lattice {
+pub struct Lattice {
     grid: Grid,
     frame: FrameSize,
     /// Interpolation along rows and columns of pixels.
@@ -24,7 +24,7 @@ pub(crate) struct Lattice {
 
 impl Lattice {
     /// `None` if some cell would cover no pixel.
-    pub(crate) fn new(grid: Grid, frame: FrameSize) -> Option<Self> {
+    pub fn new(grid: Grid, frame: FrameSize) -> Option<Self> {
         Some(Self {
             grid,
             frame,
@@ -40,12 +40,12 @@ impl Lattice {
     }
 
     /// Cells of the grid.
-    pub(crate) const fn cells(&self) -> usize {
+    pub const fn cells(&self) -> usize {
         self.grid.cells()
     }
 
     /// `A`: means over the cells.
-    pub(crate) fn average(&self, pixels: &[f32]) -> Vec<f64> {
+    pub fn average(&self, pixels: &[f32]) -> Vec<f64> {
         let (width, cols) = (self.frame.width(), self.grid.cols());
         let mut cells = vec![0.0; self.grid.cells()];
         let mut line = vec![0.0; cols];
@@ -66,7 +66,7 @@ impl Lattice {
     }
 
     /// `U`: linear interpolation between the cells' centres.
-    pub(crate) fn expand(&self, cells: &[f64]) -> Vec<f32> {
+    pub fn expand(&self, cells: &[f64]) -> Vec<f32> {
         let cols = self.grid.cols();
         let mut pixels = Vec::with_capacity(self.frame.pixels());
         for share in &self.spread[0] {

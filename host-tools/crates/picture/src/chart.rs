@@ -1,6 +1,6 @@
-//! Small line charts as inline SVG, coloured by the page's style sheet.
+//! Line charts as inline SVG, coloured by the page's style sheet.
 
-use super::colour_scale::{decades, number, steps};
+use crate::numbers::{decades, number, steps};
 use maud::{Markup, html};
 
 /// Size of a chart in its own units; the page scales it.
@@ -15,31 +15,39 @@ const BOTTOM: f64 = 52.0;
 
 /// One axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis<'a> {
-    pub(super) label: &'a str,
-    pub(super) logarithmic: bool,
+pub struct Axis<'a> {
+    /// What runs along it, with its unit.
+    pub label: &'a str,
+    /// Whether equal ratios are equally long.
+    pub logarithmic: bool,
 }
 
 /// One point, with a few words beside it if it has any.
 #[derive(Clone, Debug)]
-pub(super) struct Point {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) label: String,
+pub struct Point {
+    /// Place along the first axis.
+    pub x: f64,
+    /// Place along the second axis.
+    pub y: f64,
+    /// The words.
+    pub label: String,
 }
 
 /// A line through points.
 #[derive(Clone, Debug)]
-pub(super) struct Chart<'a> {
+pub struct Chart<'a> {
     /// What it shows, for those who cannot see it.
-    pub(super) title: &'a str,
-    pub(super) x: Axis<'a>,
-    pub(super) y: Axis<'a>,
-    pub(super) points: Vec<Point>,
+    pub title: &'a str,
+    /// The axis across.
+    pub x: Axis<'a>,
+    /// The axis upwards.
+    pub y: Axis<'a>,
+    /// The points, in the order in which the line joins them.
+    pub points: Vec<Point>,
     /// The point that matters.
-    pub(super) marked: Option<usize>,
+    pub marked: Option<usize>,
     /// A height to compare with, and what it is.
-    pub(super) level: Option<(f64, &'a str)>,
+    pub level: Option<(f64, &'a str)>,
 }
 
 /// An axis with its range, from data to places on the page.
@@ -99,7 +107,7 @@ impl Scale {
 
 impl Chart<'_> {
     /// The chart as an `svg` element.
-    pub(super) fn render(&self) -> Markup {
+    pub fn render(&self) -> Markup {
         let points = self.points.iter();
         let xs = points.clone().map(|point| point.x);
         let ys = points

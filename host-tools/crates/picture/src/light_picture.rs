@@ -1,14 +1,13 @@
-//! Pictures as light, which adds up, rather than as codes, which do not.
+//! Linear light of a picture: it adds up, which codes do not.
 
-use crate::capture::{ProjectorResponse, Response};
-use crate::video::{Picture, Samples};
+use crate::{Picture, ProjectorResponse, Response, Samples};
 use iltm_runtime::FrameSize;
 
 /// Linear light (or linear projector input) of one or three channels.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LightPicture {
-    pub(crate) size: FrameSize,
-    pub(crate) planes: Vec<Vec<f32>>,
+    size: FrameSize,
+    planes: Vec<Vec<f32>>,
 }
 
 impl LightPicture {
@@ -58,14 +57,37 @@ impl LightPicture {
         picture(self.size, samples.collect())
     }
 
+    /// Red, green and blue light of every pixel, row by row.
+    pub fn of_pixels(size: FrameSize, light: impl FnMut(usize) -> [f32; 3]) -> Self {
+        let mut planes = vec![Vec::with_capacity(size.pixels()); 3];
+        for pixel in (0..size.pixels()).map(light) {
+            for (plane, light) in planes.iter_mut().zip(pixel) {
+                plane.push(light);
+            }
+        }
+        Self { size, planes }
+    }
+
+    /// The picture with other planes, each made from its channel's number and its light.
+    ///
+    /// # Panics
+    /// If a plane is made of another length.
+    #[must_use]
+    pub fn with_planes(&self, plane: impl Fn(usize, &[f32]) -> Vec<f32>) -> Self {
+        let planes = self.planes.iter().enumerate();
+        let planes: Vec<_> = planes.map(|(at, light)| plane(at, light)).collect();
+        let fits = planes.iter().all(|plane| plane.len() == self.size.pixels());
+        assert!(fits, "a plane has a value for each pixel");
+        Self {
+            size: self.size,
+            planes,
+        }
+    }
+
     /// All light times `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
-        let scale = |plane: &Vec<f32>| plane.iter().map(|light| light * factor as f32).collect();
-        Self {
-            size: self.size,
-            planes: self.planes.iter().map(scale).collect(),
-        }
+        self.with_planes(|_, plane| plane.iter().map(|light| light * factor as f32).collect())
     }
 
     /// The mean of every 2 x 2 pixels; an odd last row or column is left out. A
@@ -109,7 +131,7 @@ impl LightPicture {
 /// # Panics
 /// If there are not one or three for each pixel: whoever calls this has counted
 /// them.
-pub(super) fn picture(size: FrameSize, samples: Vec<u8>) -> Picture {
+pub(crate) fn picture(size: FrameSize, samples: Vec<u8>) -> Picture {
     match Picture::new(size, Samples::Eight(samples)) {
         Some(picture) => picture,
         None => unreachable!("samples were made pixel by pixel"),

@@ -1,4 +1,4 @@
-//! How a device's values and light belong together.
+//! Response curves of cameras and projectors: which light belongs to which value.
 
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::{Serialize, Serializer};
@@ -92,9 +92,11 @@ impl Declared {
         }
     }
 
+    /// Whether nothing was said.
     // serde hands a reference.
     #[allow(clippy::trivially_copy_pass_by_ref)]
-    pub(super) fn is_unsaid(&self) -> bool {
+    #[must_use]
+    pub fn is_unsaid(&self) -> bool {
         *self == Self::Unsaid
     }
 }

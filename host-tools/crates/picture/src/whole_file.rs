@@ -1,9 +1,39 @@
-//! A file that is there whole or not at all.
+//! Atomic files: written under another name, then renamed, so that a file is there whole or not at all.
 
-use super::VideoError;
 use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
+
+/// Why a file could not be written or put in its place.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {source}", path.display())]
+pub struct FileError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the operating system says.
+    pub source: std::io::Error,
+}
+
+impl From<FileError> for std::io::Error {
+    fn from(error: FileError) -> Self {
+        error.source
+    }
+}
+
+/// Writes a file whole or not at all.
+///
+/// # Errors
+/// [`FileError`]; a file that was there is as it was then.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let mut whole = WholeFile::create(path)?;
+    let written = whole.file().write_all(bytes);
+    written.map_err(|source| FileError {
+        path: path.to_owned(),
+        source,
+    })?;
+    whole.finish().map(drop)
+}
 
 /// A file that is written under a temporary name beside its own.
 ///
@@ -20,8 +50,8 @@ impl WholeFile {
     /// Begins a file that is to be called `path`.
     ///
     /// # Errors
-    /// [`VideoError::File`] if nothing can be created in its folder.
-    pub fn create(path: &Path) -> Result<Self, VideoError> {
+    /// [`FileError`] if nothing can be created in its folder.
+    pub fn create(path: &Path) -> Result<Self, FileError> {
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
@@ -38,7 +68,7 @@ impl WholeFile {
                 file,
             }),
             // The temporary name that the error carries helps nobody.
-            Err(error) => Err(VideoError::File {
+            Err(error) => Err(FileError {
                 path: path.to_owned(),
                 source: error.kind().into(),
             }),
@@ -50,14 +80,14 @@ impl WholeFile {
         self.file.as_file_mut()
     }
 
-    /// Gives the file its name.
+    /// Gives the file its name; it stays open.
     ///
     /// # Errors
-    /// [`VideoError::File`] if that fails; nothing is left behind then.
-    pub fn finish(self) -> Result<(), VideoError> {
+    /// [`FileError`] if that fails; nothing is left behind then.
+    pub fn finish(self) -> Result<File, FileError> {
         match self.file.persist(&self.path) {
-            Ok(_) => Ok(()),
-            Err(error) => Err(VideoError::File {
+            Ok(file) => Ok(file),
+            Err(error) => Err(FileError {
                 path: self.path,
                 source: error.error,
             }),
@@ -68,7 +98,6 @@ impl WholeFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Write;
 
     #[test]
     fn a_file_that_is_not_finished_leaves_the_old_one_and_nothing_else() {

@@ -1,11 +1,11 @@
-//! PNG pictures.
+//! PNG files: pictures read and written.
 //!
 //! A picture keeps its size, its 8 or 16 bits and its grey or RGB. A palette, and
 //! grey of fewer than 8 bits, become RGB and grey of 8 bits, since the result has
 //! colours that they have not. Samples are what the file holds; colour profiles
 //! and gamma chunks are not applied and not written.
 
-use super::{MAX_PIXELS, Picture, Samples};
+use crate::{MAX_PIXELS, Picture, Samples};
 use iltm_runtime::FrameSize;
 use png::{BitDepth, ColorType, Decoder, Encoder, Transformations};
 use std::io::{Cursor, Read, Write};
@@ -158,4 +158,13 @@ pub fn write(output: impl Write, picture: &Picture) -> Result<(), PngError> {
     write().map_err(|error: png::EncodingError| PngError::Write {
         reason: error.to_string(),
     })
+}
+
+/// The bytes of a PNG file that holds a picture.
+#[must_use]
+pub fn encode(picture: &Picture) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Writing to memory does not fail.
+    let _ = write(&mut bytes, picture);
+    bytes
 }

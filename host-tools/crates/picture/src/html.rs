@@ -1,0 +1,71 @@
+//! HTML pages that are complete in themselves: the frame that every page stands in, and
+//! pictures and colour bars inside of one.
+
+use crate::{ColourScale, Picture, png};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// A page that is complete in itself: `style` adds to the style that all pages share.
+pub fn document(title: &str, style: &str, body: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(style)) }
+            }
+            body { (body) }
+        }
+    };
+    page.into_string()
+}
+
+/// A picture, encoded.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct PictureFile {
+    /// Name without extension: lower-case letters and `-`.
+    pub name: String,
+    /// Contents of the PNG file.
+    pub png: Vec<u8>,
+}
+
+/// A picture as a file.
+pub fn picture_file(name: &str, picture: &Picture) -> PictureFile {
+    PictureFile {
+        name: name.to_owned(),
+        png: png::encode(picture),
+    }
+}
+
+/// A picture inside of a page.
+pub fn embedded(file: &PictureFile, alt: &str) -> Markup {
+    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt); }
+}
+
+/// The colours of a scale with its ticks; `open` where greater numbers have its last colour.
+pub fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
+    const STOPS: usize = 16;
+    let stops: Vec<String> = (0..=STOPS)
+        .map(|stop| {
+            let [red, green, blue] = scale.colour_at(stop as f64 / STOPS as f64);
+            format!("#{red:02x}{green:02x}{blue:02x}")
+        })
+        .collect();
+    let ticks = scale.ticks();
+    html! {
+        div .bar role="img" aria-label="Colour scale" {
+            div .colours style=(format!("background:linear-gradient(to right,{})", stops.join(","))) {}
+            div .ticks {
+                @for tick in &ticks {
+                    @let end = tick.place > 0.95;
+                    span .end[end] style=(format!("left:{:.1}%", 100.0 * tick.place)) {
+                        (tick.label) @if end && open { " +" }
+                    }
+                }
+            }
+        }
+    }
+}

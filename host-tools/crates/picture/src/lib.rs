@@ -1,0 +1,41 @@
+//! Pictures as codes and as light, how they are resampled, coloured and charted, and how
+//! files and folders are written whole.
+//!
+//! | what | file |
+//! |---|---|
+//! | pictures as codes, and as PNG files | [`Picture`], [`png`] |
+//! | pictures as linear light | [`LightPicture`] |
+//! | response curves, declared and measured | [`Response`], [`Curve`] |
+//! | between pixels and cells | [`Lattice`] |
+//! | numbers as colours, lines and words | [`ColourScale`], [`chart`], [`canvas`], [`numbers`] |
+//! | HTML pages | [`html`] |
+//! | files and folders that are there whole or not at all | [`WholeFile`], [`WholeFolder`] |
+//! | how far long work is | [`progress`] |
+
+pub mod canvas;
+pub mod chart;
+mod colour_scale;
+mod curve;
+pub mod html;
+mod lattice;
+mod light_picture;
+pub mod numbers;
+mod picture;
+pub mod png;
+pub mod progress;
+mod response;
+pub mod whole_file;
+mod whole_folder;
+
+pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
+pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
+pub use lattice::Lattice;
+pub use light_picture::LightPicture;
+pub use picture::{Picture, Samples};
+pub use response::{Declared, Response};
+pub use whole_file::{FileError, WholeFile};
+pub use whole_folder::{FolderError, WholeFolder, check_free};
+
+/// Most pixels of a picture: twice those of 8K video. A header that says more is
+/// refused before any memory is taken.
+pub const MAX_PIXELS: usize = 1 << 26;

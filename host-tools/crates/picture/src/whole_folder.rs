@@ -1,0 +1,177 @@
+//! Atomic folders: written under another name, then renamed, so that a folder is there
+//! whole or not at all.
+
+use crate::{Picture, png};
+use std::ffi::OsString;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Why a folder could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// There is something in its place.
+    #[error("{}: it is there already, and not empty", path.display())]
+    Taken {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file or folder could not be written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl FolderError {
+    /// Says of which file or folder an error of the system is.
+    pub fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+}
+
+/// A folder that is written under a temporary name beside its own.
+///
+/// [`finish`](Self::finish) gives it its name, in one step. Dropped before that, it
+/// leaves nothing behind.
+#[derive(Debug)]
+pub struct WholeFolder {
+    out: PathBuf,
+    beside: TempDir,
+}
+
+impl WholeFolder {
+    /// Begins a folder that is to be called `out`, where nothing or an empty folder is.
+    ///
+    /// # Errors
+    /// [`FolderError`] if something is in its place or nothing can be made beside it.
+    pub fn create(out: &Path) -> Result<Self, FolderError> {
+        check_free(out)?;
+        let parent = match out.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        let mut prefix = OsString::from(".");
+        prefix.push(out.file_name().unwrap_or_default());
+        let made = tempfile::Builder::new().prefix(&prefix).tempdir_in(parent);
+        Ok(Self {
+            out: out.to_owned(),
+            beside: made.map_err(FolderError::io(parent))?,
+        })
+    }
+
+    /// Where to write.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.beside.path()
+    }
+
+    /// Makes a folder in it.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`].
+    pub fn folder(&self, name: &str) -> Result<(), FolderError> {
+        let path = self.path().join(name);
+        fs::create_dir(&path).map_err(FolderError::io(&path))
+    }
+
+    /// Writes a file in it.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`].
+    pub fn file(
+        &self,
+        name: impl AsRef<Path>,
+        contents: impl AsRef<[u8]>,
+    ) -> Result<(), FolderError> {
+        let path = self.path().join(name);
+        fs::write(&path, contents).map_err(FolderError::io(&path))
+    }
+
+    /// Writes a picture in it, as PNG.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`].
+    pub fn picture(&self, name: impl AsRef<Path>, picture: &Picture) -> Result<(), FolderError> {
+        self.file(name, png::encode(picture))
+    }
+
+    /// Gives the folder its name.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`]; nothing is left behind then.
+    pub fn finish(self) -> Result<(), FolderError> {
+        open_to_all(self.beside.path()).map_err(FolderError::io(&self.out))?;
+        // An empty folder in its place gives way to the rename.
+        let kept = self.beside.keep();
+        fs::rename(&kept, &self.out).map_err(|source| {
+            let _ = fs::remove_dir_all(&kept);
+            FolderError::io(&self.out)(source)
+        })
+    }
+}
+
+/// Refuses a place that has something in it.
+///
+/// # Errors
+/// [`FolderError::Taken`], or what reading the folder gives.
+pub fn check_free(out: &Path) -> Result<(), FolderError> {
+    let taken = match fs::read_dir(out) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => false,
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => true,
+        Err(source) => return Err(FolderError::io(out)(source)),
+    };
+    if taken {
+        let path = out.to_owned();
+        return Err(FolderError::Taken { path });
+    }
+    Ok(())
+}
+
+/// A temporary folder is for its owner only; what is written is like any other folder.
+#[cfg(unix)]
+fn open_to_all(folder: &Path) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(folder, fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn open_to_all(_folder: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_is_not_finished_leaves_nothing() {
+        let around = tempfile::tempdir().unwrap();
+        let out = around.path().join("capture");
+        let folder = WholeFolder::create(&out).unwrap();
+        folder.folder("photos").unwrap();
+        folder.file("photos/000.png", b"half").unwrap();
+        drop(folder);
+        assert_eq!(fs::read_dir(around.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn an_empty_folder_gives_way_and_a_full_one_stays() {
+        let around = tempfile::tempdir().unwrap();
+        let out = around.path().join("capture");
+        fs::create_dir(&out).unwrap();
+        let folder = WholeFolder::create(&out).unwrap();
+        folder.file("capture.csv", b"list").unwrap();
+        folder.finish().unwrap();
+        assert_eq!(fs::read(out.join("capture.csv")).unwrap(), b"list");
+        let error = WholeFolder::create(&out).unwrap_err();
+        assert!(matches!(error, FolderError::Taken { .. }), "{error}");
+        assert_eq!(fs::read_dir(around.path()).unwrap().count(), 1);
+    }
+}
