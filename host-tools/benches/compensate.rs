@@ -10,7 +10,7 @@
 //! pipes together (Linux only): it tells what a machine could do that had nothing
 //! else to do, while frames a second are those of this machine at this moment.
 
-#[path = "../src/video/tests/sample_table.rs"]
+#[path = "../crates/video/src/tests/sample_table.rs"]
 mod sample_table;
 
 use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};

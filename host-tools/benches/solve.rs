@@ -7,7 +7,7 @@
 
 #![allow(missing_docs)]
 
-#[path = "../src/solve/test_scene.rs"]
+#[path = "../crates/solve/src/test_scene.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod test_scene;
 

@@ -1,30 +1,29 @@
 //! `iltm` learns a scene's sparse inverse light transport from photographs,
 //! compiles it into a table for the runtime, and compensates frames with it.
 //!
-//! Light flows one way through the crate:
+//! This package is the command and a front door: the work is done in the crates below,
+//! each of which knows only those under it.
 //!
 //! ```text
-//! scene::Simulation -> photographs -> capture::Measurements -> solve::InverseTransport -> compile -> .iltm image -> iltm_runtime -> frames
+//! scene -> photographs -> capture -> solve -> compile -> .iltm image -> runtime -> frames
 //! ```
 
-pub mod bounces;
-pub mod capture;
 pub mod cli;
-pub mod compare;
-pub mod compile;
-pub mod content;
 pub mod demo;
-pub mod device;
-pub mod learn;
-pub mod report;
-pub mod scene;
-pub mod session;
-pub mod solve;
-pub mod solved;
-pub mod tradeoff;
-pub mod user;
-pub mod verify;
-pub mod video;
 
+pub use iltm_capture as capture;
+pub use iltm_compare as compare;
+pub use iltm_compile as compile;
+pub use iltm_compile::learn;
+pub use iltm_device as device;
+pub use iltm_device::user;
 pub use iltm_picture as picture;
 pub use iltm_picture::progress;
+pub use iltm_report as report;
+pub use iltm_report::{bounces, solved, tradeoff};
+pub use iltm_scene as scene;
+pub use iltm_session as session;
+pub use iltm_session::verify;
+pub use iltm_solve as solve;
+pub use iltm_solve::content;
+pub use iltm_video as video;

@@ -1,17 +1,24 @@
 //! The `iltm` command.
 
-use iltm::compare::Meter;
-use peak_alloc::PeakAlloc;
 use std::process::ExitCode;
 
-/// The system's allocator, counting: `iltm compare` says what each method held.
-#[global_allocator]
-static MEMORY: PeakAlloc = PeakAlloc;
-
+#[cfg(not(feature = "count-memory"))]
 fn main() -> ExitCode {
-    iltm::cli::run(Meter {
+    iltm::cli::run(None)
+}
+
+#[cfg(feature = "count-memory")]
+fn main() -> ExitCode {
+    use iltm::compare::Meter;
+    use peak_alloc::PeakAlloc;
+
+    /// The system's allocator, counting: `iltm compare` says what each method held.
+    #[global_allocator]
+    static MEMORY: PeakAlloc = PeakAlloc;
+
+    iltm::cli::run(Some(Meter {
         current: || MEMORY.current_usage(),
         peak: || MEMORY.peak_usage(),
         reset: || MEMORY.reset_peak_usage(),
-    })
+    }))
 }

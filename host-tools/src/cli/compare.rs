@@ -9,6 +9,7 @@ use crate::compare::light::{Light, LightError};
 use crate::compare::page::Contest;
 use crate::compare::paper::{self, Condition, File};
 use crate::compare::{Meter, table};
+use crate::demo;
 use crate::learn::LearnError;
 use iltm_picture::progress::Progress;
 use serde_json::{Value, json};
@@ -17,7 +18,11 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-pub(super) fn run(arguments: &Compare, meter: Meter, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(
+    arguments: &Compare,
+    meter: Option<Meter>,
+    output: &Output,
+) -> Result<(), Failure> {
     let start = Instant::now();
     // A folder that cannot be made is known before the work, not after it.
     let folder = &arguments.output;
@@ -61,7 +66,7 @@ struct Compared {
 fn of_light(
     path: &Path,
     arguments: &Compare,
-    meter: Meter,
+    meter: Option<Meter>,
     progress: &dyn Progress,
 ) -> Result<Compared, Failure> {
     let light = if path.is_dir() {
@@ -74,7 +79,7 @@ fn of_light(
         (&light.truth, &light.rig),
         arguments.photos,
         arguments.seed,
-        Some(meter),
+        meter,
         progress,
     );
     let contest = Contest {
@@ -121,7 +126,7 @@ fn of_light(
 
 fn of_paper(
     arguments: &Compare,
-    meter: Meter,
+    meter: Option<Meter>,
     progress: &dyn Progress,
 ) -> Result<Compared, Failure> {
     let mut contests = Vec::new();
@@ -131,17 +136,15 @@ fn of_paper(
     {
         if let Some((truth, rig)) = condition.world(arguments.seed) {
             let light = (&truth, &rig);
-            let (photographed, inverted) = contest::every(
-                light,
-                arguments.photos,
-                arguments.seed,
-                Some(meter),
-                progress,
-            );
+            let (photographed, inverted) =
+                contest::every(light, arguments.photos, arguments.seed, meter, progress);
             contests.push((condition.name(), photographed, inverted));
         }
     }
-    let mut files = paper::files(&contests, progress).map_err(|error| {
+    let room = tempfile::tempdir().map_err(|error| cannot_write(&std::env::temp_dir(), &error))?;
+    let sample = room.path().join("m-panels-colour");
+    demo::sample::write(&sample).map_err(super::demo::failed)?;
+    let mut files = paper::files(&contests, &sample, progress).map_err(|error| {
         Failure::new(
             Kind::Write,
             error,

@@ -24,7 +24,7 @@ pub(super) fn run(arguments: &Demo, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn failed(error: DemoError) -> Failure {
+pub(super) fn failed(error: DemoError) -> Failure {
     match error {
         DemoError::Folder { ref source, .. } => {
             let next_step = match source.kind() {

@@ -55,9 +55,9 @@ pub fn exit_codes() -> Vec<(u8, &'static str, &'static str)> {
 }
 
 /// Runs the command that the process was started with; `meter` reads the program's
-/// memory.
+/// allocator, if that counts.
 #[must_use]
-pub fn run(meter: Meter) -> ExitCode {
+pub fn run(meter: Option<Meter>) -> ExitCode {
     let arguments = Arguments::parse();
     let output = Output::new(arguments.json);
     let result = match &arguments.command {

@@ -6,17 +6,15 @@
 //! report says what came of it.
 
 mod error;
-pub(crate) mod sample;
-mod stills;
+pub mod sample;
 mod video;
 mod words;
 
 pub use error::DemoError;
-pub(crate) use stills::test_card;
 
 use crate::capture::CaptureOptions;
 use crate::learn::{Learned, learn};
-use crate::report::{Example, Report, Wanted};
+use crate::report::{Example, Report, Wanted, stills};
 use crate::solve::SolveOptions;
 use crate::video::Summary;
 use iltm_picture::progress::Progress;

@@ -15,7 +15,7 @@ static SAMPLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/samples/m-panels-colo
 ///
 /// # Errors
 /// [`DemoError::Folder`] or [`DemoError::Write`].
-pub(crate) fn write(folder: &Path) -> Result<(), DemoError> {
+pub fn write(folder: &Path) -> Result<(), DemoError> {
     write_dir(&SAMPLE, folder)
 }
 

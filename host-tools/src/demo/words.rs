@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn a_path_with_spaces_stays_one_word() {
-        assert_eq!(quoted(Path::new("my demo/it's")), r"'my demo/it'\''s'");
+        assert_eq!(quoted(Path::new("my demo/it's")), r#""my demo/it's""#);
         assert_eq!(
             quoted(Path::new("iltm-demo/table.iltm")),
             "iltm-demo/table.iltm"

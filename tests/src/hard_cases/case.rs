@@ -2,7 +2,7 @@
 
 use super::closed_loop::{LoopErrors, errors};
 use super::theory;
-use iltm::scene::coaxial::Capture;
+use crate::hard_cases::observations::Capture;
 use iltm::scene::coaxial::Scene;
 use iltm::solve::{Compensation, SolveError, gain_only};
 

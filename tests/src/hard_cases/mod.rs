@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! photographs            what a camera sees of a scene (`iltm::scene::coaxial`)
+//! observations           what a solver is given of it
 //! closed_loop, theory    the error on the wall, and the one that theory allows
 //! case, cases, page      the cases and the page that lists them
 //! ```
@@ -9,6 +10,7 @@
 pub mod case;
 pub mod cases;
 pub mod closed_loop;
+pub mod observations;
 pub mod page;
 pub mod photographs;
 pub mod theory;

@@ -1,9 +1,9 @@
 //! Whole captures of a [`Scene`], written as files: each cell is a square of
 //! camera pixels.
 
+use crate::hard_cases::observations::{normal, sequence};
 use iltm::capture::{MANIFEST_FILE, Manifest, Role, Shot};
 use iltm::scene::coaxial::Scene;
-use iltm::scene::coaxial::{normal, sequence};
 use image::{ImageBuffer, Luma};
 use nalgebra::DMatrix;
 use std::path::Path;

@@ -50,7 +50,7 @@ fn errors() -> io::Result<String> {
         "\nWhat stands in braces below is filled in: a path, a line, a number. Messages of the \
          gates before a solve are in [their own page](gates.md).\n",
     );
-    for house in ["host-tools/src", "runtime/src"] {
+    for house in ["host-tools/crates", "host-tools/src", "runtime/src"] {
         for error in errors::in_folder(&root().join(house))? {
             let _ = write!(text, "\n## {}\n\n{}\n\n", error.name, error.about);
             for case in &error.cases {

@@ -2,8 +2,8 @@
 //! or that the surface covers in part.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::observations::Capture;
 use super::super::{GRID, grid};
-use iltm::scene::coaxial::Capture;
 use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::WhyLeftOut;
 

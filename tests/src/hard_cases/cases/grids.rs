@@ -2,7 +2,7 @@
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::grid;
-use iltm::scene::coaxial::Capture;
+use super::super::observations::Capture;
 use iltm::scene::coaxial::{Panels, Scene};
 
 const THEORY: &str = "Haar functions exist on any grid: the bound of any other scene";

@@ -2,10 +2,10 @@
 
 use super::super::case::{Case, Outcome};
 use super::super::grid;
+use super::super::observations::Capture;
 use iltm::capture::Settings;
 use iltm::compile::{CompileOptions, compile};
 use iltm::progress::Silent;
-use iltm::scene::coaxial::Capture;
 use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::{InverseTransport, SolveOptions, solve_observed};
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! What projector, camera and surface do to light besides Lambert's law.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::observations::{Capture, out_of_focus};
 use super::super::{GRID, grid};
-use iltm::scene::coaxial::Capture;
 use iltm::scene::coaxial::{Panels, Scene};
 use nalgebra::DMatrix;
 
@@ -51,7 +51,7 @@ pub(super) const CASES: [Case; 10] = [
         reason: "K needs negative elements, which the solve forbids",
         theory: NO_HARM,
         run: |seeds| {
-            let scene = uniform().blurred(0.5);
+            let scene = out_of_focus(uniform(), 0.5);
             no_harm(&scene, seeds)
         },
     },
@@ -60,7 +60,7 @@ pub(super) const CASES: [Case; 10] = [
         reason: "nobody measures blur to better than a tenth",
         theory: NO_HARM,
         run: |seeds| {
-            let scene = uniform().blurred(0.5);
+            let scene = out_of_focus(uniform(), 0.5);
             let demand = Demand {
                 no_harm_only: true,
                 ..Demand::default()
@@ -108,7 +108,7 @@ fn no_harm(scene: &Scene, seeds: u64) -> Outcome {
 }
 
 fn blurred(seeds: u64, deviation: f64, required: Option<f64>) -> Outcome {
-    let scene = uniform().blurred(deviation);
+    let scene = out_of_focus(uniform(), deviation);
     let demand = Demand {
         required,
         no_harm_only: required.is_none(),

@@ -3,6 +3,7 @@
 use super::super::case::{Case, Outcome};
 use super::super::closed_loop::errors;
 use super::super::grid;
+use super::super::observations::out_of_focus;
 use super::super::photographs::Camera;
 use iltm::capture::CaptureOptions;
 use iltm::learn::{Learned, learn};
@@ -50,7 +51,7 @@ pub(super) const CASES: [Case; 8] = [
         reason: "camera pixels see light of neighbours, and B^-1 destroys the sign of K",
         theory: "T^-1 = B^-1 T0^-1; images are those that a blurred projector can make",
         run: |_| {
-            let scene = scene().blurred(0.5);
+            let scene = out_of_focus(scene(), 0.5);
             of_scene(&scene, Camera::default(), "[projector]\nblur = 0.5\n", 0.01)
         },
     },

@@ -1,8 +1,8 @@
 //! Noise, and photographs that say less than they should.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::observations::Capture;
 use super::super::{GRID, grid};
-use iltm::scene::coaxial::Capture;
 use iltm::scene::coaxial::{Panels, Scene};
 use nalgebra::DMatrix;
 

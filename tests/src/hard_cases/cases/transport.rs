@@ -1,8 +1,8 @@
 //! Transport that is strong, ill-conditioned or singular.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::observations::Capture;
 use super::super::{GRID, grid, theory};
-use iltm::scene::coaxial::Capture;
 use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::Compensation;
 

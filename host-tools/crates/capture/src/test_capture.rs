@@ -1,0 +1,230 @@
+//! Small simulated captures for tests: a flat grid in front of a camera that
+//! does not line up with it, with bounced light, ambient light and noise.
+
+use iltm_capture::{CaptureOptions, Code, Manifest, Measurements, Pattern, Role, Shot};
+use iltm_picture::progress::Silent;
+use iltm_runtime::Grid;
+use image::{ImageBuffer, Luma, Rgb};
+use std::path::Path;
+
+/// Repeatable random numbers (xorshift64*, Vigna 2016).
+pub(super) struct Dice(u64);
+
+impl Dice {
+    pub(super) fn new(seed: u64) -> Self {
+        Self(seed | 1 << 40)
+    }
+
+    /// Uniform in 0 to 1.
+    pub(super) fn uniform(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Standard normal: twelve uniforms, exact in mean and variance.
+    pub(super) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// A simulated scene and how it is photographed.
+#[derive(Clone, Debug)]
+pub(super) struct TestCapture {
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    /// Camera pixels along a cell's side; need not be whole.
+    pub(super) pitch: f64,
+    /// Camera pixels between the picture's border and the grid.
+    pub(super) margin: f64,
+    /// Camera pixels over which a cell's border is blurred.
+    pub(super) blur: f64,
+    /// Light of one cell on its own patch, of full scale.
+    pub(super) direct: f64,
+    /// Light of one cell on each other patch and beside the grid.
+    pub(super) bounced: f64,
+    pub(super) ambient: f64,
+    /// Standard deviation of a camera pixel.
+    pub(super) noise: f64,
+    pub(super) bernoulli: usize,
+    /// Photographs of white and of black each.
+    pub(super) repeats: usize,
+    /// Number of the first column and of the first row in the Gray code.
+    pub(super) offset: [usize; 2],
+    /// Gain of each channel, 1 or 3.
+    pub(super) gains: Vec<f64>,
+    /// Full scale of the files, 255 or 65535.
+    pub(super) full_scale: u16,
+    /// From light to the value in the file.
+    pub(super) encode: fn(f64) -> f64,
+    /// Albedo at a place in cell coordinates (row, column), relative.
+    pub(super) albedo: fn(f64, f64) -> f64,
+}
+
+impl Default for TestCapture {
+    fn default() -> Self {
+        Self {
+            rows: 5,
+            cols: 6,
+            pitch: 6.3,
+            margin: 4.4,
+            blur: 1.0,
+            direct: 0.5,
+            bounced: 0.005,
+            ambient: 0.02,
+            noise: 0.004,
+            bernoulli: 30,
+            repeats: 1,
+            offset: [0; 2],
+            gains: vec![1.0],
+            full_scale: u16::MAX,
+            encode: |light| light,
+            albedo: |_, _| 1.0,
+        }
+    }
+}
+
+impl TestCapture {
+    pub(super) fn grid(&self) -> Grid {
+        Grid::new(self.rows as u16, self.cols as u16).unwrap()
+    }
+
+    /// Width and height of a photograph.
+    pub(super) fn camera(&self) -> (usize, usize) {
+        let side = |cells: usize| (2.0 * self.margin + self.pitch * cells as f64).ceil() as usize;
+        (side(self.cols), side(self.rows))
+    }
+
+    /// Share of camera pixel `at`, widened to the blur, that lies in cell `index`,
+    /// along one axis.
+    pub(super) fn overlap(&self, at: usize, index: usize) -> f64 {
+        let from = self.margin + self.pitch * index as f64;
+        let centre = at as f64 + 0.5;
+        let (low, high) = (centre - 0.5 * self.blur, centre + 0.5 * self.blur);
+        (high.min(from + self.pitch) - low.max(from)).max(0.0) / self.blur
+    }
+
+    /// Every pattern with its role, in the order it is shown.
+    pub(super) fn patterns(&self) -> Vec<(Role, Pattern)> {
+        let grid = self.grid();
+        let code = |cells: usize, offset: usize| Code {
+            bits: (cells + offset).next_power_of_two().trailing_zeros() as u8,
+            offset,
+        };
+        let [column, row] = [
+            code(self.cols, self.offset[0]),
+            code(self.rows, self.offset[1]),
+        ];
+        let mut roles = [Role::White, Role::Black].repeat(self.repeats);
+        for inverse in [false, true] {
+            roles.extend((0..column.bits).map(|bit| Role::Column { bit, inverse }));
+            roles.extend((0..row.bits).map(|bit| Role::Row { bit, inverse }));
+        }
+        let coded = roles.into_iter().map(|role| {
+            let lit = (0..grid.cells()).map(|cell| match role {
+                Role::Column { bit, inverse } => column.lit(cell % self.cols, bit, inverse),
+                Role::Row { bit, inverse } => row.lit(cell / self.cols, bit, inverse),
+                role => Some(role == Role::White),
+            });
+            let lit = lit.collect::<Option<_>>().unwrap();
+            let (rows, cols) = (self.rows, self.cols);
+            (role, Pattern { rows, cols, lit })
+        });
+        let mut dice = Dice::new(1);
+        let random = (0..self.bernoulli).map(|_| {
+            let lit = (0..grid.cells()).map(|_| dice.uniform() < 0.5).collect();
+            let (rows, cols) = (self.rows, self.cols);
+            (Role::Bernoulli, Pattern { rows, cols, lit })
+        });
+        coded.chain(random).collect()
+    }
+
+    /// Light in every pixel under a pattern, before the channel's gain and noise.
+    pub(super) fn light(&self, pattern: &Pattern) -> Vec<f64> {
+        let (width, height) = self.camera();
+        let far = pattern.lit.iter().filter(|&&lit| lit).count() as f64 * self.bounced;
+        let pixel = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let mut light = self.ambient + far;
+            for (cell, _) in pattern.lit.iter().enumerate().filter(|(_, lit)| **lit) {
+                let (row, col) = (cell / self.cols, cell % self.cols);
+                light += (self.direct - self.bounced) * self.overlap(y, row) * self.overlap(x, col);
+            }
+            let place = |at: usize| (at as f64 + 0.5 - self.margin) / self.pitch;
+            light * (self.albedo)(place(y), place(x))
+        };
+        (0..width * height).map(pixel).collect()
+    }
+
+    /// Writes the capture into a folder and returns its manifest.
+    pub(super) fn write(&self, folder: &Path) -> Manifest {
+        for part in ["patterns", "photos"] {
+            std::fs::create_dir_all(folder.join(part)).unwrap();
+        }
+        let mut dice = Dice::new(2);
+        let mut shots = Vec::new();
+        for (index, (role, pattern)) in (0..).zip(self.patterns()) {
+            let shot = Shot {
+                index,
+                role,
+                pattern: format!("patterns/{index:03}.png").into(),
+                photo: format!("photos/{index:03}.png").into(),
+                exposure: None,
+                line: u64::from(index) + 2,
+            };
+            save_pattern(&pattern, &folder.join(&shot.pattern));
+            self.save_photo(&self.light(&pattern), &mut dice, &folder.join(&shot.photo));
+            shots.push(shot);
+        }
+        let manifest = Manifest { shots };
+        std::fs::write(folder.join(iltm_capture::MANIFEST_FILE), manifest.to_csv()).unwrap();
+        manifest
+    }
+
+    fn save_photo(&self, light: &[f64], dice: &mut Dice, path: &Path) {
+        let (width, height) = self.camera();
+        let full = f64::from(self.full_scale);
+        let mut value = |light: f64| {
+            let noisy = (light + self.noise * dice.normal()).clamp(0.0, 1.0);
+            ((self.encode)(noisy) * full).round() as u16
+        };
+        let values: Vec<u16> = light
+            .iter()
+            .flat_map(|&light| self.gains.iter().map(move |gain| gain * light))
+            .map(&mut value)
+            .collect();
+        let (width, height) = (width as u32, height as u32);
+        let bytes = || values.iter().map(|&v| v as u8).collect::<Vec<u8>>();
+        match (self.gains.len(), self.full_scale) {
+            (1, 255) => ImageBuffer::<Luma<u8>, _>::from_raw(width, height, bytes())
+                .unwrap()
+                .save(path),
+            (1, _) => ImageBuffer::<Luma<u16>, _>::from_raw(width, height, values)
+                .unwrap()
+                .save(path),
+            (_, 255) => ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, bytes())
+                .unwrap()
+                .save(path),
+            _ => ImageBuffer::<Rgb<u16>, _>::from_raw(width, height, values)
+                .unwrap()
+                .save(path),
+        }
+        .unwrap();
+    }
+
+    /// Writes the capture into a new folder and reads it.
+    pub(super) fn read(&self) -> Measurements {
+        let folder = tempfile::tempdir().unwrap();
+        self.write(folder.path());
+        iltm_capture::read(folder.path(), &CaptureOptions::default(), &Silent).unwrap()
+    }
+}
+
+/// Writes a pattern as `iltm patterns` does.
+pub(super) fn save_pattern(pattern: &Pattern, path: &Path) {
+    let values = pattern.lit.iter().map(|&lit| 255 * u8::from(lit)).collect();
+    let (width, height) = (pattern.cols as u32, pattern.rows as u32);
+    let picture = ImageBuffer::<Luma<u8>, Vec<u8>>::from_raw(width, height, values).unwrap();
+    picture.save(path).unwrap();
+}

@@ -1,0 +1,230 @@
+//! Krylov methods with photographs as the matrix.
+
+use super::{Inversion, Inverted, Known};
+use crate::{Answer, Project, Rig, Source, Unfit};
+use iltm_picture::progress::Progress;
+use nalgebra::{DMatrix, DVector};
+use std::cell::RefCell;
+
+/// Iterations after which the singular values of a small matrix are given up.
+const SVD_SWEEPS: usize = 10_000;
+
+/// GMRES whose products `T x` are photographs of the rig: no transport is known, every
+/// frame takes photographs of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Optical {
+    /// Steps, at least 1: dimension of the Krylov space.
+    pub steps: usize,
+    /// Whether inputs are scaled by one photograph of white first (right
+    /// preconditioning), which the original does not do.
+    pub scaled: bool,
+}
+
+impl Inversion for Optical {
+    fn name(&self) -> String {
+        let scaled = if self.scaled { ", scaled by flood" } else { "" };
+        format!("optical GMRES, steps {}{scaled}", self.steps)
+    }
+
+    fn source(&self) -> Source {
+        Source {
+            authors: "O'Toole, Kutulakos",
+            title: "Optical Computing for Fast Light Transport Analysis",
+            venue: "ACM Transactions on Graphics (SIGGRAPH Asia)",
+            year: 2010,
+        }
+    }
+
+    fn how(&self) -> &'static str {
+        "The scene itself multiplies: each step projects a pattern (its positive and its \
+         negative part, scaled to the projector's range) and photographs it; the input is \
+         the combination of patterns whose light comes nearest. Needs a still picture and \
+         new photographs for each."
+    }
+
+    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+        let live = super::live::LiveTransport::new(&known)?;
+        let mut rig = known.rig.clone();
+        let scale = if self.scaled {
+            let white = rig.photograph(&DMatrix::from_element(known.live.len(), 1, 1.0));
+            let gain = |light: f64| if light > 0.0 { light.recip() } else { 0.0 };
+            white.column(0).map(gain)
+        } else {
+            DVector::from_element(known.live.len(), 1.0)
+        };
+        let scale = scale.zip_map(&DVector::from_column_slice(&mask(known.live)), |a, b| a * b);
+        let steps = self.steps.min(live.len());
+        Ok(Inverted {
+            answer: Answer::Frames(Box::new(Frames {
+                rig: RefCell::new(rig),
+                live: mask(known.live),
+                scale,
+                steps,
+            })),
+            multiplications: None,
+            // The first pattern, wanted light, has no negative part.
+            photographs: 2 * steps - 1,
+            remark: String::new(),
+        })
+    }
+}
+
+fn mask(live: &[bool]) -> Vec<f64> {
+    live.iter().map(|live| f64::from(u8::from(*live))).collect()
+}
+
+struct Frames {
+    rig: RefCell<Rig>,
+    /// 1 where live.
+    live: Vec<f64>,
+    scale: DVector<f64>,
+    steps: usize,
+}
+
+impl Project for Frames {
+    fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
+        let mut rig = self.rig.borrow_mut();
+        let live = DVector::from_column_slice(&self.live);
+        let wanted = wanted.component_mul(&live);
+        let product = |x: &DVector<f64>| {
+            let light = product(&mut rig, &x.component_mul(&self.scale));
+            light.component_mul(&live)
+        };
+        gmres(product, &wanted, self.steps).component_mul(&self.scale)
+    }
+}
+
+/// `T x` by one photograph for each sign that occurs in `x`.
+fn product(rig: &mut Rig, x: &DVector<f64>) -> DVector<f64> {
+    let mut light = DVector::zeros(x.len());
+    for sign in [1.0, -1.0] {
+        let part = x.map(|value| (sign * value).max(0.0));
+        let brightest = part.max();
+        if brightest > 0.0 {
+            let pattern = DMatrix::from_column_slice(x.len(), 1, (part / brightest).as_slice());
+            light += rig.photograph(&pattern).column(0) * (sign * brightest);
+        }
+    }
+    light
+}
+
+/// The `x` of the Krylov space of `steps` dimensions whose `A x` is nearest to `wanted`
+/// (Saad, Schultz, *GMRES: A Generalized Minimal Residual Algorithm for Solving
+/// Nonsymmetric Linear Systems*, SISSC 1986).
+fn gmres(
+    mut apply: impl FnMut(&DVector<f64>) -> DVector<f64>,
+    wanted: &DVector<f64>,
+    steps: usize,
+) -> DVector<f64> {
+    let norm = wanted.norm();
+    let nothing = DVector::zeros(wanted.len());
+    if norm == 0.0 {
+        return nothing;
+    }
+    let mut basis = vec![wanted / norm];
+    let mut hessenberg = DMatrix::zeros(steps + 1, steps);
+    for step in 0..steps {
+        let mut next = apply(&basis[step]);
+        let before = next.norm();
+        // Twice, so that rounding leaves no part of the others.
+        for _ in 0..2 {
+            for (row, vector) in basis.iter().enumerate() {
+                let along = vector.dot(&next);
+                next.axpy(-along, vector, 1.0);
+                hessenberg[(row, step)] += along;
+            }
+        }
+        let left = next.norm();
+        if left <= 1e-12 * before || !left.is_normal() {
+            // Nothing new to see: what is there is exact.
+            break;
+        }
+        hessenberg[(step + 1, step)] = left;
+        basis.push(next / left);
+    }
+    let used = basis.len().min(steps);
+    let mut right = DVector::zeros(steps + 1);
+    right[0] = norm;
+    let square = hessenberg.columns(0, used).into_owned();
+    if square.iter().any(|value| !value.is_finite()) {
+        return nothing;
+    }
+    let largest = square.amax();
+    let values = square.try_svd(true, true, f64::EPSILON, SVD_SWEEPS);
+    // Directions in which all light is dark are left alone.
+    match values.map(|svd| svd.solve(&right, 1e-12 * largest)) {
+        Some(Ok(weights)) => basis
+            .iter()
+            .zip(weights.iter())
+            .fold(nothing, |sum, (vector, weight)| sum + vector * *weight),
+        _ => nothing,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_scene::Before;
+    use super::*;
+    use iltm_picture::progress::Silent;
+    use iltm_solve::inverted;
+
+    fn wanted(cells: usize) -> DVector<f64> {
+        DVector::from_fn(cells, |cell, _| 0.2 + 0.1 * ((cell * 7) % 5) as f64)
+    }
+
+    /// A Krylov space of `N` dimensions holds every answer.
+    #[test]
+    fn without_noise_as_many_steps_as_cells_are_exact() {
+        let before = Before::textured(4, 6);
+        let wanted = wanted(24);
+        let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
+        for scaled in [false, true] {
+            let found = before.drive(&Optical { steps: 24, scaled }, &wanted);
+            assert!((found - &exact).norm() < 1e-9 * exact.norm());
+        }
+    }
+
+    /// A sphere's transport has two eigenvalues: two steps are enough.
+    #[test]
+    fn two_steps_are_exact_on_a_sphere() {
+        let before = Before::sphere(3, 4, 0.8);
+        let wanted = wanted(12);
+        let optical = Optical {
+            steps: 2,
+            scaled: false,
+        };
+        let drive = before.drive(&optical, &wanted);
+        assert!((&before.transport * drive - &wanted).norm() < 1e-12);
+    }
+
+    #[test]
+    fn photographs_of_a_frame_are_those_that_are_counted() {
+        let before = Before::textured(4, 6);
+        let optical = Optical {
+            steps: 3,
+            scaled: false,
+        };
+        let counted = optical.invert(before.known(), &Silent).unwrap().photographs;
+        let mut rig = before.rig.clone();
+        gmres(|x| product(&mut rig, x), &wanted(24), 3);
+        assert_eq!(rig.photographs(), counted);
+    }
+
+    #[test]
+    fn noise_is_in_every_product() {
+        let wanted = wanted(24);
+        let optical = Optical {
+            steps: 8,
+            scaled: true,
+        };
+        let quiet = Before::panels(4, 6);
+        let noisy = Before::panels(4, 6).noisy(1e-4);
+        let error = |before: &Before| {
+            let light = &before.transport * before.drive(&optical, &wanted);
+            (light - &wanted).norm() / wanted.norm()
+        };
+        assert!(error(&quiet) < 1e-3);
+        assert!(error(&noisy) > 10.0 * error(&quiet));
+        assert!(error(&noisy) < 0.2);
+    }
+}

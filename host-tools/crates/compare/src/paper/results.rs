@@ -1,0 +1,320 @@
+//! The page that shows the experiments, and every file it needs.
+
+use super::complexity::{self, Timed};
+use super::feasible::{self, Place};
+use super::sample::{self, Sample as Pictures};
+use super::scenes::{Condition, surface};
+use super::seeds::{self, Mean, SEEDS, Sample};
+use super::sparsity::{self, Counted};
+use super::{File, claims, second_bounce, sections};
+use crate::chart::{self, ChartError, Interval, Series, Words};
+use crate::contest::Row;
+use crate::sheet::encoded;
+use iltm_picture::{Picture, progress::Progress};
+use iltm_solve::Method;
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Instant;
+use thiserror::Error;
+
+/// Why the experiments could not be shown.
+#[derive(Debug, Error)]
+pub enum PaperError {
+    /// A picture has no size or does not fit one.
+    #[error("the picture of {what} cannot be drawn")]
+    Picture {
+        /// Which.
+        what: &'static str,
+    },
+    /// The photographs that the program carries gave nothing.
+    #[error("the photographs that the program carries cannot be used: {why}")]
+    Sample {
+        /// What went wrong.
+        why: String,
+    },
+    /// A chart cannot be drawn.
+    #[error("the chart of {what} cannot be drawn: {why}")]
+    Chart {
+        /// Which.
+        what: &'static str,
+        /// What the library says.
+        why: String,
+    },
+}
+
+/// All files of the page. `capture` is the folder of photographs whose trade-off and
+/// bounces are shown.
+///
+/// # Errors
+/// [`PaperError`] if something cannot be drawn.
+pub fn files(
+    contests: &[(&str, Vec<Row>, Vec<Row>)],
+    capture: &Path,
+    progress: &dyn Progress,
+) -> Result<Vec<File>, PaperError> {
+    let start = Instant::now();
+    let samples = seeds::run(SEEDS, &seeds::ENTRIES, progress);
+    let timed = complexity::run(progress);
+    let sample = sample::pictures(capture, progress)?;
+    progress.begin("drawing", 0);
+    let (lit, bounces) = second_bounce::panels().ok_or(PaperError::Picture { what: "Fig. 3" })?;
+    let places = feasible::places();
+    let mut files = vec![
+        chart("fig2.svg", "Fig. 2", feasible::chart(&places))?,
+        file("fig2.csv", places_csv(&places)),
+        picture("fig1.png", "Fig. 1", sparsity::picture())?,
+        picture("fig3.png", "Fig. 3", Some(lit))?,
+        picture(
+            "fig4-uniform.png",
+            "Fig. 4",
+            second_bounce::compared(Condition::ALL[0]),
+        )?,
+        picture(
+            "fig4-textured.png",
+            "Fig. 4",
+            second_bounce::compared(Condition::ALL[2]),
+        )?,
+        chart("fig4-seeds.svg", "the seeds", seeds_chart(&samples))?,
+        chart("complexity-cells.svg", "the complexity", by_cells(&timed))?,
+        chart(
+            "complexity-photographs.svg",
+            "the complexity",
+            by_photographs(&timed),
+        )?,
+        file("fig1.csv", sparsity_csv(&sparsity::counts())),
+        file("fig3.csv", bounces_csv(&bounces)),
+        file("fig4.csv", seeds_csv(&samples)),
+        file("complexity.csv", complexity_csv(&timed)),
+    ];
+    progress.end();
+    let text = page(&Experiments {
+        samples: &samples,
+        counts: &sparsity::counts(),
+        places: &places,
+        bounces: &bounces,
+        timed: &timed,
+        sample: &sample,
+        contests,
+        seconds: start.elapsed().as_secs_f64(),
+    });
+    files.push(file("README.md", text));
+    files.extend(sample.files);
+    Ok(files)
+}
+
+fn file(name: &str, text: String) -> File {
+    File {
+        name: name.to_owned(),
+        bytes: text.into_bytes(),
+    }
+}
+
+fn picture(name: &str, what: &'static str, picture: Option<Picture>) -> Result<File, PaperError> {
+    let picture = picture.ok_or(PaperError::Picture { what })?;
+    Ok(File {
+        name: name.to_owned(),
+        bytes: encoded(&picture),
+    })
+}
+
+fn chart(
+    name: &str,
+    what: &'static str,
+    svg: Result<String, ChartError>,
+) -> Result<File, PaperError> {
+    let svg = svg.map_err(|why| PaperError::Chart {
+        what,
+        why: why.to_string(),
+    })?;
+    Ok(file(name, svg))
+}
+
+fn seeds_chart(samples: &[Sample]) -> Result<String, ChartError> {
+    let of = |condition: Condition| {
+        let own = samples.iter().filter(move |s| s.condition == condition);
+        let rows = own.filter(|s| !s.errors.is_empty()).map(interval);
+        (condition.name(), rows.collect::<Vec<Interval>>())
+    };
+    let groups = Condition::ALL.map(of);
+    let title = format!("{SEEDS} draws, their mean and its 95 % interval");
+    chart::intervals(
+        Words {
+            title: &title,
+            x: "error of the second bounce under white",
+            y: "",
+        },
+        &groups,
+    )
+}
+
+fn interval(sample: &Sample) -> Interval {
+    let values = sample.second_bounce();
+    let mean = Mean::of(&values);
+    Interval {
+        label: sections::words(sample.method, sample.photographs),
+        colour: match sample.method {
+            Method::TwoStage => 1,
+            Method::Direct => 0,
+            _ => 2,
+        },
+        low: (mean.mean - mean.half).max(mean.mean / 10.0),
+        middle: mean.mean,
+        high: mean.mean + mean.half,
+        values,
+    }
+}
+
+fn by_cells(timed: &[Timed]) -> Result<String, ChartError> {
+    let mut series = of_methods(
+        timed,
+        |t| t.photographs == complexity::PHOTOGRAPHS,
+        |t| (t.cells as f64, t.seconds),
+    );
+    let own = timed.iter().filter(|t| t.method == Method::Direct);
+    let own = own.filter(|t| t.photographs == complexity::PHOTOGRAPHS);
+    series.push(Series {
+        name: "exact inversion alone".to_owned(),
+        points: own.map(|t| (t.cells as f64, t.inversion)).collect(),
+        joined: true,
+    });
+    chart::logarithmic(
+        Words {
+            title: "Time of a solve against cells, 150 photographs",
+            x: "cells N",
+            y: "seconds",
+        },
+        &series,
+    )
+}
+
+fn by_photographs(timed: &[Timed]) -> Result<String, ChartError> {
+    let series = of_methods(
+        timed,
+        |t| t.cells == 13 * 21,
+        |t| {
+            let each = t.seconds / f64::from(t.iterations);
+            (t.photographs as f64, 1e3 * each)
+        },
+    );
+    chart::logarithmic(
+        Words {
+            title: "Time of an iteration against photographs, 13 x 21 cells",
+            x: "photographs m",
+            y: "milliseconds an iteration",
+        },
+        &series,
+    )
+}
+
+fn of_methods(
+    timed: &[Timed],
+    chosen: impl Fn(&Timed) -> bool,
+    point: impl Fn(&Timed) -> (f64, f64),
+) -> Vec<Series> {
+    let of = |method: Method| {
+        let own = timed.iter().filter(|t| t.method == method && chosen(t));
+        let mut points: Vec<(f64, f64)> = own.map(&point).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points.dedup_by(|a, b| a.0.total_cmp(&b.0).is_eq());
+        Series {
+            name: method.name().to_owned(),
+            points,
+            joined: true,
+        }
+    };
+    complexity::METHODS.map(of).to_vec()
+}
+
+fn sparsity_csv(counts: &[Counted]) -> String {
+    let mut text = "scene,matrix,99 %,99.9 %,99.99 %,all\n".to_owned();
+    for counted in counts {
+        let scene = surface(counted.textured);
+        let [a, b, c] = counted.counts;
+        let _ = writeln!(text, "{scene},{},{a},{b},{c},{}", counted.name, counted.all);
+    }
+    text
+}
+
+fn places_csv(places: &[Place]) -> String {
+    let mut text =
+        "scene,photographs,k,kappa_at_least,gamma_at_least,product_at_least,product_at_most\n"
+            .to_owned();
+    for place in places {
+        let scene = surface(place.textured);
+        let _ = writeln!(
+            text,
+            "{scene},{},{},{:.4},{:.4},{:.4},{:.4}",
+            place.photographs, place.k, place.kappa, place.gamma, place.product.0, place.product.1
+        );
+    }
+    text
+}
+
+fn bounces_csv(bounces: &[second_bounce::Lit]) -> String {
+    let mut text = "lit,second_bounce_error\n".to_owned();
+    for lit in bounces {
+        let _ = writeln!(text, "{},{:.6}", lit.name, lit.error);
+    }
+    text
+}
+
+fn seeds_csv(samples: &[Sample]) -> String {
+    let mut text =
+        "condition,method,photographs,seed,second_bounce_error,compensation_error\n".to_owned();
+    for sample in samples {
+        for (seed, second, compensation) in &sample.errors {
+            let _ = writeln!(
+                text,
+                "\"{}\",{},{},{seed},{second:.6},{compensation:.6}",
+                sample.condition.name(),
+                sample.method,
+                sample.photographs
+            );
+        }
+    }
+    text
+}
+
+fn complexity_csv(timed: &[Timed]) -> String {
+    let mut text = "method,cells,photographs,seconds,iterations,inversion_seconds\n".to_owned();
+    for t in timed {
+        let _ = writeln!(
+            text,
+            "{},{},{},{:.5},{},{:.5}",
+            t.method, t.cells, t.photographs, t.seconds, t.iterations, t.inversion
+        );
+    }
+    text
+}
+
+/// What the page is written from.
+struct Experiments<'e> {
+    samples: &'e [Sample],
+    counts: &'e [Counted],
+    places: &'e [Place],
+    bounces: &'e [second_bounce::Lit],
+    timed: &'e [Timed],
+    sample: &'e Pictures,
+    contests: &'e [(&'e str, Vec<Row>, Vec<Row>)],
+    seconds: f64,
+}
+
+fn page(all: &Experiments<'_>) -> String {
+    let mut text = String::new();
+    let _ = write!(text, "{}", include_str!("opening.md"));
+    claims::claims(&mut text, all.samples);
+    sections::fourth(&mut text, all.samples);
+    sections::sparse(&mut text, all.counts);
+    sections::second(&mut text, all.places, all.counts);
+    sections::third(&mut text, all.bounces);
+    sections::cost(&mut text, all.timed);
+    sections::time(&mut text, all.sample);
+    sections::every(&mut text, all.contests);
+    let _ = writeln!(
+        text,
+        "\nThe experiments of this page took {:.0} s on the machine that wrote it, the \
+         tables of every method not counted.",
+        all.seconds
+    );
+    text
+}

@@ -1,0 +1,286 @@
+//! The words and tables of the page, each from its numbers.
+
+use super::complexity::{self, Timed};
+use super::feasible::Place;
+use super::sample::Sample as Pictures;
+use super::scenes::{Condition, surface};
+use super::second_bounce::Lit;
+use super::seeds::{ENTRIES, Mean, SEEDS, Sample};
+use super::sparsity::{Counted, INVERSE_IN_HAAR, PARTS};
+use crate::contest::Row;
+use crate::table;
+use iltm_solve::{Method, recovery::LIMIT};
+use std::fmt::Write;
+
+/// What the page says of a method with so many photographs.
+pub(super) fn words(method: Method, photographs: usize) -> String {
+    let name = match method {
+        Method::Joint => "iltm",
+        Method::Direct => "direct (the paper)",
+        Method::TwoStage => "two-stage",
+        Method::BruteForce => "brute force",
+    };
+    format!("{name}, {photographs}")
+}
+
+/// The sample of a condition and method.
+pub(super) fn find(
+    samples: &[Sample],
+    condition: Condition,
+    entry: (Method, usize),
+) -> Option<&Sample> {
+    samples.iter().find(|sample| {
+        sample.condition == condition && (sample.method, sample.photographs) == entry
+    })
+}
+
+/// Fig. 4.
+pub(super) fn fourth(text: &mut String, samples: &[Sample]) {
+    let _ = writeln!(
+        text,
+        "\n## Fig. 4: the second bounce, by method\n\n\
+         ![Second bounce by method, uniform panels](fig4-uniform.png)\n\n\
+         ![Second bounce by method, textured panels](fig4-textured.png)\n\n\
+         One draw, noiseless: uniform panels above, textured ones below. Over {SEEDS} draws, mean \
+         and its 95 % interval (`fig4.csv` has each):\n\n\
+         ![Errors of the second bounce over the draws](fig4-seeds.svg)\n"
+    );
+    let names: Vec<&str> = Condition::ALL.iter().map(|c| c.name()).collect();
+    let _ = writeln!(text, "| second bounce | {} |", names.join(" | "));
+    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
+    rows(text, samples, Sample::second_bounce);
+    let _ = writeln!(text, "\n| compensation | {} |", names.join(" | "));
+    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
+    rows(text, samples, Sample::compensation);
+}
+
+fn rows(text: &mut String, samples: &[Sample], of: fn(&Sample) -> Vec<f64>) {
+    for (method, photographs) in ENTRIES {
+        let cell = |condition: &Condition| {
+            let Some(sample) = find(samples, *condition, (method, photographs)) else {
+                return String::new();
+            };
+            let mean = Mean::of(&of(sample));
+            let refused = match sample.refused {
+                0 => String::new(),
+                count => format!(" ({count} refused)"),
+            };
+            let half = table::error(mean.half);
+            format!("{} \u{b1} {half}{refused}", table::error(mean.mean))
+        };
+        let cells: Vec<String> = Condition::ALL.iter().map(cell).collect();
+        let _ = writeln!(
+            text,
+            "| {} | {} |",
+            words(method, photographs),
+            cells.join(" | ")
+        );
+    }
+}
+
+/// Fig. 1.
+pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
+    let _ = writeln!(
+        text,
+        "\n## Fig. 1: how sparse the matrices are\n\n\
+         ![T, its inverse, and both in Haar](fig1.png)\n\n\
+         Coefficients that hold a part of the energy (sum of squares), of {}:\n",
+        counts.first().map_or(0, |counted| counted.all)
+    );
+    let parts = PARTS.map(|part| format!("{} %", 100.0 * part));
+    let _ = writeln!(text, "| scene | matrix | {} |", parts.join(" | "));
+    let _ = writeln!(text, "|---|---|{}", "---:|".repeat(parts.len()));
+    for counted in counts {
+        let scene = surface(counted.textured);
+        let cells = counted.counts.map(|count| count.to_string());
+        let _ = writeln!(
+            text,
+            "| {scene} | {} | {} |",
+            counted.name,
+            cells.join(" | ")
+        );
+    }
+    let _ = writeln!(
+        text,
+        "\n`K` is the inverse without its diagonal: `T^-1 = diag(g) - K`. It is the same for \
+         both scenes, since texture is in `g` alone, and it is all that a table codes in Haar."
+    );
+}
+
+/// Fig. 2.
+pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
+    let _ = writeln!(
+        text,
+        "\n## Fig. 2: what the theorem promises\n\n\
+         ![The region of the theorem, and the scene](fig2.svg)\n\n\
+         Theorem 3.1 promises that the direct method finds rows of `k` coefficients exactly where \
+         `kappa^2 gamma < sqrt 2 + 1 = 2.41`. The exact constants are NP-hard. These are bounds: \
+         from below by supports that were looked at, so that the scene lies where it is drawn or \
+         further up and right; from above by Gershgorin\u{2019}s discs (`inf`: nothing known). \
+         Patterns count as +1 and -1, which is the form that promises most.\n"
+    );
+    let _ = writeln!(
+        text,
+        "| scene | photographs | k | kappa at least | gamma at least | kappa^2 gamma at least | at most |\n\
+         |---|---:|---:|---:|---:|---:|---:|"
+    );
+    for place in places {
+        let scene = surface(place.textured);
+        let _ = writeln!(
+            text,
+            "| {scene} | {} | {} | {:.2} | {:.2} | {:.2} | {:.2} |",
+            place.photographs, place.k, place.kappa, place.gamma, place.product.0, place.product.1
+        );
+    }
+    let inside = places
+        .iter()
+        .filter(|place| place.product.1 < LIMIT)
+        .count();
+    let open = places
+        .iter()
+        .filter(|place| place.product.0 < LIMIT)
+        .count()
+        - inside;
+    let a_row = |textured: bool| {
+        let own = |c: &&Counted| c.textured == textured && c.name == INVERSE_IN_HAAR;
+        let counted = counts.iter().find(own);
+        counted.map_or(0.0, |c| c.counts[2] as f64 / (c.all as f64).sqrt())
+    };
+    let _ = writeln!(
+        text,
+        "\nOf {} places {inside} are proven to lie in the region and {open} may. Rows of the \
+         inverse have {:.0} coefficients (uniform) and {:.0} (textured) for 99.99 % of the energy \
+         (Fig. 1). The theorem does not say why the method works here: it works far outside the \
+         region, as l1 methods do.",
+        places.len(),
+        a_row(false),
+        a_row(true),
+    );
+}
+
+/// Fig. 3.
+pub(super) fn third(text: &mut String, bounces: &[Lit]) {
+    let _ = writeln!(
+        text,
+        "\n## Fig. 3: second bounces from {} photographs\n\n\
+         ![Second bounces found and true](fig3.png)\n\n\
+         By the paper's direct method, on uniform panels without noise.\n",
+        super::second_bounce::PHOTOGRAPHS
+    );
+    let _ = writeln!(text, "| lit | error of the second bounce |\n|---|---:|");
+    for lit in bounces {
+        let _ = writeln!(text, "| {} | {} |", lit.name, table::error(lit.error));
+    }
+}
+
+/// Time and its exponents.
+pub(super) fn cost(text: &mut String, timed: &[Timed]) {
+    let _ = writeln!(
+        text,
+        "\n## Complexity\n\n\
+         ![Time against cells](complexity-cells.svg)\n\n\
+         ![Time against photographs](complexity-photographs.svg)\n\n\
+         The paper gives `O(N^2 m)` an iteration, and counts the exact inversion, `O(N^3)`, as the \
+         price of the two-stage method. Exponents fitted to the times of one iteration; `N^a` of \
+         a whole solve has the number of iterations in it:\n"
+    );
+    let _ = writeln!(
+        text,
+        "| method | N, an iteration | m, an iteration | N, a whole solve |\n|---|---:|---:|---:|"
+    );
+    for fit in complexity::exponents(timed) {
+        let _ = writeln!(
+            text,
+            "| {} | {:.2} | {:.2} | {:.2} |",
+            fit.method, fit.cells, fit.photographs, fit.cells_whole
+        );
+    }
+    let share = |cells: usize| {
+        let of = |t: &&Timed| (t.method, t.cells) == (Method::TwoStage, cells);
+        let timed = timed.iter().find(of)?;
+        Some((
+            1e3 * timed.inversion,
+            100.0 * timed.inversion / timed.seconds,
+        ))
+    };
+    let largest = timed.iter().map(|t| t.cells).max().unwrap_or(0);
+    let (Some(paper), Some(most)) = (share(13 * 21), share(largest)) else {
+        return;
+    };
+    let _ = writeln!(
+        text,
+        "\nThe exact inversion alone grows as `N^{:.2}`: {:.0} ms at 273 cells, {:.0} % of the \
+         two-stage solve, and {:.0} ms at {largest}, {:.0} %; the l1 problems take the rest. Where \
+         `m` enters with less than 1, the l1 step, which does not depend on it, takes its part.",
+        complexity::inversion_exponent(timed),
+        paper.0,
+        paper.1,
+        most.0,
+        most.1,
+    );
+}
+
+/// What accuracy costs in time, and bounces, on photographs.
+pub(super) fn time(text: &mut String, pictures: &Pictures) {
+    let (direct, second) = pictures.shares;
+    let _ = writeln!(
+        text,
+        "\n## What accuracy costs in time\n\n\
+         On the 60 photographs of coloured panels that the program carries. For a scene of your \
+         own: `iltm tradeoff CAPTURE -o DIR`.\n\n\
+         ![Error against instructions a frame](tradeoff.svg)\n\n\
+         In one line: {}. `tradeoff.html` is the same to point at, `tradeoff.csv` has every number.\n\n\
+         ## Bounce by bounce\n\n\
+         The same scene under white; {:.0} % of the light comes straight, {:.0} % in the second \
+         bounce. Of your own: `iltm bounces CAPTURE -o DIR`.\n\n\
+         ![Light by bounces](bounces.png)",
+        pictures.advice,
+        100.0 * direct,
+        100.0 * second,
+    );
+}
+
+/// Every method on the same light.
+pub(super) fn every(text: &mut String, contests: &[(&str, Vec<Row>, Vec<Row>)]) {
+    let _ = writeln!(text, "\n## Every method on the same light\n");
+    for (scene, photographed, inverted) in contests {
+        let _ = writeln!(
+            text,
+            "### Ways to photograph, {scene}\n\n{}",
+            table::markdown(photographed)
+        );
+        let _ = writeln!(
+            text,
+            "### Ways to invert or to do without an inverse, {scene}\n\n{}",
+            table::markdown(inverted)
+        );
+    }
+    let Some((_, photographed, inverted)) = contests.first() else {
+        return;
+    };
+    let _ = writeln!(text, "## Sources\n");
+    sources(text, photographed.iter().chain(inverted));
+}
+
+/// Where methods come from; rows that differ in a parameter only stand together.
+fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r Row>) {
+    let rows: Vec<&Row> = rows.collect();
+    for alike in rows.chunk_by(|a, b| (a.source, a.how) == (b.source, b.how)) {
+        let names: Vec<String> = alike
+            .iter()
+            .map(|row| format!("**{}**", row.name))
+            .collect();
+        let remarks: Vec<&str> = alike
+            .iter()
+            .filter_map(|row| row.result.as_ref().ok())
+            .map(|done| done.remark.as_str())
+            .filter(|remark| !remark.is_empty())
+            .collect();
+        let (source, how) = (alike[0].source, alike[0].how);
+        let _ = write!(text, "- {}: {source}. {how}", names.join("; "));
+        if !remarks.is_empty() {
+            let _ = write!(text, " Here: {}.", remarks.join("; "));
+        }
+        text.push('\n');
+    }
+}

@@ -1,0 +1,162 @@
+//! A port that harms frames, before a real one.
+
+use super::harm::{Faults, Tally};
+use super::lossy::LossyLine;
+use crate::port::is_nothing;
+use crate::{DeviceError, Line, Port};
+use serialport::{SerialPort, TTYPort};
+use std::io::{self, Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// Longest that one way waits for the other: what the proxy adds to the time of a
+/// frame, once each way.
+const ROUND: Duration = Duration::from_millis(1);
+
+/// Bytes that wait for a client that does not read. More are lost, as on a line
+/// without flow control.
+const MOST_WAITING: usize = 1 << 16;
+
+/// A pseudo-terminal that stands before a real port and does to frames what
+/// [`Faults`] say, for any client program:
+///
+/// ```no_run
+/// use iltm_device::fault::{Faults, Harm, LossyProxy};
+///
+/// let faults = Faults::both_ways(Harm::evenly(100), 1);
+/// let proxy = LossyProxy::start("/dev/ttyUSB0", 115_200, faults)?;
+/// println!("iltm status --port {}", proxy.path());
+/// # std::thread::park();
+/// # Ok::<(), iltm_device::DeviceError>(())
+/// ```
+///
+/// When the line is unplugged by order, when the real port goes, or when this is
+/// dropped, the pseudo-terminal goes too, and the client finds its port gone. Clients
+/// may come and go meanwhile.
+#[derive(Debug)]
+pub struct LossyProxy {
+    path: String,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    is_over: AtomicBool,
+    tallies: Mutex<(Tally, Tally)>,
+}
+
+impl LossyProxy {
+    /// Stands before the port with this name.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] if it cannot be opened, or if the system has no
+    /// pseudo-terminal or thread left.
+    pub fn start(port: &str, baud: u32, faults: Faults) -> Result<Self, DeviceError> {
+        Self::before(Port::open(port, baud)?, faults)
+    }
+
+    /// Stands before any line.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] if the system has no pseudo-terminal or thread left.
+    pub fn before(line: impl Line + Send + 'static, faults: Faults) -> Result<Self, DeviceError> {
+        let open = |source| DeviceError::Open { source };
+        let (mut ours, theirs) = TTYPort::pair().map_err(open)?;
+        ours.set_timeout(ROUND).map_err(open)?;
+        let path = theirs.name().unwrap_or_default();
+        let shared = Arc::new(Shared::default());
+        let thread = thread::Builder::new()
+            .name("lossy proxy".to_owned())
+            .spawn({
+                let shared = Arc::clone(&shared);
+                move || {
+                    // Kept open, or ours would end whenever a client closes it.
+                    let _theirs = theirs;
+                    // However it ends, the client will find its port gone.
+                    let _ = carry(ours, LossyLine::new(line, faults), &shared);
+                    shared.is_over.store(true, Ordering::Relaxed);
+                }
+            });
+        let thread = thread.map_err(|error| open(error.into()))?;
+        Ok(Self {
+            path,
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// Where a client finds it.
+    #[must_use]
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Whether it has gone: unplugged by order, or with the real port.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.shared.is_over.load(Ordering::Relaxed)
+    }
+
+    /// What became of frames from host to device.
+    #[must_use]
+    pub fn to_device(&self) -> Tally {
+        self.tallies().0
+    }
+
+    /// What became of frames from device to host.
+    #[must_use]
+    pub fn to_host(&self) -> Tally {
+        self.tallies().1
+    }
+
+    fn tallies(&self) -> (Tally, Tally) {
+        let tallies = self.shared.tallies.lock();
+        *tallies.unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for LossyProxy {
+    fn drop(&mut self) {
+        self.shared.is_over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Carries bytes both ways until one end has gone.
+fn carry(mut client: TTYPort, mut line: LossyLine<impl Line>, shared: &Shared) -> io::Result<()> {
+    let mut bytes = [0; 4_096];
+    let mut waiting = Vec::new();
+    while !shared.is_over.load(Ordering::Relaxed) {
+        let count = some(client.read(&mut bytes))?;
+        if count > 0 {
+            line.write(&bytes[..count])?;
+        }
+        let count = line.read(&mut bytes, ROUND)?;
+        if waiting.len() < MOST_WAITING {
+            waiting.extend(&bytes[..count]);
+        }
+        if !waiting.is_empty() {
+            let count = some(client.write(&waiting))?;
+            waiting.drain(..count);
+        }
+        let mut tallies = shared
+            .tallies
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        *tallies = (line.to_device(), line.to_host());
+    }
+    Ok(())
+}
+
+/// Nothing to read or no room to write is no reason to end.
+fn some(count: io::Result<usize>) -> io::Result<usize> {
+    match count {
+        Err(error) if is_nothing(&error) => Ok(0),
+        other => other,
+    }
+}

@@ -1,0 +1,262 @@
+//! Wanted frames for a board: the test scene, a picture, or a video over and over.
+
+use iltm_picture::{Picture, Samples, png};
+use iltm_runtime::FrameSize;
+use iltm_video::{
+    VideoError,
+    test_scene::TestScene,
+    y4m::{Frame, Reader, Y4mError},
+};
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::{Path, PathBuf};
+
+/// Frames of the test scene that are drawn; then it begins again. Drawing takes
+/// longer than many a board has for a frame, so they are kept.
+const DRAWN: u64 = 100;
+
+/// What the test scene's motion and colours follow from.
+const SEED: u64 = 1;
+
+/// Frames without an end.
+#[derive(Debug)]
+pub struct Frames {
+    kind: Kind,
+    size: FrameSize,
+    channels: u8,
+    rate: f64,
+}
+
+#[derive(Debug)]
+enum Kind {
+    Scene {
+        scene: Box<TestScene>,
+        next: u64,
+        drawn: Vec<Vec<u8>>,
+    },
+    Still(Picture),
+    Video {
+        path: PathBuf,
+        reader: Box<Reader<File>>,
+        frame: Frame,
+    },
+}
+
+impl Frames {
+    /// The moving test scene, `rate` frames a second, each of `channels` (1 or 3)
+    /// samples a pixel.
+    #[must_use]
+    pub fn scene(size: FrameSize, channels: u8, rate: f64) -> Self {
+        let scene = Box::new(TestScene::new(size, rate as f32, SEED));
+        Self {
+            kind: Kind::Scene {
+                scene,
+                next: 0,
+                drawn: Vec::new(),
+            },
+            size,
+            channels,
+            rate,
+        }
+    }
+
+    /// The frames of a PNG or Y4M file, by its first bytes; after the last one
+    /// comes the first again. `rate` frames a second, or the video's own, or 25.
+    /// Without `channels` as many as the file has.
+    ///
+    /// # Errors
+    /// [`VideoError`] if the file cannot be read.
+    pub fn file(path: &Path, channels: Option<u8>, rate: Option<f64>) -> Result<Self, VideoError> {
+        let mut file = open(path)?;
+        let mut first = [0; png::SIGNATURE.len()];
+        let read = file.read(&mut first).and_then(|count| {
+            file.rewind()?;
+            Ok(count)
+        });
+        let count = read.map_err(|source| VideoError::Read { source })?;
+        if first == png::SIGNATURE {
+            let picture = png::read(file)?;
+            return Ok(Self {
+                size: picture.size(),
+                channels: channels.unwrap_or(picture.channels() as u8),
+                rate: rate.unwrap_or(25.0),
+                kind: Kind::Still(picture),
+            });
+        }
+        if !first[..count].starts_with(b"YUV4MPEG") {
+            return Err(VideoError::UnknownFormat);
+        }
+        let reader = Box::new(Reader::new(file)?);
+        let header = reader.header();
+        let colours = if header.chroma() == (0, 0) { 1 } else { 3 };
+        Ok(Self {
+            size: header.size(),
+            channels: channels.unwrap_or(colours),
+            rate: rate.or_else(|| own_rate(header.line())).unwrap_or(25.0),
+            kind: Kind::Video {
+                path: path.to_owned(),
+                reader,
+                frame: Frame::default(),
+            },
+        })
+    }
+
+    /// Pixels of a frame.
+    #[must_use]
+    pub const fn size(&self) -> FrameSize {
+        self.size
+    }
+
+    /// Samples of a pixel.
+    #[must_use]
+    pub const fn channels(&self) -> u8 {
+        self.channels
+    }
+
+    /// Frames a second.
+    #[must_use]
+    pub const fn rate(&self) -> f64 {
+        self.rate
+    }
+
+    /// The next frame: 8-bit samples, the channels of a pixel side by side.
+    ///
+    /// # Errors
+    /// [`VideoError`] if the file does not go on.
+    ///
+    /// # Panics
+    /// Never: the reader gives frames of the stream's size only.
+    pub fn next_frame(&mut self) -> Result<Vec<u8>, VideoError> {
+        let picture = match &mut self.kind {
+            Kind::Scene { scene, next, drawn } => {
+                let number = *next as usize;
+                *next = (*next + 1) % DRAWN;
+                if number == drawn.len() {
+                    drawn.push(samples(&scene.frame(number as u64), self.channels));
+                }
+                return Ok(drawn[number].clone());
+            }
+            Kind::Still(picture) => picture.clone(),
+            Kind::Video {
+                path,
+                reader,
+                frame,
+            } => {
+                if !reader.read_frame(frame)? {
+                    **reader = Reader::new(open(path)?)?;
+                    if !reader.read_frame(frame)? {
+                        return Err(VideoError::Y4m(Y4mError::Truncated {
+                            place: "the first frame".to_owned(),
+                            offset: reader.header().line().len() as u64 + 1,
+                            needed: reader.header().frame_bytes() as u64,
+                            given: 0,
+                        }));
+                    }
+                }
+                let picture = frame.to_picture(reader.header());
+                picture.expect("a frame of the stream")
+            }
+        };
+        Ok(samples(&picture, self.channels))
+    }
+}
+
+fn open(path: &Path) -> Result<File, VideoError> {
+    File::open(path).map_err(|source| VideoError::File {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// The rate in a stream header, such as `F25:1`.
+fn own_rate(line: &[u8]) -> Option<f64> {
+    let line = std::str::from_utf8(line).ok()?;
+    let rate = line.split(' ').find_map(|word| word.strip_prefix('F'))?;
+    let (number, over) = rate.split_once(':')?;
+    let rate = number.parse::<f64>().ok()? / over.parse::<f64>().ok()?;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
+/// The samples of a picture in 8 bits and this many channels. Grey of a colour is
+/// its luma by BT.601, in 256ths.
+fn samples(picture: &Picture, channels: u8) -> Vec<u8> {
+    let eight = match picture.samples() {
+        Samples::Eight(samples) => samples.clone(),
+        Samples::Sixteen(samples) => samples.iter().map(|code| (code >> 8) as u8).collect(),
+    };
+    match (picture.channels(), channels) {
+        (1, 3) => eight.iter().flat_map(|grey| [*grey; 3]).collect(),
+        (3, 1) => {
+            let (pixels, _) = eight.as_chunks::<3>();
+            let luma = |[red, green, blue]: &[u8; 3]| {
+                let sum = 77 * u16::from(*red) + 150 * u16::from(*green) + 29 * u16::from(*blue);
+                (sum >> 8) as u8
+            };
+            pixels.iter().map(luma).collect()
+        }
+        _ => eight,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn in_file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).expect("writable");
+        (folder, path)
+    }
+
+    #[test]
+    fn a_video_begins_again_after_its_last_frame_and_keeps_its_rate() {
+        let mut stream = b"YUV4MPEG2 W2 H1 F30000:1001 Cmono\n".to_vec();
+        for code in [16, 235] {
+            stream.extend(b"FRAME\n");
+            stream.extend([code; 2]);
+        }
+        let (_folder, path) = in_file("v.y4m", &stream);
+        let mut frames = Frames::file(&path, None, None).expect("a good video");
+        assert_eq!((frames.size().width(), frames.channels()), (2, 1));
+        assert!((frames.rate() - 29.97).abs() < 0.001);
+        let got: Vec<_> = (0..5)
+            .map(|_| frames.next_frame().expect("a frame")[0])
+            .collect();
+        assert_eq!(got, [16, 235, 16, 235, 16]);
+    }
+
+    #[test]
+    fn a_video_without_frames_is_an_error_and_no_endless_loop() {
+        let (_folder, path) = in_file("v.y4m", b"YUV4MPEG2 W2 H1 F25:1 Cmono\n");
+        let mut frames = Frames::file(&path, None, None).expect("a header");
+        assert!(frames.next_frame().is_err());
+    }
+
+    #[test]
+    fn grey_and_colour_become_each_other() {
+        let size = FrameSize::new(1, 1).expect("a pixel");
+        let grey = Picture::new(size, Samples::Sixteen(vec![0xABCD])).expect("grey");
+        assert_eq!(samples(&grey, 3), [0xAB; 3]);
+        let colour = Picture::new(size, Samples::Eight(vec![255, 255, 255])).expect("colour");
+        assert_eq!(samples(&colour, 1), [255]);
+        let red = Picture::new(size, Samples::Eight(vec![255, 0, 0])).expect("colour");
+        // 0.299 * 255 = 76.2.
+        assert_eq!(samples(&red, 1), [76]);
+    }
+
+    #[test]
+    fn the_scene_moves() {
+        let size = FrameSize::new(16, 12).expect("small");
+        let mut frames = Frames::scene(size, 3, 25.0);
+        let first = frames.next_frame().expect("a frame");
+        assert_eq!(first.len(), 16 * 12 * 3);
+        let mut later = (1..DRAWN).map(|_| frames.next_frame().expect("a frame"));
+        assert!(later.all(|frame| frame != first));
+        assert_eq!(
+            frames.next_frame().expect("a frame"),
+            first,
+            "from the start"
+        );
+    }
+}

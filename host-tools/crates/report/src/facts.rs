@@ -1,0 +1,142 @@
+//! What a capture and its solve say about themselves, line by line.
+
+use iltm_capture::{Measurements, NoiseSource, RegistrationMethod};
+use iltm_compile::learn::Learned;
+use iltm_picture::numbers::{grouped, number, percent};
+
+/// One line: its name and what there is to say.
+pub(super) type Fact = (&'static str, String);
+
+/// All facts. `seconds` is wall-clock time by what it was spent on, beside the
+/// solve's own.
+pub(super) fn facts(learned: &Learned, seconds: &[(String, f64)]) -> Vec<Fact> {
+    let mut facts = of_photographs(learned);
+    facts.extend(of_the_solve(learned));
+    let own = learned.report.seconds;
+    let own = [
+        ("choosing the weight", own.choose),
+        ("solving", own.solve),
+        ("judging", own.finish + own.prepare),
+    ];
+    facts.push(("time of the solve", listed(own)));
+    let steps = seconds
+        .iter()
+        .map(|(what, seconds)| (what.as_str(), *seconds));
+    facts.push(("time of all steps", listed(steps)));
+    facts
+}
+
+fn of_photographs(learned: &Learned) -> Vec<Fact> {
+    let report = &learned.report;
+    let diagnostics = &learned.measurements.diagnostics;
+    let (counts, pixels) = (report.photographs, diagnostics.pixels);
+    let photographs = format!(
+        "{} white, {} Gray code, {} Bernoulli, of which {} held out to choose and to judge",
+        counts.white, counts.gray_code, counts.bernoulli, counts.held_out
+    );
+    let cells = match report.cells - report.live_cells {
+        0 => format!("all {} of the {} grid", report.cells, learned.inverse.grid),
+        out => format!(
+            "{} of {}; {out} could not be measured",
+            report.live_cells, report.cells
+        ),
+    };
+    let pixels = format!(
+        "{} lit, {} used; {} left out at borders of cells, {} too weak or contradicted",
+        grouped(pixels.lit as u64),
+        grouped(pixels.kept as u64),
+        grouped(pixels.shared as u64),
+        grouped(pixels.weak as u64)
+    );
+    let registration = match diagnostics.method {
+        RegistrationMethod::Regression { photographs } => {
+            format!("Gray code, then regression on {photographs} photographs")
+        }
+        RegistrationMethod::GrayCode { photographs } => {
+            format!("Gray code only, of {photographs} photographs")
+        }
+    };
+    let exposure = format!(
+        "white reaches {} of full scale",
+        percent(diagnostics.exposure)
+    );
+    let noise = format!(
+        "{} of a cell\u{2019}s light under white, {}",
+        percent(noise(learned)),
+        noise_source(diagnostics.noise)
+    );
+    let mut facts = vec![
+        ("photographs", photographs),
+        ("cells", cells),
+        ("camera pixels", pixels),
+        ("registration", registration),
+        ("exposure", exposure),
+        ("noise", noise),
+    ];
+    if let Some(excess) = diagnostics.superposition {
+        let within = percent(excess.abs());
+        let linearity = format!("patterns and their inverses add up to white within {within}");
+        facts.push(("linearity", linearity));
+    }
+    facts
+}
+
+fn of_the_solve(learned: &Learned) -> [Fact; 6] {
+    let report = &learned.report;
+    let ended = if report.convergence.converged {
+        "converged"
+    } else {
+        "stopped before convergence"
+    };
+    let condition = format!(
+        "{} (largest to smallest singular value of the transport)",
+        number(report.condition)
+    );
+    let white = number(learned.compiled.white.light);
+    [
+        ("method", report.method.name().to_owned()),
+        ("weight of sparsity", number(report.lambda)),
+        ("coefficients", grouped(report.coefficients as u64)),
+        ("iterations", format!("{}, {ended}", report.iterations)),
+        ("condition", condition),
+        (
+            "reference white",
+            format!(
+                "{white} of the camera\u{2019}s full scale: {}",
+                learned.white.reason()
+            ),
+        ),
+    ]
+}
+
+fn listed<'s>(seconds: impl IntoIterator<Item = (&'s str, f64)>) -> String {
+    let seconds = seconds
+        .into_iter()
+        .map(|(what, seconds)| format!("{what} {seconds:.2}\u{a0}s"));
+    seconds.collect::<Vec<_>>().join(", ")
+}
+
+/// Median over cells and channels of the noise of one observation under white,
+/// relative to it.
+fn noise(learned: &Learned) -> f64 {
+    let channels = learned.measurements.channels.iter();
+    let ratios = channels.flat_map(|channel| {
+        let white = channel.observations.column(Measurements::WHITE);
+        let cells = channel.noise.iter().zip(white.iter());
+        let lit = cells.filter(|(_, light)| **light > 0.0);
+        lit.map(|(noise, light)| noise / light).collect::<Vec<_>>()
+    });
+    super::quantile(ratios.collect(), 0.5)
+}
+
+fn noise_source(source: NoiseSource) -> String {
+    match source {
+        NoiseSource::Pairs { pairs } => {
+            format!("estimated from {pairs} pairs of a pattern and its inverse")
+        }
+        NoiseSource::Repeats { photographs } => {
+            format!("estimated from {photographs} photographs of white")
+        }
+        NoiseSource::Texture => "at most: estimated from neighbouring pixels".to_owned(),
+    }
+}

@@ -1,0 +1,125 @@
+//! Images that show what a table does to a scene nobody knows beforehand.
+
+use super::Content;
+use crate::Wanted;
+use crate::stills::test_card;
+use iltm_picture::{LightPicture, Picture};
+use iltm_runtime::{FrameSize, Grid, image::Table};
+use iltm_solve::content::natural_images;
+
+/// Names for the user's own pictures; no more are shown.
+const OWN: [&str; 3] = ["content-1", "content-2", "content-3"];
+
+/// Pixels of a picture's longer side, about.
+const SIDE: usize = 384;
+
+/// Darkest light of the natural image, of white: walls that light each other cannot be
+/// black beside white.
+const DARKEST: f64 = 0.1;
+
+/// The user's own pictures; without any a natural image and a test card.
+pub(super) fn wanted(table: &Table<'_>, content: &[Content]) -> Vec<Wanted> {
+    let (grid, channels) = (table.grid(), usize::from(table.channels()));
+    let mut wanted: Vec<Wanted> = OWN
+        .into_iter()
+        .zip(content)
+        .filter_map(|(name, content)| {
+            let frame = content.frames.get(content.frames.len() / 2)?;
+            let picture = halved(frame, grid);
+            (picture.channels() >= channels).then(|| Wanted {
+                name,
+                title: content.name.clone(),
+                remark: "From the content that was given.".to_owned(),
+                picture: of_channels(picture, channels),
+            })
+        })
+        .collect();
+    // White was chosen for these: others would only show that it was not for them.
+    if !wanted.is_empty() {
+        return wanted;
+    }
+    wanted.push(natural(grid, channels));
+    if let Some(size) = size(grid) {
+        let card = test_card(size);
+        wanted.push(Wanted {
+            picture: of_channels(card.picture, channels),
+            ..card
+        });
+    }
+    wanted
+}
+
+/// A size of the grid's shape, so many whole pixels a cell that it is large enough.
+fn size(grid: Grid) -> Option<FrameSize> {
+    let factor = SIDE.div_ceil(grid.rows().max(grid.cols())).max(1);
+    let side = |cells: usize| u16::try_from(cells * factor).ok();
+    FrameSize::new(side(grid.cols())?, side(grid.rows())?)
+}
+
+/// Dead leaves: surfaces before each other, as in photographs.
+fn natural(grid: Grid, channels: usize) -> Wanted {
+    // As fine as a grid can be.
+    let factor = (1..=SIDE / grid.cols().max(grid.rows()).max(1))
+        .rev()
+        .find(|factor| factor * factor * grid.cells() <= Grid::MAX_CELLS)
+        .unwrap_or(1);
+    let side = |cells: usize| (cells * factor) as u16;
+    let fine = Grid::new(side(grid.rows()), side(grid.cols())).unwrap_or(grid);
+    let images = natural_images(fine);
+    let plane = |channel: usize| {
+        let cells = images.column(0).into_iter().zip(images.column(1 + channel));
+        let light = cells.map(|(common, own)| {
+            let light = if channels == 1 {
+                *common
+            } else {
+                0.6 * common + 0.4 * own
+            };
+            (DARKEST + (1.0 - DARKEST) * light) as f32
+        });
+        light.collect()
+    };
+    let planes = (0..channels).map(plane).collect();
+    let picture = LightPicture::new(FrameSize::of_grid(fine), planes);
+    Wanted {
+        name: "natural",
+        title: "Like a photograph".to_owned(),
+        remark:
+            "Surfaces of all sizes before each other, which have the statistics of natural images."
+                .to_owned(),
+        picture: match picture {
+            Some(picture) => picture.for_display(),
+            None => unreachable!("one or three planes of the grid's cells"),
+        },
+    }
+}
+
+/// The picture, half as large until a page can hold it.
+fn halved(picture: &Picture, grid: Grid) -> Picture {
+    let mut light = LightPicture::decode(picture, iltm_picture::Response::Srgb);
+    while light.size().width() > 2 * SIDE {
+        let half = light.halved();
+        if !half.size().holds(grid) || half.size() == light.size() {
+            break;
+        }
+        light = half;
+    }
+    light.for_display()
+}
+
+/// A picture in colour as one of the table's channels: grey light is the mean.
+fn of_channels(picture: Picture, channels: usize) -> Picture {
+    if picture.channels() == channels {
+        return picture;
+    }
+    let light = LightPicture::decode(&picture, iltm_picture::Response::Srgb);
+    let pixels = 0..light.size().pixels();
+    let mean = |pixel: usize| {
+        let colours = light.planes().iter().map(|plane| plane[pixel]);
+        colours.sum::<f32>() / light.planes().len() as f32
+    };
+    let grey = LightPicture::new(light.size(), vec![pixels.map(mean).collect()]);
+    match grey {
+        Some(grey) => grey.for_display(),
+        None => unreachable!("a value for each pixel"),
+    }
+}

@@ -1,0 +1,189 @@
+//! One line of advice.
+
+use super::{Point, Sweep};
+use iltm_compile::cost::{CLOCK, RATE};
+
+/// One step of an 8-bit code.
+const TARGET: f64 = 1.0 / 255.0;
+
+/// A tier that errs by no more than this times the least error is as good.
+const AS_GOOD: f64 = 1.05;
+
+/// A gain below this, in decibels, is none.
+const LEAST_GAIN: f64 = 0.05;
+
+/// See [`Tradeoff::advice`](super::Tradeoff::advice).
+pub(super) fn advice(points: &[Point]) -> String {
+    let table = || points.iter().filter(|point| point.sweep == Sweep::Table);
+    let least = table()
+        .map(|point| point.predicted)
+        .fold(f64::INFINITY, f64::min);
+    let enough = |limit: f64| {
+        let good = table().filter(|point| point.predicted <= limit);
+        good.min_by_key(|point| point.instructions)
+    };
+    if let Some(chosen) = enough(TARGET) {
+        return format!(
+            "{} meets 1/255 at {}; {}",
+            tier(chosen),
+            cost(chosen),
+            doubling(points, chosen)
+        );
+    }
+    let Some(chosen) = enough(AS_GOOD * least) else {
+        return "no tier has an error that is a number".to_owned();
+    };
+    let own = if chosen.inverse > TARGET {
+        format!(
+            "1/255 is out of reach of any tier, since the inverse itself errs by {}",
+            fraction(chosen.inverse)
+        )
+    } else {
+        "1/255 is out of reach of this table".to_owned()
+    };
+    let as_good = if chosen.predicted > least {
+        ", within 5 % of the best tier"
+    } else {
+        ""
+    };
+    format!(
+        "{} errs by {}{as_good}, at {}; {}; {own}",
+        tier(chosen),
+        fraction(chosen.predicted),
+        cost(chosen),
+        doubling(points, chosen)
+    )
+}
+
+fn tier(point: &Point) -> String {
+    match point.tier {
+        0 => "gain only (tier 0)".to_owned(),
+        tier => format!("tier {tier}"),
+    }
+}
+
+fn cost(point: &Point) -> String {
+    format!(
+        "{} of a {RATE} Hz frame on a {} MHz part",
+        share(point.share()),
+        CLOCK / 1_000_000
+    )
+}
+
+/// What twice the time would buy from the same photographs.
+fn doubling(points: &[Point], chosen: &Point) -> String {
+    let affordable = points.iter().filter(|point| {
+        matches!(point.sweep, Sweep::Table | Sweep::Tiers)
+            && point.instructions <= 2 * chosen.instructions
+    });
+    let best = affordable
+        .map(|point| point.predicted)
+        .fold(chosen.predicted, f64::min);
+    let gain = 20.0 * (chosen.predicted / best).log10();
+    // Written so that no error at all gains nothing either.
+    if gain >= LEAST_GAIN {
+        format!("doubling the time buys {gain:.1} dB")
+    } else {
+        "doubling the time buys nothing".to_owned()
+    }
+}
+
+/// A share as per cent: one digit after the point below 10.
+pub(super) fn share(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent < 9.95 {
+        format!("{percent:.1} %")
+    } else {
+        format!("{percent:.0} %")
+    }
+}
+
+/// An error as people say it: 1/131, or per cent where it is large.
+pub(super) fn fraction(error: f64) -> String {
+    if error > 0.0 && error < 0.1 {
+        format!("1/{:.0}", 1.0 / error)
+    } else {
+        format!("{:.0} %", 100.0 * error)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use iltm_compile::cost::BUDGET;
+    use iltm_runtime::Grid;
+
+    pub(in crate::tradeoff) fn point(sweep: Sweep, tier: u8, predicted: f64, share: f64) -> Point {
+        Point {
+            sweep,
+            setting: String::new(),
+            tier,
+            method: None,
+            photographs: None,
+            bits: 16,
+            grid: Grid::new(2, 2).unwrap(),
+            left_out: predicted,
+            inverse: 0.0,
+            predicted,
+            truth: None,
+            instructions: (share * BUDGET as f64) as u64,
+            microseconds: None,
+            bytes: 1,
+            seconds: None,
+            hypothetical: false,
+            front: false,
+        }
+    }
+
+    #[test]
+    fn the_cheapest_tier_that_meets_the_target_is_advised() {
+        let points = [
+            point(Sweep::Table, 0, 0.1, 0.05),
+            point(Sweep::Table, 2, 0.01, 0.2),
+            point(Sweep::Table, 3, 0.0039, 0.41),
+            point(Sweep::Table, 4, 0.0030, 0.95),
+            // 20 log10(.0039 / .00377) = .29 dB
+            point(Sweep::Tiers, 9, 0.00377, 0.8),
+            point(Sweep::Photographs, 5, 0.001, 0.5),
+        ];
+        assert_eq!(
+            advice(&points),
+            "tier 3 meets 1/255 at 41 % of a 60 Hz frame on a 216 MHz part; \
+             doubling the time buys 0.3 dB"
+        );
+    }
+
+    #[test]
+    fn where_the_target_is_out_of_reach_it_says_whose_error_that_is() {
+        let mut points = [
+            point(Sweep::Table, 0, 0.1, 0.005),
+            point(Sweep::Table, 3, 0.0078, 0.012),
+            point(Sweep::Table, 6, 0.0076, 0.03),
+        ];
+        for point in &mut points {
+            point.inverse = 0.0075;
+        }
+        assert_eq!(
+            advice(&points),
+            "tier 3 errs by 1/128, within 5 % of the best tier, at 1.2 % of a 60 Hz frame on a \
+             216 MHz part; doubling the time buys nothing; 1/255 is out of reach of any tier, \
+             since the inverse itself errs by 1/133"
+        );
+    }
+
+    #[test]
+    fn a_table_of_gains_alone_has_advice_too() {
+        let points = [point(Sweep::Table, 0, 0.2, 0.004)];
+        assert_eq!(
+            advice(&points),
+            "gain only (tier 0) errs by 20 %, at 0.4 % of a 60 Hz frame on a 216 MHz part; \
+             doubling the time buys nothing; 1/255 is out of reach of this table"
+        );
+    }
+
+    #[test]
+    fn points_whose_error_is_no_number_are_not_advised() {
+        let points = [point(Sweep::Table, 0, f64::NAN, 0.1)];
+        assert_eq!(advice(&points), "no tier has an error that is a number");
+    }
+}

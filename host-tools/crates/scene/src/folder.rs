@@ -1,0 +1,103 @@
+//! Writes the photographs of a simulated scene as a capture folder.
+
+use super::description::Scene;
+use super::shooting::{Shooting, Slide, png};
+use super::simulation::{Simulation, SimulationError};
+use iltm_capture::{
+    CameraSettings, MANIFEST_FILE, Manifest, Pattern, ProjectorSettings, Role, SETTINGS_FILE,
+    SceneSettings, Settings, numbered,
+};
+use iltm_picture::{FolderError, WholeFolder, progress::Progress};
+use image::ColorType;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use thiserror::Error;
+
+/// Why a capture could not be written.
+#[derive(Debug, Error)]
+pub enum CaptureFolderError {
+    /// There is no light to photograph.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The folder could not be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+}
+
+/// What was written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Written {
+    /// Photographs.
+    pub photographs: usize,
+    /// Most bounces that any pattern's light was followed over.
+    pub bounces: usize,
+}
+
+/// Photographs `patterns` and writes the folder `out`: beside its place first, then
+/// renamed, so that it is whole or not there.
+///
+/// # Errors
+/// [`CaptureFolderError`] if something is in its place or it cannot be written.
+pub fn write(
+    shooting: &Shooting<'_>,
+    patterns: &[(Role, Pattern)],
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Written, CaptureFolderError> {
+    let folder = WholeFolder::create(out)?;
+    folder.folder("patterns")?;
+    folder.folder("photos")?;
+    for (index, (_, pattern)) in patterns.iter().enumerate() {
+        let lit: Vec<u8> = pattern.lit.iter().map(|lit| 255 * u8::from(*lit)).collect();
+        let size = (pattern.cols as u32, pattern.rows as u32);
+        let picture = png(&lit, size, ColorType::L8).map_err(FolderError::io(out))?;
+        folder.file(numbered("patterns", index as u32), picture)?;
+    }
+    progress.begin("taking photographs", patterns.len() as u64);
+    let slides: Vec<Slide> = patterns.iter().map(|(_, pattern)| pattern.into()).collect();
+    let all: Vec<usize> = (0..slides.len()).collect();
+    let taken = AtomicUsize::new(0);
+    let bounces = shooting.take(&slides, &all, |place, photograph| {
+        if let Some(photograph) = photograph {
+            let picture = photograph.png().map_err(FolderError::io(out))?;
+            folder.file(numbered("photos", place as u32), picture)?;
+            taken.fetch_add(1, Ordering::Relaxed);
+        }
+        progress.advance(1);
+        Ok::<(), CaptureFolderError>(())
+    })?;
+    let roles = (0..).zip(patterns.iter().map(|(role, _)| *role));
+    let manifest = Manifest::numbered("patterns", roles);
+    folder.file(MANIFEST_FILE, manifest.to_csv())?;
+    folder.file(SETTINGS_FILE, settings(shooting.scene, shooting.simulation))?;
+    folder.finish()?;
+    progress.end();
+    Ok(Written {
+        photographs: taken.into_inner(),
+        bounces,
+    })
+}
+
+fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
+    let settings = Settings {
+        camera: CameraSettings {
+            response: scene.camera.response.into(),
+            ..CameraSettings::default()
+        },
+        projector: ProjectorSettings {
+            response: scene.projector.response.into(),
+            // Known exactly here, as whoever focused the projector might know it.
+            blur: Some(if simulation.blurred() {
+                scene.projector.blur
+            } else {
+                0.0
+            }),
+            ..ProjectorSettings::default()
+        },
+        scene: SceneSettings {
+            name: scene.name.clone(),
+        },
+    };
+    // Numbers and strings always have a TOML form.
+    toml::to_string(&settings).unwrap_or_default()
+}

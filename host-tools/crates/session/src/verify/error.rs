@@ -1,0 +1,176 @@
+//! Why there is no verdict.
+
+use crate::PatternsError;
+use iltm_capture::CaptureError;
+use iltm_picture::FolderError;
+use iltm_video::VideoError;
+use std::path::{Path, PathBuf};
+
+/// Photographs that are named before the rest is only counted.
+const NAMED: usize = 8;
+
+/// What went wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The folder could not be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The table cannot compensate the test images, or one of them cannot be read.
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    /// Cells and projector do not fit together.
+    #[error(transparent)]
+    Slides(#[from] PatternsError),
+    /// A file of the folder cannot be used.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// There is no such folder, or it was not made by `iltm verify`.
+    #[error("{}: there is no verify.csv", path.display())]
+    NoManifest {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Photographs that `verify.csv` names are not there.
+    #[error("{}: {} missing: {}", folder.display(), count(missing.len()), listed(missing))]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+        /// All of them, relative to it.
+        missing: Vec<PathBuf>,
+    },
+    /// A test image is not there both plain and compensated.
+    #[error("{}: test image {image} has no {what} picture", path.display())]
+    Unpaired {
+        /// The manifest.
+        path: PathBuf,
+        /// Its number.
+        image: u8,
+        /// Which one it lacks.
+        what: &'static str,
+    },
+    /// There is nothing to judge by.
+    #[error("{}: it names no test image", path.display())]
+    NoImages {
+        /// The manifest.
+        path: PathBuf,
+    },
+    /// A picture has another size, depth or number of colours than the table's cells ask
+    /// for.
+    #[error("{}: it is no 8-bit picture of one pixel a cell with the table's {channels} channel(s)", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// Channels of the table.
+        channels: u8,
+    },
+    /// The folder was made with another table.
+    #[error("{}: it is not what this table makes of test image {image}: the folder was made with another table", path.display())]
+    OtherTable {
+        /// The compensated picture.
+        path: PathBuf,
+        /// Number of the test image.
+        image: u8,
+    },
+    /// The folder was made for another grid.
+    #[error("{}: its pictures are of {found} cells, the table is for {expected}", path.display())]
+    Grid {
+        /// The folder.
+        path: PathBuf,
+        /// Cells of the pictures, rows by columns.
+        found: String,
+        /// Cells of the table.
+        expected: String,
+    },
+    /// Photographs are grey and the table has colours, or the other way round.
+    #[error("{}: the photographs have {photographs} channel(s), the table has {table}", path.display())]
+    Channels {
+        /// The folder.
+        path: PathBuf,
+        /// Channels of the photographs.
+        photographs: usize,
+        /// Channels of the table.
+        table: usize,
+    },
+    /// A photograph fits another picture much better than its own.
+    #[error(
+        "{}: it shows the picture of {shows}, not its own, {own}: photographs were exchanged, or one is missing and all later ones moved up",
+        path.display()
+    )]
+    Order {
+        /// The photograph.
+        path: PathBuf,
+        /// Role of the picture that it fits.
+        shows: String,
+        /// Role that its line has.
+        own: String,
+    },
+    /// Too few of the table's cells were found.
+    #[error("{}: only {found} of the {live} cells that the table knows were found", path.display())]
+    TooFewCells {
+        /// The folder.
+        path: PathBuf,
+        /// Cells that were found.
+        found: usize,
+        /// Cells that the table has gains for.
+        live: usize,
+    },
+}
+
+impl VerifyError {
+    /// What to do next.
+    #[must_use]
+    pub fn next_step(&self) -> String {
+        match self {
+            Self::Folder(FolderError::Taken { .. }) => {
+                "Choose another folder, or move that one away.".to_owned()
+            }
+            Self::Folder(_) => "Check the folder and run the command again.".to_owned(),
+            Self::Video(error) => error.next_step().to_owned(),
+            Self::Slides(error) => error.next_step().to_owned(),
+            Self::Capture(error) => error.next_step().to_owned(),
+            Self::NoManifest { path } => format!(
+                "Make the folder first: `iltm verify TABLE.iltm -o {}`, then photograph its slides.",
+                path.display()
+            ),
+            Self::Missing { folder, .. } => format!(
+                "Take them: `iltm capture {}` goes on where it stopped; or copy them into photos/.",
+                folder.display()
+            ),
+            Self::Unpaired { .. } | Self::NoImages { .. } | Self::Picture { .. } => {
+                "Make the folder anew with `iltm verify TABLE.iltm -o FOLDER`.".to_owned()
+            }
+            Self::OtherTable { .. } | Self::Grid { .. } => {
+                "Verify with the table that the folder was made with, or make a folder with this \
+                 one and photograph it."
+                    .to_owned()
+            }
+            Self::Channels { .. } => {
+                "Photograph in colour for a colour table and in grey for a grey one, as the table's \
+                 own photographs were."
+                    .to_owned()
+            }
+            Self::Order { .. } => {
+                "Put the photographs in the order of verify.csv, or take them again.".to_owned()
+            }
+            Self::TooFewCells { .. } => {
+                "Point the camera so that it sees the whole projection, in focus.".to_owned()
+            }
+        }
+    }
+}
+
+fn count(missing: usize) -> String {
+    match missing {
+        1 => "1 photograph is".to_owned(),
+        more => format!("{more} photographs are"),
+    }
+}
+
+fn listed(missing: &[PathBuf]) -> String {
+    let name = |path: &PathBuf| -> String { Path::new(path).display().to_string() };
+    let mut names: Vec<String> = missing.iter().take(NAMED).map(name).collect();
+    if missing.len() > NAMED {
+        names.push(format!("and {} more", missing.len() - NAMED));
+    }
+    names.join(", ")
+}

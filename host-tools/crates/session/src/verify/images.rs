@@ -1,0 +1,149 @@
+//! The test images: wanted light, one value a cell and channel.
+//!
+//! Natural ones, an even grey, a checkerboard and, where a table has colours, bars. None
+//! wants black beside white, which walls that light each other cannot show; where a table
+//! would still have to cut more than a little, the contrast is lowered, so that the error
+//! is that of the table and not of the image.
+
+use super::Expected;
+use iltm_capture::CellPlanes;
+use iltm_picture::{Picture, Samples};
+use iltm_runtime::{FrameSize, Grid, image::Table};
+use iltm_solve::content::wanted_images;
+use iltm_video::{Compensator, Settings, VideoError};
+
+/// Natural images among the test images.
+const NATURAL: usize = 3;
+
+/// Share of an image's samples that the table may have to cut.
+const MOST_CLIPPED: f64 = 0.005;
+
+/// Darkest and brightest light that images are squeezed between, until they fit.
+const RANGES: [(f64, f64); 6] = [
+    (0.2, 1.0),
+    (0.2, 0.85),
+    (0.3, 0.85),
+    (0.3, 0.7),
+    (0.4, 0.7),
+    (0.45, 0.6),
+];
+
+/// Cells along the side of a checkerboard's field.
+const FIELD: usize = 3;
+
+/// Red, green and blue of the bars: 1 where lit.
+const BARS: [[f64; 3]; 7] = [
+    [1.0, 1.0, 1.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 1.0],
+    [0.0, 1.0, 0.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0],
+];
+
+/// A test image of one pixel a cell.
+#[derive(Clone, PartialEq, Debug)]
+pub struct TestImage {
+    /// What it is, for people.
+    pub title: String,
+    /// sRGB codes, as many channels as the table has.
+    pub wanted: Picture,
+    /// The same, compensated: codes for the projector.
+    pub compensated: Picture,
+    /// Share of the samples that the table has to cut.
+    pub clipped: f64,
+}
+
+/// The images that a table is verified with.
+///
+/// # Errors
+/// [`VideoError`] if the table cannot compensate a picture of its own size.
+pub fn test_images(table: &Table<'_>) -> Result<Vec<TestImage>, VideoError> {
+    let drawn = drawn(table.grid(), usize::from(table.channels()));
+    let compensator = Compensator::new(table, Settings::default())?;
+    // Where white is brighter than the wall can be everywhere, images are darker.
+    let most = Expected::new(table).even_grey().min(1.0);
+    let mut images = Vec::new();
+    for (title, shape) in drawn {
+        for (index, (dark, bright)) in RANGES.into_iter().enumerate() {
+            let wanted = codes(table.grid(), &shape, (most * dark, most * bright));
+            let mut compensated = wanted.clone();
+            let summary = compensator.picture(&mut compensated)?;
+            let clipped = summary.clipped as f64 / summary.samples.max(1) as f64;
+            if clipped <= MOST_CLIPPED || index + 1 == RANGES.len() {
+                images.push(TestImage {
+                    title,
+                    wanted,
+                    compensated,
+                    clipped,
+                });
+                break;
+            }
+        }
+    }
+    Ok(images)
+}
+
+/// Titles and shapes, 0 where darkest and 1 where brightest, one entry a channel.
+fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellPlanes)> {
+    let (rows, cols) = (grid.rows(), grid.cols());
+    let cells = move || (0..rows * cols).map(move |cell| (cell / cols, cell % cols));
+    // Back from the range that `wanted_images` has to 0 to 1.
+    let darkest = iltm_solve::content::DARKEST;
+    let natural = wanted_images(grid).map(|light| (light - darkest) / (1.0 - darkest));
+    let mut drawn: Vec<(String, CellPlanes)> = (0..NATURAL)
+        .map(|image| {
+            // Colours differ less than brightness does in what people watch.
+            let plane = |channel: usize| {
+                let own = natural.column(NATURAL + image * 3 + channel);
+                let common = natural.column(image);
+                let mix = |(common, own)| {
+                    if channels == 1 {
+                        common
+                    } else {
+                        0.65 * common + 0.35 * own
+                    }
+                };
+                common
+                    .iter()
+                    .copied()
+                    .zip(own.iter().copied())
+                    .map(mix)
+                    .collect()
+            };
+            let planes = (0..channels).map(plane).collect();
+            (format!("Natural image {}", image + 1), planes)
+        })
+        .collect();
+    drawn.push((
+        "Even grey".to_owned(),
+        vec![vec![0.5; grid.cells()]; channels],
+    ));
+    let fields =
+        |(row, col): (usize, usize)| f64::from((row / FIELD + col / FIELD).is_multiple_of(2));
+    drawn.push((
+        "Checkerboard".to_owned(),
+        vec![cells().map(fields).collect(); channels],
+    ));
+    if channels == 3 {
+        let bar = |col: usize, channel: usize| BARS[col * BARS.len() / cols][channel];
+        let plane = |channel| cells().map(|(_, col)| bar(col, channel)).collect();
+        drawn.push(("Colour bars".to_owned(), (0..channels).map(plane).collect()));
+    }
+    drawn
+}
+
+/// A shape as sRGB codes between two lights.
+fn codes(grid: Grid, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Picture {
+    let code = |shape: f64| {
+        let light = dark + (bright - dark) * shape;
+        (iltm_picture::Response::Srgb.value(light) * 255.0).round() as u8
+    };
+    let cells = 0..grid.cells();
+    let samples = cells.flat_map(|cell| shape.iter().map(move |plane| code(plane[cell])));
+    match Picture::new(FrameSize::of_grid(grid), Samples::Eight(samples.collect())) {
+        Some(picture) => picture,
+        None => unreachable!("a sample for each cell and channel"),
+    }
+}

@@ -1,0 +1,441 @@
+//! From photographs to a verdict.
+//!
+//! The error is the one that a solve predicts and the documentation measures: a
+//! photograph against the wanted light at the one scale, for all cells and colours, that
+//! suits it best ([`Comparison`]). What may be expected of it is put together from what is
+//! known: the table's own predicted error, what the projector's range and its 8-bit codes
+//! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
+
+use super::session::Shown;
+use super::{Expected, Session, VerifyError};
+use iltm_capture::CellPlanes;
+use iltm_picture::LightPicture;
+use iltm_report::{Comparison, steps};
+use iltm_runtime::{FrameSize, image::Table};
+use std::path::Path;
+
+/// How much larger than expected an error may be.
+const MARGIN: f64 = 1.5;
+
+/// Largest change of white from cell to cell that a camera standing elsewhere explains.
+pub(super) const MOST_VIEWPOINT: f64 = 0.01;
+
+/// Where the table predicts nothing: share of the error before that may remain.
+const UNPREDICTED: f64 = 0.5;
+
+/// Cells that are named as the worst.
+const WORST: usize = 8;
+
+/// A photograph that fits another picture this much better than its own shows that one.
+const EXCHANGED: f64 = 0.4;
+
+/// What the error is held against.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bound {
+    /// The largest error that passes.
+    pub limit: f64,
+    /// Whether the user chose it.
+    pub given: bool,
+    /// Error that the table predicts of itself at its top tier; `None` if it predicts
+    /// none.
+    pub predicted: Option<f64>,
+    /// Error that cut samples and the steps of 8-bit codes leave, mean over the images;
+    /// `None` if the table does not tell what light comes of an input.
+    pub range: Option<f64>,
+    /// Error that the noise of these photographs makes, mean over the images; `None` with
+    /// a single photograph of white.
+    pub noise: Option<f64>,
+    /// Error of finding the cells again: what white differs by from cell to cell, which a
+    /// camera elsewhere sees other parts of; at most 1 %, beyond which it is
+    /// a change of the scene.
+    pub viewpoint: f64,
+    /// All of them together: root of the sum of squares, mean over the images.
+    pub expected: Option<f64>,
+}
+
+/// A test image on the wall.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ImageVerdict {
+    /// Its number.
+    pub image: u8,
+    /// Error without and with compensation.
+    pub error: [f64; 2],
+    /// Both as the table read backwards would have them, without its own error; `None` if
+    /// it cannot be.
+    pub modelled: Option<[f64; 2]>,
+    /// Error with compensation if the table's own reference white is the scale: right
+    /// only where camera and exposure are the ones of the table's photographs.
+    pub at_table_white: f64,
+    /// Camera units of wanted white, by the scale that suits the compensated photograph
+    /// best.
+    pub white: f64,
+    /// Error of each cell with and without compensation, relative to reference white, root
+    /// mean square over the channels; `None` where it was not compared. Length `N`.
+    pub cells: [Vec<Option<f64>>; 2],
+}
+
+/// What has changed.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Drift {
+    /// White since the table was made; `None` if the table does not tell what light comes
+    /// of an input.
+    pub white: Option<WhiteChange>,
+    /// Largest change of white from its first photograph in this session to another.
+    pub session: f64,
+}
+
+/// How white differs from what the table expects.
+#[derive(Clone, PartialEq, Debug)]
+pub struct WhiteChange {
+    /// Light of white now, relative to what the table expects, each channel: the median
+    /// over the cells. Other exposures and cameras change it too.
+    pub level: Vec<f64>,
+    /// The same from cell to cell once that is divided out: root mean square.
+    pub shape: f64,
+    /// Of each cell, mean over the channels; `None` where it was not compared.
+    pub cells: Vec<Option<f64>>,
+}
+
+/// A cell with a large error.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct WorstCell {
+    /// Its row, from 0.
+    pub row: usize,
+    /// Its column, from 0.
+    pub col: usize,
+    /// Error with compensation, relative to reference white: root mean square over images
+    /// and channels.
+    pub error: f64,
+}
+
+/// The answer.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Verdict {
+    /// Whether the table keeps its promise.
+    pub passed: bool,
+    /// Mean error of the images without and with compensation.
+    pub error: [f64; 2],
+    /// What the latter is held against.
+    pub bound: Bound,
+    /// Image by image.
+    pub images: Vec<ImageVerdict>,
+    /// What has changed.
+    pub drift: Drift,
+    /// The worst cells, the worst first.
+    pub worst: Vec<WorstCell>,
+    /// Cells compared, and cells that the table knows.
+    pub cells: (usize, usize),
+}
+
+/// Judges a table by the photographs of its folder; `bound` is the largest error that
+/// passes, by default 1.5 times what is to be expected.
+///
+/// # Errors
+/// [`VerifyError::Order`] if a photograph shows the picture of another line.
+pub fn judge(
+    folder: &Path,
+    table: &Table<'_>,
+    session: &Session,
+    bound: Option<f64>,
+) -> Result<Verdict, VerifyError> {
+    let mut expected = Expected::new(table);
+    let known = expected.live().iter().filter(|live| **live).count();
+    let lit = LiveCells::new(&session.live);
+    let models: Option<Vec<[CellPlanes; 2]>> = (session.shown.iter())
+        .map(|shown| {
+            let [plain, compensated] = &shown.input;
+            Some([
+                expected.photograph(plain)?,
+                expected.photograph(compensated)?,
+            ])
+        })
+        .collect();
+    if let Some(models) = &models {
+        check_order(folder, session, models, &lit)?;
+    }
+    let white = table.reference_white().to_num::<f64>();
+    let images: Vec<ImageVerdict> = session
+        .shown
+        .iter()
+        .enumerate()
+        .map(|(at, shown)| {
+            let models = models.as_ref().map(|models| &models[at]);
+            image(shown, models, white, &lit)
+        })
+        .collect();
+    let mean = |of: &dyn Fn(&ImageVerdict) -> f64| {
+        images.iter().map(of).sum::<f64>() / images.len().max(1) as f64
+    };
+    let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
+    let drift = drift(session, &mut expected, white, &lit);
+    let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
+    let viewpoint = shape.min(MOST_VIEWPOINT);
+    let bound = self::bound(table, session, &images, (error[0], bound), viewpoint, &lit);
+    Ok(Verdict {
+        passed: error[1] <= bound.limit,
+        error,
+        bound,
+        drift,
+        worst: worst(table, &images),
+        cells: (lit.0.len(), known),
+        images,
+    })
+}
+
+/// The cells that are compared.
+struct LiveCells(Vec<usize>);
+
+impl LiveCells {
+    fn new(live: &[bool]) -> Self {
+        Self((0..live.len()).filter(|cell| live[*cell]).collect())
+    }
+
+    /// Their light side by side, to be compared like a picture.
+    fn light(&self, light: &CellPlanes) -> LightPicture {
+        let plane = |plane: &Vec<f64>| self.0.iter().map(|cell| plane[*cell] as f32).collect();
+        let size = FrameSize::new(self.0.len() as u16, 1);
+        let planes = light.iter().map(plane).collect();
+        match size.and_then(|size| LightPicture::new(size, planes)) {
+            Some(picture) => picture,
+            None => unreachable!("a table has cells, and one or three channels"),
+        }
+    }
+
+    fn compare(&self, seen: &CellPlanes, wanted: &CellPlanes) -> Comparison {
+        Comparison::new(&self.light(seen), &self.light(wanted))
+    }
+
+    /// Values of these cells, among all `cells`.
+    fn among(&self, cells: usize, values: &[f32]) -> Vec<Option<f64>> {
+        let mut all = vec![None; cells];
+        for (cell, value) in self.0.iter().zip(values) {
+            all[*cell] = Some(f64::from(*value));
+        }
+        all
+    }
+
+    /// Values of these cells in one channel.
+    fn of<'l>(&'l self, plane: &'l [f64]) -> impl Iterator<Item = f64> + 'l {
+        self.0.iter().map(|cell| plane[*cell])
+    }
+}
+
+fn image(
+    shown: &Shown,
+    models: Option<&[CellPlanes; 2]>,
+    white: f64,
+    lit: &LiveCells,
+) -> ImageVerdict {
+    let cells = shown.wanted[0].len();
+    let compared = shown
+        .seen
+        .each_ref()
+        .map(|seen| lit.compare(seen, &shown.wanted));
+    let error = |model| lit.compare(model, &shown.wanted).error;
+    let modelled = models.map(|models| models.each_ref().map(error));
+    let scale = compared[1].scale;
+    ImageVerdict {
+        image: shown.image,
+        error: compared.each_ref().map(|compared| compared.error),
+        modelled,
+        at_table_white: at_scale(&shown.seen[1], &shown.wanted, 1.0 / white, lit),
+        white: if scale > 0.0 { 1.0 / scale } else { 0.0 },
+        cells: compared.map(|compared| lit.among(cells, &compared.map)),
+    }
+}
+
+/// The error at a scale that is not chosen.
+fn at_scale(seen: &CellPlanes, wanted: &CellPlanes, scale: f64, lit: &LiveCells) -> f64 {
+    let pairs = || {
+        let planes = seen.iter().zip(wanted);
+        planes.flat_map(|(seen, wanted)| lit.of(seen).zip(lit.of(wanted)))
+    };
+    let off: f64 = pairs().map(|(s, w)| (scale * s - w).powi(2)).sum();
+    let norm: f64 = pairs().map(|(_, w)| w * w).sum();
+    if norm > 0.0 { (off / norm).sqrt() } else { 1.0 }
+}
+
+/// What the error is held against.
+fn bound(
+    table: &Table<'_>,
+    session: &Session,
+    images: &[ImageVerdict],
+    (before, given): (f64, Option<f64>),
+    viewpoint: f64,
+    lit: &LiveCells,
+) -> Bound {
+    let own = table.inverse_error().to_num::<f64>();
+    let predicted = steps(table).last().map(|step| step.total);
+    let predicted = predicted.filter(|_| own > 0.0);
+    let noise = noise(session, lit);
+    let count = images.len().max(1) as f64;
+    let mean = |of: &dyn Fn(usize) -> f64| (0..images.len()).map(of).sum::<f64>() / count;
+    let noise_of = |image: usize| noise.as_ref().map_or(0.0, |noise| noise[image]);
+    let range_of = |image: usize| images[image].modelled.map_or(0.0, |modelled| modelled[1]);
+    let modelled = images.iter().all(|image| image.modelled.is_some());
+    let expected = predicted.map(|predicted| {
+        mean(&|image| {
+            predicted
+                .hypot(range_of(image))
+                .hypot(noise_of(image))
+                .hypot(viewpoint)
+        })
+    });
+    let limit = given.or(expected.map(|expected| MARGIN * expected));
+    Bound {
+        limit: limit.unwrap_or(UNPREDICTED * before),
+        given: given.is_some(),
+        predicted,
+        range: modelled.then(|| mean(&range_of)),
+        viewpoint,
+        noise: noise.is_some().then(|| mean(&noise_of)),
+        expected,
+    }
+}
+
+/// Error that noise makes in each compensated photograph, from what photographs of white
+/// differ by; `None` with a single one.
+fn noise(session: &Session, lit: &LiveCells) -> Option<Vec<f64>> {
+    let white = &session.revisited.white;
+    let (first, others) = white.split_first()?;
+    let first = lit.light(first);
+    let norm = norm(&first);
+    // Relative to white, of one of the two that differ.
+    let of_pair = |other| Comparison::new(&lit.light(other), &first).error / 2.0_f64.sqrt();
+    let relative: Vec<f64> = others.iter().map(of_pair).collect();
+    if relative.is_empty() || norm <= 0.0 {
+        return None;
+    }
+    let square: f64 = relative.iter().map(|error| error * error).sum();
+    let white = (square / relative.len() as f64).sqrt() * norm;
+    let of_image = |shown: &Shown| white / self::norm(&lit.light(&shown.seen[1])).max(1e-12);
+    Some(session.shown.iter().map(of_image).collect())
+}
+
+fn norm(picture: &LightPicture) -> f64 {
+    let light = picture.planes().iter().flatten();
+    light
+        .map(|light| f64::from(*light).powi(2))
+        .sum::<f64>()
+        .sqrt()
+}
+
+/// Refuses photographs that show another picture than their own.
+fn check_order(
+    folder: &Path,
+    session: &Session,
+    models: &[[CellPlanes; 2]],
+    lit: &LiveCells,
+) -> Result<(), VerifyError> {
+    let named = |image: u8, half: usize| {
+        let role = [super::VerifyRole::Plain, super::VerifyRole::Compensated][half];
+        role(image).to_string()
+    };
+    for (own, shown) in session.shown.iter().enumerate() {
+        for half in 0..2 {
+            let error = |model: &CellPlanes| lit.compare(model, &shown.seen[half]).error;
+            let of_own = error(&models[own][half]);
+            // Plain and compensated pictures of one image differ by too little to tell
+            // them apart where the table may be wrong.
+            let others = models.iter().enumerate().filter(|(other, _)| *other != own);
+            let fits = others.flat_map(|(other, pair)| {
+                pair.iter()
+                    .enumerate()
+                    .map(move |(half, model)| (other, half, model))
+            });
+            let best = fits
+                .map(|(other, half, model)| (other, half, error(model)))
+                .min_by(|a, b| a.2.total_cmp(&b.2));
+            if let Some((other, other_half, _)) = best.filter(|best| best.2 < EXCHANGED * of_own) {
+                return Err(VerifyError::Order {
+                    path: folder.join(&shown.photos[half]),
+                    shows: named(session.shown[other].image, other_half),
+                    own: named(shown.image, half),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// White now against the white that the table expects, and against its first photograph.
+fn drift(session: &Session, expected: &mut Expected<'_, '_>, white: f64, lit: &LiveCells) -> Drift {
+    let seen = &session.revisited.white;
+    let total = |light: &CellPlanes| {
+        light
+            .iter()
+            .map(|plane| lit.of(plane).sum::<f64>())
+            .sum::<f64>()
+    };
+    let first = seen.first().map_or(0.0, total).max(1e-12);
+    let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
+    let ones = vec![vec![1.0; session.live.len()]; session.revisited.channels];
+    let flood = expected.photograph(&ones);
+    Drift {
+        white: flood.map(|flood| white_change(session, &flood, white, lit)),
+        session: changes.fold(0.0, f64::max),
+    }
+}
+
+fn white_change(session: &Session, flood: &CellPlanes, white: f64, lit: &LiveCells) -> WhiteChange {
+    let seen = &session.revisited.white;
+    let mut level = Vec::new();
+    let mut change = vec![0.0; lit.0.len()];
+    let mut square = 0.0;
+    for (channel, plane) in flood.iter().enumerate() {
+        let mean = |cell: &usize| {
+            seen.iter().map(|light| light[channel][*cell]).sum::<f64>() / seen.len().max(1) as f64
+        };
+        let ratio = |cell: &usize| mean(cell) / (white * plane[*cell]).max(1e-12);
+        let ratios: Vec<f64> = lit.0.iter().map(ratio).collect();
+        let median = median(ratios.clone());
+        for (change, ratio) in change.iter_mut().zip(&ratios) {
+            let off = ratio / median.max(1e-12) - 1.0;
+            *change += off / flood.len() as f64;
+            square += off * off;
+        }
+        level.push(median);
+    }
+    let change: Vec<f32> = change.into_iter().map(|change| change as f32).collect();
+    WhiteChange {
+        level,
+        shape: (square / (lit.0.len() * flood.len()).max(1) as f64).sqrt(),
+        cells: lit.among(session.live.len(), &change),
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Error of every cell over all images, with (1) or without (0) compensation.
+pub(super) fn over_images(images: &[ImageVerdict], half: usize) -> Vec<Option<f64>> {
+    let cells = images.first().map_or(0, |image| image.cells[half].len());
+    let of_cell = |cell: usize| {
+        let squares: Option<Vec<f64>> = images
+            .iter()
+            .map(|image| image.cells[half][cell].map(|error| error * error))
+            .collect();
+        let squares = squares?;
+        Some((squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt())
+    };
+    (0..cells).map(of_cell).collect()
+}
+
+fn worst(table: &Table<'_>, images: &[ImageVerdict]) -> Vec<WorstCell> {
+    let cols = table.grid().cols();
+    let cells = over_images(images, 1).into_iter().enumerate();
+    let mut worst: Vec<WorstCell> = cells
+        .filter_map(|(cell, error)| {
+            Some(WorstCell {
+                row: cell / cols,
+                col: cell % cols,
+                error: error?,
+            })
+        })
+        .collect();
+    worst.sort_by(|a, b| b.error.total_cmp(&a.error));
+    worst.truncate(WORST);
+    worst
+}

@@ -1,0 +1,127 @@
+//! The pictures of a verdict: maps of the cells, and the test images as the wall showed
+//! them.
+
+use super::judge::over_images;
+use super::{Session, Verdict};
+use iltm_capture::CellPlanes;
+use iltm_picture::{
+    ColourScale, LightPicture, Palette, Picture, Samples,
+    html::{PictureFile, picture_file},
+};
+use iltm_runtime::{FrameSize, Grid, image::Table};
+
+/// Pixels that the longer side of a map should have at least.
+const MAP_SIDE: usize = 480;
+
+/// Grey of cells that were not compared.
+const UNKNOWN: [u8; 3] = [88, 92, 100];
+
+/// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `drift`, and
+/// of each test image `K-wanted`, `K-before`, `K-after`.
+#[must_use]
+pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<PictureFile> {
+    let grid = table.grid();
+    let errors = |half| {
+        map(
+            grid,
+            &error_scale(verdict, half),
+            &over_images(&verdict.images, half),
+        )
+    };
+    let mut files = vec![
+        picture_file("worst-cells", &errors(1)),
+        picture_file("worst-cells-before", &errors(0)),
+    ];
+    if let Some(white) = &verdict.drift.white {
+        let change: Vec<Option<f64>> = white.cells.iter().map(|c| c.map(f64::abs)).collect();
+        let change = map(grid, &drift_scale(verdict), &change);
+        files.push(picture_file("drift", &change));
+    }
+    for (shown, image) in session.shown.iter().zip(&verdict.images) {
+        let number = image.image;
+        let wall = |half: usize| as_seen(grid, &shown.seen[half], &shown.wanted, &session.live);
+        files.push(picture_file(
+            &format!("{number}-wanted"),
+            &lit(grid, &shown.wanted),
+        ));
+        files.push(picture_file(&format!("{number}-before"), &wall(0)));
+        files.push(picture_file(&format!("{number}-after"), &wall(1)));
+    }
+    files
+}
+
+/// Colours of the map of errors with (1) or without (0) compensation: each has its own, or
+/// nothing would be seen of what is left.
+pub(super) fn error_scale(verdict: &Verdict, half: usize) -> ColourScale {
+    let errors = over_images(&verdict.images, half).into_iter().flatten();
+    ColourScale::linear(Palette::Magma, rounded(errors.fold(0.0, f64::max)))
+}
+
+/// Colours of the map of changes.
+pub(super) fn drift_scale(verdict: &Verdict) -> ColourScale {
+    let white = verdict.drift.white.iter();
+    let cells = white.flat_map(|white| white.cells.iter().flatten());
+    let largest = cells.fold(0.0_f64, |a, b| a.max(b.abs()));
+    ColourScale::linear(Palette::Viridis, rounded(largest.max(0.01)))
+}
+
+/// The next number up with one digit.
+fn rounded(value: f64) -> f64 {
+    let value = value.max(1e-3);
+    let power = 10_f64.powf(value.log10().floor());
+    (value / power).ceil() * power
+}
+
+fn map(grid: Grid, scale: &ColourScale, cells: &[Option<f64>]) -> Picture {
+    let colour = |cell: &Option<f64>| cell.map_or(UNKNOWN, |value| scale.colour(value));
+    blocks(grid, 3, &cells.iter().flat_map(colour).collect::<Vec<u8>>())
+}
+
+/// A photograph's cells at the brightness that suits the wanted image best, as its error is
+/// taken.
+fn as_seen(grid: Grid, seen: &CellPlanes, wanted: &CellPlanes, live: &[bool]) -> Picture {
+    let pairs = || {
+        let planes = seen.iter().zip(wanted);
+        let cells = planes.flat_map(|(seen, wanted)| seen.iter().zip(wanted).zip(live));
+        cells.filter(|(_, live)| **live).map(|(pair, _)| pair)
+    };
+    let both: f64 = pairs().map(|(seen, wanted)| seen * wanted).sum();
+    let own: f64 = pairs().map(|(seen, _)| seen * seen).sum();
+    let scale = if own > 0.0 { both / own } else { 0.0 };
+    let light = |plane: &Vec<f64>| {
+        let cells = plane.iter().zip(live);
+        let scaled = cells.map(|(light, live)| if *live { scale * light } else { 0.0 });
+        scaled.collect()
+    };
+    lit(grid, &seen.iter().map(light).collect())
+}
+
+/// Light of the cells as a screen shows it.
+fn lit(grid: Grid, light: &CellPlanes) -> Picture {
+    let plane = |plane: &Vec<f64>| plane.iter().map(|light| *light as f32).collect();
+    let planes = light.iter().map(plane).collect();
+    let Some(picture) = LightPicture::new(FrameSize::of_grid(grid), planes) else {
+        unreachable!("one or three values for each cell");
+    };
+    let shown = picture.for_display();
+    match shown.samples() {
+        Samples::Eight(samples) => blocks(grid, shown.channels(), samples),
+        Samples::Sixteen(_) => unreachable!("screens get 8 bits"),
+    }
+}
+
+/// Cells as squares of pixels.
+fn blocks(grid: Grid, channels: usize, samples: &[u8]) -> Picture {
+    let side = MAP_SIDE.div_ceil(grid.rows().max(grid.cols()));
+    let (width, height) = (grid.cols() * side, grid.rows() * side);
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y / side, x / side)));
+    let all = pixels.flat_map(|(row, col)| {
+        let at = (row * grid.cols() + col) * channels;
+        samples[at..at + channels].iter().copied()
+    });
+    let size = FrameSize::new(width as u16, height as u16);
+    match size.and_then(|size| Picture::new(size, Samples::Eight(all.collect()))) {
+        Some(picture) => picture,
+        None => unreachable!("squares of the cells' samples"),
+    }
+}

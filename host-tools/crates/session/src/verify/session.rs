@@ -1,0 +1,276 @@
+//! A verification folder with its photographs, read back and checked.
+
+use super::folder::{plain, wanted_file};
+use super::response::ProjectorCurves;
+use super::role::{VerifyManifest, VerifyRole, VerifyShot};
+use super::{Expected, VerifyError};
+use iltm_capture::VERIFY_FILE;
+use iltm_capture::{CaptureError, CellPlanes, Revisited, Settings, Shot, find_photo, revisit};
+use iltm_compile::learn::mixing_in;
+use iltm_picture::{LightPicture, Picture, Response, Samples, png, progress::Progress};
+use iltm_runtime::{FrameSize, image::Table};
+use iltm_video::{Compensator, VideoError};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// A test image that was photographed.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Its number in `verify.csv`.
+    pub image: u8,
+    /// The light that was wanted, relative to reference white, one entry a channel.
+    pub wanted: CellPlanes,
+    /// Input of the projector for the picture as it is, and compensated, relative to its
+    /// white.
+    pub input: [CellPlanes; 2],
+    /// What was photographed of either, camera units, ambient light included.
+    pub seen: [CellPlanes; 2],
+    /// The photographs, relative to the folder.
+    pub photos: [PathBuf; 2],
+}
+
+/// Everything that the photographs of a verification folder say.
+#[derive(Clone, Debug)]
+pub struct Session {
+    /// The test images, by number.
+    pub shown: Vec<Shown>,
+    /// The cells, white and black.
+    pub revisited: Revisited,
+    /// Cells that the table has gains for and that were measured, length `N`.
+    pub live: Vec<bool>,
+}
+
+/// Share of the table's cells that must be found.
+const LEAST_FOUND: f64 = 0.5;
+
+impl Session {
+    /// Reads the folder that was made with `table`.
+    ///
+    /// # Errors
+    /// [`VerifyError`] for whatever is missing, contradictory or unusable.
+    pub fn read(
+        folder: &Path,
+        table: &Table<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Self, VerifyError> {
+        let manifest = VerifyManifest::read(folder).map_err(|error| match error {
+            CaptureError::NoManifest { .. } => VerifyError::NoManifest {
+                path: folder.to_owned(),
+            },
+            other => other.into(),
+        })?;
+        let settings = Settings::read(folder)?;
+        let mixing = mixing_in(table.provenance());
+        let mut code: Vec<Shot> = Vec::new();
+        let mut images: BTreeMap<u8, [Option<VerifyShot>; 2]> = BTreeMap::new();
+        for shot in manifest.shots {
+            match shot.role {
+                VerifyRole::Code(role) => code.push(with_role(&shot, role)),
+                VerifyRole::Plain(image) => images.entry(image).or_default()[0] = Some(shot),
+                VerifyRole::Compensated(image) => images.entry(image).or_default()[1] = Some(shot),
+            }
+        }
+        let path = || folder.join(VERIFY_FILE);
+        if images.is_empty() {
+            return Err(VerifyError::NoImages { path: path() });
+        }
+        let mut pairs = Vec::new();
+        for (image, pair) in images {
+            let lacking = |what| VerifyError::Unpaired {
+                path: path(),
+                image,
+                what,
+            };
+            let [own, compensated] = pair;
+            let own = own.ok_or_else(|| lacking("plain"))?;
+            let compensated = compensated.ok_or_else(|| lacking("compensated"))?;
+            pairs.push((image, [own, compensated]));
+        }
+        check_all_there(folder, &code, &pairs)?;
+        let pictures = pictures(folder, table, &pairs)?;
+        // Of the shots of pictures, only photograph and line are looked at.
+        let flat = pairs.iter().flat_map(|(_, pair)| pair);
+        let shots: Vec<Shot> = flat
+            .map(|shot| with_role(shot, iltm_capture::Role::White))
+            .collect();
+        let revisited = revisit(folder, &settings, mixing, (&code, &shots), progress)?;
+        let live = live(folder, table, &revisited)?;
+        let shown = pairs
+            .into_iter()
+            .zip(pictures)
+            .zip(revisited.pictures.chunks_exact(2));
+        let shown = shown.map(|(((image, pair), picture), seen)| Shown {
+            image,
+            wanted: picture.wanted,
+            input: picture.input,
+            seen: [seen[0].clone(), seen[1].clone()],
+            photos: pair.map(|shot| shot.photo),
+        });
+        Ok(Self {
+            shown: shown.collect(),
+            live,
+            revisited,
+        })
+    }
+}
+
+fn with_role(shot: &VerifyShot, role: iltm_capture::Role) -> Shot {
+    Shot {
+        index: shot.index,
+        role,
+        pattern: shot.pattern.clone(),
+        photo: shot.photo.clone(),
+        exposure: shot.exposure,
+        line: shot.line,
+    }
+}
+
+fn check_all_there(
+    folder: &Path,
+    code: &[Shot],
+    pairs: &[(u8, [VerifyShot; 2])],
+) -> Result<(), VerifyError> {
+    let of_code = code.iter().map(|shot| (shot.index, &shot.photo));
+    let of_images = pairs.iter().flat_map(|(_, pair)| pair);
+    let of_images = of_images.map(|shot| (shot.index, &shot.photo));
+    let mut missing = Vec::new();
+    for (index, photo) in of_code.chain(of_images) {
+        if find_photo(folder, photo)?.is_none() {
+            missing.push((index, photo));
+        }
+    }
+    missing.sort();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(VerifyError::Missing {
+        folder: folder.to_owned(),
+        missing: missing
+            .into_iter()
+            .map(|(_, photo)| photo.clone())
+            .collect(),
+    })
+}
+
+/// What the pictures of a test image say.
+struct Pictures {
+    wanted: CellPlanes,
+    input: [CellPlanes; 2],
+}
+
+/// Reads the pictures and makes sure that they are what this table makes.
+fn pictures(
+    folder: &Path,
+    table: &Table<'_>,
+    pairs: &[(u8, [VerifyShot; 2])],
+) -> Result<Vec<Pictures>, VerifyError> {
+    let curves = ProjectorCurves::new(table);
+    let compensator = Compensator::new(table, iltm_video::Settings::default())?;
+    let of_pair = |(image, [own, compensated]): &(u8, [VerifyShot; 2])| {
+        let wanted = read(folder, &wanted_file(*image), table)?;
+        let given = [
+            read(folder, &own.pattern, table)?,
+            read(folder, &compensated.pattern, table)?,
+        ];
+        let mut made = wanted.clone();
+        compensator.picture(&mut made)?;
+        let expected = [plain(&wanted, &curves), made];
+        let shots = [own, compensated];
+        for ((given, expected), shot) in given.iter().zip(&expected).zip(shots) {
+            if given != expected {
+                return Err(VerifyError::OtherTable {
+                    path: folder.join(&shot.pattern),
+                    image: *image,
+                });
+            }
+        }
+        Ok(Pictures {
+            wanted: light(&LightPicture::decode(&wanted, Response::Srgb)),
+            input: given.map(|picture| input(&picture, &curves)),
+        })
+    };
+    pairs.iter().map(of_pair).collect()
+}
+
+/// A picture of one pixel a cell, 8 bits, as many channels as the table.
+fn read(folder: &Path, name: &Path, table: &Table<'_>) -> Result<Picture, VerifyError> {
+    let path = folder.join(name);
+    let file = File::open(&path).map_err(|source| {
+        if source.kind() == ErrorKind::NotFound {
+            let missing = vec![name.to_owned()];
+            let folder = folder.to_owned();
+            return VerifyError::Missing { folder, missing };
+        }
+        let path = path.clone();
+        VerifyError::Capture(CaptureError::Io { path, source })
+    })?;
+    let picture = png::read(BufReader::new(file)).map_err(VideoError::Png)?;
+    let (grid, size) = (table.grid(), picture.size());
+    if size != FrameSize::of_grid(grid) {
+        return Err(VerifyError::Grid {
+            path,
+            found: format!("{} x {}", size.height(), size.width()),
+            expected: grid.to_string(),
+        });
+    }
+    let suits = picture.channels() == usize::from(table.channels());
+    if !suits || !matches!(picture.samples(), Samples::Eight(_)) {
+        return Err(VerifyError::Picture {
+            path,
+            channels: table.channels(),
+        });
+    }
+    Ok(picture)
+}
+
+fn light(picture: &LightPicture) -> CellPlanes {
+    let plane = |plane: &Vec<f32>| plane.iter().map(|light| f64::from(*light)).collect();
+    picture.planes().iter().map(plane).collect()
+}
+
+/// The projector's input that codes stand for.
+fn input(picture: &Picture, curves: &ProjectorCurves) -> CellPlanes {
+    let Samples::Eight(samples) = picture.samples() else {
+        unreachable!("`read` takes 8 bits only");
+    };
+    let channels = picture.channels();
+    let plane = |channel: usize| {
+        let codes = samples.iter().skip(channel).step_by(channels);
+        codes.map(|code| curves.drive(channel, *code)).collect()
+    };
+    (0..channels).map(plane).collect()
+}
+
+/// The cells that can be compared.
+fn live(folder: &Path, table: &Table<'_>, revisited: &Revisited) -> Result<Vec<bool>, VerifyError> {
+    let path = || folder.to_owned();
+    if revisited.grid != table.grid() {
+        return Err(VerifyError::Grid {
+            path: path(),
+            found: revisited.grid.to_string(),
+            expected: table.grid().to_string(),
+        });
+    }
+    let channels = usize::from(table.channels());
+    if revisited.channels != channels {
+        return Err(VerifyError::Channels {
+            path: path(),
+            photographs: revisited.channels,
+            table: channels,
+        });
+    }
+    let known = Expected::new(table).live();
+    let both = known.iter().zip(&revisited.live);
+    let live: Vec<bool> = both.map(|(known, seen)| *known && *seen).collect();
+    let count = |cells: &[bool]| cells.iter().filter(|live| **live).count();
+    if (count(&live) as f64) < LEAST_FOUND * count(&known) as f64 || count(&live) == 0 {
+        return Err(VerifyError::TooFewCells {
+            path: path(),
+            found: count(&live),
+            live: count(&known),
+        });
+    }
+    Ok(live)
+}

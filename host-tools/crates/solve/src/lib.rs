@@ -1,0 +1,456 @@
+//! From [`Measurements`] to [`InverseTransport`].
+//!
+//! The inverse of a scene's light transport is `T^-1 = diag(g) - K`: texture is
+//! in the gains `g` alone, and `K` is geometry, one bounce, smooth and
+//! non-negative. [`Method::Joint`] looks for exactly that, over all channels and
+//! all photographs at once; [`Method::Direct`] is the method of Chu, Ng, Pahwa,
+//! Quek, Huang, *Compressive Inverse Light Transport* (BMVC 2011), for
+//! comparison.
+//!
+//! ```text
+//! observed, prepare     what is solved from, checked and scaled
+//! own_light             which cells can be solved for
+//! blur                  where a projector out of focus throws its light
+//! haar, lane            the sparse basis, sixteen images at a time
+//! joint                 lambda, scales of the channels, solve, gains, deviations
+//!   admm                the iteration, over data_term, row_block and column_block
+//! direct                the paper's method, over basis_pursuit
+//! two_stage, brute_force    forward transport first, then its inverse
+//! forward, held_out     light from an inverse; the photographs it is judged by
+//! content_loop          what clipping makes of natural images
+//! flux                  what of a gain is the projector's, where reciprocity tells
+//! sharpen               undoes the projector's blur as well
+//! recovery              whether the paper's theorem promises anything here
+//! gain_only             what it is judged against, and what remains if it loses
+//! ```
+//!
+//! # Cost
+//!
+//! An iteration takes `O(N^2 min(N, m))` multiplications, memory grows as
+//! `N^2 + N m`. Whole solves of a simulated corner, `lambda` by held-out
+//! photographs included, on 2 cores (x86-64, AVX-512) that other work kept busy;
+//! memory is what is held beyond the measurements. Repeat with
+//! `cargo bench -p iltm --bench solve`.
+//!
+//! | cells | photographs | channels | joint | | direct | |
+//! |---|---|---|---|---|---|---|
+//! | 273 | 41 | 1 | 0.21 s | 8 MB | 0.25 s | 5 MB |
+//! | 273 | 151 | 1 | 0.24 s | 12 MB | 0.19 s | 7 MB |
+//! | 273 | 301 | 1 | 0.26 s | 19 MB | 0.18 s | 10 MB |
+//! | 384 | 151 | 3 | 1.5 s | 47 MB | 1.3 s | 19 MB |
+//! | 1024 | 301 | 1 | 4.5 s | 124 MB | 4.7 s | 79 MB |
+//! | 2025 | 301 | 1 | 18 s | 415 MB | 60 s | 270 MB |
+
+mod admm;
+mod basis_pursuit;
+mod blur;
+mod brute_force;
+mod column_block;
+pub mod content;
+mod content_loop;
+mod convergence;
+mod data_term;
+mod direct;
+mod error;
+mod flux;
+mod forward;
+mod gain_only;
+mod haar;
+mod held_out;
+mod inverse;
+mod joint;
+mod lane;
+mod observed;
+mod options;
+mod own_light;
+mod prepare;
+pub mod recovery;
+mod report;
+mod row_block;
+mod sharpen;
+mod solution;
+#[cfg(test)]
+mod test_linear_program;
+#[cfg(test)]
+mod test_reference;
+#[cfg(test)]
+#[allow(missing_docs, unreachable_pub)]
+mod test_scene;
+#[cfg(test)]
+mod tests;
+mod two_stage;
+
+pub use blur::blur;
+pub use convergence::Convergence;
+pub use error::SolveError;
+pub use flux::Flux;
+pub use forward::Inverse;
+pub use gain_only::{GainOnly, gain_only};
+pub use haar::{Basis, Haar};
+pub use inverse::{ChannelInverse, InverseTransport};
+pub use observed::{CellNoise, Observed, ObservedChannel};
+pub use options::{Method, SolveOptions, UnknownMethod};
+pub use own_light::{LeftOut, WhyLeftOut};
+pub use recovery::Recovery;
+pub use report::{
+    Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
+};
+pub use two_stage::inverted;
+
+use content_loop::ContentLoop;
+use convergence::Stop;
+use held_out::{Judged, Split, predict};
+use iltm_capture::{Measurements, Role};
+use iltm_picture::progress::Progress;
+use joint::Solver;
+use prepare::Prepared;
+use sharpen::sharpen;
+use solution::{Candidate, Solution, drop_dead};
+use std::time::Instant;
+
+/// A solve that ends with a residual above this is no answer.
+const HOPELESS: f64 = 0.05;
+/// A predicted error above this means that patterns and photographs do not belong
+/// together: random patterns that have nothing to do with the light are off by
+/// 0.5 to 0.7.
+const UNPREDICTABLE: f64 = 0.4;
+/// Predicted error up to which no other method is tried.
+const GOOD: f64 = 0.01;
+/// Another method's predicted error, relative to `joint`'s, from which it is taken.
+const BETTER: f64 = 0.8;
+/// Photographs below which no scene of more cells can be told.
+const LEAST_PHOTOGRAPHS: usize = 8;
+
+/// Solves `measurements` for the inverse light transport.
+///
+/// The same measurements and options give the same bits, whatever the number of
+/// threads.
+///
+/// # Errors
+/// [`SolveError`] if the measurements are inconsistent, not finite or too few,
+/// if the iteration does not come near an answer, or if the answer cannot be the
+/// inverse of a real scene.
+pub fn solve(
+    measurements: &Measurements,
+    options: &SolveOptions,
+    progress: &dyn Progress,
+) -> Result<(InverseTransport, SolveReport), SolveError> {
+    solve_observed(&measurements.into(), options, progress)
+}
+
+/// [`solve`] for observations that are not from photographs.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_observed(
+    observed: &Observed<'_>,
+    options: &SolveOptions,
+    progress: &dyn Progress,
+) -> Result<(InverseTransport, SolveReport), SolveError> {
+    let mut clock = Clock::new();
+    options.check()?;
+    let prepared = Prepared::new(observed)?;
+    check_count(&prepared, options.method)?;
+    let haar = Haar::new(observed.grid, options.basis);
+    let splits = Split::all(&prepared);
+    let mut seconds = Seconds {
+        prepare: clock.lap(),
+        ..Seconds::default()
+    };
+    let stop = Stop {
+        tolerance: options.tolerance,
+        iterations: options.iterations,
+    };
+    let task = Task {
+        prepared: &prepared,
+        haar: &haar,
+        splits: &splits,
+        stop,
+        progress,
+    };
+    let outcome = match options.method {
+        Method::Joint => {
+            let joint = task.joint(options.lambda, &mut seconds, &mut clock);
+            task.or_two_stage(joint, &mut seconds, &mut clock)
+        }
+        other => task.by_rows(other, &mut seconds, &mut clock)?,
+    };
+    let candidates = outcome.solution.candidates(&prepared.live);
+    check_answer(&outcome.solution, &candidates, &prepared, options)?;
+    let condition = |candidate: &Candidate| candidate.inverse.condition(&prepared.live);
+    let condition = candidates.iter().map(condition).fold(1.0, f64::max);
+    let prediction = predict(&prepared, &outcome.judged);
+    check_prediction(&prediction)?;
+    let blur = prepared.blur.clone().map(|mut blur| {
+        drop_dead(&mut blur, &prepared.live);
+        blur
+    });
+    let content = ContentLoop::new(observed.grid, &prepared, &candidates, blur.as_ref());
+    let sharpened = blur
+        .as_ref()
+        .and_then(|blur| sharpen(blur, &prepared.live, &candidates, &content));
+    let with_operator = sharpened.as_ref().map_or_else(
+        || {
+            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
+            content.operator(&inverses).0
+        },
+        |sharpened| sharpened.error,
+    );
+    let clipped = Clipped {
+        uncompensated: content.nothing(),
+        gain_only: content.gain_only(&prediction),
+        compensated: with_operator,
+    };
+    seconds.finish = clock.lap();
+    let recovery = recovery(&prepared, &haar, &candidates);
+    seconds.recovery = clock.lap();
+    let report = SolveReport {
+        method: outcome.method,
+        photographs: count(&prepared, outcome.method, &splits),
+        left_out: prepared.left_out.clone(),
+        live_cells: prepared.live_cells(),
+        cells: prepared.cells(),
+        lambda: outcome.lambda,
+        lambda_path: outcome.trials,
+        convergence: outcome.solution.convergence,
+        iterations: outcome.iterations,
+        coefficients: outcome.solution.coefficients,
+        condition,
+        compensation: prediction.best(clipped),
+        prediction,
+        clipped,
+        recovery,
+        seconds,
+    };
+    Ok((
+        outcome
+            .solution
+            .in_camera_units(observed, &prepared, sharpened.map(|s| s.parts)),
+        report,
+    ))
+}
+
+/// What both methods need.
+struct Task<'t> {
+    prepared: &'t Prepared,
+    haar: &'t Haar,
+    splits: &'t [Split],
+    stop: Stop,
+    progress: &'t dyn Progress,
+}
+
+/// What a method returns beside its answer.
+struct Outcome<'t> {
+    method: Method,
+    solution: Solution,
+    lambda: f64,
+    trials: Vec<LambdaTrial>,
+    iterations: u32,
+    /// Inverses that have not seen the held-out photographs.
+    judged: Vec<Judged<'t>>,
+}
+
+impl<'t> Task<'t> {
+    fn joint(&self, lambda: Option<f64>, seconds: &mut Seconds, clock: &mut Clock) -> Outcome<'t> {
+        let mut solver = Solver::new(self.prepared, self.haar, self.stop);
+        let choice = solver.choose(self.splits, lambda, self.progress);
+        seconds.choose = clock.lap();
+        let lambda = choice.lambda;
+        let solution = solver.solve(lambda, self.progress);
+        seconds.solve = clock.lap();
+        let iterations = solver.iterations();
+        Outcome {
+            method: Method::Joint,
+            solution,
+            lambda,
+            trials: choice.trials,
+            iterations,
+            judged: choice.judged,
+        }
+    }
+
+    /// The two-stage answer where held-out photographs say that `joint` errs and that the
+    /// other errs less: where cells differ much in light, or each lights several places, `K`
+    /// is not what `joint` takes it for, and the transport itself is easier to find.
+    fn or_two_stage(
+        &self,
+        joint: Outcome<'t>,
+        seconds: &mut Seconds,
+        clock: &mut Clock,
+    ) -> Outcome<'t> {
+        let error = predict(self.prepared, &joint.judged).compensated;
+        // Written so that what is not a number asks for another answer.
+        let good = error <= GOOD;
+        // Few photographs are held out in turns, which takes as many solves.
+        if good || self.splits.len() > 1 {
+            return joint;
+        }
+        let spent = *seconds;
+        let other = self.by_rows(Method::TwoStage, seconds, clock);
+        seconds.choose += spent.choose;
+        seconds.solve += spent.solve;
+        let live = &self.prepared.live;
+        let sound = |other: &Outcome<'_>| {
+            let candidates = other.solution.candidates(live);
+            let near = other.solution.convergence.residual() <= HOPELESS;
+            near && candidates.iter().all(|c| c.inverse.flaw(live).is_none())
+        };
+        match other {
+            Ok(other) if sound(&other) => {
+                let instead = predict(self.prepared, &other.judged).compensated;
+                if instead < BETTER * error {
+                    other
+                } else {
+                    joint
+                }
+            }
+            _ => joint,
+        }
+    }
+
+    /// Any method that takes each row for itself.
+    fn by_rows(
+        &self,
+        method: Method,
+        seconds: &mut Seconds,
+        clock: &mut Clock,
+    ) -> Result<Outcome<'t>, SolveError> {
+        let usable = self.prepared.with_role(|role| uses(method, role));
+        let solve = |chosen: &[usize], what| {
+            self.progress.begin(what, 0);
+            let (prepared, haar, stop) = (self.prepared, self.haar, self.stop);
+            let found = match method {
+                Method::TwoStage => two_stage::solve(prepared, haar, chosen, stop, self.progress),
+                Method::BruteForce => brute_force::solve(prepared, chosen),
+                Method::Direct | Method::Joint => {
+                    Ok(direct::solve(prepared, haar, chosen, stop, self.progress))
+                }
+            };
+            self.progress.end();
+            found
+        };
+        let mut iterations = 0;
+        let mut judged = Vec::new();
+        for split in self.splits {
+            let kept = |k: &usize| !split.held_out.contains(k);
+            let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
+            let trial = solve(&chosen, "solving without the held-out photographs")?;
+            iterations += trial.convergence.iterations;
+            judged.push(Judged {
+                split,
+                candidates: trial.candidates(&self.prepared.live),
+            });
+        }
+        seconds.choose = clock.lap();
+        let solution = solve(&usable, "solving")?;
+        seconds.solve = clock.lap();
+        Ok(Outcome {
+            method,
+            lambda: 0.0,
+            trials: Vec::new(),
+            iterations: iterations + solution.convergence.iterations,
+            judged,
+            solution,
+        })
+    }
+}
+
+/// Whether a method uses a photograph.
+fn uses(method: Method, role: Role) -> bool {
+    match method {
+        Method::Joint | Method::BruteForce => true,
+        // As the paper does.
+        Method::Direct | Method::TwoStage => matches!(role, Role::White | Role::Bernoulli),
+    }
+}
+
+fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
+    let given = prepared.with_role(|role| uses(method, role)).len();
+    // One cell needs a second photograph too: the first one's judge.
+    let least = (prepared.live_cells() + 1).min(LEAST_PHOTOGRAPHS);
+    if given < least {
+        return Err(SolveError::TooFewPhotographs {
+            method: method.name(),
+            given,
+            least,
+        });
+    }
+    Ok(())
+}
+
+fn check_answer(
+    solution: &Solution,
+    candidates: &[Candidate],
+    prepared: &Prepared,
+    options: &SolveOptions,
+) -> Result<(), SolveError> {
+    let residual = solution.convergence.residual();
+    // Written so that a residual that is not a number is refused too.
+    let near = residual <= HOPELESS.max(options.tolerance);
+    if !near {
+        return Err(SolveError::DidNotConverge {
+            iterations: solution.convergence.iterations,
+            residual,
+            tolerance: options.tolerance,
+        });
+    }
+    for (channel, candidate) in candidates.iter().enumerate() {
+        if let Some(why) = candidate.inverse.flaw(&prepared.live) {
+            return Err(SolveError::NotPhysical { channel, why });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses photographs that do not follow from their patterns.
+fn check_prediction(prediction: &Prediction) -> Result<(), SolveError> {
+    let least = prediction.compensated.min(prediction.gain_only);
+    // Written so that what is not a number is refused too.
+    let usable = least <= UNPREDICTABLE;
+    if usable {
+        return Ok(());
+    }
+    Err(SolveError::Unpredictable {
+        percent: 100.0 * least,
+        limit: 100.0 * UNPREDICTABLE,
+    })
+}
+
+/// What the paper's theorem says of its method on these photographs; `None` without a
+/// photograph of white, or if the inverse has no transport.
+fn recovery(prepared: &Prepared, haar: &Haar, candidates: &[Candidate]) -> Option<Recovery> {
+    let white = *prepared.with_role(|role| role == Role::White).first()?;
+    let patterns = prepared
+        .patterns
+        .select_columns(&prepared.with_role(|role| uses(Method::Direct, role)));
+    let inverses: Vec<&Inverse> = candidates.iter().map(|c| &c.inverse).collect();
+    let flood = prepared.patterns.column(white).into_owned();
+    recovery::of_direct(&inverses, haar, &patterns, &flood)
+}
+
+fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCounts {
+    let gray = |role| matches!(role, Role::Column { .. } | Role::Row { .. });
+    PhotographCounts {
+        white: prepared.with_role(|role| role == Role::White).len(),
+        gray_code: prepared
+            .with_role(|role| gray(role) && uses(method, role))
+            .len(),
+        bernoulli: prepared.with_role(|role| role == Role::Bernoulli).len(),
+        held_out: splits.iter().map(|split| split.held_out.len()).sum(),
+    }
+}
+
+/// Seconds between laps.
+struct Clock(Instant);
+
+impl Clock {
+    fn new() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> f64 {
+        let seconds = self.0.elapsed().as_secs_f64();
+        self.0 = Instant::now();
+        seconds
+    }
+}

@@ -1,0 +1,308 @@
+//! Frames through a table: pictures, and video as a stream.
+//!
+//! | frame | table of one channel | table of three |
+//! |---|---|---|
+//! | grey | as it is | refused: grey light needs a coloured input, which a grey frame has no room for |
+//! | colour | each colour like grey: gain and geometry are common to all | as it is |
+//!
+//! A frame of one pixel a cell is compensated cell by cell, any larger one at
+//! full resolution; a smaller one is refused. The result has the size and the
+//! kind of the input.
+
+use super::bands::Bands;
+use super::engine::{Engine, Work};
+use super::planar::{Layout, Planar};
+use super::y4m::Reader;
+use super::{VideoError, stream};
+use crate::interleaved::Interleaved;
+use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
+use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// How frames are to be compensated.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Settings {
+    /// The tier; by default the table's top one.
+    pub tier: Option<u8>,
+    /// What the codes of the frames mean.
+    pub encoding: Encoding,
+    /// Threads that work on the rows, 0 for one a core. A stream has two more,
+    /// which read and write. The result is the same for any number.
+    pub threads: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            tier: None,
+            encoding: Encoding::Display,
+            threads: 0,
+        }
+    }
+}
+
+/// What has been done.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Summary {
+    /// Size of the frames.
+    pub size: FrameSize,
+    /// How many frames there were.
+    pub frames: u64,
+    /// Samples of all frames: three a pixel, or one where they are grey.
+    pub samples: u64,
+    /// Samples that the projector would have had to show darker than black or
+    /// brighter than white.
+    pub clipped: u64,
+}
+
+/// Compensates frames with one table.
+#[derive(Debug)]
+pub struct Compensator<'t, 'a> {
+    table: &'t Table<'a>,
+    tier: u8,
+    encoding: Encoding,
+    threads: Arc<ThreadPool>,
+}
+
+impl<'t, 'a> Compensator<'t, 'a> {
+    /// A compensator for `table`.
+    ///
+    /// # Errors
+    /// [`VideoError::NoSuchTier`], or [`VideoError::Threads`] if the threads cannot
+    /// be started.
+    pub fn new(table: &'t Table<'a>, settings: Settings) -> Result<Self, VideoError> {
+        Self::on(table, settings, Arc::new(threads(settings.threads)?))
+    }
+
+    /// The same on threads that are there already.
+    pub(super) fn on(
+        table: &'t Table<'a>,
+        settings: Settings,
+        threads: Arc<ThreadPool>,
+    ) -> Result<Self, VideoError> {
+        let top = table.top_tier();
+        let tier = settings.tier.unwrap_or(top);
+        if tier > top {
+            return Err(VideoError::NoSuchTier { tier, top });
+        }
+        Ok(Self {
+            table,
+            tier,
+            encoding: settings.encoding,
+            threads,
+        })
+    }
+
+    /// Compensates a file into another, PNG or Y4M by the first bytes of the
+    /// input. The output is there whole or not at all, and may replace the input.
+    ///
+    /// # Errors
+    /// [`VideoError`] if the input is unusable or a file cannot be read or written.
+    pub fn file(
+        &self,
+        input: &Path,
+        output: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Summary, VideoError> {
+        let opened = File::open(input).map_err(|source| VideoError::File {
+            path: input.to_owned(),
+            source,
+        })?;
+        let mut whole = WholeFile::create(output)?;
+        let summary = self.stream(opened, whole.file(), progress)?;
+        whole.finish()?;
+        Ok(summary)
+    }
+
+    /// Compensates a picture or a stream, PNG or Y4M by its first bytes.
+    ///
+    /// # Errors
+    /// As [`png`](Self::png) and [`y4m`](Self::y4m), and
+    /// [`VideoError::UnknownFormat`].
+    pub fn stream<R: Read + Send, W: Write + Send>(
+        &self,
+        mut input: R,
+        output: W,
+        progress: &dyn Progress,
+    ) -> Result<Summary, VideoError> {
+        let first = first_bytes(&mut input).map_err(|source| VideoError::Read { source })?;
+        let whole = first.as_slice().chain(input);
+        if first.starts_with(&png::SIGNATURE) {
+            self.png(whole, output)
+        } else if first.starts_with(b"YUV4MPEG") {
+            self.y4m(whole, output, progress)
+        } else {
+            Err(VideoError::UnknownFormat)
+        }
+    }
+
+    /// Compensates a PNG picture.
+    ///
+    /// # Errors
+    /// [`VideoError`] if the input is no readable picture, is smaller than the
+    /// grid, is grey with a table of three channels, or the output cannot be
+    /// written.
+    pub fn png(&self, input: impl Read, output: impl Write) -> Result<Summary, VideoError> {
+        let mut picture = png::read(input)?;
+        let summary = self.picture(&mut picture)?;
+        png::write(output, &picture)?;
+        Ok(summary)
+    }
+
+    /// Compensates a picture in place.
+    ///
+    /// # Errors
+    /// [`VideoError`] if it is smaller than the grid, or grey with a table of three
+    /// channels.
+    pub fn picture(&self, picture: &mut Picture) -> Result<Summary, VideoError> {
+        let (size, channels) = (picture.size(), picture.channels());
+        let work = self.work(size, channels)?;
+        let width = size.width();
+        let clipped = match picture.samples_mut() {
+            Samples::Eight(samples) => self.one(
+                work,
+                &mut Interleaved {
+                    width,
+                    channels,
+                    samples,
+                },
+            ),
+            Samples::Sixteen(samples) => self.one(
+                work,
+                &mut Interleaved {
+                    width,
+                    channels,
+                    samples,
+                },
+            ),
+        };
+        Ok(summary(work, 1, clipped?))
+    }
+
+    /// Compensates a Y4M stream, frame by frame: memory does not depend on its
+    /// length. Reading, computing and writing overlap.
+    ///
+    /// `progress` advances by one a frame.
+    ///
+    /// # Errors
+    /// [`VideoError`] if the stream is malformed, its frames are smaller than the
+    /// grid, it is mono and the table has three channels, or the output cannot be
+    /// written. Frames before the fault have been written.
+    pub fn y4m<R: Read + Send, W: Write + Send>(
+        &self,
+        input: R,
+        output: W,
+        progress: &dyn Progress,
+    ) -> Result<Summary, VideoError> {
+        let reader = Reader::new(input)?;
+        let header = reader.header();
+        let work = self.work(header.size(), Layout::new(header).colours())?;
+        progress.begin("compensate", 0);
+        let result = match self.table.channels() {
+            1 => self.frames::<_, _, 1>(work, reader, output, progress),
+            _ => self.frames::<_, _, 3>(work, reader, output, progress),
+        };
+        progress.end();
+        let (frames, clipped) = result?;
+        Ok(summary(work, frames, clipped))
+    }
+
+    /// Every frame of a stream through a table of `C` channels; how many there
+    /// were and how many samples were clipped.
+    fn frames<R: Read + Send, W: Write + Send, const C: usize>(
+        &self,
+        work: Work,
+        reader: Reader<R>,
+        output: W,
+        progress: &dyn Progress,
+    ) -> Result<(u64, u64), VideoError> {
+        let layout = Layout::new(reader.header());
+        let mut engine = self.engine::<Planar, C>(work)?;
+        let mut clipped = 0;
+        let frames = stream::run(reader, output, |frames| {
+            let mut worked = || {
+                frames.work(|frame| {
+                    let mut planar = Planar {
+                        layout,
+                        frame: std::mem::take(frame),
+                    };
+                    let clipped = engine.compensate(&mut planar)?;
+                    *frame = planar.frame;
+                    Ok(clipped)
+                })
+            };
+            while let Some(more) = worked()? {
+                clipped += more;
+                progress.advance(1);
+            }
+            Ok(())
+        })?;
+        Ok((frames, clipped))
+    }
+
+    /// What is to be done to frames of this size and number of colours, if that is
+    /// possible.
+    pub(super) fn work(&self, size: FrameSize, colours: usize) -> Result<Work, VideoError> {
+        if colours < usize::from(self.table.channels()) {
+            return Err(VideoError::GreyFrame);
+        }
+        if !size.holds(self.table.grid()) {
+            return Err(VideoError::SmallerThanGrid {
+                frame: size,
+                grid: self.table.grid(),
+            });
+        }
+        Ok(Work {
+            size,
+            colours,
+            tier: self.tier,
+            encoding: self.encoding,
+        })
+    }
+
+    /// A single frame in place; how many samples were clipped.
+    fn one<P: Bands>(&self, work: Work, frame: &mut P) -> Result<u64, VideoError> {
+        match self.table.channels() {
+            1 => self.engine::<P, 1>(work)?.compensate(frame),
+            _ => self.engine::<P, 3>(work)?.compensate(frame),
+        }
+    }
+
+    fn engine<P: Bands, const C: usize>(
+        &self,
+        work: Work,
+    ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
+        Engine::new(self.table, &self.threads, work).map_err(VideoError::Runtime)
+    }
+}
+
+/// Threads that work on the rows, 0 for one a core.
+pub(super) fn threads(threads: usize) -> Result<ThreadPool, VideoError> {
+    let builder = ThreadPoolBuilder::new().num_threads(threads);
+    builder.build().map_err(|error| VideoError::Threads {
+        threads,
+        reason: error.to_string(),
+    })
+}
+
+fn summary(work: Work, frames: u64, clipped: u64) -> Summary {
+    Summary {
+        size: work.size,
+        frames,
+        samples: frames * (work.size.pixels() * work.colours) as u64,
+        clipped,
+    }
+}
+
+/// As many bytes as it takes to know what the input is, or all there are.
+pub fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
+    let mut first = Vec::new();
+    input
+        .take(png::SIGNATURE.len() as u64)
+        .read_to_end(&mut first)?;
+    Ok(first)
+}

@@ -1,0 +1,60 @@
+//! Tests of the whole way through a table.
+
+mod exactness;
+mod kinds;
+mod live;
+mod reference;
+mod sample_table;
+mod streams;
+
+use crate::VideoError;
+use iltm_compile::{
+    image::{ImageWriter, StoredRow, segment_bytes},
+    response::codes as response_codes,
+};
+use iltm_picture::{Picture, Samples};
+use iltm_runtime::{FrameSize, Grid, image::Table, pipeline::Encoding};
+use sample_table::SampleTable;
+
+use super::{Compensator, Settings, Summary};
+
+fn grid(rows: u16, cols: u16) -> Grid {
+    Grid::new(rows, cols).expect("a small grid")
+}
+
+fn size(width: u16, height: u16) -> FrameSize {
+    FrameSize::new(width, height).expect("not empty")
+}
+
+fn settings(encoding: Encoding) -> Settings {
+    Settings {
+        encoding,
+        threads: 2,
+        ..Settings::default()
+    }
+}
+
+/// Random samples, as many as the picture needs.
+fn random_picture(size: FrameSize, channels: usize, wide: bool, seed: u64) -> Picture {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let count = size.pixels() * channels;
+    let samples = if wide {
+        Samples::Sixteen((0..count).map(|_| random.u16(..)).collect())
+    } else {
+        Samples::Eight((0..count).map(|_| random.u8(..)).collect())
+    };
+    Picture::new(size, samples).expect("as many samples as pixels")
+}
+
+/// The picture through a table.
+fn compensated(
+    table: &SampleTable,
+    settings: Settings,
+    picture: &Picture,
+) -> Result<(Picture, Summary), VideoError> {
+    let image = table.image();
+    let table = Table::check(&image).expect("a sample table is whole");
+    let mut picture = picture.clone();
+    let summary = Compensator::new(&table, settings)?.picture(&mut picture)?;
+    Ok((picture, summary))
+}

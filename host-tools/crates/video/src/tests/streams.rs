@@ -1,0 +1,304 @@
+//! Video from end to end.
+
+use super::*;
+use crate::test_scene::TestScene;
+use crate::y4m::{Frame, Header, Reader, Y4mError};
+use iltm_picture::progress::Progress;
+use proptest::prelude::*;
+use std::io::{ErrorKind, Read, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A stream of frames of random bytes between two codes.
+fn stream(line: &str, frames: usize, codes: std::ops::RangeInclusive<u8>) -> Vec<u8> {
+    let header = Header::parse(line.as_bytes()).expect("a header");
+    let mut random = fastrand::Rng::with_seed(11);
+    let mut stream = format!("{line}\n").into_bytes();
+    for _ in 0..frames {
+        stream.extend(b"FRAME Xkept\n");
+        stream.extend((0..header.frame_bytes()).map(|_| random.u8(codes.clone())));
+    }
+    stream
+}
+
+/// The stream through a table.
+fn video(
+    table: &SampleTable,
+    settings: Settings,
+    input: &[u8],
+) -> Result<(Vec<u8>, Summary), VideoError> {
+    let image = table.image();
+    let table = Table::check(&image).expect("a sample table is whole");
+    let mut output = Vec::new();
+    let summary =
+        Compensator::new(&table, settings)?.y4m(input, &mut output, &Counter::default())?;
+    Ok((output, summary))
+}
+
+/// Counts frames.
+#[derive(Default)]
+struct Counter(AtomicU64);
+
+impl Progress for Counter {
+    fn begin(&self, _what: &str, _total: u64) {}
+    fn advance(&self, parts: u64) {
+        self.0.fetch_add(parts, Ordering::Relaxed);
+    }
+    fn end(&self) {}
+}
+
+#[test]
+fn headers_and_frame_parameters_are_kept_byte_for_byte() {
+    let table = SampleTable::identity(grid(2, 2), 1);
+    for line in [
+        "YUV4MPEG2 W6 H4 F30000:1001 Ip A128:117 C420mpeg2 XYSCSS=420MPEG2 XCOLORRANGE=FULL",
+        "YUV4MPEG2 H5 W7",
+        "YUV4MPEG2 W5 H3 C444 Xa  Xb",
+        "YUV4MPEG2 W5 H3 Cmono",
+    ] {
+        let input = stream(line, 3, 0..=255);
+        let (output, summary) = video(&table, Settings::default(), &input).unwrap();
+        assert_eq!(output.len(), input.len(), "{line}");
+        assert!(
+            output.starts_with(format!("{line}\nFRAME Xkept\n").as_bytes()),
+            "{line}"
+        );
+        assert_eq!(summary.frames, 3);
+    }
+}
+
+#[test]
+fn mono_video_that_is_not_changed_comes_back_exactly() {
+    let table = SampleTable::identity(grid(2, 2), 1);
+    for (line, codes) in [
+        ("YUV4MPEG2 W7 H5 Cmono", 0..=255),
+        ("YUV4MPEG2 W2 H2 Cmono", 0..=255),
+        ("YUV4MPEG2 W7 H5 Cmono XCOLORRANGE=LIMITED", 16..=235),
+    ] {
+        let input = stream(line, 2, codes);
+        let (output, _) = video(&table, settings(Encoding::Linear), &input).unwrap();
+        assert_eq!(output, input, "{line}");
+    }
+}
+
+/// Frames of the test scene.
+fn scene_stream(line: &str, frames: usize) -> Vec<u8> {
+    let header = Header::parse(line.as_bytes()).expect("a header");
+    let scene = TestScene::new(header.size(), 25.0, 1);
+    let mut stream = format!("{line}\n").into_bytes();
+    for number in 0..frames {
+        stream.extend(b"FRAME\n");
+        let frame = Frame::from_picture(&header, &scene.frame(number as u64));
+        stream.extend(frame.expect("a frame of the stream's size").samples);
+    }
+    stream
+}
+
+#[test]
+fn video_that_is_not_changed_comes_back_as_good_as_it_was() {
+    let table = SampleTable::identity(grid(9, 16), 3);
+    for colour in ["420jpeg", "420mpeg2", "444"] {
+        for range in ["LIMITED", "FULL"] {
+            for (width, height) in [(320, 180), (321, 181), (1024, 578)] {
+                let line = format!("YUV4MPEG2 W{width} H{height} C{colour} XCOLORRANGE={range}");
+                let input = scene_stream(&line, 1);
+                let (output, _) = video(&table, settings(Encoding::Linear), &input).unwrap();
+                let differences = input.iter().zip(&output).map(|(a, b)| a.abs_diff(*b));
+                let mean_square = differences
+                    .clone()
+                    .map(|d| f64::from(d).powi(2))
+                    .sum::<f64>()
+                    / input.len() as f64;
+                let psnr = 10.0 * (255.0_f64.powi(2) / mean_square).log10();
+                let within = differences.clone().filter(|d| *d <= 1).count() as f64;
+                let share = within / input.len() as f64;
+                println!(
+                    "{line}: {psnr:.1} dB, {share:.5} within a code, worst {:?}",
+                    differences.max()
+                );
+                // Chroma that four pixels share can be more than one of them, which is
+                // darker or brighter, can have: those are cut.
+                let enough = if colour == "444" { 1.0 } else { 0.995 };
+                assert!(
+                    share >= enough && psnr >= 48.0,
+                    "{line}: {psnr:.1} dB, {share}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn subsampled_colours_that_rgb_has_come_back_within_a_code() {
+    // Chroma within 18 of grey and luma within 40 of the middle is inside RGB for
+    // either standard, whatever their combination.
+    let table = SampleTable::identity(grid(9, 16), 3);
+    for (line, luma) in [
+        ("YUV4MPEG2 W64 H36 C420", 64 * 36),
+        ("YUV4MPEG2 W65 H37 C420 XCOLORRANGE=FULL", 65 * 37),
+        ("YUV4MPEG2 W33 H601 C420", 33 * 601),
+    ] {
+        let mut input = stream(line, 1, 110..=146);
+        let start = input.len() - Header::parse(line.as_bytes()).unwrap().frame_bytes();
+        let mut random = fastrand::Rng::with_seed(1);
+        input[start..start + luma].fill_with(|| random.u8(86..=166));
+        let (output, summary) = video(&table, settings(Encoding::Linear), &input).unwrap();
+        let worst = input.iter().zip(&output).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(1), "{line}: {worst:?}");
+        assert_eq!(summary.clipped, 0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn streams_come_out_alike_for_any_number_of_threads(
+        (width, height) in (21_u16..70, 13_u16..70),
+        (table_channels, colour) in prop::sample::select(vec![
+            (1, "mono"), (1, "420"), (3, "420jpeg"), (3, "444"),
+        ]),
+    ) {
+        let table = SampleTable::random(grid(13, 21), table_channels, 5, 3);
+        let input = stream(&format!("YUV4MPEG2 W{width} H{height} C{colour}"), 3, 0..=255);
+        let by = |threads| {
+            let settings = Settings { threads, ..Settings::default() };
+            video(&table, settings, &input).unwrap()
+        };
+        let one = by(1);
+        for threads in [2, 5] {
+            prop_assert_eq!(&by(threads), &one);
+        }
+    }
+
+    #[test]
+    fn damaged_streams_give_an_error_or_frames(
+        place in 0_usize..220,
+        byte: u8,
+        cut in 0_usize..260,
+    ) {
+        let table = SampleTable::identity(grid(2, 2), 3);
+        let mut input = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
+        input[place] = byte;
+        input.truncate(input.len() - cut);
+        let _ = video(&table, Settings::default(), &input);
+    }
+}
+
+#[test]
+fn frames_before_a_fault_have_been_written_and_the_fault_is_named() {
+    let table = SampleTable::identity(grid(2, 2), 3);
+    let image = table.image();
+    let table = Table::check(&image).unwrap();
+    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let whole = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
+    let mut output = Vec::new();
+    let counter = Counter::default();
+    let error = compensator
+        .y4m(&whole[..whole.len() - 1], &mut output, &counter)
+        .unwrap_err();
+    assert!(matches!(error, VideoError::Y4m(Y4mError::Truncated { .. })));
+    assert!(error.to_string().contains("frame 3"));
+    assert_eq!(counter.0.load(Ordering::Relaxed), 2);
+    let mut reader = Reader::new(&output[..]).unwrap();
+    let mut frame = Frame::default();
+    assert!(reader.read_frame(&mut frame).unwrap());
+    assert!(reader.read_frame(&mut frame).unwrap());
+    assert!(!reader.read_frame(&mut frame).unwrap());
+}
+
+/// Frames without end.
+struct Endless(Vec<u8>, usize);
+
+impl Read for Endless {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        // The header is read once, the frame over and over.
+        if self.1 == self.0.len() {
+            self.1 = self.0.iter().position(|byte| *byte == b'\n').unwrap_or(0) + 1;
+        }
+        let count = (&self.0[self.1..]).read(buffer)?;
+        self.1 += count;
+        Ok(count)
+    }
+}
+
+/// Takes some bytes and then no more.
+struct Limited(usize);
+
+impl Write for Limited {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 = self
+            .0
+            .checked_sub(bytes.len())
+            .ok_or(ErrorKind::BrokenPipe)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_an_endless_stream() {
+    let table = SampleTable::identity(grid(2, 2), 3);
+    let image = table.image();
+    let table = Table::check(&image).unwrap();
+    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let input = Endless(stream("YUV4MPEG2 W6 H4 C444", 1, 0..=255), 0);
+    let error = compensator
+        .y4m(input, Limited(1000), &Counter::default())
+        .unwrap_err();
+    assert!(matches!(error, VideoError::Y4m(Y4mError::Write { .. })));
+}
+
+#[test]
+fn a_stream_without_frames_has_none() {
+    let table = SampleTable::identity(grid(2, 2), 3);
+    let (output, summary) = video(&table, Settings::default(), b"YUV4MPEG2 W6 H4\n").unwrap();
+    assert_eq!(output, b"YUV4MPEG2 W6 H4\n");
+    assert_eq!(
+        (summary.frames, summary.samples, summary.clipped),
+        (0, 0, 0)
+    );
+}
+
+#[test]
+fn mono_video_is_refused_by_a_table_of_three_channels() {
+    let table = SampleTable::identity(grid(2, 2), 3);
+    let input = stream("YUV4MPEG2 W6 H4 Cmono", 1, 0..=255);
+    let error = video(&table, Settings::default(), &input).unwrap_err();
+    assert!(matches!(error, VideoError::GreyFrame));
+}
+
+#[test]
+fn files_are_replaced_whole_or_left_alone() {
+    let table = SampleTable::identity(grid(2, 2), 3);
+    let image = table.image();
+    let table = Table::check(&image).unwrap();
+    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let (input, output) = (folder.path().join("in.y4m"), folder.path().join("out.y4m"));
+    let whole = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
+    std::fs::write(&input, &whole[..whole.len() - 1]).unwrap();
+    std::fs::write(&output, "old").unwrap();
+    assert!(
+        compensator
+            .file(&input, &output, &Counter::default())
+            .is_err()
+    );
+    assert_eq!(std::fs::read(&output).unwrap(), b"old");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    std::fs::write(&input, &whole).unwrap();
+    compensator
+        .file(&input, &output, &Counter::default())
+        .unwrap();
+    assert_eq!(std::fs::read(&output).unwrap().len(), whole.len());
+    let error = compensator
+        .file(
+            &folder.path().join("none.y4m"),
+            &output,
+            &Counter::default(),
+        )
+        .unwrap_err();
+    assert!(error.to_string().contains("none.y4m"));
+}
