@@ -7,36 +7,37 @@ use std::fmt::Write as _;
 /// What the page says before its tables.
 const HEAD: &str = "# Hard cases
 
-Where the light or the mathematics is unkind: what is hard, what must hold and from
-which theory, what was found. Made by
+This page is for those who want to know the limits of the method. It lists scenes, photographs,
+grids and frames that are difficult, the bound that must hold with its theory, and the measured
+result. This command writes the page:
 
     cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md
 
-and held, case by case, by `cargo test -p iltm-tests --test hard_cases`.
+`cargo test -p iltm-tests --test hard_cases` checks every case.
 
-Errors are those of the closed loop, `min_s |s T p - d| / |d|`, mean over 16 natural
-images `d` (dead leaves, darkest parts a fifth of white), `p` the projector's input
-clipped to what it can show; the scene's transport `T` is known exactly. Seeds change
-patterns and noise; the worst one counts. Whatever is chosen, operator, gains alone or
-nothing, may never be worse than gains alone or nothing by more than a tenth.
+Errors are those of the closed loop, `min_s |s T p - d| / |d|`, as the mean over 16 natural
+images `d` (dead leaves, darkest parts a fifth of white), where `p` is the projector's input
+clipped to its range and the scene's transport `T` is known exactly. Seeds change patterns and
+noise; the worst seed counts. The chosen result (operator, gains alone or nothing) must never be
+worse than gains alone or nothing by more than a tenth.
 
-Unless a case says otherwise the scene is 13 x 21 cells on M-shaped panels at 75 degrees,
+Unless a case says otherwise, the scene is 13 x 21 cells on M-shaped panels at 75 degrees,
 photographed under white, Gray code with inverses and random patterns. The bound is
 
     perfect + min over s of (2 tail(s) + cond sigma sqrt(s ln N / m)) + cond tolerance,   s <= m / (2 ln(N / m)) <= N
 
-with `perfect` the error of the true inverse (clipping), `tail(s)` that of its best `s`
-Haar coefficients a row, `cond` the condition number, `sigma` the noise, `m` photographs,
-`N` cells and `tolerance` = 0.0005 the solver's own
-(`tests/src/hard_cases/theory.rs` says where it is from).
+where `perfect` is the error of the true inverse (clipping), `tail(s)` that of its best `s` Haar
+coefficients per row, `cond` the condition number, `sigma` the noise, `m` the number of
+photographs, `N` that of cells, and `tolerance` = 0.0005 the solver's own
+(`tests/src/hard_cases/theory.rs` derives the bound).
 ";
 
 /// What the page says of the device's arithmetic.
 const FRAMES: &str = "
 ## Frames on the device
 
-The same integers on every device and on the host, beside an exact reference. A step is
-2^-15 of the projector's white: 128 of them are an 8-bit code of linear light.
+Every device and the host compute the same integers; here they are compared with an exact
+reference. A step is 2^-15 of the projector's white: 128 steps are an 8-bit code of linear light.
 
 | case | why it is hard | must hold | measured | verdict |
 |---|---|---|---|---|

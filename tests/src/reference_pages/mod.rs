@@ -38,8 +38,10 @@ fn commands() -> String {
 
 fn errors() -> io::Result<String> {
     let mut text = String::from(
-        "# Errors\n\nA command that fails prints what happened, where, and what to do next; with \
-         `--json` the same as one object on standard output. The exit code tells the cause:\n\n\
+        "# Errors\n\nThis page is for anyone whose command or script failed: it lists every exit code \
+         and every error. A command that fails prints what happened, where, and what to do next; \
+         with `--json` it prints the same as one object on standard output. The exit code tells \
+         the cause:\n\n\
          | code | name | cause |\n|---|---|---|\n",
     );
     for (code, name, meaning) in iltm::cli::exit_codes() {
@@ -47,8 +49,8 @@ fn errors() -> io::Result<String> {
         let _ = writeln!(text, "| {code} | `{name}` | {meaning} |");
     }
     text.push_str(
-        "\nWhat stands in braces below is filled in: a path, a line, a number. Messages of the \
-         gates before a solve are in [their own page](gates.md).\n",
+        "\nWords in braces stand for a path, a line or a number. Messages of the gates before a \
+         solve have [their own page](gates.md).\n",
     );
     for house in ["host-tools/crates", "host-tools/src", "runtime/src"] {
         for error in errors::in_folder(&root().join(house))? {

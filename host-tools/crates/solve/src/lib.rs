@@ -26,20 +26,9 @@
 //!
 //! # Cost
 //!
-//! An iteration takes `O(N^2 min(N, m))` multiplications, memory grows as
-//! `N^2 + N m`. Whole solves of a simulated corner, `lambda` by held-out
-//! photographs included, on 2 cores (x86-64, AVX-512) that other work kept busy;
-//! memory is what is held beyond the measurements. Repeat with
-//! `cargo bench -p iltm --bench solve`.
-//!
-//! | cells | photographs | channels | joint | | direct | |
-//! |---|---|---|---|---|---|---|
-//! | 273 | 41 | 1 | 0.21 s | 8 MB | 0.25 s | 5 MB |
-//! | 273 | 151 | 1 | 0.24 s | 12 MB | 0.19 s | 7 MB |
-//! | 273 | 301 | 1 | 0.26 s | 19 MB | 0.18 s | 10 MB |
-//! | 384 | 151 | 3 | 1.5 s | 47 MB | 1.3 s | 19 MB |
-//! | 1024 | 301 | 1 | 4.5 s | 124 MB | 4.7 s | 79 MB |
-//! | 2025 | 301 | 1 | 18 s | 415 MB | 60 s | 270 MB |
+//! An iteration takes `O(N^2 min(N, m))` multiplications for `N` cells and `m`
+//! photographs, memory grows as `N^2 + N m`. `docs/measured.md` has measured times
+//! and memory; `cargo bench -p iltm --bench solve` repeats them.
 
 mod admm;
 mod basis_pursuit;

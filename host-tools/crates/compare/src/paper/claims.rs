@@ -63,7 +63,7 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
             let enough = fewest(samples, condition, direct);
             let _ = writeln!(
                 text,
-                "  What is left there is noise: fewer photographs average less of it. {enough}",
+                "  The rest is noise, which fewer photographs average less. {enough}",
             );
         }
     }
@@ -82,7 +82,7 @@ fn fewest(samples: &[Sample], condition: Condition, other: &Sample) -> String {
         .map(|s| s.photographs)
         .min()
         .map_or_else(String::new, |enough| {
-            format!("With {enough} photographs it is better in this number too.")
+            format!("With {enough} photographs `iltm` is better here too.")
         })
 }
 

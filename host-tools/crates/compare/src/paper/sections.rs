@@ -84,7 +84,7 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
         text,
         "\n## Fig. 1: how sparse the matrices are\n\n\
          ![T, its inverse, and both in Haar](fig1.png)\n\n\
-         Coefficients that hold a part of the energy (sum of squares), of {}:\n",
+         Number of coefficients, of {}, that hold a part of the energy (sum of squares):\n",
         counts.first().map_or(0, |counted| counted.all)
     );
     let parts = PARTS.map(|part| format!("{} %", 100.0 * part));
@@ -103,7 +103,8 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
     let _ = writeln!(
         text,
         "\n`K` is the inverse without its diagonal: `T^-1 = diag(g) - K`. It is the same for \
-         both scenes, since texture is in `g` alone, and it is all that a table codes in Haar."
+         both scenes, since texture is only in `g`, and it is the only part that a table codes \
+         in Haar."
     );
 }
 
@@ -114,10 +115,11 @@ pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
         "\n## Fig. 2: what the theorem promises\n\n\
          ![The region of the theorem, and the scene](fig2.svg)\n\n\
          Theorem 3.1 promises that the direct method finds rows of `k` coefficients exactly where \
-         `kappa^2 gamma < sqrt 2 + 1 = 2.41`. The exact constants are NP-hard. These are bounds: \
-         from below by supports that were looked at, so that the scene lies where it is drawn or \
-         further up and right; from above by Gershgorin\u{2019}s discs (`inf`: nothing known). \
-         Patterns count as +1 and -1, which is the form that promises most.\n"
+         `kappa^2 gamma < sqrt 2 + 1 = 2.41`. Computing the exact constants is NP-hard, so \
+         the table has bounds. Lower bounds come from the supports that were tried, so the scene \
+         lies where it is drawn or further up and right. Upper bounds come from \
+         Gershgorin\u{2019}s discs (`inf`: no bound). Patterns enter as +1 and -1, the form that \
+         promises most.\n"
     );
     let _ = writeln!(
         text,
@@ -150,8 +152,8 @@ pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
         text,
         "\nOf {} places {inside} are proven to lie in the region and {open} may. Rows of the \
          inverse have {:.0} coefficients (uniform) and {:.0} (textured) for 99.99 % of the energy \
-         (Fig. 1). The theorem does not say why the method works here: it works far outside the \
-         region, as l1 methods do.",
+         (Fig. 1). The theorem does not explain why the method works here: like other l1 \
+         methods, it works far outside the region.",
         places.len(),
         a_row(false),
         a_row(true),
@@ -180,13 +182,13 @@ pub(super) fn cost(text: &mut String, timed: &[Timed]) {
         "\n## Complexity\n\n\
          ![Time against cells](complexity-cells.svg)\n\n\
          ![Time against photographs](complexity-photographs.svg)\n\n\
-         The paper gives `O(N^2 m)` an iteration, and counts the exact inversion, `O(N^3)`, as the \
-         price of the two-stage method. Exponents fitted to the times of one iteration; `N^a` of \
-         a whole solve has the number of iterations in it:\n"
+         The paper gives `O(N^2 m)` per iteration, and names the exact inversion, `O(N^3)`, as the \
+         additional cost of the two-stage method. The exponents are fitted to the time of one \
+         iteration; that of a whole solve includes the number of iterations:\n"
     );
     let _ = writeln!(
         text,
-        "| method | N, an iteration | m, an iteration | N, a whole solve |\n|---|---:|---:|---:|"
+        "| method | N, one iteration | m, one iteration | N, whole solve |\n|---|---:|---:|---:|"
     );
     for fit in complexity::exponents(timed) {
         let _ = writeln!(
@@ -210,8 +212,8 @@ pub(super) fn cost(text: &mut String, timed: &[Timed]) {
     let _ = writeln!(
         text,
         "\nThe exact inversion alone grows as `N^{:.2}`: {:.0} ms at 273 cells, {:.0} % of the \
-         two-stage solve, and {:.0} ms at {largest}, {:.0} %; the l1 problems take the rest. Where \
-         `m` enters with less than 1, the l1 step, which does not depend on it, takes its part.",
+         two-stage solve, and {:.0} ms at {largest}, {:.0} %; the l1 problems take the rest. \
+         Exponents of `m` below 1 come from the l1 step, whose time does not depend on `m`.",
         complexity::inversion_exponent(timed),
         paper.0,
         paper.1,
@@ -226,13 +228,14 @@ pub(super) fn time(text: &mut String, pictures: &Pictures) {
     let _ = writeln!(
         text,
         "\n## What accuracy costs in time\n\n\
-         On the 60 photographs of coloured panels that the program carries. For a scene of your \
-         own: `iltm tradeoff CAPTURE -o DIR`.\n\n\
+         Measured on the 60 photographs of coloured panels that are built into the program. For \
+         your own scene, run `iltm tradeoff CAPTURE -o DIR`.\n\n\
          ![Error against instructions a frame](tradeoff.svg)\n\n\
-         In one line: {}. `tradeoff.html` is the same to point at, `tradeoff.csv` has every number.\n\n\
+         In one line: {}. `tradeoff.html` is an interactive version, `tradeoff.csv` has every \
+         number.\n\n\
          ## Bounce by bounce\n\n\
-         The same scene under white; {:.0} % of the light comes straight, {:.0} % in the second \
-         bounce. Of your own: `iltm bounces CAPTURE -o DIR`.\n\n\
+         The same scene under white: {:.0} % of the light is direct, {:.0} % is the second \
+         bounce. For your own scene, run `iltm bounces CAPTURE -o DIR`.\n\n\
          ![Light by bounces](bounces.png)",
         pictures.advice,
         100.0 * direct,
