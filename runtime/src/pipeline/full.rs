@@ -146,8 +146,9 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
             *slot = blend(widen(before), widen(after), place.fraction);
         }
         cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
+        // A step is rounded, so a row that falls to no light may end below it.
         for ambient in row.spread.iter_mut() {
-            *ambient >>= GAIN_GUARD_BITS;
+            *ambient = (*ambient >> GAIN_GUARD_BITS).max(0);
         }
         true
     }
