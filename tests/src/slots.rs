@@ -39,6 +39,13 @@ impl Layout {
         (index * self.sector) as u32..((index + 1) * self.sector) as u32
     }
 
+    /// Where the device's key is.
+    #[must_use]
+    pub const fn identity(self) -> Range<usize> {
+        let start = (2 * self.slot + 2) * self.sector;
+        start..start + self.sector
+    }
+
     /// As the store wants it.
     ///
     /// # Panics

@@ -87,8 +87,12 @@ fn run<B: Board>(
     let mut frames = Frames::<B, _>::new(side, memory, tables, rehearsal, vitals);
     let updater = Updater::start(flash, map, &mut frames);
     if let Some(fault) = updater.fault() {
-        if let Fault::Table { slot, .. } = fault {
-            defmt::error!("the table in slot {=u8} is refused", slot);
+        match fault {
+            Fault::Table { slot, .. } => {
+                defmt::error!("the table in slot {=u8} is refused", slot);
+            }
+            Fault::KeyLost => defmt::error!("the key cannot be read"),
+            _ => {}
         }
         frames.vitals.set_fault(fault);
     }

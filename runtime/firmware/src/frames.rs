@@ -312,7 +312,7 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
             Fault::Source(cause) => {
                 defmt::warn!("the source cannot be followed, cause {=u8}", cause as u8);
             }
-            Fault::Table { .. } | Fault::Watchdog | Fault::Crash => {}
+            Fault::Table { .. } | Fault::Watchdog | Fault::Crash | Fault::KeyLost => {}
         }
         self.vitals.set_fault(fault);
         self.notice(Notice::Fault(fault));

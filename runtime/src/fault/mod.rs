@@ -12,4 +12,4 @@
 
 mod nor;
 
-pub use nor::{ERASE_STAGES, NorError, NorSimulator, Operation, Violations, Wear, Work};
+pub use nor::{ERASE_STAGES, Misread, NorError, NorSimulator, Operation, Violations, Wear, Work};

@@ -35,6 +35,8 @@ mod commit {
     pub(super) const OTHER: Range<usize> = 40..44;
     /// 1 if there is such a table; anything else is none.
     pub(super) const HAS_OTHER: Range<usize> = 44..48;
+    /// 1 if the device has a key; anything else is none.
+    pub(super) const HAS_KEY: Range<usize> = 48..52;
 }
 
 /// The fields of an identity record.
@@ -60,6 +62,8 @@ pub(super) struct Commit {
     pub(super) floor: u32,
     /// Times that sectors of slot A, slot B and the records were erased.
     pub(super) erases: [u32; 3],
+    /// Whether the device has a key.
+    pub(super) has_key: bool,
 }
 
 impl Commit {
@@ -117,6 +121,7 @@ impl Record for Commit {
             floor: u32_at(bytes, commit::FLOOR),
             lengths: lengths.map(|field| u32_at(bytes, field)),
             erases: erases.map(|field| u32_at(bytes, field)),
+            has_key: u32_at(bytes, commit::HAS_KEY) == 1,
         }
     }
 
@@ -137,6 +142,7 @@ impl Record for Commit {
             (commit::LENGTH_B, length_b),
             (commit::OTHER, self.other.unwrap_or(0)),
             (commit::HAS_OTHER, self.other.is_some().into()),
+            (commit::HAS_KEY, self.has_key.into()),
         ] {
             put(bytes, field, &value.to_le_bytes());
         }

@@ -28,6 +28,20 @@ pub enum Wear {
     LostBits,
 }
 
+/// How a read goes wrong though the cells are good: a bus that is disturbed, a supply that
+/// sags.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Misread {
+    /// It fails.
+    Error,
+    /// All bits are 0.
+    Zeros,
+    /// All bits are 1, as of erased flash.
+    Ones,
+    /// One bit of the first byte is the other one.
+    OneBit,
+}
+
 /// NOR flash in memory: write units of `W` bytes, sectors of `E` bytes, reads of
 /// multiples of `R` bytes.
 ///
@@ -85,6 +99,8 @@ pub enum Wear {
 /// a sector stands. [`put`](Self::put) and [`contents`](Self::contents) are the debug
 /// port.
 ///
+/// [`misread`](Self::misread) spoils reads and leaves the cells as they are.
+///
 /// # Cost
 ///
 /// A clone is two copies of memory (the cells, and one bit a write unit), a program
@@ -100,6 +116,7 @@ pub struct NorSimulator<const W: usize, const E: usize, const R: usize = 1> {
     steps: u64,
     /// Number of the step in which the power fails.
     cut_at: Option<u64>,
+    misread: Option<(Range<usize>, u32, Misread)>,
     is_on: bool,
     is_rewritable: bool,
     preprograms: bool,
@@ -124,6 +141,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
             random: Rng::with_seed(seed),
             steps: 0,
             cut_at: None,
+            misread: None,
             is_on: true,
             is_rewritable: false,
             preprograms: false,
@@ -249,6 +267,11 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         let cells = self.cells.get_mut(range).ok_or(NorError::OutOfBounds)?;
         damage::rot(cells, count, &mut self.random);
         Ok(())
+    }
+
+    /// Spoils the next `reads` reads that begin in a range. An earlier order is forgotten.
+    pub const fn misread(&mut self, range: Range<usize>, reads: u32, how: Misread) {
+        self.misread = Some((range, reads, how));
     }
 
     /// What is in the cells, power or not. A weak bit shows as what it would be on

@@ -19,6 +19,8 @@ pub enum NorError {
     NotAligned,
     /// A range that is not within the part. Nothing was changed.
     OutOfBounds,
+    /// The cells could not be read, by order.
+    Unreadable,
 }
 
 impl fmt::Display for NorError {
@@ -28,6 +30,7 @@ impl fmt::Display for NorError {
             Self::NotErased { unit } => write!(f, "the write unit at {unit:#x} is not erased"),
             Self::NotAligned => f.write_str("offset or length is not aligned"),
             Self::OutOfBounds => f.write_str("the range is not within the flash"),
+            Self::Unreadable => f.write_str("the cells cannot be read"),
         }
     }
 }
@@ -37,7 +40,7 @@ impl core::error::Error for NorError {}
 impl NorFlashError for NorError {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
-            Self::PowerCut | Self::NotErased { .. } => NorFlashErrorKind::Other,
+            Self::PowerCut | Self::NotErased { .. } | Self::Unreadable => NorFlashErrorKind::Other,
             Self::NotAligned => NorFlashErrorKind::NotAligned,
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
         }
@@ -69,7 +72,7 @@ pub struct Violations {
 impl Violations {
     pub(super) const fn count(&mut self, error: NorError) {
         let count = match error {
-            NorError::PowerCut => return,
+            NorError::PowerCut | NorError::Unreadable => return,
             NorError::NotErased { .. } => &mut self.not_erased,
             NorError::NotAligned => &mut self.not_aligned,
             NorError::OutOfBounds => &mut self.out_of_bounds,

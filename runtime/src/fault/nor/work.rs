@@ -1,7 +1,7 @@
 //! What a simulated flash does when it is asked: read, program, erase.
 
 use super::damage;
-use super::{ERASE_STAGES, NorError, NorSimulator, Operation, Wear, Work};
+use super::{ERASE_STAGES, Misread, NorError, NorSimulator, Operation, Wear, Work};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
 };
@@ -27,7 +27,7 @@ impl<const W: usize, const E: usize, const R: usize> ReadNorFlash for NorSimulat
                 *byte = (*byte & !weak) | (self.random.u8(..) & weak);
             }
         }
-        Ok(())
+        self.spoil(from, bytes)
     }
 
     fn capacity(&self) -> usize {
@@ -62,6 +62,28 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         } else {
             Err(NorError::PowerCut)
         }
+    }
+
+    /// Spoils what was read from an offset if that was ordered.
+    fn spoil(&mut self, from: usize, bytes: &mut [u8]) -> Result<(), NorError> {
+        let Some((range, reads, how)) = &mut self.misread else {
+            return Ok(());
+        };
+        if !range.contains(&from) || *reads == 0 {
+            return Ok(());
+        }
+        *reads -= 1;
+        match how {
+            Misread::Error => return Err(NorError::Unreadable),
+            Misread::Zeros => bytes.fill(0),
+            Misread::Ones => bytes.fill(0xFF),
+            Misread::OneBit => {
+                if let Some(byte) = bytes.first_mut() {
+                    *byte ^= 1;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Counts, notes and passes on what came of an operation.

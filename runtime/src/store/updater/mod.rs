@@ -24,6 +24,8 @@ pub struct Updater<F> {
     flash: F,
     map: Map,
     trust: Trust,
+    /// Whether the device was given a key that cannot be read: it takes no table.
+    has_lost_key: bool,
     journal: Journal,
     /// Sectors erased so far: slot A, slot B, records.
     erases: [u32; 3],
@@ -63,6 +65,11 @@ impl<F: NorFlash> Updater<F> {
         shelf: &mut impl Shelf<F>,
     ) -> Response {
         let answer = match request {
+            Request::Begin { .. } | Request::Rollback { .. } | Request::Provision { .. }
+                if self.has_lost_key =>
+            {
+                Err(Refusal::KeyLost)
+            }
             Request::Slots => Ok(Response::Slots(self.slots(now_ms))),
             Request::Sectors { length, first } => self.sectors(length, first, shelf),
             Request::Begin { length, digest } => self.begin(length, digest),

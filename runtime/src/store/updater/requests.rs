@@ -75,11 +75,7 @@ impl<F: NorFlash> Updater<F> {
             return Err(Refusal::OnTrial);
         }
         self.check_length(length)?;
-        if self.journal.last().is_none() {
-            // Without a record, a whole table that nobody confirmed would count at
-            // the next start.
-            self.commit(self.in_use, 0)?;
-        }
+        self.need_record()?;
         let same = |transfer: &Transfer| transfer.digest == digest && transfer.length == length;
         if !self.transfer.as_ref().is_some_and(same) {
             self.transfer = Some(Transfer::new(digest, length));
@@ -233,10 +229,17 @@ impl<F: NorFlash> Updater<F> {
             if self.trial.is_some() {
                 return Err(Refusal::OnTrial);
             }
+            self.need_record()?;
             let part = self.map.identity();
             let written = identity::write(&mut self.flash, part, &identity);
             written.map_err(|_| Refusal::ReadOnly)?;
             self.trust = wanted;
+            if let Err(refusal) = self.renew_record() {
+                // What was refused must not count at the next start.
+                let _ = identity::erase(&mut self.flash, part);
+                self.trust = Trust::default();
+                return Err(refusal);
+            }
             // From now on nobody goes back to a table that the next start would refuse.
             // The one in use stays until then.
             for slot in Slot::ALL {

@@ -3,8 +3,9 @@
 use super::Updater;
 use crate::image::layout::header;
 use crate::link::{Fault, PassThrough};
+use crate::store::identity::Found;
 use crate::store::journal::Journal;
-use crate::store::record::Commit;
+use crate::store::record::{Commit, Identity};
 use crate::store::{Map, Shelf, Slot, flash, identity};
 use crate::trust::{Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
@@ -14,21 +15,21 @@ impl<F: NorFlash> Updater<F> {
     /// the other one if that fails, or none.
     #[inline(never)]
     pub fn start(mut flash: F, map: Map, shelf: &mut impl Shelf<F>) -> Self {
-        let identity = identity::find(&mut flash, map.identity());
-        if identity.is_none() {
-            // A flash that fails here leaves things as they are.
-            let _ = identity::settle(&mut flash, map.identity());
-        }
-        let trust = identity.map_or_else(Trust::default, |identity| Trust {
-            key: Some(identity.key),
-            device: identity.device,
-        });
         let journal = Journal::find(&mut flash, map.records());
+        let found = identity::find(&mut flash, map.identity(), journal.last());
+        let trust = match found {
+            Found::Identity(Identity { key, device }) => Trust {
+                key: Some(key),
+                device,
+            },
+            Found::Nothing | Found::Lost => Trust::default(),
+        };
         let erases = journal.last().unwrap_or_default().erases;
         let mut updater = Self {
             flash,
             map,
             trust,
+            has_lost_key: found == Found::Lost,
             journal,
             erases,
             tables: [None; 2],
@@ -44,16 +45,20 @@ impl<F: NorFlash> Updater<F> {
             updater.look(slot, shelf);
         }
         updater.in_use = updater.choose();
+        if updater.has_lost_key {
+            updater.fault = Some(Fault::KeyLost);
+        }
         let chosen = updater.in_use.ok_or(updater.absence());
         shelf.select(chosen);
         updater
     }
 
-    /// Ends the doubt about a record that may have been cut. A flash that fails here leaves
-    /// things as they are.
+    /// Ends the doubt about a record that may have been cut, and has the last one say that
+    /// there is a key. A flash that fails here leaves things as they are.
     fn settle(&mut self) {
-        if let Some(last) = self.journal.last().filter(|_| self.journal.is_doubtful()) {
-            let _ = self.append(last);
+        let noted = self.journal.last().is_none_or(|last| last.has_key);
+        if self.journal.is_doubtful() || self.trust.key.is_some() && !noted {
+            let _ = self.renew_record();
         }
     }
 
@@ -69,10 +74,15 @@ impl<F: NorFlash> Updater<F> {
             return;
         }
         let last = self.journal.last();
+        let meant = last.and_then(|last| last.table);
+        if self.has_lost_key && meant.is_none_or(|(meant, _)| meant != slot) {
+            // Who signed it cannot be told. What was confirmed may run on.
+            *slot.of_mut(&mut self.broken) = true;
+            return;
+        }
         let noted = last.map(|last| *slot.of(&last.lengths));
         let length = noted.filter(|length| *length > 0);
         let loaded = shelf.load(&self.flash, slot, length, &self.terms());
-        let meant = last.and_then(|last| last.table);
         let loaded = loaded.and_then(|accepted| match meant {
             // Something else was put there past this code.
             Some((meant, id)) if meant == slot && id != accepted.id => {

@@ -537,6 +537,16 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         for (before, after) in before.iter_mut().zip(&after) {
             before.touched.clone_from(&after.touched);
         }
+        // The first record comes before a key: there may be the one without the other.
+        let mut noted = Vec::new();
+        for (before, after) in before.iter().zip(&after) {
+            if before.owner != after.owner {
+                let mut between = before.clone();
+                between.record = after.record;
+                noted.push(between);
+            }
+        }
+        before.extend(noted);
         before.extend(after);
         for model in &mut before {
             if let Some((slot, range)) = model.touched.clone() {
