@@ -45,14 +45,10 @@
     )
 )]
 
-#[cfg(feature = "fault-tools")]
-extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
 pub mod exchange;
-#[cfg(feature = "fault-tools")]
-pub mod fault;
 mod frame;
 pub mod governor;
 mod grid;

@@ -1,7 +1,7 @@
 //! The tables of the device that is none: the runtime's own updater over a simulated
 //! flash.
 
-use iltm_runtime::fault::NorSimulator;
+use crate::flash_simulator::NorSimulator;
 use iltm_runtime::image::content;
 use iltm_runtime::link::{PassThrough, Request, Response};
 use iltm_runtime::store::{Change, Map, Shelf, Slot, Updater};

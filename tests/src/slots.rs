@@ -2,7 +2,7 @@
 //! with nothing but memory around them.
 
 use crate::fake_device::FakeDevice;
-use iltm_runtime::fault::NorSimulator;
+use crate::flash_simulator::NorSimulator;
 use iltm_runtime::image::content;
 use iltm_runtime::link::{Device, Digest, Hello, PassThrough, Refusal, Request, Response, Status};
 use iltm_runtime::store::{Map, Shelf, Slot, Updater};

@@ -4,10 +4,10 @@
 use ed25519_dalek::SigningKey;
 use iltm::capture::Response as Projector;
 use iltm::compile::sign::{SealTerms, sign};
-use iltm_runtime::fault::{Misread, NorSimulator, Violations, Wear};
 use iltm_runtime::link::{Fault, Refusal, Request, Response};
 use iltm_runtime::store::identity_record;
 use iltm_runtime::trust::{Rejected, Trust};
+use iltm_tests::flash_simulator::{Misread, NorSimulator, Violations, Wear};
 use iltm_tests::slots::{Layout, SimDevice};
 use iltm_tests::wedge_table_for;
 

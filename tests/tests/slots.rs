@@ -3,10 +3,10 @@
 use ed25519_dalek::SigningKey;
 use iltm::capture::Response as Projector;
 use iltm::compile::sign::{SealTerms, sign};
-use iltm_runtime::fault::NorSimulator;
 use iltm_runtime::link::{PassThrough, Refusal, Request, Response, SlotState, Slots};
 use iltm_runtime::store::{Map, MapError};
 use iltm_runtime::trust::Rejected;
+use iltm_tests::flash_simulator::NorSimulator;
 use iltm_tests::slots::{SimDevice, Step, TRIAL_S, digest};
 use iltm_tests::wedge_table_for;
 

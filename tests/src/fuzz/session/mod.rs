@@ -17,8 +17,8 @@ mod wire;
 pub(super) use op::OP;
 
 use super::files::{Owner, files};
+use crate::flash_simulator::{NorSimulator, Violations};
 use crate::slots::{Layout, SimDevice};
-use iltm_runtime::fault::{NorSimulator, Violations};
 use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
 use iltm_runtime::store::Slot;
 use model::{Model, Record, Sizes};

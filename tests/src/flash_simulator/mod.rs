@@ -1,4 +1,8 @@
-//! NOR flash in memory, which fails by order.
+//! NOR flash simulator: power cuts, bit rot, worn sectors and misread bytes by order, and a
+//! count of the rules that its user broke.
+//!
+//! Whatever is random follows from a seed: a failure that was printed with its seed
+//! and its step can be repeated.
 
 mod damage;
 mod operation;
@@ -9,11 +13,10 @@ mod work;
 
 pub use operation::{NorError, Operation, Violations, Work};
 
-use alloc::vec::Vec;
-use core::ops::Range;
 use damage::Sector;
 use fastrand::Rng;
 use spent::Spent;
+use std::ops::Range;
 
 /// Steps that the erase of one sector takes, at each of which the power can fail.
 pub const ERASE_STAGES: u64 = 8;
@@ -68,7 +71,7 @@ pub enum Misread {
 ///
 /// ```
 /// use embedded_storage::nor_flash::NorFlash;
-/// use iltm_runtime::fault::{NorError, NorSimulator, Violations};
+/// use iltm_tests::flash_simulator::{NorError, NorSimulator, Violations};
 ///
 /// // Write units of 4 bytes, two sectors of 256 bytes.
 /// let new = NorSimulator::<4, 256>::new(2, 1);
@@ -134,10 +137,10 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         const { assert!(W > 0 && E > 0 && R > 0 && E.is_multiple_of(W)) };
         let capacity = sectors.saturating_mul(E);
         Self {
-            cells: alloc::vec![0xFF; capacity],
+            cells: vec![0xFF; capacity],
             spent: Spent::new(capacity / W),
             weak: None,
-            sectors: alloc::vec![Sector::NEW; sectors],
+            sectors: vec![Sector::NEW; sectors],
             random: Rng::with_seed(seed),
             steps: 0,
             cut_at: None,
@@ -172,7 +175,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// may not do so again.)
     #[must_use]
     pub fn with_weak_bits(mut self) -> Self {
-        self.weak = Some(alloc::vec![0; self.cells.len()]);
+        self.weak = Some(vec![0; self.cells.len()]);
         self
     }
 

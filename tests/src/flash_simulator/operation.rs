@@ -1,8 +1,8 @@
 //! What was asked of a simulated flash, and what came of it.
 
 use super::ERASE_STAGES;
-use core::fmt;
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
+use std::fmt;
 
 /// Why a simulated flash did not do, or not finish, what it was asked.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -35,7 +35,7 @@ impl fmt::Display for NorError {
     }
 }
 
-impl core::error::Error for NorError {}
+impl std::error::Error for NorError {}
 
 impl NorFlashError for NorError {
     fn kind(&self) -> NorFlashErrorKind {

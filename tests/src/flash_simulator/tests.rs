@@ -1,6 +1,4 @@
 use super::*;
-use alloc::format;
-use alloc::vec;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
 type Flash = NorSimulator<4, 64>;

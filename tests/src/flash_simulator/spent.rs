@@ -3,9 +3,8 @@
 //! What a unit reads as does not say: an all-ones word that was programmed, or a
 //! program that was cut before its first bit moved, reads as erased.
 
-use alloc::vec::Vec;
-use core::iter;
-use core::ops::Range;
+use std::iter;
+use std::ops::Range;
 
 /// One bit a unit.
 #[derive(Clone, Debug)]
@@ -16,7 +15,7 @@ pub(super) struct Spent {
 impl Spent {
     pub(super) fn new(units: usize) -> Self {
         Self {
-            words: alloc::vec![0; units.div_ceil(64)],
+            words: vec![0; units.div_ceil(64)],
         }
     }
 

@@ -1,8 +1,8 @@
 //! What a power cut, age and wear do to cells.
 
 use super::{ERASE_STAGES, Wear};
-use alloc::collections::BTreeSet;
 use fastrand::Rng;
+use std::collections::BTreeSet;
 
 /// Bits that are set with a probability of `1 / 2^halvings` each.
 fn rare(random: &mut Rng, halvings: u32) -> u64 {
