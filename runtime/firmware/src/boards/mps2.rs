@@ -1,16 +1,22 @@
-//! Arm MPS2+ with a Cortex-M7 (application note 500), as QEMU's `mps2-an500`.
+//! MPS2+ boards of Arm, as QEMU has them: with a Cortex-M7 (application note 500,
+//! `mps2-an500`) or a Cortex-M4F (application note 386, `mps2-an386`).
 //!
-//! Its PSRAM stands for table flash and frame memory.
+//! They differ in the processor and in where the PSRAM is, which `build.rs` knows. The
+//! PSRAM stands for table flash and frame memory.
 
 use super::cmsdk::{self, Lamp, Nap, Timer, Uart, WatchdogTimer};
 use super::psram::{PsramFlash, PsramSink, PsramSource};
 use crate::board::{Board, Peripherals};
 
 /// The board.
-pub struct Mps2An500;
+pub struct Mps2;
 
-impl Board for Mps2An500 {
-    const NAME: &'static str = "mps2-an500";
+impl Board for Mps2 {
+    const NAME: &'static str = if cfg!(feature = "mps2-an386") {
+        "mps2-an386"
+    } else {
+        "mps2-an500"
+    };
 
     type Clock = Timer;
     type Source = PsramSource;
