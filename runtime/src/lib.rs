@@ -14,12 +14,14 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`units`] | fixed-point types of light, drive and correction |
+//! | [`features`] | the stages that a build has |
+//! | [`response`] | from drive to projector codes |
 //! | [`haar`] | the exact integer Haar transform on any grid |
 //! | [`operator`] | the sparse operator and the proof that it cannot overflow |
 //! | [`image`] | the `.iltm` image: layout, check, accessors |
 //! | [`resample`] | between pixels and cells |
 //! | [`pipeline`] | frames in, projector input out |
-//! | [`exchange`] | frame buffers shared with the hardware that fills and shows them |
+//! | [`frame_buffers`] | frame buffers shared with the hardware that fills and shows them |
 //! | [`governor`] | the tier that fits the frame budget |
 //! | [`link`] | the serial line: frames, channels, messages |
 //! | [`trust`] | who signed a table, and whether it may run here |
@@ -48,10 +50,9 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod exchange;
-mod frame;
+pub mod features;
+pub mod frame_buffers;
 pub mod governor;
-mod grid;
 pub mod haar;
 pub mod image;
 mod kernel;
@@ -60,10 +61,11 @@ pub mod operator;
 mod pace;
 pub mod pipeline;
 pub mod resample;
+pub mod response;
 pub mod ring;
+mod size;
 pub mod store;
 pub mod trust;
 pub mod units;
 
-pub use frame::FrameSize;
-pub use grid::{Grid, GridError};
+pub use size::{FrameSize, Grid, GridError};

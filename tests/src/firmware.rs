@@ -7,7 +7,7 @@ use iltm::device::emulator::Board;
 use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
 use iltm::video::{Compensator, Picture, Samples, Settings};
-use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use std::collections::HashMap;

@@ -1,7 +1,7 @@
 //! A device's way through a frame larger than the grid against the host's.
 
 use iltm::video::OperatorMemory;
-use iltm_runtime::exchange::Format;
+use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{Encoding, FullMemory, FullPipeline, Row};
 use iltm_runtime::{FrameSize, Grid};
@@ -16,8 +16,8 @@ fn device<const C: usize>(
     let (cells, size) = (C * table.grid().cells(), format.size());
     let pipeline = FullPipeline::<C>::new(table, size).expect("it fits");
     let mut memory = FullMemory {
-        gains: &mut vec![[[0; 2]; C]; size.pixels()],
-        ambient: &mut vec![[[0; 2]; C]; size.pixels()],
+        gains: &mut vec![[0; 2]; C * size.pixels()],
+        ambient: &mut vec![[0; 2]; C * size.pixels()],
         sums: &mut vec![0; cells],
         corrections: &mut vec![0; cells],
         columns: &mut vec![0; 2 * C * size.width()],

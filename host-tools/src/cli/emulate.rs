@@ -15,7 +15,7 @@ use crate::user::Folders;
 use crate::user::emulated::register;
 use crate::video::VideoError;
 use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::Encoding;
 use serde_json::json;

@@ -3,9 +3,8 @@
 use super::ladder::Part;
 use super::quantise::Quantised;
 use iltm_runtime::image::crc32;
-use iltm_runtime::image::layout::{
-    ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, segment,
-};
+use iltm_runtime::image::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header};
+use iltm_runtime::operator::layout as segment;
 use std::ops::Range;
 
 /// Sections in the order of their kinds and selectors.

@@ -4,8 +4,8 @@
 //! read and written through the file rather than mapped, since the system calls
 //! cost little beside a frame and need no unsafe code.
 
-use iltm_runtime::exchange::layout::CONTROL_WORDS;
-use iltm_runtime::exchange::{ControlWords, psram};
+use iltm_runtime::frame_buffers::layout::CONTROL_WORDS;
+use iltm_runtime::frame_buffers::{ControlWords, psram};
 use iltm_runtime::store::identity_record;
 use std::fs::{File, OpenOptions};
 use std::io;

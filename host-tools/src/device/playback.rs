@@ -3,7 +3,7 @@
 //! it.
 
 use super::memory::{FileWords, Memory};
-use iltm_runtime::exchange::{Display, Format, Layout, RegionError, Shown, Source, psram};
+use iltm_runtime::frame_buffers::{Display, Format, Layout, RegionError, Shown, Source, psram};
 use std::io;
 use std::ops::Range;
 
@@ -123,7 +123,7 @@ const fn within_memory(range: &Range<usize>) -> Range<usize> {
 mod tests {
     use super::*;
     use iltm_runtime::FrameSize;
-    use iltm_runtime::exchange::{Presenter, Receiver};
+    use iltm_runtime::frame_buffers::{Presenter, Receiver};
     use iltm_runtime::pipeline::Encoding;
 
     #[test]

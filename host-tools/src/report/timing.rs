@@ -5,8 +5,9 @@ use crate::compile::content::natural_images;
 use crate::video::OperatorMemory;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{
-    Encoding, FlatMemory, FrameError, Halfword, Row, compensate_cells, compensate_pixels,
+    Encoding, FrameError, FullMemory, Row, compensate_cells, compensate_pixels,
 };
+use iltm_runtime::units::Halfword;
 use iltm_runtime::{FrameSize, Grid};
 use std::time::Instant;
 
@@ -57,7 +58,14 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
                 compensate_cells(table, how, image, &mut input, &mut workspace)?;
             } else {
                 let what = (table, size, prepared);
-                compensate_pixels(what, how, image, &mut input, frame.flat(), &mut workspace)?;
+                compensate_pixels(
+                    what,
+                    how,
+                    image,
+                    &mut input,
+                    &mut frame.lent(),
+                    &mut workspace,
+                )?;
                 prepared = true;
             }
             runs.push(start.elapsed().as_secs_f64() * 1e6);
@@ -68,7 +76,7 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
     Ok(medians)
 }
 
-/// What the runtime's [`FlatMemory`] borrows.
+/// What the runtime's [`FullMemory`] borrows.
 struct FrameMemory {
     gains: Vec<Halfword>,
     ambient: Vec<Halfword>,
@@ -99,8 +107,8 @@ impl FrameMemory {
         }
     }
 
-    fn flat(&mut self) -> FlatMemory<'_> {
-        FlatMemory {
+    fn lent(&mut self) -> FullMemory<'_> {
+        FullMemory {
             gains: &mut self.gains,
             ambient: &mut self.ambient,
             sums: &mut self.sums,

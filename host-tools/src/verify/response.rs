@@ -1,7 +1,7 @@
 //! Between light and the codes that a projector is sent, by a table's response.
 
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::codes::{INDEX_SHIFT, at, proportional};
+use iltm_runtime::response::{INDEX_SHIFT, code_at, linear_code_8};
 use iltm_runtime::units::Drive;
 
 /// The 8-bit codes of a table's projector, both ways, one curve a channel.
@@ -23,7 +23,7 @@ impl ProjectorCurves {
                 let code = |index: u16| {
                     let drive = Drive::from_bits(index << INDEX_SHIFT);
                     let own = table.codes(channel);
-                    own.map_or_else(|| proportional(drive), |codes| at(codes, drive))
+                    own.map_or_else(|| linear_code_8(drive), |codes| code_at(codes, drive))
                 };
                 let last = Drive::ONE.to_bits() >> INDEX_SHIFT;
                 (0..=last).map(code).collect()

@@ -6,7 +6,7 @@
 use embedded_hal::digital::OutputPin;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use embedded_storage::nor_flash::NorFlash;
-use iltm_runtime::exchange::{Broken, Format, InputCounts};
+use iltm_runtime::frame_buffers::{Broken, Format, InputCounts};
 use iltm_runtime::link::SourceFault;
 use iltm_runtime::store::{Map, MapError, Slot};
 

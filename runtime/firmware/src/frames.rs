@@ -17,7 +17,7 @@ use crate::stage::Stage;
 use crate::vitals::Vitals;
 use embedded_hal::digital::OutputPin;
 use heapless::Deque;
-use iltm_runtime::exchange::{Format, Lateness};
+use iltm_runtime::frame_buffers::{Format, Lateness};
 use iltm_runtime::governor::{Change, Governor, Reason};
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{Event, Fault, Mode, PassThrough, TableName, TableReason, TierReason};

@@ -1,8 +1,9 @@
 //! The workspace of a frame: the one large piece of memory, taken once.
 
+use iltm_runtime::features::Stage;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FlatMemory, Halfword, Row, Stage, Workspace};
-use iltm_runtime::units::InputCoefficient;
+use iltm_runtime::pipeline::{FullMemory, Row, Workspace};
+use iltm_runtime::units::{Halfword, InputCoefficient};
 use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
 
@@ -94,9 +95,9 @@ impl Memory {
         channels: usize,
         cells: usize,
         width: usize,
-    ) -> (FlatMemory<'_>, Workspace<'_>) {
+    ) -> (FullMemory<'_>, Workspace<'_>) {
         let [first, second] = &mut self.buffers;
-        let frame = FlatMemory {
+        let frame = FullMemory {
             gains: &mut self.gains,
             ambient: &mut self.ambient,
             sums: leading(&mut self.sums, channels * cells),

@@ -1,11 +1,11 @@
 //! One frame through a table, or past it.
 
 use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
-use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::Format;
+use iltm_runtime::{FrameSize, features};
+use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{self, Encoding, FrameError, compensate_cells, compensate_pixels};
+use iltm_runtime::pipeline::{Encoding, FrameError, compensate_cells, compensate_pixels};
 
 /// What is done to the frames of a format.
 #[derive(Clone, Copy)]
@@ -36,7 +36,7 @@ impl Stage {
         if size == FrameSize::of_grid(table.grid()) {
             return Self::Grid(format.encoding());
         }
-        if !pipeline::Stage::FullResolution.is_built() {
+        if !features::Stage::FullResolution.is_built() {
             return Self::PassThrough(PassThrough::OtherFrames);
         }
         if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
@@ -73,8 +73,8 @@ impl Stage {
                 let how = (tier, encoding);
                 let what = (table, size, memory.is_prepared(table, size));
                 let (channels, cells) = (table.channels().into(), table.grid().cells());
-                let (flat, mut workspace) = memory.full(channels, cells, size.width());
-                compensate_pixels(what, how, wanted, input, flat, &mut workspace)
+                let (mut pixels, mut workspace) = memory.full(channels, cells, size.width());
+                compensate_pixels(what, how, wanted, input, &mut pixels, &mut workspace)
             }
         }
     }

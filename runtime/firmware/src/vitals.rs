@@ -3,7 +3,7 @@
 use crate::board::{Board, Clock};
 use crate::retained::{Cause, Restart};
 use crate::stack;
-use iltm_runtime::exchange::InputCounts;
+use iltm_runtime::frame_buffers::InputCounts;
 use iltm_runtime::link::{
     Clipping, Fault, FrameCounts, FrameTime, Mode, Name, PassThrough, SerialCounts, SlotState,
     Stack, Status, Version,

@@ -2,8 +2,9 @@
 
 use super::basis::{Basis, NodeShifts, input_shift};
 use super::level::{Level, Pair};
-use super::source::{Block, Cells, Row, Source};
+use super::source::{Cells, Row, Source};
 use super::{ShortSlice, front};
+use crate::kernel::Block;
 use crate::units::InputCoefficient;
 
 /// A coefficient as it is stored. `shift` is its function's

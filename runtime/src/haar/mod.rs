@@ -31,10 +31,11 @@ mod reconstruction;
 mod source;
 mod synthesis;
 
+pub use crate::kernel::Block;
 pub use analysis::{Coefficient, analyse};
 pub use basis::{Basis, Function, Functions, Split};
 pub use reconstruction::reconstruct;
-pub use source::{Block, Cells, Row, Source};
+pub use source::{Cells, Row, Source};
 pub use synthesis::synthesise;
 
 #[cfg(test)]

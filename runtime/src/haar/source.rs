@@ -1,6 +1,6 @@
 //! Where the values of the finest level come from.
 
-use crate::kernel::levels;
+use crate::kernel::{Block, levels};
 use crate::units::InputCoefficient;
 
 /// The cells of a grid.
@@ -30,19 +30,6 @@ pub trait Source {
         let _ = (block, shift, sums, details);
         false
     }
-}
-
-/// Some nodes of two by two cells: all of some rows, or the first of one row.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Block {
-    /// First row of cells.
-    pub row: usize,
-    /// Columns of the grid.
-    pub cols: usize,
-    /// Nodes of each row of nodes.
-    pub nodes: usize,
-    /// Rows of nodes.
-    pub rows: usize,
 }
 
 /// A row of cells.

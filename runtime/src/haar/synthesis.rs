@@ -2,9 +2,8 @@
 
 use super::basis::Basis;
 use super::level::{Level, Pair};
-use super::source::Block;
 use super::{ShortSlice, front};
-use crate::kernel::levels;
+use crate::kernel::{Block, levels};
 
 /// How the values of a node's four quarters follow from the node's own value and
 /// its details. Quarters: top left, top right, bottom left, bottom right.

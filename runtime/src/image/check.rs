@@ -1,17 +1,16 @@
 //! The check of what an image's sections say.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
-use super::layout::{
-    MAX_PROVENANCE, MAX_SEGMENTS, MAX_TIERS, SectionKind, fine_gain, header, meta, tier,
-};
+use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, meta, tier};
 use super::sections::{Section, Whole};
 use super::table::curve;
 use super::{FineGain, ImageError, SectionProblem, Table, TierInfo};
+use crate::features::Stage;
 use crate::haar::Basis;
+use crate::operator::layout::MAX_SEGMENTS;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
 use crate::pace::{Pace, cost};
-use crate::pipeline::codes::{CODES, code};
-use crate::pipeline::{RESPONSE_KNOTS, Stage};
+use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U1F15, U8F24};
@@ -263,7 +262,7 @@ fn codes<'a>(
         let response = curve(response, channel);
         let differs = |(index, stored): (usize, &u8)| {
             pace.done(1, cost::CODE);
-            *stored != code(index, response)
+            *stored != code_of_index(index, response)
         };
         if let Some(index) = of_channel.iter().enumerate().position(differs) {
             return Err(section.field_error("code", channel * CODES + index));

@@ -19,8 +19,8 @@ mod sections;
 mod table;
 
 pub use check::Checked;
-pub use error::{ImageError, SectionProblem};
-pub use seal::{Seal, SealError, content, unseal};
+pub use error::{ImageError, SealError, SectionProblem};
+pub use seal::{Seal, content, unseal};
 pub(crate) use sections::Whole;
 pub use table::{FineGain, Table, TierInfo};
 

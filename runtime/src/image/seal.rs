@@ -4,10 +4,9 @@
 //! who signed it, and on which terms. The signature covers the image and the seal
 //! before it. Whether a seal is good is for [`trust`](crate::trust) to say.
 
-use super::ImageError;
 use super::bytes::{u16_at, u32_at};
 use super::layout::{self, header};
-use core::fmt;
+use super::{ImageError, SealError};
 
 /// First bytes of every seal.
 pub const MAGIC: [u8; 4] = *b"SEAL";
@@ -54,19 +53,6 @@ pub struct Seal {
     pub key: [u8; 8],
     /// Ed25519 signature.
     pub signature: [u8; 64],
-}
-
-/// Why the bytes behind an image are not a seal that this runtime can read.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum SealError {
-    /// It is of another version.
-    Version {
-        /// Version found.
-        found: u16,
-    },
-    /// Bytes that must be zero are not.
-    Reserved,
 }
 
 impl Seal {
@@ -193,18 +179,6 @@ pub fn content(slot: &[u8]) -> &[u8] {
         0
     };
     slot.get(..stated.saturating_add(seal)).unwrap_or(slot)
-}
-
-impl fmt::Display for SealError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Version { found } => write!(
-                f,
-                "has version {found}; this runtime reads version {SEAL_VERSION}"
-            ),
-            Self::Reserved => f.write_str("has bytes other than zero in a reserved place"),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
 use super::{Checked, ImageError};
+use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
-use crate::pipeline::{CODES, RESPONSE_KNOTS, Response, Stage};
+use crate::response::{CODES, RESPONSE_KNOTS, Response};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U8F24};
@@ -219,7 +220,7 @@ impl<'a> Table<'a> {
     }
 
     /// 8-bit projector codes of a channel by the upper bits of the drive
-    /// ([`codes`](crate::pipeline::codes)); `None` if the projector is linear.
+    /// ([`codes`](crate::response)); `None` if the projector is linear.
     #[must_use]
     #[inline]
     pub fn codes(&self, channel: usize) -> Option<&'a [u8; CODES]> {

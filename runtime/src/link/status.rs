@@ -3,7 +3,7 @@
 //! The order of variants and fields is the wire format: do not reorder.
 
 use super::message::Version;
-use crate::exchange::{AttachError, Broken};
+use crate::frame_buffers::{AttachError, Broken};
 use crate::trust::Rejected;
 use core::fmt;
 use heapless::String;

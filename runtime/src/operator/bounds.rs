@@ -6,9 +6,9 @@
 //! level do not overlap between nodes, so a correction is at most the sum over
 //! the levels of the largest node's `sum_i z_i * peak_i`.
 
+use super::layout::MAX_SHORT;
 use super::{Channels, OperatorError, Rows, Segment};
 use crate::haar::Basis;
-use crate::image::layout::segment::MAX_SHORT;
 use crate::pace::{Pace, cost};
 use crate::units::INPUT_COEFFICIENT_MAX;
 use heapless::Vec;

@@ -29,6 +29,8 @@
 
 mod bounds;
 mod error;
+pub mod layout;
+mod reference;
 mod segment;
 
 pub use bounds::Bounds;
@@ -37,12 +39,12 @@ pub use segment::{Channels, Group, Groups, Pair, Row, Rows, Segment};
 
 use crate::Grid;
 use crate::haar::Basis;
-use crate::image::layout::MAX_SEGMENTS;
-use crate::kernel::gather::{self, Sums};
+use crate::kernel::{self, Sums};
 use crate::pace::{Pace, cost};
 use crate::units::InputCoefficient;
 use fixed::types::{I2F30, U1F15};
 use heapless::Vec;
+use layout::MAX_SEGMENTS;
 
 /// An operator whose entries are well-formed and cannot overflow.
 #[derive(Clone, Debug)]
@@ -188,12 +190,39 @@ impl<'a> Operator<'a> {
             };
             match (count, scales) {
                 (3, &[red, green, blue]) => {
-                    gather::gather(segment, [red, green, blue], fresh, &mut sums);
+                    add(segment, [red, green, blue], fresh, &mut sums);
                 }
-                (1, &[scale, ..]) => gather::gather(segment, [scale], fresh, &mut sums),
+                (1, &[scale, ..]) => add(segment, [scale], fresh, &mut sums),
                 _ => {}
             }
         }
+    }
+}
+
+/// Adds a segment, scaled by channel, to the sums of `C` channels. The segment was
+/// checked against a grid of `sums.cells` cells; too short slices stay as they are.
+///
+/// `fresh` says that the sums are all zero: a row is then stored, not added.
+fn add<const C: usize>(
+    segment: &Segment<'_>,
+    scales: [I2F30; C],
+    fresh: bool,
+    sums: &mut Sums<'_>,
+) {
+    let needed = C.saturating_mul(sums.cells);
+    if sums.inputs.len() < needed || sums.outputs.len() < needed {
+        return;
+    }
+    let rows = segment.groups().map(|group| kernel::Rows {
+        pairs: group.pairs.unwrap_or(0),
+        count: group.count,
+        words: group.words(),
+    });
+    if kernel::gather::gather(rows, &scales, fresh, sums) {
+        return;
+    }
+    for group in segment.groups() {
+        reference::add(&group, &scales, sums);
     }
 }
 

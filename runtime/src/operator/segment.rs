@@ -1,7 +1,7 @@
 //! One tier's entries, as they lie in the image.
 
 use super::OperatorError;
-use crate::image::layout::segment::{MAX_SHORT, WORD, halves, pair_words};
+use super::layout::{MAX_SHORT, WORD, halves, pair_words};
 use crate::pace::{Pace, cost};
 
 /// Which channels a segment applies to.
@@ -135,8 +135,7 @@ impl<'a> Group<'a> {
     }
 
     /// The words of its rows.
-    #[cfg(target_arch = "arm")]
-    pub(crate) const fn words(&self) -> &'a [[u8; WORD]] {
+    pub(super) const fn words(&self) -> &'a [[u8; WORD]] {
         self.words
     }
 
@@ -258,14 +257,6 @@ impl Row<'_> {
 #[derive(Clone, Debug)]
 pub struct Groups<'a> {
     words: &'a [[u8; WORD]],
-}
-
-#[cfg(target_arch = "arm")]
-impl<'a> Groups<'a> {
-    /// The words that are left.
-    pub(crate) const fn words(&self) -> &'a [[u8; WORD]] {
-        self.words
-    }
 }
 
 impl<'a> Iterator for Groups<'a> {

@@ -11,9 +11,10 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
+use super::FrameError;
 use super::stages::{Workspace, correct, drive_row, subtract_ambient};
-use super::{FrameError, Stage};
 use crate::FrameSize;
+use crate::features::Stage;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
 use crate::resample::area::AreaAverage;

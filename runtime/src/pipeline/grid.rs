@@ -6,6 +6,7 @@ use super::sample::{Encoding, Sample};
 use super::stages::Workspace;
 use crate::haar::ShortSlice;
 use crate::image::Table;
+use crate::kernel::Plane;
 
 /// Compensates frames of the grid's own size, `C` channels side by side.
 #[derive(Clone, Copy, Debug)]
@@ -138,10 +139,12 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
     ) -> Pixels<'f, S, C> {
         let grid = self.table.grid();
         Pixels {
-            codes: wanted.get(..grid.cells()).unwrap_or_default(),
-            ambient: self.table.ambient().map(|light| light.as_chunks::<C>().0),
-            cols: grid.cols(),
-            channel,
+            plane: Plane {
+                codes: wanted.get(..grid.cells()).unwrap_or_default(),
+                ambient: self.table.ambient().map(|light| light.as_chunks::<C>().0),
+                cols: grid.cols(),
+                channel,
+            },
             curves: S::curves(self.table, encoding, channel),
         }
     }

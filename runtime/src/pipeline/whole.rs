@@ -7,20 +7,21 @@
 
 use super::FrameError;
 use super::full::{FullPipeline, Row};
-use super::pixels::{Halfword, Pixels};
+use super::pixels::Pixels;
 use super::sample::{Encoding, Sample};
 use super::stages::Workspace;
 use crate::haar::ShortSlice;
-use crate::units::Light;
+use crate::kernel::Plane;
+use crate::units::Halfword;
 use core::array::from_fn;
 
 /// Memory for frames of `W x H` pixels of `C` channels over `N` cells.
 #[derive(Debug)]
-pub struct FullMemory<'m, const C: usize> {
-    /// Gains of the pixels, `W * H` elements.
-    pub gains: &'m mut [[Halfword; C]],
-    /// Ambient light of the pixels, `W * H` elements; unused in a dark room.
-    pub ambient: &'m mut [[Halfword; C]],
+pub struct FullMemory<'m> {
+    /// Gains of the pixels, channels of a pixel side by side, `W * H * C` elements.
+    pub gains: &'m mut [Halfword],
+    /// Ambient light of the pixels in the same way; unused in a dark room.
+    pub ambient: &'m mut [Halfword],
     /// Sums of the light of the cells, `C * N` elements.
     pub sums: &'m mut [u64],
     /// Corrections of the cells, `C * N` elements.
@@ -35,16 +36,16 @@ pub struct FullMemory<'m, const C: usize> {
 }
 
 impl<const C: usize> FullPipeline<'_, '_, C> {
-    fn check(&self, memory: &FullMemory<'_, C>) -> Result<(), ShortSlice> {
+    fn check(&self, memory: &FullMemory<'_>) -> Result<(), ShortSlice> {
         let (cells, width) = (C * self.table().grid().cells(), self.frame().width());
-        let pixels = self.frame().pixels();
+        let samples = C * self.frame().pixels();
         let ambient = if self.table().ambient().is_some() {
-            pixels
+            samples
         } else {
             0
         };
         for (what, needed, given) in [
-            ("gains", pixels, memory.gains.len()),
+            ("gains", samples, memory.gains.len()),
             ("ambient light", ambient, memory.ambient.len()),
             ("sums", cells, memory.sums.len()),
             ("corrections", cells, memory.corrections.len()),
@@ -63,15 +64,11 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     ///
     /// # Errors
     /// [`FrameError::Short`] if a slice is too short.
-    pub fn prepare(&self, memory: &mut FullMemory<'_, C>) -> Result<(), FrameError> {
+    pub fn prepare(&self, memory: &mut FullMemory<'_>) -> Result<(), FrameError> {
         self.check(memory)?;
         let (width, height) = (self.frame().width(), self.frame().height());
-        for (y, line) in memory
-            .gains
-            .chunks_exact_mut(width)
-            .take(height)
-            .enumerate()
-        {
+        let (gains, _) = memory.gains.as_chunks_mut::<C>();
+        for (y, line) in gains.chunks_exact_mut(width).take(height).enumerate() {
             for channel in 0..C {
                 self.gain_row(y, channel, &mut memory.row, memory.values);
                 store(line, channel, memory.values);
@@ -82,7 +79,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         } else {
             0
         };
-        let lines = memory.ambient.chunks_exact_mut(width).take(lit);
+        let (ambient, _) = memory.ambient.as_chunks_mut::<C>();
+        let lines = ambient.chunks_exact_mut(width).take(lit);
         for (y, line) in lines.enumerate() {
             for channel in 0..C {
                 if self.ambient_row(y, channel, &mut memory.row) {
@@ -106,7 +104,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         (tier, encoding): (u8, Encoding),
         wanted: &[[S; C]],
         input: &mut [[S; C]],
-        memory: &mut FullMemory<'_, C>,
+        memory: &mut FullMemory<'_>,
         workspace: &mut Workspace<'_>,
     ) -> Result<u32, FrameError> {
         self.check_tier(tier)?;
@@ -126,13 +124,13 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         &self,
         encoding: Encoding,
         wanted: &[[S; C]],
-        memory: &mut FullMemory<'_, C>,
+        memory: &mut FullMemory<'_>,
     ) -> Result<(), FrameError> {
         self.check(memory)?;
         self.check_pixels("wanted", wanted.len())?;
         let (cells, width) = (self.table().grid().cells(), self.frame().width());
         memory.sums.fill(0);
-        let ambient = &*memory.ambient;
+        let (ambient, _) = memory.ambient.as_chunks();
         let sums = memory.sums.chunks_exact_mut(cells);
         let columns = memory.columns.chunks_exact_mut(2 * width);
         for (channel, (sums, columns)) in sums.zip(columns).enumerate().take(C) {
@@ -155,7 +153,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         (tier, encoding): (u8, Encoding),
         wanted: &[[S; C]],
         input: &mut [[S; C]],
-        memory: &mut FullMemory<'_, C>,
+        memory: &mut FullMemory<'_>,
     ) -> Result<u32, FrameError> {
         self.check(memory)?;
         self.check_pixels("wanted", wanted.len())?;
@@ -169,15 +167,16 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
         let lines = input.chunks_exact_mut(width).take(self.frame().height());
-        let gains = memory.gains.chunks_exact(width);
-        for (y, (line, gains)) in lines.zip(gains).enumerate() {
+        let (gains, _) = memory.gains.as_chunks();
+        let (ambient, _) = memory.ambient.as_chunks();
+        for (y, (line, gains)) in lines.zip(gains.chunks_exact(width)).enumerate() {
             let corrections = memory.corrections.chunks_exact(cells);
             for (channel, (corrections, curves)) in corrections.zip(curves).enumerate() {
                 if operates {
                     self.correct_row(y, corrections, &mut memory.row);
                 }
                 let spread = memory.row.spread.get(..width).unwrap_or_default();
-                let pixels = self.pixels(wanted, memory.ambient, (y, channel), curves);
+                let pixels = self.pixels(wanted, ambient, (y, channel), curves);
                 clipped += S::finish(&pixels, fraction, gains, spread, line);
             }
         }
@@ -202,10 +201,12 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
             .ambient()
             .map(|_| ambient.get(start..).unwrap_or_default());
         Pixels {
-            codes: wanted.get(start..).unwrap_or_default(),
-            ambient,
-            cols: self.frame().width(),
-            channel,
+            plane: Plane {
+                codes: wanted.get(start..).unwrap_or_default(),
+                ambient,
+                cols: self.frame().width(),
+                channel,
+            },
             curves,
         }
     }
@@ -217,17 +218,5 @@ fn store<const C: usize>(line: &mut [[Halfword; C]], channel: usize, values: &[u
         if let Some(slot) = pixel.get_mut(channel) {
             *slot = value.to_le_bytes();
         }
-    }
-}
-
-/// [`Sample::add_light`] sample by sample.
-pub(super) fn add_plainly<S: Sample, const C: usize>(
-    pixels: &Pixels<'_, S, C>,
-    weight: u32,
-    columns: &mut [u32],
-) {
-    for (index, column) in columns.iter_mut().enumerate() {
-        let light = u32::from(Light::to_bits(pixels.light(index)));
-        *column = column.wrapping_add(weight.wrapping_mul(light));
     }
 }

@@ -12,7 +12,7 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use crate::kernel::lines::{self, Between};
+use crate::kernel::{Between, lines};
 
 /// One axis of an interpolation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

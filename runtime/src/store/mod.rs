@@ -33,9 +33,8 @@ mod updater;
 
 pub use error::StoreError;
 pub use identity::identity_record;
-pub use map::{Map, MapError};
+pub use map::{MAX_CHUNK, Map, MapError};
 pub use record::RECORD;
-pub use transfer::MAX_CHUNK;
 pub use updater::{Change, Updater};
 
 use crate::link::PassThrough;

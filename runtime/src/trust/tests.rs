@@ -1,11 +1,11 @@
 //! The gate, by files that are wrong in one way each.
 
 use super::*;
+use crate::features::Stage;
 use crate::image::layout::{SectionKind, header, meta};
 use crate::image::made_up::{flat, image};
 use crate::image::{ImageError, Seal, Table, seal::field};
 use crate::pace::{Pace, cost};
-use crate::pipeline::Stage;
 use ed25519_dalek::{Signer, SigningKey};
 use std::collections::BTreeSet;
 use std::string::ToString;

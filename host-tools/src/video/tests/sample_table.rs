@@ -9,7 +9,7 @@ use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::{SectionKind, meta, tier};
 use iltm_runtime::operator::{Channels, Operator, Segment};
-use iltm_runtime::pipeline::{RESPONSE_KNOTS, knot_drive};
+use iltm_runtime::response::{RESPONSE_KNOTS, knot_drive};
 use std::ops::Range;
 
 /// What a table is to hold.

@@ -16,7 +16,7 @@ use iltm_firmware::boards::{Chosen, psram};
 use iltm_firmware::fault;
 use iltm_firmware::memory::{MAX_PIXELS, Memory};
 use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::ControlWords;
+use iltm_runtime::frame_buffers::ControlWords;
 use iltm_runtime::image::{Table, content, unseal};
 use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 use iltm_runtime::store::Slot;
@@ -98,8 +98,7 @@ fn full<const C: usize>(
     let pipeline = FullPipeline::<C>::new(table, size)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     let prepared = memory.is_prepared(table, size);
-    let (flat, mut workspace) = memory.full(C, table.grid().cells(), size.width());
-    let mut frame = flat.channels::<C>();
+    let (mut frame, mut workspace) = memory.full(C, table.grid().cells(), size.width());
     if !prepared {
         pipeline.prepare(&mut frame)?;
     }

@@ -18,8 +18,8 @@ use iltm_firmware::rehearsal::{Outcome, Rehearsal};
 use iltm_firmware::stack;
 use iltm_firmware::vitals::Vitals;
 use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::layout::{BUFFERS, descriptor};
-use iltm_runtime::exchange::{
+use iltm_runtime::frame_buffers::layout::{BUFFERS, descriptor};
+use iltm_runtime::frame_buffers::{
     ControlWords, Display, Format, Layout, NativeWords, Source, psram as map,
 };
 use iltm_runtime::image::crc32;

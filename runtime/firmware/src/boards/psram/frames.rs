@@ -2,7 +2,7 @@
 
 use crate::board::{FrameSink, FrameSource};
 use core::ops::Range;
-use iltm_runtime::exchange::{
+use iltm_runtime::frame_buffers::{
     AttachError, Broken, Claim, Format, InputCounts, Layout, NativeWords, Presenter, Receiver,
     psram,
 };

@@ -10,8 +10,8 @@ pub use frames::{PsramSink, PsramSource};
 
 use core::ops::Range;
 use core::sync::atomic::AtomicU32;
-use iltm_runtime::exchange::layout::CONTROL_WORDS;
-use iltm_runtime::exchange::{NativeWords, psram};
+use iltm_runtime::frame_buffers::layout::CONTROL_WORDS;
+use iltm_runtime::frame_buffers::{NativeWords, psram};
 
 unsafe extern "C" {
     /// The PSRAM: a symbol of `memory.x`. Atomics, because the host writes it too.

@@ -1,13 +1,14 @@
-//! The definition, in plain Rust.
+//! Products of an operator's entries with input coefficients: the definition, in plain
+//! Rust.
 
-use super::Sums;
-use crate::operator::{Group, Row};
+use super::{Group, Row};
+use crate::kernel::Sums;
 use crate::units::InputCoefficient;
 use fixed::types::I2F30;
 
 /// Adds the rows of a group to the sums of `C` channels, which are long enough.
 #[inline(never)]
-pub(super) fn gather<const C: usize>(group: &Group<'_>, scales: &[I2F30; C], sums: &mut Sums<'_>) {
+pub(super) fn add<const C: usize>(group: &Group<'_>, scales: &[I2F30; C], sums: &mut Sums<'_>) {
     let mut inputs = [&[][..]; C];
     for (channel, of_channel) in inputs
         .iter_mut()

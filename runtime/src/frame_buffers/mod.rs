@@ -27,8 +27,6 @@
 //! they are, and whoever has the memory makes slices of it. Words are
 //! little-endian, reached through [`ControlWords`]; no length in them is trusted.
 
-mod error;
-mod format;
 mod input;
 mod lateness;
 pub mod layout;
@@ -36,12 +34,8 @@ mod output;
 pub mod psram;
 #[cfg(test)]
 mod tests;
-mod words;
 
-pub use error::{AttachError, Broken, RegionError};
-pub use format::Format;
-pub use input::{Claim, Filling, InputCounts, Receiver, Source};
+pub use input::{AttachError, Broken, Claim, Filling, InputCounts, Receiver, Source};
 pub use lateness::Lateness;
-pub use layout::Layout;
+pub use layout::{ControlWords, Format, Layout, NativeWords, RegionError};
 pub use output::{Display, Presenter, Shown};
-pub use words::{ControlWords, NativeWords};

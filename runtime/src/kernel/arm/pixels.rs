@@ -8,10 +8,10 @@
 //!
 //! `docs/firmware.md` says what that brings and how to repeat it.
 
-use crate::haar::Block;
-use crate::kernel::levels::arm::span;
-use crate::pipeline::{CODES, Halfword, Pixels};
-use crate::units::{Drive, InputCoefficient};
+use super::levels::span;
+use crate::kernel::{Block, Plane};
+use crate::response::CODES;
+use crate::units::{Drive, Halfword, InputCoefficient};
 use core::arch::global_asm;
 use core::ptr::without_provenance;
 
@@ -91,16 +91,16 @@ fn samples<T, const C: usize>(pixels: &[[T; C]], channel: usize, count: usize) -
 }
 
 /// Address of the first sample of the ambient light, null in a dark room.
-fn ambient<const C: usize>(pixels: &Pixels<'_, u8, C>, count: usize) -> Option<*const u8> {
+fn ambient<const C: usize>(pixels: &Plane<'_, u8, C>, count: usize) -> Option<*const u8> {
     match pixels.ambient {
         Some(ambient) => Some(samples(ambient, pixels.channel, count)?.cast()),
         None => Some(core::ptr::null()),
     }
 }
 
-/// See [`merge`](super::merge).
-pub(super) fn merge<const C: usize>(
-    pixels: &Pixels<'_, u8, C>,
+/// Sums and details of a block, as `portable.rs` says.
+pub(crate) fn merge<const C: usize>(
+    pixels: &Plane<'_, u8, C>,
     light: &[u16; 256],
     (block, shift): (Block, u32),
     sums: &mut [i32],
@@ -147,9 +147,9 @@ pub(super) fn merge<const C: usize>(
     true
 }
 
-/// See [`finish`](super::finish).
-pub(super) fn finish<const C: usize>(
-    wanted: &Pixels<'_, u8, C>,
+/// Codes of pixels, as `portable.rs` says.
+pub(crate) fn finish<const C: usize>(
+    wanted: &Plane<'_, u8, C>,
     (light, codes): (&[u16; 256], Option<&[u8; CODES]>),
     gain_fraction: u32,
     gains: &[[Halfword; C]],
@@ -192,9 +192,9 @@ pub(super) fn finish<const C: usize>(
     }
 }
 
-/// See [`add_light`](super::add_light).
-pub(super) fn add_light<const C: usize>(
-    pixels: &Pixels<'_, u8, C>,
+/// Light added to columns, as `portable.rs` says.
+pub(crate) fn add_light<const C: usize>(
+    pixels: &Plane<'_, u8, C>,
     light: &[u16; 256],
     weight: u32,
     columns: &mut [u32],

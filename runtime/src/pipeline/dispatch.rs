@@ -1,49 +1,13 @@
 //! Frames as a device has them: bytes, channels of a pixel side by side, as many as
 //! the table has.
 
-use super::full::{FullPipeline, Row};
+use super::full::FullPipeline;
 use super::grid::GridPipeline;
-use super::pixels::Halfword;
 use super::sample::Encoding;
 use super::stages::Workspace;
 use super::{FrameError, FullMemory};
 use crate::FrameSize;
 use crate::image::Table;
-
-/// [`FullMemory`] for any number of channels: each slice has room for the table's.
-#[derive(Debug)]
-pub struct FlatMemory<'m> {
-    /// See [`FullMemory::gains`].
-    pub gains: &'m mut [Halfword],
-    /// See [`FullMemory::ambient`].
-    pub ambient: &'m mut [Halfword],
-    /// See [`FullMemory::sums`].
-    pub sums: &'m mut [u64],
-    /// See [`FullMemory::corrections`].
-    pub corrections: &'m mut [i32],
-    /// See [`FullMemory::columns`].
-    pub columns: &'m mut [u32],
-    /// See [`FullMemory::row`].
-    pub row: Row<'m>,
-    /// See [`FullMemory::values`].
-    pub values: &'m mut [u16],
-}
-
-impl<'m> FlatMemory<'m> {
-    /// The same for `C` channels.
-    #[must_use]
-    pub fn channels<const C: usize>(self) -> FullMemory<'m, C> {
-        FullMemory {
-            gains: self.gains.as_chunks_mut().0,
-            ambient: self.ambient.as_chunks_mut().0,
-            sums: self.sums,
-            corrections: self.corrections,
-            columns: self.columns,
-            row: self.row,
-            values: self.values,
-        }
-    }
-}
 
 /// Compensates a frame of one pixel a cell at a tier; returns how many samples were
 /// clipped.
@@ -89,13 +53,13 @@ pub fn compensate_pixels(
     how: (u8, Encoding),
     wanted: &[u8],
     input: &mut [u8],
-    memory: FlatMemory<'_>,
+    memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
     let what = (table, size, prepared);
     match table.channels() {
-        1 => pixels::<1>(what, how, wanted, input, memory.channels(), workspace),
-        _ => pixels::<3>(what, how, wanted, input, memory.channels(), workspace),
+        1 => pixels::<1>(what, how, wanted, input, memory, workspace),
+        _ => pixels::<3>(what, how, wanted, input, memory, workspace),
     }
 }
 
@@ -104,13 +68,13 @@ fn pixels<const C: usize>(
     how: (u8, Encoding),
     wanted: &[u8],
     input: &mut [u8],
-    mut memory: FullMemory<'_, C>,
+    memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
     let pipeline = FullPipeline::<C>::new(table, size)?;
     if !prepared {
-        pipeline.prepare(&mut memory)?;
+        pipeline.prepare(memory)?;
     }
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
-    pipeline.compensate(how, wanted, input, &mut memory, workspace)
+    pipeline.compensate(how, wanted, input, memory, workspace)
 }

@@ -4,7 +4,7 @@
 //! begins with working out how long its slices are. Here one call takes a level;
 //! two details are packed and stored at once (`pkhbt`).
 
-use crate::haar::Block;
+use crate::kernel::Block;
 use crate::units::InputCoefficient;
 use core::arch::global_asm;
 
@@ -42,7 +42,7 @@ unsafe extern "C" {
 
 /// Cells that a block spans in memory; `None` if the loops cannot run through it.
 #[inline]
-pub(in crate::kernel) fn span(block: Block) -> Option<usize> {
+pub(super) fn span(block: Block) -> Option<usize> {
     let Block {
         cols, nodes, rows, ..
     } = block;
@@ -54,9 +54,9 @@ pub(in crate::kernel) fn span(block: Block) -> Option<usize> {
     Some(cols * (2 * rows - 1) + 2 * nodes)
 }
 
-/// See [`merge`](super::merge).
+/// Sums and details of a block, as `portable.rs` says.
 #[inline]
-pub(super) fn merge(
+pub(crate) fn merge(
     values: &[i32],
     block: Block,
     shift: u32,
@@ -85,9 +85,9 @@ pub(super) fn merge(
     true
 }
 
-/// See [`split`](super::split).
+/// Quarters of a block, as `portable.rs` says.
 #[inline]
-pub(super) fn split(block: Block, values: &[i32], details: &[[i32; 3]], to: &mut [i32]) -> bool {
+pub(crate) fn split(block: Block, values: &[i32], details: &[[i32; 3]], to: &mut [i32]) -> bool {
     let count = block.nodes * block.rows;
     let fits = span(block).is_some_and(|span| to.len() >= span);
     if !fits || values.len() < count || details.len() < count {

@@ -1,7 +1,8 @@
 //! Wanted frames on their way to the device.
 
-use super::layout::{BUFFERS, MAGIC, descriptor, owner, word};
-use super::{AttachError, Broken, ControlWords, Format, Layout, RegionError};
+use super::layout::{BUFFERS, MAGIC, VERSION, descriptor, owner, word};
+use super::{ControlWords, Format, Layout, RegionError};
+use core::fmt;
 use core::ops::Range;
 use core::sync::atomic::{Ordering, fence};
 
@@ -50,7 +51,7 @@ impl<W: ControlWords> Source<W> {
                 owner::OUTSIDE,
             );
         }
-        format.write(&words);
+        format.emit(&words);
         words.store(word::EPOCH, epoch);
         words.store(word::MAGIC, MAGIC);
         Ok(Self {
@@ -117,6 +118,66 @@ impl<W: ControlWords> Source<W> {
     }
 }
 
+/// Why a device cannot take frames from a frame memory.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum AttachError {
+    /// No source has announced itself.
+    NoSource,
+    /// The source speaks another version.
+    Version {
+        /// What the header says.
+        found: u32,
+    },
+    /// The header describes no possible frame.
+    Format,
+    /// The frames do not fit.
+    Region(RegionError),
+}
+
+impl fmt::Display for AttachError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoSource => f.write_str("no source has announced frames"),
+            Self::Version { found } => write!(
+                f,
+                "the source has version {found} of the frame memory; this device has {}",
+                VERSION
+            ),
+            Self::Format => f.write_str("the source announces frames that there cannot be"),
+            Self::Region(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for AttachError {}
+
+/// Why a frame is not shown.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Broken {
+    /// The sequence numbers around the pixels differ, or changed while the frame
+    /// was worked on.
+    Torn,
+    /// It has not as many bytes as the format says.
+    Short,
+    /// It is not newer than the frame before it.
+    Stale,
+    /// The source announced another format while the frame was worked on.
+    Superseded,
+}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Torn => "the frame changed while it was read",
+            Self::Short => "the frame is incomplete",
+            Self::Stale => "the frame is not newer than the last",
+            Self::Superseded => "the source changed its format",
+        })
+    }
+}
+
+impl core::error::Error for Broken {}
+
 /// The device's side of the input buffers.
 #[derive(Debug)]
 pub struct Receiver<W> {
@@ -172,7 +233,7 @@ impl<W: ControlWords> Receiver<W> {
     /// [`AttachError`] if there is no source or its frames are impossible.
     pub fn attach(words: W, region: usize) -> Result<Self, AttachError> {
         let epoch = words.load(word::EPOCH);
-        let format = Format::read(&words)?;
+        let format = Format::parse(&words)?;
         let layout = Layout::new(format, region).map_err(AttachError::Region)?;
         if words.load(word::ATTACHED) != epoch {
             for buffer in 0..BUFFERS {

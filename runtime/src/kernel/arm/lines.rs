@@ -4,7 +4,7 @@
 //! a compiler takes apart and products of 64 bits. Here they are products of 32 bits
 //! with their upper halves.
 
-use super::Between;
+use crate::kernel::Between;
 use core::arch::global_asm;
 
 /// What the loop needs. The assembler below knows the order of the fields.
@@ -28,8 +28,8 @@ unsafe extern "C" {
     fn iltm_expand(expand: *const Expand);
 }
 
-/// See [`expand`](super::expand).
-pub(super) fn expand(between: &Between, values: &[i32], pixels: &mut [i32]) -> bool {
+/// Cells to pixels, as `portable.rs` says.
+pub(crate) fn expand(between: &Between, values: &[i32], pixels: &mut [i32]) -> bool {
     let runs = values.len().saturating_sub(1);
     let Between {
         past,
@@ -59,8 +59,8 @@ pub(super) fn expand(between: &Between, values: &[i32], pixels: &mut [i32]) -> b
     true
 }
 
-/// See [`blend`](super::blend).
-pub(super) fn blend(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) -> bool {
+/// Two rows to one between, as `portable.rs` says.
+pub(crate) fn blend(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) -> bool {
     let count = line.len();
     if count == 0 || before.len() < count || after.len() < count || fraction >> 31 != 0 {
         return false;

@@ -1,4 +1,4 @@
-//! The same as [`reference`](super::reference) for Arm's DSP extension.
+//! The same as the plain way ([`operator`](crate::operator)) for Arm's DSP extension.
 //!
 //! What makes it faster than what a compiler makes of the plain loop: rows of one
 //! number of pairs run without counting them (at most eight, unrolled), words come
@@ -8,8 +8,7 @@
 //!
 //! `docs/firmware.md` says what that brings and how to repeat it.
 
-use super::Sums;
-use crate::operator::Segment;
+use crate::kernel::{Rows, Sums};
 use core::arch::global_asm;
 use core::ffi::c_void;
 use fixed::types::I2F30;
@@ -28,11 +27,13 @@ struct Context {
 /// Runs `rows` rows of one number of pairs (or of any) from `words`.
 type Loop = unsafe extern "C" fn(words: *const c_void, context: *const Context, rows: u32);
 
-/// Adds a segment to the sums; `false` if it has to be done the plain way.
+/// Adds rows to the sums; `false`, and nothing done, if that has to be done the plain way.
 ///
-/// `fresh` says that the sums are zero.
-pub(super) fn gather(
-    segment: &Segment<'_>,
+/// `fresh` says that the sums are zero. The rows are those of a segment that was checked
+/// against a grid of `sums.cells` cells, and inputs and sums have that many elements for
+/// each scale.
+pub(crate) fn gather<'a>(
+    rows: impl Iterator<Item = Rows<'a>>,
     scales: &[I2F30],
     fresh: bool,
     sums: &mut Sums<'_>,
@@ -52,14 +53,14 @@ pub(super) fn gather(
     for (slot, scale) in context.scales.iter_mut().zip(scales) {
         *slot = scale.to_bits();
     }
-    let mut groups = segment.groups();
-    // Tables lie at multiples of four in flash; `ldm` needs it.
-    if !groups.words().as_ptr().cast::<u32>().is_aligned() {
-        return false;
-    }
-    while let Some(group) = groups.next() {
-        // A checked segment has no group of other lengths.
-        let Some(run) = loops.get(usize::from(group.pairs.unwrap_or(0))) else {
+    for rows in rows {
+        // Tables lie at multiples of four in flash; `ldm` needs it. What holds for the
+        // first rows of a segment holds for all.
+        if !rows.words.as_ptr().cast::<u32>().is_aligned() {
+            return false;
+        }
+        // A checked segment has no rows of other lengths.
+        let Some(run) = loops.get(usize::from(rows.pairs)) else {
             continue;
         };
         // SAFETY: the segment was checked, so `words` holds `count` rows as the loop
@@ -69,9 +70,9 @@ pub(super) fn gather(
         // writes while a `Table` borrows it. Words of two inputs need no alignment.
         unsafe {
             run(
-                group.words().as_ptr().cast(),
+                rows.words.as_ptr().cast(),
                 &raw const context,
-                group.count.into(),
+                rows.count.into(),
             );
         };
     }

@@ -1,0 +1,6 @@
+//! The loops in assembler.
+
+pub(crate) mod gather;
+pub(crate) mod levels;
+pub(crate) mod lines;
+pub(crate) mod pixels;
