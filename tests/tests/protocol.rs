@@ -3,7 +3,7 @@
 use iltm_runtime::link::{
     Channel, Device as _, Digest, Event, Fault, FaultyFrame, Frame, InUse, MAX_ENCODED,
     MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState,
-    Slots, TableName, TableReason, TierReason, encode,
+    Slots, TableName, TableReason, TierReason,
 };
 use iltm_runtime::store::MAX_CHUNK;
 use iltm_runtime::trust::Rejected;
@@ -25,7 +25,7 @@ impl Examples {
             sequence,
             payload,
         };
-        let length = encode(frame, &mut line).expect("short enough");
+        let length = frame.emit(&mut line).expect("short enough");
         let [low, high] = u16::to_le_bytes(sequence);
         let mut content = [&[channel as u8, low, high], payload].concat();
         let crc = iltm_runtime::image::crc32(&[&content]);

@@ -4,7 +4,7 @@ use super::client::{Incoming, Patience};
 use super::error::Heard;
 use super::{DeviceError, Line};
 use iltm_runtime::link::{
-    Channel, DELIMITER, Decoder, Frame, MAX_ENCODED, MAX_PAYLOAD, Request, Response, encode,
+    Channel, DELIMITER, Decoder, Frame, MAX_ENCODED, MAX_PAYLOAD, Request, Response,
 };
 use std::collections::VecDeque;
 use std::io;
@@ -217,7 +217,7 @@ fn encoded(sequence: u16, request: Request<'_>) -> Vec<u8> {
         sequence,
         payload,
     };
-    let length = encode(frame, &mut bytes[1..]).expect("a payload fits a frame");
+    let length = frame.emit(&mut bytes[1..]).expect("a payload fits a frame");
     bytes[..=length].to_vec()
 }
 

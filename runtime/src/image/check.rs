@@ -1,10 +1,10 @@
 //! The check of what an image's sections say.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
-use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, meta, tier};
+use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, tier};
 use super::sections::{Section, Whole};
 use super::table::curve;
-use super::{FineGain, ImageError, SectionProblem, Table, TierInfo};
+use super::{FineGain, ImageError, Meta, SectionProblem, Table, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::layout::MAX_SEGMENTS;
@@ -13,7 +13,6 @@ use crate::pace::{Pace, cost};
 use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
-use fixed::types::{U0F32, U1F15, U8F24};
 use heapless::Vec;
 
 /// An image that passed the check: small, and all that a [`Table`] is made from.
@@ -44,7 +43,7 @@ impl<'a> Checked<'a> {
 
     /// Checks what the sections of an image say whose checksums hold.
     pub(crate) fn of(whole: Whole<'a>, pace: &mut Pace<'_>) -> Result<Self, ImageError> {
-        let meta = Meta::read(whole.required(SectionKind::Meta)?)?;
+        let meta = Meta::parse(whole.required(SectionKind::Meta)?.bytes)?;
         let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
         let _ = tiers(whole.required(SectionKind::Tiers)?)?;
         check_stages(&whole, &meta)?;
@@ -111,87 +110,12 @@ impl<'a> Checked<'a> {
     }
 }
 
-/// The fields of the meta section.
-#[derive(Clone, Copy, Debug)]
-struct Meta {
-    grid: Grid,
-    channels: u8,
-    gain_fraction: u8,
-    reference_white: U8F24,
-    inverse_error: U0F32,
-    bounds: Bounds,
-    channel_scales: [U1F15; 3],
-}
-
-impl Meta {
-    fn read(section: Section<'_>) -> Result<Self, ImageError> {
-        if section.bytes.len() != meta::SIZE {
-            return Err(section.length_error());
-        }
-        let wide = |field| u32_at(section.bytes, field).unwrap_or(0);
-        let half = |field| u16_at(section.bytes, field).unwrap_or(0);
-        let byte = |at: usize| section.bytes.get(at).copied().unwrap_or(0);
-        let grid = Grid::new(half(meta::ROWS), half(meta::COLS)).map_err(ImageError::Grid)?;
-        let channels = byte(meta::CHANNELS);
-        if !matches!(channels, 1 | 3) {
-            return Err(section.field_error("channels", meta::CHANNELS));
-        }
-        let gain_fraction = byte(meta::GAIN_FRACTION);
-        if gain_fraction > 15 {
-            return Err(section.field_error("gain fraction", meta::GAIN_FRACTION));
-        }
-        for reserved in [meta::RESERVED, meta::RESERVED_END] {
-            let start = reserved.start;
-            let bytes = section.bytes.get(reserved).unwrap_or_default();
-            if bytes.iter().any(|byte| *byte != 0) {
-                return Err(section.field_error("reserved", start));
-            }
-        }
-        let reference_white = U8F24::from_bits(wide(meta::REFERENCE_WHITE));
-        if reference_white == U8F24::ZERO {
-            return Err(section.field_error("reference white", meta::REFERENCE_WHITE.start));
-        }
-        let mut channel_scales = [U1F15::ZERO; 3];
-        let scales = section.bytes.get(meta::CHANNEL_SCALES).unwrap_or_default();
-        for (channel, (scale, bytes)) in channel_scales
-            .iter_mut()
-            .zip(scales.as_chunks::<2>().0)
-            .enumerate()
-        {
-            *scale = U1F15::from_bits(u16::from_le_bytes(*bytes));
-            if channel >= usize::from(channels) && *scale != U1F15::ZERO {
-                let offset = meta::CHANNEL_SCALES.start + 2 * channel;
-                return Err(section.field_error("channel scale", offset));
-            }
-        }
-        Ok(Self {
-            grid,
-            channels,
-            gain_fraction,
-            reference_white,
-            inverse_error: U0F32::from_bits(wide(meta::INVERSE_ERROR)),
-            bounds: Bounds {
-                accumulator: wide(meta::ACCUMULATOR_BOUND),
-                correction: wide(meta::CORRECTION_BOUND),
-            },
-            channel_scales,
-        })
-    }
-}
-
 fn tiers(section: Section<'_>) -> Result<impl ExactSizeIterator<Item = TierInfo>, ImageError> {
     let (entries, rest) = section.bytes.as_chunks::<{ tier::SIZE }>();
     if !rest.is_empty() || entries.is_empty() || entries.len() > MAX_TIERS {
         return Err(section.length_error());
     }
-    Ok(entries.iter().map(|entry| {
-        let field = |field| u32_at(entry, field).unwrap_or(0);
-        TierInfo {
-            predicted_error: U0F32::from_bits(field(tier::PREDICTED_ERROR)),
-            entries: field(tier::ENTRIES),
-            multiplications: field(tier::MULTIPLICATIONS),
-        }
-    }))
+    Ok(entries.iter().map(TierInfo::parse))
 }
 
 fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageError> {

@@ -14,15 +14,17 @@ mod error;
 pub mod layout;
 #[cfg(test)]
 pub(crate) mod made_up;
+mod meta;
 pub mod seal;
 mod sections;
 mod table;
 
 pub use check::Checked;
 pub use error::{ImageError, SealError, SectionProblem};
+pub use meta::{Meta, TierInfo};
 pub use seal::{Seal, content, unseal};
 pub(crate) use sections::Whole;
-pub use table::{FineGain, Table, TierInfo};
+pub use table::{FineGain, Table};
 
 use crate::pace::{Pace, cost};
 

@@ -4,7 +4,7 @@
 //! who signed it, and on which terms. The signature covers the image and the seal
 //! before it. Whether a seal is good is for [`trust`](crate::trust) to say.
 
-use super::bytes::{u16_at, u32_at};
+use super::bytes::{put, u16_at, u32_at};
 use super::layout::{self, header};
 use super::{ImageError, SealError};
 
@@ -85,12 +85,7 @@ impl Seal {
     #[must_use]
     pub fn emit(&self) -> [u8; field::SIZE] {
         let mut bytes = [0; field::SIZE];
-        let mut put = |field, value: &[u8]| {
-            let place = bytes.get_mut::<core::ops::Range<usize>>(field);
-            for (to, from) in place.unwrap_or_default().iter_mut().zip(value) {
-                *to = *from;
-            }
-        };
+        let mut put = |field, value: &[u8]| put(&mut bytes, field, value);
         put(field::MAGIC, &MAGIC);
         put(field::SEAL_VERSION, &SEAL_VERSION.to_le_bytes());
         put(field::VERSION, &self.version.to_le_bytes());

@@ -2,7 +2,7 @@
 
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
-use super::{Checked, ImageError};
+use super::{Checked, ImageError, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
@@ -33,20 +33,6 @@ pub struct Table<'a> {
     pub(super) provenance: &'a [u8],
     pub(super) bytes: usize,
     pub(super) id: u32,
-}
-
-/// What one tier promises and costs.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct TierInfo {
-    /// Predicted error of what the tier leaves out of the inverse: mean over
-    /// natural images of `|light with the tier - light with all entries|` over
-    /// `|wanted light|`. It adds to [`Table::inverse_error`], as the root of the
-    /// sum of squares.
-    pub predicted_error: U0F32,
-    /// Operator entries read a frame.
-    pub entries: u32,
-    /// Multiplications by operator entries a frame, all channels.
-    pub multiplications: u32,
 }
 
 /// Gains on a grid finer than the cells, for frames larger than the grid.

@@ -59,7 +59,7 @@ impl Decoder {
             }
             Ok(DecodeResult::DataComplete) => {
                 let whole = self.bytes.get(..self.length);
-                let frame = whole.ok_or(FrameError::TooLong).and_then(Frame::check);
+                let frame = whole.ok_or(FrameError::TooLong).and_then(Frame::parse);
                 if frame.is_err() {
                     self.bad = self.bad.saturating_add(1);
                 }

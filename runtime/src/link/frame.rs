@@ -107,11 +107,11 @@ impl fmt::Display for FrameError {
 impl core::error::Error for FrameError {}
 
 impl<'a> Frame<'a> {
-    /// Checks the bytes of a frame after COBS.
+    /// Reads the bytes of a frame after COBS.
     ///
     /// # Errors
     /// [`FrameError`], except for [`FrameError::Cobs`].
-    pub(super) fn check(bytes: &'a [u8]) -> Result<Self, FrameError> {
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, FrameError> {
         let (checked, crc) = bytes
             .split_last_chunk::<{ field::CRC }>()
             .ok_or(FrameError::TooShort)?;
@@ -132,25 +132,25 @@ impl<'a> Frame<'a> {
             payload,
         })
     }
-}
 
-/// Writes a frame as it goes on the line, delimiter included, into `out`.
-///
-/// Returns its length, at most [`MAX_ENCODED`]; `None` if the payload is too long
-/// or `out` too short.
-#[must_use]
-pub fn encode(frame: Frame<'_>, out: &mut [u8]) -> Option<usize> {
-    if frame.payload.len() > MAX_PAYLOAD {
-        return None;
+    /// Writes it as it goes on the line, delimiter included, into `out`.
+    ///
+    /// Returns its length, at most [`MAX_ENCODED`]; `None` if the payload is too long
+    /// or `out` too short.
+    #[must_use]
+    pub fn emit(&self, out: &mut [u8]) -> Option<usize> {
+        if self.payload.len() > MAX_PAYLOAD {
+            return None;
+        }
+        let [low, high] = self.sequence.to_le_bytes();
+        let head = [self.channel as u8, low, high];
+        let crc = crc32(&[&head, self.payload]);
+        let mut encoder = CobsEncoder::new(out);
+        for part in [&head, self.payload, &crc.to_le_bytes()] {
+            encoder.push(part).ok()?;
+        }
+        let length = encoder.finalize();
+        *out.get_mut(length)? = DELIMITER;
+        Some(length + 1)
     }
-    let [low, high] = frame.sequence.to_le_bytes();
-    let head = [frame.channel as u8, low, high];
-    let crc = crc32(&[&head, frame.payload]);
-    let mut encoder = CobsEncoder::new(out);
-    for part in [&head, frame.payload, &crc.to_le_bytes()] {
-        encoder.push(part).ok()?;
-    }
-    let length = encoder.finalize();
-    *out.get_mut(length)? = DELIMITER;
-    Some(length + 1)
 }

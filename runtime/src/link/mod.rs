@@ -26,9 +26,7 @@ mod tests;
 mod update;
 
 pub use decoder::Decoder;
-pub use frame::{
-    Channel, DELIMITER, Frame, FrameError, MAX_ENCODED, MAX_FRAME, MAX_PAYLOAD, encode,
-};
+pub use frame::{Channel, DELIMITER, Frame, FrameError, MAX_ENCODED, MAX_FRAME, MAX_PAYLOAD};
 pub use message::{
     Event, Hello, Limits, PROTOCOL_VERSION, Refusal, Request, Response, TableReason, TierReason,
     Version,

@@ -59,7 +59,7 @@ impl Conversation {
             sequence,
             payload,
         };
-        let length = encode(frame, &mut bytes).expect("short enough");
+        let length = frame.emit(&mut bytes).expect("short enough");
         self.session
             .receive(&bytes[..length], self.now, &mut FullDevice);
         self.said()

@@ -15,7 +15,7 @@ fn encoded(channel: Channel, sequence: u16, payload: &[u8]) -> Vec<u8> {
         sequence,
         payload,
     };
-    let length = encode(frame, &mut bytes).expect("the payload is not too long");
+    let length = frame.emit(&mut bytes).expect("the payload is not too long");
     bytes[..length].to_vec()
 }
 
@@ -152,10 +152,10 @@ fn a_payload_that_is_too_long_is_not_sent() {
         payload,
     };
     let mut out = [0; 2 * MAX_ENCODED];
-    assert_eq!(encode(frame(&long), &mut out), None);
-    assert_eq!(encode(frame(b"abc"), &mut [0; 11]), None);
+    assert_eq!(frame(&long).emit(&mut out), None);
+    assert_eq!(frame(b"abc").emit(&mut [0; 11]), None);
     // 3 bytes of payload, 7 around them, 1 of COBS, 1 delimiter.
-    assert_eq!(encode(frame(b"abc"), &mut [0; 12]), Some(12));
+    assert_eq!(frame(b"abc").emit(&mut [0; 12]), Some(12));
 }
 
 proptest! {

@@ -2,7 +2,7 @@
 
 use crate::slots::SimDevice;
 use iltm_runtime::link::{Channel, Decoder, Event, MAX_PAYLOAD, Response, Session};
-use iltm_runtime::link::{DELIMITER, Frame, MAX_ENCODED, Request, encode};
+use iltm_runtime::link::{DELIMITER, Frame, MAX_ENCODED, Request};
 
 /// What a device said.
 #[derive(Debug, Default)]
@@ -108,7 +108,7 @@ pub(super) fn framed(channel: Channel, sequence: u16, payload: &[u8]) -> Vec<u8>
         sequence,
         payload,
     };
-    let length = encode(frame, &mut encoded).expect("it fits");
+    let length = frame.emit(&mut encoded).expect("it fits");
     encoded[..length].to_vec()
 }
 
