@@ -1,5 +1,4 @@
-//! The stages that a build of this crate has: each is a feature, and all are on by
-//! default.
+//! Cargo features: the stages that a build of this crate has. All are on by default.
 //!
 //! A device that will only ever see grey frames, or a dark room, can be built without
 //! what those need not (`docs/firmware.md` says what each takes). A table that lists a

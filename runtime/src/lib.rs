@@ -1,5 +1,5 @@
-//! What runs on the device: the table image, the Haar-domain operator and the
-//! frame pipeline.
+//! Runtime of iltm, which runs on the device: table image, Haar-domain operator, frame
+//! pipeline, serial link and table store.
 //!
 //! The principles of this crate:
 //!
@@ -58,7 +58,6 @@ pub mod image;
 mod kernel;
 pub mod link;
 pub mod operator;
-mod pace;
 pub mod pipeline;
 pub mod resample;
 pub mod response;
@@ -67,5 +66,6 @@ mod size;
 pub mod store;
 pub mod trust;
 pub mod units;
+mod yield_budget;
 
 pub use size::{FrameSize, Grid, GridError};

@@ -40,11 +40,11 @@ pub const fn knot_drive(knot: usize) -> Drive {
 
 /// The response of one channel.
 #[derive(Clone, Copy, Debug)]
-pub struct Response<'a> {
+pub struct ResponseCurve<'a> {
     knots: &'a [[u8; 2]],
 }
 
-impl<'a> Response<'a> {
+impl<'a> ResponseCurve<'a> {
     /// The response with these little-endian codes, full scale 65,535, at its
     /// [`RESPONSE_KNOTS`] knots; without any, codes are proportional to drives.
     #[must_use]
@@ -111,7 +111,7 @@ pub const fn narrow(code: u16) -> u8 {
 /// The code at an index of [`SectionKind::Codes`](crate::image::layout::SectionKind),
 /// as its response has it.
 #[must_use]
-pub fn code_of_index(index: usize, response: Response<'_>) -> u8 {
+pub fn code_of_index(index: usize, response: ResponseCurve<'_>) -> u8 {
     narrow(response.fine_code(middle_drive(index)))
 }
 

@@ -1,4 +1,4 @@
-//! Fixed-point quantities and the places where they are rounded.
+//! Units: fixed-point quantities and the places where they are rounded.
 //!
 //! Everything between the decoded frame and the encoded one is one of these
 //! types. A value changes type, and is rounded, only in a function that says so

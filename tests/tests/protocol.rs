@@ -1,7 +1,7 @@
 //! That `docs/protocol.md` says what host and device say: its byte examples and limits.
 
 use iltm_runtime::link::{
-    Channel, Device as _, Digest, Event, Fault, FaultyFrame, Frame, InUse, MAX_ENCODED,
+    Channel, Device as _, Digest, Event, Fault, FaultyFrame, InUse, LinkFrame, MAX_ENCODED,
     MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState,
     Slots, TableName, TableReason, TierReason,
 };
@@ -20,7 +20,7 @@ struct Examples(BTreeMap<&'static str, (Vec<u8>, Vec<u8>)>);
 impl Examples {
     fn add(&mut self, name: &'static str, channel: Channel, sequence: u16, payload: &[u8]) {
         let mut line = [0; MAX_ENCODED];
-        let frame = Frame {
+        let frame = LinkFrame {
             channel,
             sequence,
             payload,

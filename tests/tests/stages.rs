@@ -39,7 +39,7 @@ fn code(stage: Stage) -> Vec<Code> {
             File("runtime/src/haar/source.rs"),
             File("runtime/src/haar/synthesis.rs"),
             Function("runtime/src/pipeline/stages.rs", "operate"),
-            Function("runtime/src/pipeline/whole.rs", "average_frame"),
+            Function("runtime/src/pipeline/full_frames.rs", "average_frame"),
             Function("runtime/src/pipeline/full.rs", "correct_row"),
             Symbol("merge"),
             Symbol("split"),
@@ -70,7 +70,7 @@ fn code(stage: Stage) -> Vec<Code> {
         ],
         Stage::FullResolution => vec![
             File("runtime/src/pipeline/full.rs"),
-            File("runtime/src/pipeline/whole.rs"),
+            File("runtime/src/pipeline/full_frames.rs"),
             File("runtime/src/resample/"),
             File("runtime/src/kernel/arm/lines.rs"),
             OneOf(&[

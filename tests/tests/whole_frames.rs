@@ -3,7 +3,7 @@
 use iltm::video::OperatorMemory;
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, FullMemory, FullPipeline, Row};
+use iltm_runtime::pipeline::{Encoding, FullMemory, FullPipeline, RowBuffers};
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::firmware::{Effects, on_host, random_frame, random_table};
 use iltm_tests::made_up::MadeUp;
@@ -21,7 +21,7 @@ fn device<const C: usize>(
         sums: &mut vec![0; cells],
         corrections: &mut vec![0; cells],
         columns: &mut vec![0; 2 * C * size.width()],
-        row: Row {
+        row: RowBuffers {
             line: &mut vec![0; pipeline.line_len()],
             spread: &mut vec![0; size.width()],
         },
@@ -32,7 +32,8 @@ fn device<const C: usize>(
     let (encoding, mut operator) = (format.encoding(), OperatorMemory::new(table));
     pipeline
         .compensate(
-            (tier, encoding),
+            tier,
+            encoding,
             wanted.as_chunks().0,
             &mut input,
             &mut memory,

@@ -1,7 +1,7 @@
 //! What is said on a line, in words, for support.
 
 use super::Line;
-use iltm_runtime::link::{Channel, Decoder, Event, Frame, Request, Response};
+use iltm_runtime::link::{Channel, Decoder, Event, LinkFrame, Request, Response};
 use iltm_runtime::trust::KEY_ID;
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -102,7 +102,7 @@ impl<L: Line> Line for Transcribed<L> {
 }
 
 /// What a frame says.
-fn words(frame: Frame<'_>) -> String {
+fn words(frame: LinkFrame<'_>) -> String {
     let unread = || format!("{:?}: {} bytes", frame.channel, frame.payload.len());
     match frame.channel {
         Channel::Request => Request::parse(frame.payload).map_or_else(|_| unread(), asked),

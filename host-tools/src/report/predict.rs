@@ -19,7 +19,7 @@ use super::resample::Lattice;
 use crate::solve::InverseTransport;
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FullPipeline, Row};
+use iltm_runtime::pipeline::{FullPipeline, RowBuffers};
 use nalgebra::{DMatrix, DVector};
 
 /// Bounces after which the rest is below rounding for any scene that reflects
@@ -183,7 +183,7 @@ fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f
     let mut planes = vec![Vec::with_capacity(size.pixels()); C];
     for (channel, plane) in planes.iter_mut().enumerate() {
         for y in 0..size.height() {
-            let mut row = Row {
+            let mut row = RowBuffers {
                 line: &mut line,
                 spread: &mut spread,
             };

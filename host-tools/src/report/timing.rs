@@ -5,7 +5,7 @@ use crate::compile::content::natural_images;
 use crate::video::OperatorMemory;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{
-    Encoding, FrameError, FullMemory, Row, compensate_cells, compensate_pixels,
+    Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells, compensate_pixels,
 };
 use iltm_runtime::units::Halfword;
 use iltm_runtime::{FrameSize, Grid};
@@ -49,23 +49,22 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
     let mut medians = Vec::new();
     let mut prepared = false;
     for tier in 0..=table.top_tier() {
-        let how = (tier, Encoding::Display);
+        let encoding = Encoding::Display;
         let mut runs = Vec::with_capacity(RUNS);
         for image in images.iter().cycle().take(RUNS) {
             let mut workspace = memory.workspace();
             let start = Instant::now();
             if of_grid {
-                compensate_cells(table, how, image, &mut input, &mut workspace)?;
+                compensate_cells(table, tier, encoding, image, &mut input, &mut workspace)?;
             } else {
-                let what = (table, size, prepared);
-                compensate_pixels(
-                    what,
-                    how,
-                    image,
-                    &mut input,
-                    &mut frame.lent(),
-                    &mut workspace,
-                )?;
+                let job = FrameJob {
+                    table,
+                    size,
+                    prepared,
+                    tier,
+                    encoding,
+                };
+                compensate_pixels(&job, image, &mut input, &mut frame.lent(), &mut workspace)?;
                 prepared = true;
             }
             runs.push(start.elapsed().as_secs_f64() * 1e6);
@@ -114,7 +113,7 @@ impl FrameMemory {
             sums: &mut self.sums,
             corrections: &mut self.corrections,
             columns: &mut self.columns,
-            row: Row {
+            row: RowBuffers {
                 line: &mut self.line,
                 spread: &mut self.spread,
             },

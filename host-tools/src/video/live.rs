@@ -11,7 +11,7 @@ use super::stream::{self, Frames};
 use super::y4m::Reader;
 use super::{Compensator, Settings, Summary, VideoError};
 use crate::progress::Progress;
-use iltm_runtime::governor::{Change, Governor, Reason};
+use iltm_runtime::governor::{Governor, Reason, TierChange};
 use iltm_runtime::image::layout::MAX_TIERS;
 use iltm_runtime::image::{ImageError, Table, unseal};
 use rayon::ThreadPool;
@@ -27,7 +27,7 @@ pub enum Event {
         /// Frames before it.
         frame: u64,
         /// From which to which, and why; times in microseconds.
-        change: Change,
+        change: TierChange,
     },
     /// A newer table took over.
     Table {

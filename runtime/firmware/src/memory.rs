@@ -1,8 +1,8 @@
-//! The workspace of a frame: the one large piece of memory, taken once.
+//! Workspace of a frame: the one large piece of memory, taken once.
 
 use iltm_runtime::features::Stage;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FullMemory, Row, Workspace};
+use iltm_runtime::pipeline::{FullMemory, RowBuffers, Workspace};
 use iltm_runtime::units::{Halfword, InputCoefficient};
 use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
@@ -103,7 +103,7 @@ impl Memory {
             sums: leading(&mut self.sums, channels * cells),
             corrections: leading(&mut self.corrections, channels * cells),
             columns: &mut self.columns,
-            row: Row {
+            row: RowBuffers {
                 line: &mut self.line,
                 spread: leading(&mut self.spread, width),
             },

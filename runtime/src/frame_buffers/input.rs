@@ -1,4 +1,4 @@
-//! Wanted frames on their way to the device.
+//! Input buffers: wanted frames on their way to the device.
 
 use super::layout::{BUFFERS, MAGIC, VERSION, descriptor, owner, word};
 use super::{ControlWords, Format, Layout, RegionError};

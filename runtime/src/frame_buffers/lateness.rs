@@ -1,4 +1,4 @@
-//! Frames that do not come when they should.
+//! Late frames: counts those that do not come when they should.
 
 /// Counts the periods in which a source owed a frame and none came.
 ///

@@ -1,4 +1,4 @@
-//! Where everything in a frame memory is.
+//! Layout of a frame memory: header, descriptors, pixels, and how its words are reached.
 //!
 //! ```text
 //! byte 0     header, see `word`

@@ -1,4 +1,4 @@
-//! Projector input on its way to the display.
+//! Output buffers: projector input on its way to the display.
 
 use super::layout::{BUFFERS, descriptor, owner};
 use super::{ControlWords, Layout};

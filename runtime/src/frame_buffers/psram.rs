@@ -1,4 +1,4 @@
-//! What lies where in the emulated boards' PSRAM.
+//! Memory map of the emulated boards' PSRAM.
 //!
 //! 16 MiB that stand for three things of a real board: the NOR flash with the
 //! table slots, the flash sectors for small records, and the DMA memory of the

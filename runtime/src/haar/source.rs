@@ -1,4 +1,4 @@
-//! Where the values of the finest level come from.
+//! Cells of a grid, in memory or computed as they are read.
 
 use crate::kernel::{Block, levels};
 use crate::units::InputCoefficient;
@@ -7,9 +7,9 @@ use crate::units::InputCoefficient;
 ///
 /// They can be computed as they are read, from pixels for instance, so that a
 /// frame's light is not stored before it is transformed.
-pub trait Source {
+pub trait CellSource {
     /// One row of them.
-    type Row<'r>: Row
+    type Row<'r>: CellRow
     where
         Self: 'r;
 
@@ -33,14 +33,14 @@ pub trait Source {
 }
 
 /// A row of cells.
-pub trait Row: Copy {
+pub trait CellRow: Copy {
     /// The values two by two, without a last odd one.
     fn pairs(self) -> impl Iterator<Item = [i32; 2]>;
     /// The value at an index; 0 past the end.
     fn at(self, index: usize) -> i32;
 }
 
-impl Row for &[i32] {
+impl CellRow for &[i32] {
     #[inline]
     fn pairs(self) -> impl Iterator<Item = [i32; 2]> {
         self.as_chunks::<2>().0.iter().copied()
@@ -61,7 +61,7 @@ pub struct Cells<'c> {
     pub cols: usize,
 }
 
-impl Source for Cells<'_> {
+impl CellSource for Cells<'_> {
     type Row<'r>
         = &'r [i32]
     where

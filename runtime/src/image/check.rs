@@ -1,4 +1,4 @@
-//! The check of what an image's sections say.
+//! Check of an image: what its sections say, and that no frame can overflow.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
 use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, tier};
@@ -9,9 +9,9 @@ use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::layout::MAX_SEGMENTS;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
-use crate::pace::{Pace, cost};
 use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
 use crate::units::Light;
+use crate::yield_budget::{YieldBudget, cost};
 use crate::{FrameSize, Grid};
 use heapless::Vec;
 
@@ -36,28 +36,28 @@ impl<'a> Checked<'a> {
     ///
     /// # Errors
     /// [`ImageError`] with the section and field at fault.
-    pub fn new(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
-        let mut pace = Pace::new(pause);
-        Self::of(Whole::new(image, &mut pace)?, &mut pace)
+    pub fn new(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+        let mut budget = YieldBudget::new(yield_now);
+        Self::of(Whole::new(image, &mut budget)?, &mut budget)
     }
 
     /// Checks what the sections of an image say whose checksums hold.
-    pub(crate) fn of(whole: Whole<'a>, pace: &mut Pace<'_>) -> Result<Self, ImageError> {
+    pub(crate) fn of(whole: Whole<'a>, budget: &mut YieldBudget<'_>) -> Result<Self, ImageError> {
         let meta = Meta::parse(whole.required(SectionKind::Meta)?.bytes)?;
         let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
         let _ = tiers(whole.required(SectionKind::Tiers)?)?;
         check_stages(&whole, &meta)?;
         let gain = halfwords(whole.required(SectionKind::Gain)?, values)?;
         let ambient = of_stage(Stage::Ambient, &whole, SectionKind::Ambient)
-            .map(|section| ambient(section, values, pace))
+            .map(|section| ambient(section, values, budget))
             .transpose()?;
         let response = of_stage(Stage::Response, &whole, SectionKind::Response)
-            .map(|section| response(section, meta.channels, pace))
+            .map(|section| response(section, meta.channels, budget))
             .transpose()?;
         let fine_gain = of_stage(Stage::FullResolution, &whole, SectionKind::FineGain)
             .map(|section| fine_gains(section, grid, meta.channels))
             .transpose()?;
-        check_operator(&whole, &meta, pace)?;
+        check_operator(&whole, &meta, budget)?;
         Ok(Self {
             whole,
             meta,
@@ -67,11 +67,11 @@ impl<'a> Checked<'a> {
             fine_gain,
             provenance: whole
                 .optional(SectionKind::Provenance)
-                .map_or(Ok(&[][..]), |section| provenance(section, pace))?,
+                .map_or(Ok(&[][..]), |section| provenance(section, budget))?,
             codes: codes(
                 of_stage(Stage::Response, &whole, SectionKind::Codes),
                 response,
-                pace,
+                budget,
             )?,
         })
     }
@@ -127,11 +127,11 @@ fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageE
 fn ambient<'a>(
     section: Section<'a>,
     count: usize,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = halfwords(section, count)?;
     let too_much = |bits| {
-        pace.done(1, cost::VALUE);
+        budget.spend(1, cost::VALUE);
         Light::from_bits(bits) > Light::ONE
     };
     match words.run(0, count).position(too_much) {
@@ -143,7 +143,7 @@ fn ambient<'a>(
 fn response<'a>(
     section: Section<'a>,
     channels: u8,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = Halfwords::new(section.bytes).ok_or(section.length_error())?;
     let own = usize::from(channels) * RESPONSE_KNOTS;
@@ -152,7 +152,7 @@ fn response<'a>(
     }
     for start in (0..words.len()).step_by(RESPONSE_KNOTS) {
         let falls = |index: &usize| {
-            pace.done(1, cost::VALUE);
+            budget.spend(1, cost::VALUE);
             words.get(*index) < words.get(index.saturating_sub(1))
         };
         if let Some(index) = (start + 1..start + RESPONSE_KNOTS).find(falls) {
@@ -166,7 +166,7 @@ fn response<'a>(
 fn codes<'a>(
     section: Option<Section<'a>>,
     response: Option<Halfwords<'_>>,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<&'a [[u8; CODES]], ImageError> {
     let Some(section) = section else {
         return match response {
@@ -185,7 +185,7 @@ fn codes<'a>(
     for (channel, of_channel) in codes.iter().enumerate() {
         let response = curve(response, channel);
         let differs = |(index, stored): (usize, &u8)| {
-            pace.done(1, cost::CODE);
+            budget.spend(1, cost::CODE);
             *stored != code_of_index(index, response)
         };
         if let Some(index) = of_channel.iter().enumerate().position(differs) {
@@ -288,14 +288,18 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
 ///
 /// Not inlined: what it needs, other checks need not stand on.
 #[inline(never)]
-fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result<(), ImageError> {
+fn check_operator(
+    whole: &Whole<'_>,
+    meta: &Meta,
+    budget: &mut YieldBudget<'_>,
+) -> Result<(), ImageError> {
     let operator = if Stage::Operator.is_built() {
         operator(whole, meta)?
     } else {
         None
     };
     let bounds = match &operator {
-        Some(operator) => operator.prove(meta.grid, pace),
+        Some(operator) => operator.prove(meta.grid, budget),
         None => Ok(Bounds::default()),
     };
     if bounds.map_err(ImageError::Operator)? != meta.bounds {
@@ -304,7 +308,7 @@ fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result
     let tiers = tiers(whole.required(SectionKind::Tiers)?)?;
     for (tier, info) in (0_u8..).zip(tiers) {
         let cost = operator.as_ref().map_or((0, 0), |operator| {
-            operator.cost_with_pace(tier, meta.channels, pace)
+            operator.cost_yielding(tier, meta.channels, budget)
         });
         if cost != (info.entries, info.multiplications) {
             return Err(ImageError::Operator(OperatorError::CostDiffers { tier }));
@@ -314,7 +318,10 @@ fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result
 }
 
 /// Checks the text piece by piece, for it may be long.
-fn provenance<'a>(section: Section<'a>, pace: &mut Pace<'_>) -> Result<&'a [u8], ImageError> {
+fn provenance<'a>(
+    section: Section<'a>,
+    budget: &mut YieldBudget<'_>,
+) -> Result<&'a [u8], ImageError> {
     const PIECE: usize = 256;
     if section.bytes.len() > MAX_PROVENANCE {
         return Err(section.length_error());
@@ -334,7 +341,7 @@ fn provenance<'a>(section: Section<'a>, pace: &mut Pace<'_>) -> Result<&'a [u8],
             }
         };
         rest = rest.get(good..).unwrap_or_default();
-        pace.done(piece.len(), cost::VALUE);
+        budget.spend(piece.len(), cost::VALUE);
     }
     Ok(section.bytes)
 }

@@ -1,4 +1,4 @@
-//! Why an image is refused.
+//! Image errors: why an image or a seal is refused.
 
 use super::layout::{FORMAT_VERSION, SectionKind};
 use super::seal::SEAL_VERSION;

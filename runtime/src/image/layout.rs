@@ -1,4 +1,4 @@
-//! Where every byte of a table image is.
+//! Layout of a table image: where every byte is.
 //!
 //! An image is little-endian and can be used where it lies, in flash:
 //!

@@ -1,4 +1,4 @@
-//! Small images for tests of this crate; the host tools write the real ones.
+//! Sample images for tests of this crate; the host tools write the real ones.
 
 use super::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, tier};
 use super::{Meta, crc32};

@@ -1,4 +1,4 @@
-//! The seal behind a signed image: where its bytes are, and taking a file apart.
+//! Seal behind a signed image: where its bytes are, and taking a file apart.
 //!
 //! A file is an image, as long as its header says, and nothing more or one seal:
 //! who signed it, and on which terms. The signature covers the image and the seal

@@ -1,4 +1,4 @@
-//! A checked table.
+//! Compensation table, checked: its accessors.
 
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
@@ -6,7 +6,7 @@ use super::{Checked, ImageError, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
-use crate::response::{CODES, RESPONSE_KNOTS, Response};
+use crate::response::{CODES, RESPONSE_KNOTS, ResponseCurve};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U8F24};
@@ -75,13 +75,13 @@ fn channel_row(
 }
 
 /// The response of a channel: its own, or that of all.
-pub(super) fn curve(response: Option<Halfwords<'_>>, channel: usize) -> Response<'_> {
+pub(super) fn curve(response: Option<Halfwords<'_>>, channel: usize) -> ResponseCurve<'_> {
     let knots = response.map_or(&[][..], Halfwords::words);
     let curve = |channel: usize| {
         let start = channel.checked_mul(RESPONSE_KNOTS)?;
         knots.get(start..)?.get(..RESPONSE_KNOTS)
     };
-    Response::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
+    ResponseCurve::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
 }
 
 impl<'a> Table<'a> {
@@ -100,13 +100,13 @@ impl<'a> Table<'a> {
         Self::check_with(image, &mut || {})
     }
 
-    /// The same, with a `pause` every few thousand instructions for what cannot wait
+    /// The same, with a `yield_now` every few thousand instructions for what cannot wait
     /// until the check is done.
     ///
     /// # Errors
     /// As [`check`](Self::check).
-    pub fn check_with(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
-        Ok(Checked::new(image, pause)?.table())
+    pub fn check_with(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+        Ok(Checked::new(image, yield_now)?.table())
     }
 
     /// The grid of cells.
@@ -194,7 +194,7 @@ impl<'a> Table<'a> {
     /// The projector's response in a channel; [`has_response`](Self::has_response)
     /// says whether it is more than a straight line.
     #[must_use]
-    pub fn response(&self, channel: usize) -> Response<'a> {
+    pub fn response(&self, channel: usize) -> ResponseCurve<'a> {
         curve(self.response.filter(|_| self.has_response()), channel)
     }
 

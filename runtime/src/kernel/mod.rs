@@ -41,12 +41,12 @@ pub(crate) struct Sums<'s> {
     pub(crate) outputs: &'s mut [i32],
 }
 
-/// Rows of an operator with one number of pairs of entries.
+/// GroupRows of an operator with one number of pairs of entries.
 #[cfg_attr(
     not(target_arch = "arm"),
     allow(dead_code, reason = "read by the assembler")
 )]
-pub(crate) struct Rows<'a> {
+pub(crate) struct GroupRows<'a> {
     /// Pairs of each row; 0 if every row says how many it has.
     pub(crate) pairs: u16,
     /// Number of rows.
@@ -64,7 +64,7 @@ pub struct Block {
     pub cols: usize,
     /// Nodes of each row of nodes.
     pub nodes: usize,
-    /// Rows of nodes.
+    /// GroupRows of nodes.
     pub rows: usize,
 }
 

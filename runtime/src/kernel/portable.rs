@@ -1,8 +1,8 @@
-//! What each loop does, on processors for which there is none: nothing, and says so.
+//! Loops on processors for which there is no assembler: each does nothing and says so.
 
 /// Products of an operator's entries with input coefficients.
 pub(crate) mod gather {
-    use crate::kernel::{Rows, Sums};
+    use crate::kernel::{GroupRows, Sums};
     use fixed::types::I2F30;
 
     /// Adds rows to the sums of each scale's channel. `false`, and nothing done, if that
@@ -12,7 +12,7 @@ pub(crate) mod gather {
     /// are those of a segment that was checked against a grid of `sums.cells` cells, and
     /// inputs and sums have that many elements for each scale.
     pub(crate) fn gather<'a>(
-        _rows: impl Iterator<Item = Rows<'a>>,
+        _rows: impl Iterator<Item = GroupRows<'a>>,
         _scales: &[I2F30],
         _fresh: bool,
         _sums: &mut Sums<'_>,
@@ -91,7 +91,8 @@ pub(crate) mod pixels {
     pub(crate) const fn merge<const C: usize>(
         _plane: &Plane<'_, u8, C>,
         _light: &[u16; 256],
-        _block: (Block, u32),
+        _block: Block,
+        _shift: u32,
         _sums: &mut [i32],
         _details: &mut [[InputCoefficient; 3]],
     ) -> bool {
@@ -105,7 +106,8 @@ pub(crate) mod pixels {
     #[inline]
     pub(crate) const fn finish<const C: usize>(
         _wanted: &Plane<'_, u8, C>,
-        _curves: (&[u16; 256], Option<&[u8; CODES]>),
+        _light: &[u16; 256],
+        _codes: Option<&[u8; CODES]>,
         _gain_fraction: u32,
         _gains: &[[Halfword; C]],
         _corrections: &[i32],

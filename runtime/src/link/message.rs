@@ -1,4 +1,4 @@
-//! What host and device say to each other.
+//! Messages between host and device: requests, responses, refusals, events.
 //!
 //! Messages are postcard (version 1 of its wire format): integers as varints,
 //! an enum as the number of its variant and then its fields. **The order of

@@ -1,6 +1,6 @@
-//! Bytes that wait for the line.
+//! Send buffer: bytes that wait for the line.
 
-use super::frame::{Frame, MAX_ENCODED};
+use super::frame::{LinkFrame, MAX_ENCODED};
 
 /// A ring of `N` bytes that takes frames whole or not at all.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ impl<const N: usize> Outbox<N> {
 
     /// Encodes a frame behind the bytes that wait; `false`, and one more refused,
     /// if it has no room.
-    pub fn push(&mut self, frame: Frame<'_>) -> bool {
+    pub fn push(&mut self, frame: LinkFrame<'_>) -> bool {
         let mut encoded = [0; MAX_ENCODED];
         let length = frame.emit(&mut encoded);
         let encoded = length.and_then(|length| encoded.get(..length));

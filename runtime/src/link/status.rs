@@ -1,4 +1,4 @@
-//! How a device is.
+//! Status messages: tables, frames, faults and counters of a device.
 //!
 //! The order of variants and fields is the wire format: do not reorder.
 

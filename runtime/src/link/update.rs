@@ -1,4 +1,4 @@
-//! What is said about tables on their way into a device.
+//! Update messages: tables on their way into a device.
 //!
 //! The order of variants and fields is the wire format: do not reorder.
 

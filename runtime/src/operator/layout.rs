@@ -1,4 +1,4 @@
-//! The words of an operator section, `u32` each.
+//! Layout of an operator section: its words, `u32` each.
 //!
 //! Entries stand in pairs: the values `v` of two neighbouring input coefficients,
 //! zero where one of them has no entry, so that a device multiplies both at once.

@@ -1,5 +1,4 @@
-//! Products of an operator's entries with input coefficients: the definition, in plain
-//! Rust.
+//! Plain operator loop: products of entries with input coefficients, by definition.
 
 use super::{Group, Row};
 use crate::kernel::Sums;

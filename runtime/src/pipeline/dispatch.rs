@@ -1,5 +1,5 @@
-//! Frames as a device has them: bytes, channels of a pixel side by side, as many as
-//! the table has.
+//! Dispatch by channels: frames as a device has them, bytes with the channels of a pixel side
+//! by side.
 
 use super::full::FullPipeline;
 use super::grid::GridPipeline;
@@ -16,65 +16,74 @@ use crate::image::Table;
 /// As [`GridPipeline::compensate`].
 pub fn compensate_cells(
     table: &Table<'_>,
-    how: (u8, Encoding),
+    tier: u8,
+    encoding: Encoding,
     wanted: &[u8],
     input: &mut [u8],
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
     match table.channels() {
-        1 => cells::<1>(table, how, wanted, input, workspace),
-        _ => cells::<3>(table, how, wanted, input, workspace),
+        1 => cells::<1>(table, tier, encoding, wanted, input, workspace),
+        _ => cells::<3>(table, tier, encoding, wanted, input, workspace),
     }
 }
 
 fn cells<const C: usize>(
     table: &Table<'_>,
-    (tier, encoding): (u8, Encoding),
+    tier: u8,
+    encoding: Encoding,
     wanted: &[u8],
     input: &mut [u8],
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
-    GridPipeline::<C>::new(table)?.compensate(
-        tier,
-        encoding,
-        wanted.as_chunks().0,
-        input.as_chunks_mut().0,
-        workspace,
-    )
+    let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
+    GridPipeline::<C>::new(table)?.compensate(tier, encoding, wanted, input, workspace)
 }
 
-/// Compensates a frame larger than the grid at a tier, preparing the memory for table
-/// and size first unless it is; returns how many samples were clipped.
+/// What is done to a frame larger than the grid.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameJob<'t, 'a> {
+    /// The table that it goes through.
+    pub table: &'t Table<'a>,
+    /// Its size.
+    pub size: FrameSize,
+    /// Whether the memory is prepared for table and size.
+    pub prepared: bool,
+    /// The tier that it goes through.
+    pub tier: u8,
+    /// What its codes mean.
+    pub encoding: Encoding,
+}
+
+/// Compensates a frame larger than the grid, preparing the memory first unless it is;
+/// returns how many samples were clipped.
 ///
 /// # Errors
 /// As [`FullPipeline::new`] and [`FullPipeline::compensate`].
 pub fn compensate_pixels(
-    (table, size, prepared): (&Table<'_>, FrameSize, bool),
-    how: (u8, Encoding),
+    job: &FrameJob<'_, '_>,
     wanted: &[u8],
     input: &mut [u8],
     memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
-    let what = (table, size, prepared);
-    match table.channels() {
-        1 => pixels::<1>(what, how, wanted, input, memory, workspace),
-        _ => pixels::<3>(what, how, wanted, input, memory, workspace),
+    match job.table.channels() {
+        1 => pixels::<1>(job, wanted, input, memory, workspace),
+        _ => pixels::<3>(job, wanted, input, memory, workspace),
     }
 }
 
 fn pixels<const C: usize>(
-    (table, size, prepared): (&Table<'_>, FrameSize, bool),
-    how: (u8, Encoding),
+    job: &FrameJob<'_, '_>,
     wanted: &[u8],
     input: &mut [u8],
     memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
-    let pipeline = FullPipeline::<C>::new(table, size)?;
-    if !prepared {
+    let pipeline = FullPipeline::<C>::new(job.table, job.size)?;
+    if !job.prepared {
         pipeline.prepare(memory)?;
     }
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
-    pipeline.compensate(how, wanted, input, memory, workspace)
+    pipeline.compensate(job.tier, job.encoding, wanted, input, memory, workspace)
 }

@@ -1,4 +1,4 @@
-//! Frames of one pixel a cell.
+//! Grid-size frames: one pixel a cell.
 
 use super::FrameError;
 use super::pixels::Pixels;
@@ -53,7 +53,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
             self.analyse(encoding, wanted, workspace)?;
             self.operate(tier, workspace)?;
         }
-        self.finish((tier, encoding), wanted, input, workspace)
+        self.finish(tier, encoding, wanted, input, workspace)
     }
 
     /// First stage: from pixels to input coefficients, which stay in the workspace.
@@ -92,7 +92,8 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
     /// [`FrameError::Short`] if a slice is too short.
     pub fn finish<S: Sample>(
         &self,
-        (tier, encoding): (u8, Encoding),
+        tier: u8,
+        encoding: Encoding,
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         workspace: &mut Workspace<'_>,

@@ -1,4 +1,4 @@
-//! From a wanted frame to the projector's input.
+//! Frame pipeline: from a wanted frame to the projector's input.
 //!
 //! ```text
 //! codes -> light d -> d' = d - ambient -> Haar -> operator -> inverse Haar = K d'
@@ -20,20 +20,20 @@
 
 mod dispatch;
 mod full;
+mod full_frames;
 mod grid;
 mod pixels;
 mod sample;
 pub mod srgb;
 pub mod stages;
-mod whole;
 
-pub use dispatch::{compensate_cells, compensate_pixels};
-pub use full::{FullPipeline, Row};
+pub use dispatch::{FrameJob, compensate_cells, compensate_pixels};
+pub use full::{FullPipeline, RowBuffers};
+pub use full_frames::FullMemory;
 pub use grid::GridPipeline;
 pub use pixels::Pixels;
 pub use sample::{Encoding, Sample};
 pub use stages::Workspace;
-pub use whole::FullMemory;
 
 use crate::features::Stage;
 use crate::haar::ShortSlice;

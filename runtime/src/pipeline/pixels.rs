@@ -1,8 +1,8 @@
-//! The pixels of a frame of the grid's size, as the transforms read them.
+//! Pixels of a frame of the grid's size, as the transforms read them.
 
 use super::sample::Sample;
 use super::stages::subtract_ambient;
-use crate::haar::{Row, Source};
+use crate::haar::{CellRow, CellSource};
 use crate::kernel::{Block, Plane};
 use crate::units::{InputCoefficient, Light};
 
@@ -46,7 +46,7 @@ pub struct PixelRow<'r, 'f, S: Sample, const C: usize> {
     start: usize,
 }
 
-impl<S: Sample, const C: usize> Row for PixelRow<'_, '_, S, C> {
+impl<S: Sample, const C: usize> CellRow for PixelRow<'_, '_, S, C> {
     #[inline]
     fn pairs(self) -> impl Iterator<Item = [i32; 2]> {
         (0..self.pixels.plane.cols / 2).map(move |pair| [self.at(2 * pair), self.at(2 * pair + 1)])
@@ -58,7 +58,7 @@ impl<S: Sample, const C: usize> Row for PixelRow<'_, '_, S, C> {
     }
 }
 
-impl<'f, S: Sample, const C: usize> Source for Pixels<'f, S, C> {
+impl<'f, S: Sample, const C: usize> CellSource for Pixels<'f, S, C> {
     type Row<'r>
         = PixelRow<'r, 'f, S, C>
     where
@@ -81,6 +81,6 @@ impl<'f, S: Sample, const C: usize> Source for Pixels<'f, S, C> {
         sums: &mut [i32],
         details: &mut [[InputCoefficient; 3]],
     ) -> bool {
-        S::merge(self, (block, shift), sums, details)
+        S::merge(self, block, shift, sums, details)
     }
 }

@@ -1,11 +1,11 @@
-//! Frame samples: from codes to light, and from drive to codes.
+//! Samples of a frame: from codes to light, and from drive to codes.
 
 use super::pixels::Pixels;
 use super::srgb;
 use super::stages::{clip, drive};
 use crate::image::Table;
 use crate::kernel::{Block, pixels};
-use crate::response::{CODES, INDEX_SHIFT, Response, code_at, linear_code, linear_code_8};
+use crate::response::{CODES, INDEX_SHIFT, ResponseCurve, code_at, linear_code, linear_code_8};
 use crate::units::{Halfword, InputCoefficient, Light};
 use core::fmt;
 
@@ -35,11 +35,12 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
     /// whether it did.
     fn code(wanted: i32, curves: Self::Curves<'_>) -> (Self, bool);
 
-    /// [`Source::merge`](crate::haar::Source::merge) of pixels.
+    /// [`Source::merge`](crate::haar::CellSource::merge) of pixels.
     #[inline]
     fn merge<const C: usize>(
         pixels: &Pixels<'_, Self, C>,
-        (block, shift): (Block, u32),
+        block: Block,
+        shift: u32,
         sums: &mut [i32],
         details: &mut [[InputCoefficient; 3]],
     ) -> bool {
@@ -149,11 +150,19 @@ impl Sample for u8 {
     #[inline]
     fn merge<const C: usize>(
         pixels: &Pixels<'_, Self, C>,
-        block: (Block, u32),
+        block: Block,
+        shift: u32,
         sums: &mut [i32],
         details: &mut [[InputCoefficient; 3]],
     ) -> bool {
-        pixels::merge(&pixels.plane, pixels.curves.light, block, sums, details)
+        pixels::merge(
+            &pixels.plane,
+            pixels.curves.light,
+            block,
+            shift,
+            sums,
+            details,
+        )
     }
 
     fn add_light<const C: usize>(pixels: &Pixels<'_, Self, C>, weight: u32, columns: &mut [u32]) {
@@ -169,10 +178,12 @@ impl Sample for u8 {
         corrections: &[i32],
         input: &mut [[Self; C]],
     ) -> u32 {
-        let curves = (wanted.curves.light, wanted.curves.codes);
+        let Curves { light, codes } = wanted.curves;
+        let plane = &wanted.plane;
         let done = pixels::finish(
-            &wanted.plane,
-            curves,
+            plane,
+            light,
+            codes,
             gain_fraction,
             gains,
             corrections,
@@ -186,7 +197,7 @@ impl Sample for u8 {
 #[derive(Clone, Copy, Debug)]
 pub struct WideCurves<'a> {
     encoding: Encoding,
-    response: Response<'a>,
+    response: ResponseCurve<'a>,
 }
 
 impl Sample for u16 {
@@ -255,7 +266,7 @@ mod tests {
     #[test]
     fn what_is_clipped_is_what_lies_outside() {
         let of_response: [u8; CODES] =
-            core::array::from_fn(|index| code_of_index(index, Response::new(&[])));
+            core::array::from_fn(|index| code_of_index(index, ResponseCurve::new(&[])));
         for codes in [None, Some(&of_response)] {
             let curves = Curves {
                 light: &LINEAR_LIGHT,

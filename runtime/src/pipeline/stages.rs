@@ -1,4 +1,4 @@
-//! What is done to a row of samples of one channel, and to the grid.
+//! Stages of the pipeline over a row of samples of one channel, and over the grid.
 //!
 //! Each stage is one function over slices; slices of different lengths are
 //! worked up to the shortest. The grid path and the full-resolution path are
@@ -9,7 +9,7 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use crate::haar::{Cells, ShortSlice, Source, analyse, synthesise};
+use crate::haar::{CellSource, Cells, ShortSlice, analyse, synthesise};
 use crate::image::Table;
 use crate::units::{CORRECTION_GUARD_BITS, Drive, InputCoefficient, Light};
 
@@ -105,7 +105,7 @@ impl Workspace<'_> {
         &mut self,
         table: &Table<'_>,
         channel: usize,
-        cells: &impl Source,
+        cells: &impl CellSource,
     ) -> Result<(), ShortSlice> {
         let start = channel * table.grid().cells();
         let inputs = self.inputs.get_mut(start..).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `U`: linear interpolation between cell centres.
+//! Linear interpolation `U` between cell centres.
 //!
 //! Along an axis of `length` pixels and `cells` cells, the centre of pixel `x`
 //! lies `((2 x + 1) cells - length) / (2 length)` cell widths after the centre of

@@ -1,4 +1,4 @@
-//! Flash in pieces of any length.
+//! Flash access in pieces of any length.
 
 use super::StoreError;
 use super::map::{MAX_WRITE, Part};

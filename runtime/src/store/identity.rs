@@ -22,7 +22,7 @@
 //! (a supply that sags, a bus that is disturbed) is over with the next.
 
 use super::map::Part;
-use super::record::{self, Commit, Identity, Place, RECORD, places};
+use super::record::{self, Commit, Contents, Identity, RECORD, places};
 use super::{StoreError, flash};
 use embedded_storage::nor_flash::NorFlash;
 
@@ -52,9 +52,9 @@ pub(super) fn find<F: NorFlash>(flash: &mut F, part: Part, last: Option<Commit>)
     let (mut identity, mut blank, mut first_blank) = (None, true, true);
     for place in 0..places(part) {
         match record::look(flash, part, place) {
-            Ok(Place::Blank) => continue,
-            Ok(Place::Record(found)) => identity = identity.or(Some(found)),
-            Ok(Place::Spoiled) | Err(_) => {}
+            Ok(Contents::Blank) => continue,
+            Ok(Contents::Record(found)) => identity = identity.or(Some(found)),
+            Ok(Contents::Corrupt) | Err(_) => {}
         }
         blank = false;
         first_blank &= place > 0;

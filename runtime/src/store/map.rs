@@ -1,4 +1,4 @@
-//! What lies where in the flash.
+//! Flash map: where slots, commit records and identity lie.
 
 use super::Slot;
 use core::fmt;

@@ -68,12 +68,12 @@ pub(super) struct Commit {
 
 impl Commit {
     /// Whether `next` says the same and was written right after it.
-    pub(super) fn is_twin(&self, next: &Self) -> bool {
-        let twin = Self {
+    pub(super) fn is_duplicate(&self, next: &Self) -> bool {
+        let duplicate = Self {
             sequence: self.sequence.saturating_add(1),
             ..*self
         };
-        twin == *next
+        duplicate == *next
     }
 }
 
@@ -87,8 +87,8 @@ pub(super) struct Identity {
 /// What can be written as a record.
 pub(super) trait Record: Sized {
     const MAGIC: [u8; 4];
-    fn read(bytes: &[u8; RECORD]) -> Self;
-    fn write(&self, bytes: &mut [u8; RECORD]);
+    fn parse(bytes: &[u8; RECORD]) -> Self;
+    fn emit(&self, bytes: &mut [u8; RECORD]);
 }
 
 fn u32_at(bytes: &[u8; RECORD], field: Range<usize>) -> u32 {
@@ -106,7 +106,7 @@ fn put(bytes: &mut [u8; RECORD], field: Range<usize>, value: &[u8]) {
 impl Record for Commit {
     const MAGIC: [u8; 4] = *b"ILTC";
 
-    fn read(bytes: &[u8; RECORD]) -> Self {
+    fn parse(bytes: &[u8; RECORD]) -> Self {
         let slot = match u32_at(bytes, commit::SLOT) {
             0 => Some(Slot::A),
             1 => Some(Slot::B),
@@ -125,7 +125,7 @@ impl Record for Commit {
         }
     }
 
-    fn write(&self, bytes: &mut [u8; RECORD]) {
+    fn emit(&self, bytes: &mut [u8; RECORD]) {
         let slot = self.table.map_or(u32::MAX, |(slot, _)| slot as u32);
         let id = self.table.map_or(0, |(_, id)| id);
         let [a, b, records] = self.erases;
@@ -152,7 +152,7 @@ impl Record for Commit {
 impl Record for Identity {
     const MAGIC: [u8; 4] = *b"ILTI";
 
-    fn read(bytes: &[u8; RECORD]) -> Self {
+    fn parse(bytes: &[u8; RECORD]) -> Self {
         let key = bytes.get(identity::KEY).and_then(|key| key.try_into().ok());
         let device = bytes.get(identity::DEVICE);
         let device = device.and_then(|device| device.try_into().ok());
@@ -162,7 +162,7 @@ impl Record for Identity {
         }
     }
 
-    fn write(&self, bytes: &mut [u8; RECORD]) {
+    fn emit(&self, bytes: &mut [u8; RECORD]) {
         put(bytes, identity::KEY, &self.key);
         put(bytes, identity::DEVICE, &self.device.to_le_bytes());
     }
@@ -170,13 +170,13 @@ impl Record for Identity {
 
 /// What is at a record's place.
 #[derive(Debug)]
-pub(super) enum Place<R> {
+pub(super) enum Contents<R> {
     /// Erased bytes.
     Blank,
     /// A whole record.
     Record(R),
     /// Something else, such as a record that was cut.
-    Spoiled,
+    Corrupt,
 }
 
 /// Looks at place `index` of a part.
@@ -184,7 +184,7 @@ pub(super) fn look<F: NorFlash, R: Record>(
     flash: &mut F,
     part: Part,
     index: u32,
-) -> Result<Place<R>, StoreError> {
+) -> Result<Contents<R>, StoreError> {
     let mut bytes = [0; RECORD];
     flash::read(flash, part, place(index), RECORD as u32, |piece| {
         if let Ok(piece) = piece.try_into() {
@@ -193,15 +193,15 @@ pub(super) fn look<F: NorFlash, R: Record>(
         true
     })?;
     if bytes.iter().all(|byte| *byte == ERASED) {
-        return Ok(Place::Blank);
+        return Ok(Contents::Blank);
     }
     let covered = bytes.get(..field::CRC.start).unwrap_or_default();
     let whole = u32_at(&bytes, field::CRC) == crc32(&[covered]);
     let ours = bytes.get(field::MAGIC) == Some(&R::MAGIC);
     Ok(if whole && ours {
-        Place::Record(R::read(&bytes))
+        Contents::Record(R::parse(&bytes))
     } else {
-        Place::Spoiled
+        Contents::Corrupt
     })
 }
 
@@ -219,7 +219,7 @@ pub(super) fn write<F: NorFlash, R: Record>(
 pub(super) fn bytes<R: Record>(record: &R) -> [u8; RECORD] {
     let mut bytes = [0; RECORD];
     put(&mut bytes, field::MAGIC, &R::MAGIC);
-    record.write(&mut bytes);
+    record.emit(&mut bytes);
     let covered = bytes.get(..field::CRC.start).unwrap_or_default();
     let crc = crc32(&[covered]);
     put(&mut bytes, field::CRC, &crc.to_le_bytes());

@@ -1,4 +1,4 @@
-//! A file on its way into a slot.
+//! Transfer of a file into a slot.
 
 use super::flash::{self, PIECE};
 use super::map::{MAX_SECTORS, Part};
@@ -90,7 +90,7 @@ impl Transfer {
         &self,
         flash: &mut F,
         slot: Part,
-        mut pause: impl FnMut(),
+        mut yield_now: impl FnMut(),
     ) -> Result<bool, StoreError> {
         let mut hash = Sha512::new();
         let mut pieces = 0_usize;
@@ -99,7 +99,7 @@ impl Transfer {
             pieces += piece.len();
             // A block of the hash takes some 12,000 instructions.
             if pieces.is_multiple_of(2 * PIECE) {
-                pause();
+                yield_now();
             }
             true
         })?;

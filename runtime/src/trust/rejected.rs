@@ -1,4 +1,4 @@
-//! Why a table may not run here.
+//! Rejections: why a table may not run here.
 
 use crate::features::Stage;
 use crate::image::{ImageError, SealError, SectionProblem};

@@ -4,7 +4,7 @@
 //! They differ in the processor and in where the PSRAM is, which `build.rs` knows. The
 //! PSRAM stands for table flash and frame memory.
 
-use super::cmsdk::{self, Lamp, Nap, Timer, Uart, WatchdogTimer};
+use super::cmsdk::{self, Lamp, Timer, Uart, WakeTimer, WatchdogTimer};
 use super::psram::{PsramFlash, PsramSink, PsramSource};
 use crate::board::{Board, Peripherals};
 
@@ -25,7 +25,7 @@ impl Board for Mps2 {
     type Flash = PsramFlash;
     type Watchdog = WatchdogTimer;
     type Lamp = Lamp;
-    type Rest = Nap;
+    type Idle = WakeTimer;
 
     fn take() -> Option<Peripherals<Self>> {
         // The first to take the core's peripherals has the board's as well. The
@@ -43,7 +43,7 @@ impl Board for Mps2 {
             flash,
             watchdog: cmsdk.watchdog,
             lamp: cmsdk.lamp,
-            rest: cmsdk.nap,
+            idle: cmsdk.wake,
         })
     }
 }

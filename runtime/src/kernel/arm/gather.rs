@@ -1,4 +1,5 @@
-//! The same as the plain way ([`operator`](crate::operator)) for Arm's DSP extension.
+//! Operator loop in assembler: the same as the plain way ([`operator`](crate::operator)) for
+//! Arm's DSP extension.
 //!
 //! What makes it faster than what a compiler makes of the plain loop: rows of one
 //! number of pairs run without counting them (at most eight, unrolled), words come
@@ -8,7 +9,7 @@
 //!
 //! `docs/firmware.md` says what that brings and how to repeat it.
 
-use crate::kernel::{Rows, Sums};
+use crate::kernel::{GroupRows, Sums};
 use core::arch::global_asm;
 use core::ffi::c_void;
 use fixed::types::I2F30;
@@ -33,7 +34,7 @@ type Loop = unsafe extern "C" fn(words: *const c_void, context: *const Context, 
 /// against a grid of `sums.cells` cells, and inputs and sums have that many elements for
 /// each scale.
 pub(crate) fn gather<'a>(
-    rows: impl Iterator<Item = Rows<'a>>,
+    rows: impl Iterator<Item = GroupRows<'a>>,
     scales: &[I2F30],
     fresh: bool,
     sums: &mut Sums<'_>,

@@ -1,4 +1,5 @@
-//! The same as the plain way ([`haar`](crate::haar)) for Arm's DSP extension.
+//! Haar loops in assembler: the same as the plain way ([`haar`](crate::haar)) for Arm's DSP
+//! extension.
 //!
 //! The levels of a small grid are short rows, and a compiler's loop over a row
 //! begins with working out how long its slices are. Here one call takes a level;
@@ -10,13 +11,13 @@ use core::arch::global_asm;
 
 /// What the loops need. The assembler below knows the order of the fields.
 #[repr(C)]
-struct Merge {
+struct MergeValues {
     values: *const i32,
     sums: *mut i32,
     details: *mut i16,
     /// Nodes of a row.
     nodes: usize,
-    /// Rows of nodes.
+    /// GroupRows of nodes.
     rows: usize,
     shift: u32,
     half: u32,
@@ -24,9 +25,9 @@ struct Merge {
     stride: usize,
 }
 
-/// See [`Merge`].
+/// See [`MergeValues`].
 #[repr(C)]
-struct Split {
+struct SplitValues {
     values: *const i32,
     details: *const i32,
     to: *mut i32,
@@ -36,8 +37,8 @@ struct Split {
 }
 
 unsafe extern "C" {
-    fn iltm_merge_values(merge: *const Merge);
-    fn iltm_split_values(split: *const Split);
+    fn iltm_merge_values(merge: *const MergeValues);
+    fn iltm_split_values(split: *const SplitValues);
 }
 
 /// Cells that a block spans in memory; `None` if the loops cannot run through it.
@@ -69,7 +70,7 @@ pub(crate) fn merge(
     if !fits || sums.len() < count || details.len() < count || shift == 0 {
         return false;
     }
-    let merge = Merge {
+    let merge = MergeValues {
         values: values.as_ptr(),
         sums: sums.as_mut_ptr(),
         details: details.as_mut_ptr().cast(),
@@ -93,7 +94,7 @@ pub(crate) fn split(block: Block, values: &[i32], details: &[[i32; 3]], to: &mut
     if !fits || values.len() < count || details.len() < count {
         return false;
     }
-    let split = Split {
+    let split = SplitValues {
         values: values.as_ptr(),
         details: details.as_ptr().cast(),
         to: to.as_mut_ptr(),

@@ -1,4 +1,5 @@
-//! The same as the plain way ([`resample`](crate::resample)) for 32-bit Arm.
+//! Interpolation loops in assembler: the same as the plain way
+//! ([`resample`](crate::resample)) for 32-bit Arm.
 //!
 //! A cell covers a few pixels only, so what is done once a cell counts: slices that
 //! a compiler takes apart and products of 64 bits. Here they are products of 32 bits

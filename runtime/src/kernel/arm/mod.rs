@@ -1,4 +1,4 @@
-//! The loops in assembler.
+//! Assembler loops for Arm.
 
 pub(crate) mod gather;
 pub(crate) mod levels;

@@ -1,4 +1,5 @@
-//! The same as the plain way ([`pipeline`](crate::pipeline)) for Arm's DSP extension.
+//! Pixel loops in assembler: the same as the plain way ([`pipeline`](crate::pipeline)) for
+//! Arm's DSP extension.
 //!
 //! A compiler keeps some twenty addresses and values of these loops, more than there
 //! are registers, and spends a third of its instructions on moving them. Written
@@ -20,14 +21,14 @@ const FINEST_SHIFT: u32 = 2;
 
 /// What the merging loop needs. The assembler below knows the order of the fields.
 #[repr(C)]
-struct Merge {
+struct MergePixels {
     top: *const u8,
     light: *const u16,
     sums: *mut i32,
     details: *mut i16,
     /// Nodes of a row.
     nodes: usize,
-    /// Rows of nodes.
+    /// GroupRows of nodes.
     rows: usize,
     ambient: *const u8,
     /// Bytes from a row of pixels to the next.
@@ -69,10 +70,10 @@ unsafe extern "C" {
     fn iltm_add_1_lit(add: *const AddLight);
     fn iltm_add_3_dark(add: *const AddLight);
     fn iltm_add_3_lit(add: *const AddLight);
-    fn iltm_merge_1_dark(merge: *const Merge);
-    fn iltm_merge_1_lit(merge: *const Merge);
-    fn iltm_merge_3_dark(merge: *const Merge);
-    fn iltm_merge_3_lit(merge: *const Merge);
+    fn iltm_merge_1_dark(merge: *const MergePixels);
+    fn iltm_merge_1_lit(merge: *const MergePixels);
+    fn iltm_merge_3_dark(merge: *const MergePixels);
+    fn iltm_merge_3_lit(merge: *const MergePixels);
     fn iltm_finish_1_dark(finish: *const Finish) -> u32;
     fn iltm_finish_1_lit(finish: *const Finish) -> u32;
     fn iltm_finish_3_dark(finish: *const Finish) -> u32;
@@ -102,7 +103,8 @@ fn ambient<const C: usize>(pixels: &Plane<'_, u8, C>, count: usize) -> Option<*c
 pub(crate) fn merge<const C: usize>(
     pixels: &Plane<'_, u8, C>,
     light: &[u16; 256],
-    (block, shift): (Block, u32),
+    block: Block,
+    shift: u32,
     sums: &mut [i32],
     details: &mut [[InputCoefficient; 3]],
 ) -> bool {
@@ -120,7 +122,7 @@ pub(crate) fn merge<const C: usize>(
     let (Some(top), Some(ambient)) = (top, ambient(&pixels, span)) else {
         return false;
     };
-    let merge = Merge {
+    let merge = MergePixels {
         top,
         light: light.as_ptr(),
         sums: sums.as_mut_ptr(),
@@ -150,7 +152,8 @@ pub(crate) fn merge<const C: usize>(
 /// Codes of pixels, as `portable.rs` says.
 pub(crate) fn finish<const C: usize>(
     wanted: &Plane<'_, u8, C>,
-    (light, codes): (&[u16; 256], Option<&[u8; CODES]>),
+    light: &[u16; 256],
+    codes: Option<&[u8; CODES]>,
     gain_fraction: u32,
     gains: &[[Halfword; C]],
     corrections: &[i32],

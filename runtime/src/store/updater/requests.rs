@@ -1,10 +1,10 @@
-//! What each request does.
+//! Requests about tables, carried out.
 
 use super::{Trial, Updater};
 use crate::link::{Digest, Receiving, Refusal, Response, Sectors, SlotInfo, Slots, TableReason};
 use crate::store::record::Identity;
 use crate::store::transfer::Transfer;
-use crate::store::{Shelf, Slot, flash, identity};
+use crate::store::{Slot, TableSlots, flash, identity};
 use crate::trust::{Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
@@ -43,7 +43,7 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         length: u32,
         first: u32,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         self.check_length(length)?;
         let part = self.map.slot(self.target());
@@ -56,7 +56,7 @@ impl<F: NorFlash> Updater<F> {
             // Not full.
             let _ = crcs.push(crc);
             start = start.saturating_add(sector);
-            shelf.pause();
+            slots.yield_now();
         }
         Ok(Response::Sectors(Sectors { first, crcs }))
     }
@@ -93,7 +93,7 @@ impl<F: NorFlash> Updater<F> {
         transfer: u32,
         offset: u32,
         bytes: &[u8],
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         let slot = self.target();
         let running = self.transfer.as_mut();
@@ -101,7 +101,7 @@ impl<F: NorFlash> Updater<F> {
         let running = running.ok_or(Refusal::NoTransfer)?;
         running.check(&self.map, offset, bytes)?;
         // Its bytes are about to change.
-        shelf.unload(slot);
+        slots.unload(slot);
         *slot.of_mut(&mut self.tables) = None;
         *slot.of_mut(&mut self.broken) = true;
         let part = self.map.slot(slot);
@@ -118,7 +118,7 @@ impl<F: NorFlash> Updater<F> {
         transfer: u32,
         trial_s: u16,
         now_ms: u64,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         // The answer to the first such request may have been lost.
         if self.trial.is_some_and(|trial| trial.transfer == transfer) {
@@ -132,7 +132,7 @@ impl<F: NorFlash> Updater<F> {
         let running = *running.ok_or(Refusal::NoTransfer)?;
         let slot = self.target();
         let part = self.map.slot(slot);
-        let whole = running.is_whole(&mut self.flash, part, || shelf.pause());
+        let whole = running.is_whole(&mut self.flash, part, || slots.yield_now());
         if !whole.map_err(|_| Refusal::Incomplete)? {
             return Err(Refusal::Incomplete);
         }
@@ -141,10 +141,10 @@ impl<F: NorFlash> Updater<F> {
             floor: self.oldest(),
         };
         let before = *slot.of(&self.tables);
-        if let Err(rejected) = self.take(slot, running.length, &terms, shelf) {
+        if let Err(rejected) = self.take(slot, running.length, &terms, slots) {
             // What lay there already is still good to go back to.
             if let Some(before) = before {
-                let _ = self.take(slot, before.length, &self.terms(), shelf);
+                let _ = self.take(slot, before.length, &self.terms(), slots);
             }
             return Err(Refusal::Table(rejected));
         }
@@ -155,7 +155,7 @@ impl<F: NorFlash> Updater<F> {
             before: self.in_use,
         });
         self.transfer = None;
-        self.use_slot(Some(slot), TableReason::Trial, shelf);
+        self.use_slot(Some(slot), TableReason::Trial, slots);
         Ok(self.use_now(now_ms))
     }
 
@@ -165,9 +165,9 @@ impl<F: NorFlash> Updater<F> {
         slot: Slot,
         length: u32,
         terms: &Terms,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<(), Rejected> {
-        let loaded = shelf.load(&self.flash, slot, Some(length), terms);
+        let loaded = slots.load(&self.flash, slot, Some(length), terms);
         *slot.of_mut(&mut self.tables) = loaded.ok();
         *slot.of_mut(&mut self.broken) = loaded.is_err();
         loaded.map(|_| ())
@@ -190,11 +190,11 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         table: u32,
         now_ms: u64,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         self.check_in_use(table)?;
         if let Some(trial) = self.trial {
-            self.end_trial(trial, TableReason::RolledBack, shelf);
+            self.end_trial(trial, TableReason::RolledBack, slots);
             return Ok(self.use_now(now_ms));
         }
         let other = self.target();
@@ -207,11 +207,11 @@ impl<F: NorFlash> Updater<F> {
         // Since it was checked last, its version may have been revoked, or the device
         // have got a key.
         let terms = self.terms();
-        let taken = self.take(other, there.length, &terms, shelf);
+        let taken = self.take(other, there.length, &terms, slots);
         taken.map_err(Refusal::Table)?;
         self.commit(Some(other), 0)?;
         self.transfer = None;
-        self.use_slot(Some(other), TableReason::RolledBack, shelf);
+        self.use_slot(Some(other), TableReason::RolledBack, slots);
         Ok(self.use_now(now_ms))
     }
 
@@ -219,7 +219,7 @@ impl<F: NorFlash> Updater<F> {
     pub(super) fn provision(
         &mut self,
         identity: Identity,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         let wanted = Trust {
             key: Some(identity.key),
@@ -244,7 +244,7 @@ impl<F: NorFlash> Updater<F> {
             // The one in use stays until then.
             for slot in Slot::ALL {
                 if self.in_use != Some(slot) {
-                    self.look(slot, shelf);
+                    self.look(slot, slots);
                 }
             }
         }

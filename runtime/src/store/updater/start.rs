@@ -1,4 +1,4 @@
-//! What an updater finds when the device starts.
+//! Start of an updater: the tables and records that it finds.
 
 use super::Updater;
 use crate::image::layout::header;
@@ -6,7 +6,7 @@ use crate::link::{Fault, PassThrough};
 use crate::store::identity::Found;
 use crate::store::journal::Journal;
 use crate::store::record::{Commit, Identity};
-use crate::store::{Map, Shelf, Slot, flash, identity};
+use crate::store::{Map, Slot, TableSlots, flash, identity};
 use crate::trust::{Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
 
@@ -14,7 +14,7 @@ impl<F: NorFlash> Updater<F> {
     /// After a start: finds the table that counts, checks it and has it used; with
     /// the other one if that fails, or none.
     #[inline(never)]
-    pub fn start(mut flash: F, map: Map, shelf: &mut impl Shelf<F>) -> Self {
+    pub fn start(mut flash: F, map: Map, slots: &mut impl TableSlots<F>) -> Self {
         let journal = Journal::find(&mut flash, map.records());
         let found = identity::find(&mut flash, map.identity(), journal.last());
         let trust = match found {
@@ -42,14 +42,14 @@ impl<F: NorFlash> Updater<F> {
         };
         updater.settle();
         for slot in Slot::ALL {
-            updater.look(slot, shelf);
+            updater.look(slot, slots);
         }
         updater.in_use = updater.choose();
         if updater.has_lost_key {
             updater.fault = Some(Fault::KeyLost);
         }
         let chosen = updater.in_use.ok_or(updater.absence());
-        shelf.select(chosen);
+        slots.select(chosen);
         updater
     }
 
@@ -57,14 +57,14 @@ impl<F: NorFlash> Updater<F> {
     /// there is a key. A flash that fails here leaves things as they are.
     fn settle(&mut self) {
         let noted = self.journal.last().is_none_or(|last| last.has_key);
-        if self.journal.is_doubtful() || self.trust.key.is_some() && !noted {
+        if self.journal.is_uncertain() || self.trust.key.is_some() && !noted {
             let _ = self.renew_record();
         }
     }
 
     /// Checks what is in a slot.
     #[inline(never)]
-    pub(super) fn look(&mut self, slot: Slot, shelf: &mut impl Shelf<F>) {
+    pub(super) fn look(&mut self, slot: Slot, slots: &mut impl TableSlots<F>) {
         let part = self.map.slot(slot);
         let head = header::SIZE as u32;
         let empty = flash::is_blank(&mut self.flash, part, 0, head).unwrap_or(false);
@@ -82,11 +82,11 @@ impl<F: NorFlash> Updater<F> {
         }
         let noted = last.map(|last| *slot.of(&last.lengths));
         let length = noted.filter(|length| *length > 0);
-        let loaded = shelf.load(&self.flash, slot, length, &self.terms());
+        let loaded = slots.load(&self.flash, slot, length, &self.terms());
         let loaded = loaded.and_then(|accepted| match meant {
             // Something else was put there past this code.
             Some((meant, id)) if meant == slot && id != accepted.id => {
-                shelf.unload(slot);
+                slots.unload(slot);
                 Err(Rejected::NotATable)
             }
             _ => Ok(accepted),

@@ -1,9 +1,9 @@
-//! What requests have in common: the slot in use, the trial, the record that counts.
+//! State of an updater: the slot in use, the trial, the record that counts.
 
-use super::{Change, Trial, Updater};
+use super::{TableChange, Trial, Updater};
 use crate::link::{InUse, Refusal, Response, TableName, TableReason};
 use crate::store::record::Commit;
-use crate::store::{Shelf, Slot, StoreError};
+use crate::store::{Slot, StoreError, TableSlots};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<F: NorFlash> Updater<F> {
@@ -51,26 +51,26 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         trial: Trial,
         reason: TableReason,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) {
         self.trial = None;
-        self.use_slot(trial.before, reason, shelf);
+        self.use_slot(trial.before, reason, slots);
     }
 
     pub(super) fn use_slot(
         &mut self,
         slot: Option<Slot>,
         reason: TableReason,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) {
         self.in_use = slot;
-        shelf.select(slot.ok_or(self.absence()));
+        slots.select(slot.ok_or(self.absence()));
         self.changed(reason);
     }
 
     pub(super) fn changed(&mut self, reason: TableReason) {
         let table = self.table();
-        self.change = Some(Change { table, reason });
+        self.change = Some(TableChange { table, reason });
     }
 
     /// Makes the table of a slot the one that counts; `oldest` is the lowest version

@@ -656,7 +656,7 @@ fn agrees<const W: usize, const E: usize>(
     let updater = &device.updater;
     let in_use = updater.in_use().map(Slot::index);
     same("in use", in_use == model.in_use, &in_use, &model.in_use)?;
-    let selected = device.shelf.selected.ok().map(Slot::index);
+    let selected = device.tables.selected.ok().map(Slot::index);
     same("frames", selected == model.in_use, &selected, &model.in_use)?;
     let (states, wanted) = (updater.states(), model.states());
     same("states", states == wanted, &states, &wanted)?;

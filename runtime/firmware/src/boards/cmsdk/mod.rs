@@ -5,7 +5,7 @@ mod uart;
 
 pub use uart::Uart;
 
-use crate::board::{Clock, Rest, Watchdog};
+use crate::board::{Clock, Idle, Watchdog};
 use crate::retained::{Cause, Retained};
 use core::cell::Cell;
 use core::convert::Infallible;
@@ -29,7 +29,7 @@ pub struct Cmsdk {
     /// The first user light.
     pub lamp: Lamp,
     /// Timer 1, running.
-    pub nap: Nap,
+    pub wake: WakeTimer,
 }
 
 /// Hands out the peripherals. The caller makes sure that this happens once: two
@@ -37,7 +37,7 @@ pub struct Cmsdk {
 pub(super) fn take() -> Cmsdk {
     // SAFETY: the addresses are those of the peripherals (application notes 386
     // and 500, memory map), and each gets one driver.
-    let (timer, nap, uart, watchdog, lamp) = unsafe {
+    let (timer, wake, uart, watchdog, lamp) = unsafe {
         (
             Registers::at(0x4000_0000),
             Registers::at(TIMER_1),
@@ -53,7 +53,7 @@ pub(super) fn take() -> Cmsdk {
             registers: watchdog,
         },
         lamp: Lamp { registers: lamp },
-        nap: Nap::new(nap),
+        wake: WakeTimer::new(wake),
     }
 }
 
@@ -203,9 +203,9 @@ const AWAKE: Registers = unsafe { Registers::at(TIMER_1) };
 /// The host puts frames into the frame memory without an interrupt, so timer 1
 /// wakes the processor to look. A board whose frames come with an interrupt needs
 /// no such timer.
-pub struct Nap(());
+pub struct WakeTimer(());
 
-impl Nap {
+impl WakeTimer {
     fn new(registers: Registers) -> Self {
         let round = HERTZ / LOOKS - 1;
         registers.write(timer::RELOAD, round);
@@ -217,8 +217,8 @@ impl Nap {
     }
 }
 
-impl Rest for Nap {
-    fn rest(&mut self) {
+impl Idle for WakeTimer {
+    fn idle(&mut self) {
         cortex_m::asm::wfi();
     }
 }

@@ -1,4 +1,4 @@
-//! Frames through the frame memory, with the host at the other end.
+//! Frame source and sink in the PSRAM's frame memory, with the host at the other end.
 
 use crate::board::{FrameSink, FrameSource};
 use core::ops::Range;

@@ -1,4 +1,4 @@
-//! The emulated boards' PSRAM, which stands for table flash and frame memory.
+//! PSRAM of the emulated boards, which stands for table flash and frame memory.
 //!
 //! This is the one place that turns its addresses into slices.
 

@@ -1,4 +1,4 @@
-//! What the device knows of itself.
+//! Telemetry: all that a status says, kept up to date by the frame loop.
 
 use crate::board::{Board, Clock};
 use crate::retained::{Cause, Restart};
@@ -10,7 +10,7 @@ use iltm_runtime::link::{
 };
 
 /// Everything that a status says, kept up to date by the frame loop.
-pub struct Vitals {
+pub struct Telemetry {
     status: Status,
     ticks_per_microsecond: u32,
     /// Mean frame time in ticks, 16 times.
@@ -20,7 +20,7 @@ pub struct Vitals {
 /// Frames over which the mean frame time moves.
 const MEAN_OVER: u32 = 16;
 
-impl Vitals {
+impl Telemetry {
     /// Of a device that starts.
     #[must_use]
     pub fn new<B: Board>(restart: Restart) -> Self {

@@ -1,4 +1,4 @@
-//! Whole frames larger than the grid, on one thread: what a device does.
+//! Full-resolution frames, whole and on one thread: what a device does.
 //!
 //! The result is that of the rows of [`FullPipeline`], bit for bit, by a way that
 //! suits a small processor: gains and ambient light of all pixels are computed once
@@ -6,7 +6,7 @@
 //! pixels one plain loop, and by cells once for every row of cells.
 
 use super::FrameError;
-use super::full::{FullPipeline, Row};
+use super::full::{FullPipeline, RowBuffers};
 use super::pixels::Pixels;
 use super::sample::{Encoding, Sample};
 use super::stages::Workspace;
@@ -30,7 +30,7 @@ pub struct FullMemory<'m> {
     /// `2 * W` elements for each channel.
     pub columns: &'m mut [u32],
     /// For one row, as wide as the frame.
-    pub row: Row<'m>,
+    pub row: RowBuffers<'m>,
     /// One row of values of one channel, `W` elements.
     pub values: &'m mut [u16],
 }
@@ -101,7 +101,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     /// left as it was then.
     pub fn compensate<S: Sample>(
         &self,
-        (tier, encoding): (u8, Encoding),
+        tier: u8,
+        encoding: Encoding,
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         memory: &mut FullMemory<'_>,
@@ -113,7 +114,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
             self.average_frame(encoding, wanted, memory)?;
             self.correct(tier, memory.sums, memory.corrections, workspace)?;
         }
-        self.finish_frame((tier, encoding), wanted, input, memory)
+        self.finish_frame(tier, encoding, wanted, input, memory)
     }
 
     /// First stage: adds up the light of a frame by cells.
@@ -136,7 +137,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         for (channel, (sums, columns)) in sums.zip(columns).enumerate().take(C) {
             let curves = S::curves(self.table(), encoding, channel);
             self.average(columns, sums, |y, weight, columns| {
-                let pixels = self.pixels(wanted, ambient, (y, channel), curves);
+                let pixels = self.pixels(wanted, ambient, y, channel, curves);
                 S::add_light(&pixels, weight, columns);
             });
         }
@@ -150,7 +151,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     /// [`FrameError::Short`] if a slice is too short.
     pub fn finish_frame<S: Sample>(
         &self,
-        (tier, encoding): (u8, Encoding),
+        tier: u8,
+        encoding: Encoding,
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         memory: &mut FullMemory<'_>,
@@ -176,7 +178,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
                     self.correct_row(y, corrections, &mut memory.row);
                 }
                 let spread = memory.row.spread.get(..width).unwrap_or_default();
-                let pixels = self.pixels(wanted, ambient, (y, channel), curves);
+                let pixels = self.pixels(wanted, ambient, y, channel, curves);
                 clipped += S::finish(&pixels, fraction, gains, spread, line);
             }
         }
@@ -193,7 +195,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         &'f self,
         wanted: &'f [[S; C]],
         ambient: &'f [[Halfword; C]],
-        (y, channel): (usize, usize),
+        y: usize,
+        channel: usize,
         curves: S::Curves<'f>,
     ) -> Pixels<'f, S, C> {
         let (table, start) = (self.table(), y * self.frame().width());

@@ -1,8 +1,8 @@
-//! Long work in short pieces.
+//! Yield budget: long work in short pieces.
 //!
-//! A table is checked while frames arrive. So whoever asks for the check passes a
-//! *pause*: work of his own, done whenever the check has worked for a while. The
-//! check counts its work here instead of calling at every step, so that pauses are
+//! A table is checked while frames arrive. So whoever asks for the check passes
+//! `yield_now`: work of his own, done whenever the check has worked for a while. The
+//! check counts its work here instead of calling at every step, so that calls are
 //! neither far apart nor many, whatever the shape of the table.
 
 /// What work costs, in instructions of a Cortex-M7, rounded up. Counted in the
@@ -28,36 +28,39 @@ pub(crate) mod cost {
     pub(crate) const FUNCTION: usize = 200;
 }
 
-/// Counts work and pauses when there was enough.
-pub(crate) struct Pace<'p> {
-    pause: &'p mut dyn FnMut(),
+/// Counts work and yields when there was enough.
+pub(crate) struct YieldBudget<'p> {
+    yield_now: &'p mut dyn FnMut(),
     worked: usize,
 }
 
-impl<'p> Pace<'p> {
-    /// Work between two pauses, in instructions. Frames are tens of milliseconds
+impl<'p> YieldBudget<'p> {
+    /// Work between two calls, in instructions. Frames are tens of milliseconds
     /// apart, so this could be longer; it is short enough that nobody has to ask.
     pub(crate) const STRIDE: usize = 10_000;
 
     /// Starts counting.
-    pub(crate) fn new(pause: &'p mut dyn FnMut()) -> Self {
-        Self { pause, worked: 0 }
+    pub(crate) fn new(yield_now: &'p mut dyn FnMut()) -> Self {
+        Self {
+            yield_now,
+            worked: 0,
+        }
     }
 
     /// `count` pieces of work of `cost` instructions are done.
     #[inline]
-    pub(crate) fn done(&mut self, count: usize, cost: usize) {
+    pub(crate) fn spend(&mut self, count: usize, cost: usize) {
         let work = count.saturating_mul(cost);
         self.worked = self.worked.saturating_add(work);
         if self.worked >= Self::STRIDE {
-            self.rest();
+            self.yield_anew();
         }
     }
 
     #[inline(never)]
-    fn rest(&mut self) {
+    fn yield_anew(&mut self) {
         self.worked = 0;
-        (self.pause)();
+        (self.yield_now)();
     }
 }
 
@@ -66,14 +69,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pause_comes_after_a_stride_of_work_and_not_before() {
-        let mut pauses = 0;
-        let mut pause = || pauses += 1;
-        let mut pace = Pace::new(&mut pause);
-        for _ in 0..3 * Pace::STRIDE {
-            pace.done(1, 1);
+    fn a_call_comes_after_a_stride_of_work_and_not_before() {
+        let mut calls = 0;
+        let mut yield_now = || calls += 1;
+        let mut budget = YieldBudget::new(&mut yield_now);
+        for _ in 0..3 * YieldBudget::STRIDE {
+            budget.spend(1, 1);
         }
-        pace.done(usize::MAX, usize::MAX);
-        assert_eq!(pauses, 4);
+        budget.spend(usize::MAX, usize::MAX);
+        assert_eq!(calls, 4);
     }
 }

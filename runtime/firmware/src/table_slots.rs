@@ -1,11 +1,11 @@
-//! The tables of both slots, checked, and the one that frames go through.
+//! Table slots: the tables of both, checked, and the one that frames go through.
 
 use crate::board::{Board, TableFlash};
 use crate::frames::Frames;
-use crate::rehearsal::Rehearsal;
+use crate::hooks::FrameHooks;
 use iltm_runtime::image::{Checked, Table, content};
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::store::{Shelf, Slot};
+use iltm_runtime::store::{Slot, TableSlots};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, examine};
 use static_cell::StaticCell;
 
@@ -28,7 +28,7 @@ fn put(place: &mut Option<Table<'static>>, checked: &Checked<'static>) {
     *place = Some(checked.table());
 }
 
-impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
+impl<B: Board, H: FrameHooks> TableSlots<B::Flash> for Frames<B, H> {
     fn load(
         &mut self,
         flash: &B::Flash,
@@ -58,7 +58,7 @@ impl<B: Board, R: Rehearsal> Shelf<B::Flash> for Frames<B, R> {
         self.restage();
     }
 
-    fn pause(&mut self) {
+    fn yield_now(&mut self) {
         self.round();
     }
 }

@@ -1,15 +1,15 @@
-//! One frame through a table, or past it.
+//! Frame path: one frame through a table, or past it.
 
 use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
-use iltm_runtime::{FrameSize, features};
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, compensate_cells, compensate_pixels};
+use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells, compensate_pixels};
+use iltm_runtime::{FrameSize, features};
 
 /// What is done to the frames of a format.
 #[derive(Clone, Copy)]
-pub enum Stage {
+pub enum FramePath {
     /// They are shown as they are.
     PassThrough(PassThrough),
     /// They have one pixel a cell.
@@ -18,7 +18,7 @@ pub enum Stage {
     Full(Encoding, FrameSize),
 }
 
-impl Stage {
+impl FramePath {
     /// What can be done to frames of `format` with a table, and if nothing, why.
     #[must_use]
     pub fn new(table: Result<&Table<'_>, PassThrough>, format: Format) -> Self {
@@ -66,15 +66,20 @@ impl Stage {
                 Ok(0)
             }
             (Self::Grid(encoding), Some(table)) => {
-                let how = (tier, encoding);
-                compensate_cells(table, how, wanted, input, &mut memory.workspace())
+                let mut workspace = memory.workspace();
+                compensate_cells(table, tier, encoding, wanted, input, &mut workspace)
             }
             (Self::Full(encoding, size), Some(table)) => {
-                let how = (tier, encoding);
-                let what = (table, size, memory.is_prepared(table, size));
+                let job = FrameJob {
+                    table,
+                    size,
+                    prepared: memory.is_prepared(table, size),
+                    tier,
+                    encoding,
+                };
                 let (channels, cells) = (table.channels().into(), table.grid().cells());
                 let (mut pixels, mut workspace) = memory.full(channels, cells, size.width());
-                compensate_pixels(what, how, wanted, input, &mut pixels, &mut workspace)
+                compensate_pixels(&job, wanted, input, &mut pixels, &mut workspace)
             }
         }
     }

@@ -1,11 +1,11 @@
-//! What a self-test may do to the frame loop.
+//! Hooks of a self-test in the frame loop.
 
 use crate::board::Clock;
-use crate::vitals::Vitals;
-use iltm_runtime::governor::Change;
+use crate::telemetry::Telemetry;
+use iltm_runtime::governor::TierChange;
 
-/// What a self-test may do to the loop; the product runs with [`Live`].
-pub trait Rehearsal {
+/// What a self-test may do to the loop; the product runs with [`NoHooks`].
+pub trait FrameHooks {
     /// Called once a round, before a frame is looked for.
     fn round(&mut self, _clock: &impl Clock) {}
 
@@ -18,7 +18,7 @@ pub trait Rehearsal {
     fn during_frame(&mut self, _sequence: u32, _tier: u8, _clock: &impl Clock) {}
 
     /// Called after every frame.
-    fn after_frame(&mut self, _outcome: Outcome, _status: &Vitals) {}
+    fn after_frame(&mut self, _outcome: Outcome, _status: &Telemetry) {}
 }
 
 /// What became of a frame.
@@ -33,10 +33,10 @@ pub struct Outcome {
     /// Whether it took longer than the budget.
     pub over: bool,
     /// Whether the governor changed the tier after it.
-    pub change: Option<Change>,
+    pub change: Option<TierChange>,
 }
 
-/// No rehearsal.
-pub struct Live;
+/// No hooks.
+pub struct NoHooks;
 
-impl Rehearsal for Live {}
+impl FrameHooks for NoHooks {}

@@ -1,8 +1,8 @@
-//! The gate.
+//! Admission: checks signature, version and contents of a table before it may run.
 
 use super::{Accepted, Rejected, Terms, ed25519};
 use crate::image::{Checked, Seal, Table, Whole, seal, unseal};
-use crate::pace::Pace;
+use crate::yield_budget::YieldBudget;
 
 /// [`examine`]s a file and makes its table.
 ///
@@ -11,16 +11,16 @@ use crate::pace::Pace;
 pub fn admit<'a>(
     file: &'a [u8],
     terms: &Terms,
-    pause: &mut dyn FnMut(),
+    yield_now: &mut dyn FnMut(),
 ) -> Result<(Table<'a>, Accepted), Rejected> {
-    let (checked, accepted) = examine(file, terms, pause)?;
+    let (checked, accepted) = examine(file, terms, yield_now)?;
     Ok((checked.table(), accepted))
 }
 
 /// Checks the bytes of a whole file against `terms`, and its table as
 /// [`Table::check`] does. What this returns may run.
 ///
-/// `pause` is called every few thousand instructions, and a device works on frames
+/// `yield_now` is called every few thousand instructions, and a device works on frames
 /// in it: on the reference board at most 25,000 apart, but for a square root and an
 /// inverse modulo `2^255 - 19`, which a signature takes one each of: 125,000 and
 /// 108,000.
@@ -33,16 +33,16 @@ pub fn admit<'a>(
 pub fn examine<'a>(
     file: &'a [u8],
     terms: &Terms,
-    pause: &mut dyn FnMut(),
+    yield_now: &mut dyn FnMut(),
 ) -> Result<(Checked<'a>, Accepted), Rejected> {
     let (image, seal) = unseal(file)?;
-    let mut pace = Pace::new(pause);
-    let whole = Whole::new(image, &mut pace)?;
+    let mut budget = YieldBudget::new(yield_now);
+    let whole = Whole::new(image, &mut budget)?;
     let oldest = match &terms.trust.key {
-        Some(key) => vouched(file, seal.as_ref(), key, terms, &mut pace)?,
+        Some(key) => vouched(file, seal.as_ref(), key, terms, &mut budget)?,
         None => 0,
     };
-    let checked = Checked::of(whole, &mut pace)?;
+    let checked = Checked::of(whole, &mut budget)?;
     let accepted = Accepted {
         id: checked.id(),
         version: seal.map_or(0, |seal| seal.version),
@@ -60,7 +60,7 @@ fn vouched(
     seal: Option<&Seal>,
     key: &[u8; 32],
     terms: &Terms,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<u32, Rejected> {
     let seal = seal.ok_or(Rejected::Unsigned)?;
     if seal.key != Seal::key_id(key) {
@@ -68,7 +68,7 @@ fn vouched(
     }
     let signed = file.len().saturating_sub(seal::field::SIGNATURE.len());
     let message = file.get(..signed).unwrap_or_default();
-    if !ed25519::verify(key, &seal.signature, message, pace) {
+    if !ed25519::verify(key, &seal.signature, message, budget) {
         return Err(Rejected::Signature);
     }
     if seal.device != 0 && seal.device != terms.trust.device {
