@@ -140,8 +140,7 @@ impl fmt::Display for AttachError {
             Self::NoSource => f.write_str("no source has announced frames"),
             Self::Version { found } => write!(
                 f,
-                "the source has version {found} of the frame memory; this device has {}",
-                VERSION
+                "the source has version {found} of the frame memory; this device has {VERSION}"
             ),
             Self::Format => f.write_str("the source announces frames that there cannot be"),
             Self::Region(error) => error.fmt(f),

@@ -115,9 +115,9 @@ impl LevelAxis {
 pub(crate) struct Level {
     pub(crate) rows: LevelAxis,
     pub(crate) cols: LevelAxis,
-    /// NodePair of rows anywhere but at the end, and the last one.
+    /// Pair of rows anywhere but at the end, and the last one.
     row_pairs: [NodePair; 2],
-    /// NodePair of columns anywhere but at the end, and the last one.
+    /// Pair of columns anywhere but at the end, and the last one.
     col_pairs: [NodePair; 2],
     /// Input shifts of the nodes, by kind of row pair and of column pair.
     shifts: [[NodeShifts; 2]; 2],

@@ -41,7 +41,7 @@ pub(crate) struct Sums<'s> {
     pub(crate) outputs: &'s mut [i32],
 }
 
-/// GroupRows of an operator with one number of pairs of entries.
+/// Rows of an operator with one number of pairs of entries.
 #[cfg_attr(
     not(target_arch = "arm"),
     allow(dead_code, reason = "read by the assembler")
@@ -64,7 +64,7 @@ pub struct Block {
     pub cols: usize,
     /// Nodes of each row of nodes.
     pub nodes: usize,
-    /// GroupRows of nodes.
+    /// Rows of nodes.
     pub rows: usize,
 }
 

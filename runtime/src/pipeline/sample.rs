@@ -35,7 +35,7 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
     /// whether it did.
     fn code(wanted: i32, curves: Self::Curves<'_>) -> (Self, bool);
 
-    /// [`Source::merge`](crate::haar::CellSource::merge) of pixels.
+    /// [`CellSource::merge`](crate::haar::CellSource::merge) of pixels.
     #[inline]
     fn merge<const C: usize>(
         pixels: &Pixels<'_, Self, C>,

@@ -12,7 +12,7 @@ pub(super) struct Journal {
     parts: [Part; 2],
     /// Index of the part with the record that counts.
     part: usize,
-    /// Contents of the next record there.
+    /// Place of the next record there.
     next: u32,
     last: Option<Commit>,
     /// Places between the last record and the next one, which hold something that is
