@@ -1,4 +1,4 @@
-//! Puts the memory layout of the chosen board where the linker finds it.
+//! Linker script: the memory layout of the chosen board, put where the linker finds it.
 
 use std::env;
 use std::error::Error;

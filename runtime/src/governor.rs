@@ -1,4 +1,4 @@
-//! Chooses the tier that fits the frame budget.
+//! Governor: chooses the tier that fits the frame budget.
 //!
 //! A [`Governor`] is told how long every frame took and says which tier the next
 //! one gets. It knows how much longer each tier takes than the one below, as a
@@ -81,7 +81,7 @@ struct Step {
 
 /// A change of tier.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Change {
+pub struct TierChange {
     /// Tier of the frame that was measured.
     pub from: u8,
     /// Tier of the next frame.
@@ -168,7 +168,7 @@ impl Governor {
 
     /// Takes the time of a frame at [`tier`](Self::tier); the next frame may have
     /// another one.
-    pub fn frame(&mut self, took: u32) -> Option<Change> {
+    pub fn frame(&mut self, took: u32) -> Option<TierChange> {
         // An eighth down a frame: what is over for some frames is forgotten.
         self.peak = took.max(self.peak - self.peak / 8);
         if took > self.budget {
@@ -181,7 +181,7 @@ impl Governor {
     }
 
     /// The highest tier below that should fit, and at least one below.
-    fn over_budget(&mut self, took: u32) -> Option<Change> {
+    fn over_budget(&mut self, took: u32) -> Option<TierChange> {
         self.overruns = self.overruns.saturating_add(1);
         if let Some(before) = self.before.take() {
             self.learn(took, before);
@@ -201,7 +201,7 @@ impl Governor {
         }
         self.fall = from - self.tier;
         self.peak = 0;
-        Some(Change {
+        Some(TierChange {
             from,
             to: self.tier,
             reason: Reason::OverBudget { took },
@@ -219,7 +219,7 @@ impl Governor {
         }
     }
 
-    fn try_next(&mut self) -> Option<Change> {
+    fn try_next(&mut self) -> Option<TierChange> {
         if self.tier >= self.top || self.before.is_some() {
             return None;
         }
@@ -238,7 +238,7 @@ impl Governor {
         self.peak = 0;
         self.steady = 0;
         self.roomy = 0;
-        Some(Change {
+        Some(TierChange {
             from,
             to: self.tier,
             reason: Reason::TimeToSpare { expected },
@@ -307,7 +307,7 @@ mod tests {
 
     /// A device whose tiers take these times, for `frames` frames; the changes
     /// with the frame that they came after.
-    fn run(governor: &mut Governor, times: &[u32], frames: usize) -> Vec<(usize, Change)> {
+    fn run(governor: &mut Governor, times: &[u32], frames: usize) -> Vec<(usize, TierChange)> {
         (0..frames)
             .filter_map(|frame| {
                 let change = governor.frame(times[usize::from(governor.tier())])?;
@@ -349,7 +349,7 @@ mod tests {
         let reason = Reason::OverBudget { took: 3_200 };
         assert_eq!(
             change,
-            Some(Change {
+            Some(TierChange {
                 from: 3,
                 to: 1,
                 reason

@@ -1,5 +1,5 @@
-//! What runs on the device: the table image, the Haar-domain operator and the
-//! frame pipeline.
+//! Runtime of iltm, which runs on the device: table image, Haar-domain operator, frame
+//! pipeline, serial link and table store.
 //!
 //! The principles of this crate:
 //!
@@ -14,12 +14,14 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`units`] | fixed-point types of light, drive and correction |
+//! | [`features`] | the stages that a build has |
+//! | [`response`] | from drive to projector codes |
 //! | [`haar`] | the exact integer Haar transform on any grid |
 //! | [`operator`] | the sparse operator and the proof that it cannot overflow |
 //! | [`image`] | the `.iltm` image: layout, check, accessors |
 //! | [`resample`] | between pixels and cells |
 //! | [`pipeline`] | frames in, projector input out |
-//! | [`exchange`] | frame buffers shared with the hardware that fills and shows them |
+//! | [`frame_buffers`] | frame buffers shared with the hardware that fills and shows them |
 //! | [`governor`] | the tier that fits the frame budget |
 //! | [`link`] | the serial line: frames, channels, messages |
 //! | [`trust`] | who signed a table, and whether it may run here |
@@ -45,29 +47,25 @@
     )
 )]
 
-#[cfg(feature = "fault-tools")]
-extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
-pub mod exchange;
-#[cfg(feature = "fault-tools")]
-pub mod fault;
-mod frame;
+pub mod features;
+pub mod frame_buffers;
 pub mod governor;
-mod grid;
 pub mod haar;
 pub mod image;
 mod kernel;
 pub mod link;
 pub mod operator;
-mod pace;
 pub mod pipeline;
 pub mod resample;
+pub mod response;
 pub mod ring;
+mod size;
 pub mod store;
 pub mod trust;
 pub mod units;
+mod yield_budget;
 
-pub use frame::FrameSize;
-pub use grid::{Grid, GridError};
+pub use size::{FrameSize, Grid, GridError};

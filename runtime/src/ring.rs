@@ -1,7 +1,12 @@
-//! Bytes between an interrupt and the loop.
+//! Ring buffer of bytes between an interrupt and the loop.
 //!
 //! Atomics and no locks: neither side waits for the other, whichever interrupts
 //! which.
+//!
+//! Why not `heapless::spsc`: its queue is split into a producer and a consumer, and an
+//! interrupt handler has no arguments that could hand it its half; it would have to come
+//! out of a static through a lock or unsafe code. A [`Ring`] is a plain `static` that
+//! both sides name, and since its bytes are atomics there is nothing unsafe in it.
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 

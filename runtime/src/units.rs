@@ -1,4 +1,4 @@
-//! Fixed-point quantities and the places where they are rounded.
+//! Units: fixed-point quantities and the places where they are rounded.
 //!
 //! Everything between the decoded frame and the encoded one is one of these
 //! types. A value changes type, and is rounded, only in a function that says so
@@ -30,3 +30,6 @@ pub type InputCoefficient = i16;
 /// One bit below the type's own limit, so that a full-scale frame, whose mean is
 /// exactly 1, still fits.
 pub const INPUT_COEFFICIENT_MAX: u32 = 1 << 14;
+
+/// One `u16` of a table, little-endian.
+pub type Halfword = [u8; 2];

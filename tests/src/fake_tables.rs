@@ -1,10 +1,10 @@
 //! The tables of the device that is none: the runtime's own updater over a simulated
 //! flash.
 
-use iltm_runtime::fault::NorSimulator;
+use crate::flash_simulator::NorSimulator;
 use iltm_runtime::image::content;
 use iltm_runtime::link::{PassThrough, Request, Response};
-use iltm_runtime::store::{Change, Map, Shelf, Slot, Updater};
+use iltm_runtime::store::{Map, Slot, TableChange, TableSlots, Updater};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
 use std::ops::Range;
 
@@ -28,11 +28,11 @@ pub const fn slot(index: usize) -> Range<usize> {
 
 /// Which table frames would go through.
 #[derive(Debug)]
-struct FakeShelf {
+struct FakeSlots {
     selected: Result<Slot, PassThrough>,
 }
 
-impl Shelf<Flash> for FakeShelf {
+impl TableSlots<Flash> for FakeSlots {
     fn load(
         &mut self,
         flash: &Flash,
@@ -53,7 +53,7 @@ impl Shelf<Flash> for FakeShelf {
         self.selected = table;
     }
 
-    fn pause(&mut self) {}
+    fn yield_now(&mut self) {}
 }
 
 /// The tables of a device.
@@ -61,7 +61,7 @@ impl Shelf<Flash> for FakeShelf {
 pub struct FakeTables {
     updater: Option<Updater<Flash>>,
     map: Map,
-    shelf: FakeShelf,
+    tables: FakeSlots,
     /// Offset of every chunk that came.
     pub writes: Vec<u32>,
     /// How often an activation was asked for.
@@ -92,7 +92,7 @@ impl FakeTables {
         let mut tables = Self {
             updater: None,
             map,
-            shelf: FakeShelf {
+            tables: FakeSlots {
                 selected: Err(PassThrough::NoTable),
             },
             writes: Vec::new(),
@@ -105,8 +105,8 @@ impl FakeTables {
     }
 
     fn start(&mut self, flash: Flash) {
-        self.shelf.selected = Err(PassThrough::NoTable);
-        self.updater = Some(Updater::start(flash, self.map, &mut self.shelf));
+        self.tables.selected = Err(PassThrough::NoTable);
+        self.updater = Some(Updater::start(flash, self.map, &mut self.tables));
     }
 
     /// As after a loss of power.
@@ -155,9 +155,9 @@ impl FakeTables {
     ///
     /// # Panics
     /// Never.
-    pub fn poll(&mut self, now_ms: u64) -> Option<Change> {
+    pub fn poll(&mut self, now_ms: u64) -> Option<TableChange> {
         let updater = self.updater.as_mut().expect("running");
-        updater.poll(now_ms, &mut self.shelf);
+        updater.poll(now_ms, &mut self.tables);
         updater.take_change()
     }
 
@@ -187,6 +187,6 @@ impl FakeTables {
             _ => {}
         }
         let updater = self.updater.as_mut().expect("running");
-        updater.answer(request, now_ms, &mut self.shelf)
+        updater.answer(request, now_ms, &mut self.tables)
     }
 }

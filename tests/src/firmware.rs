@@ -5,12 +5,11 @@ use iltm::compile::{CompileOptions, FineGains, compile};
 use iltm::device::emulator::Board;
 use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
-use iltm::picture::Response;
 use iltm::{
-    picture::{Picture, Samples},
+    picture::{Picture, Response, Samples},
     video::{Compensator, Settings},
 };
-use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use std::collections::HashMap;

@@ -15,7 +15,7 @@ use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::solve::{ChannelInverse, SolveOptions};
 use iltm::{capture::CaptureOptions, picture::Response};
-use iltm_runtime::exchange::psram;
+use iltm_runtime::frame_buffers::psram;
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write as _;

@@ -6,6 +6,7 @@ pub mod executed;
 pub mod fake_device;
 pub mod fake_tables;
 pub mod firmware;
+pub mod flash_simulator;
 pub mod fuzz;
 pub mod gates;
 pub mod hard_cases;

@@ -7,9 +7,9 @@ use iltm::compile::response;
 use iltm::picture::Response;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
-use iltm_runtime::image::layout::{SectionKind, meta, tier};
+use iltm_runtime::image::layout::SectionKind;
+use iltm_runtime::image::{Meta, TierInfo};
 use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
-use std::ops::Range;
 
 /// What a table is to hold.
 #[derive(Clone, Debug)]
@@ -82,15 +82,21 @@ impl MadeUp {
         let operator = (!self.rows.is_empty()).then(|| self.operator(&segment));
         let operator = operator.and_then(Result::ok);
         let mut image = ImageWriter::default();
-        image.section(SectionKind::Meta, 0, self.meta(operator.as_ref()));
+        image.section(
+            SectionKind::Meta,
+            0,
+            self.meta(operator.as_ref()).emit().to_vec(),
+        );
         let top = u8::from(!self.rows.is_empty());
         let tiers = (0..=top).flat_map(|number| {
             let cost = operator.as_ref();
             let cost = cost.map_or((0, 0), |o| o.cost(number, self.channels as u8));
-            let mut entry = vec![0; tier::SIZE];
-            put(&mut entry, tier::ENTRIES, &cost.0.to_le_bytes());
-            put(&mut entry, tier::MULTIPLICATIONS, &cost.1.to_le_bytes());
-            entry
+            TierInfo {
+                predicted_error: U0F32::ZERO,
+                entries: cost.0,
+                multiplications: cost.1,
+            }
+            .emit()
         });
         image.section(SectionKind::Tiers, 0, tiers.collect());
         image.section(SectionKind::Gain, 0, halfwords(self.gains.iter().copied()));
@@ -108,30 +114,17 @@ impl MadeUp {
         image.finish()
     }
 
-    fn meta(&self, operator: Option<&Operator<'_>>) -> Vec<u8> {
-        let bounds = operator.map_or(Bounds::default(), Operator::bounds);
-        let sides = [self.grid.rows(), self.grid.cols()].map(|side| (side as u16).to_le_bytes());
-        let mut head = vec![0; meta::SIZE];
-        put(&mut head, meta::ROWS, &sides[0]);
-        put(&mut head, meta::COLS, &sides[1]);
-        head[meta::CHANNELS] = self.channels as u8;
-        head[meta::GAIN_FRACTION] = self.gain_fraction;
-        let white = 1_u32 << 23;
-        for (field, value) in [
-            (meta::REFERENCE_WHITE, white),
-            (meta::ACCUMULATOR_BOUND, bounds.accumulator),
-            (meta::CORRECTION_BOUND, bounds.correction),
-        ] {
-            put(&mut head, field, &value.to_le_bytes());
+    fn meta(&self, operator: Option<&Operator<'_>>) -> Meta {
+        Meta {
+            grid: self.grid,
+            channels: self.channels as u8,
+            gain_fraction: self.gain_fraction,
+            reference_white: U8F24::from_bits(1 << 23),
+            inverse_error: U0F32::ZERO,
+            bounds: operator.map_or(Bounds::default(), Operator::bounds),
+            channel_scales: self.scales,
         }
-        let scales = self.scales.map(U1F15::to_bits);
-        put(&mut head, meta::CHANNEL_SCALES, &halfwords(scales));
-        head
     }
-}
-
-fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
-    bytes[field].copy_from_slice(value);
 }
 
 fn halfwords(values: impl IntoIterator<Item = u16>) -> Vec<u8> {

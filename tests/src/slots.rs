@@ -2,10 +2,10 @@
 //! with nothing but memory around them.
 
 use crate::fake_device::FakeDevice;
-use iltm_runtime::fault::NorSimulator;
+use crate::flash_simulator::NorSimulator;
 use iltm_runtime::image::content;
 use iltm_runtime::link::{Device, Digest, Hello, PassThrough, Refusal, Request, Response, Status};
-use iltm_runtime::store::{Map, Shelf, Slot, Updater};
+use iltm_runtime::store::{Map, Slot, TableSlots, Updater};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
 use sha2::{Digest as _, Sha512};
 use std::ops::Range;
@@ -39,6 +39,13 @@ impl Layout {
         (index * self.sector) as u32..((index + 1) * self.sector) as u32
     }
 
+    /// Where the device's key is.
+    #[must_use]
+    pub const fn identity(self) -> Range<usize> {
+        let start = (2 * self.slot + 2) * self.sector;
+        start..start + self.sector
+    }
+
     /// As the store wants it.
     ///
     /// # Panics
@@ -57,7 +64,7 @@ impl Layout {
 
 /// Which table frames would go through.
 #[derive(Clone, Debug)]
-pub struct SimShelf {
+pub struct SimTables {
     layout: Layout,
     /// The slot.
     pub selected: Result<Slot, PassThrough>,
@@ -67,7 +74,7 @@ pub struct SimShelf {
     pub pauses: u32,
 }
 
-impl<const W: usize, const E: usize> Shelf<NorSimulator<W, E>> for SimShelf {
+impl<const W: usize, const E: usize> TableSlots<NorSimulator<W, E>> for SimTables {
     fn load(
         &mut self,
         flash: &NorSimulator<W, E>,
@@ -100,7 +107,7 @@ impl<const W: usize, const E: usize> Shelf<NorSimulator<W, E>> for SimShelf {
         self.selected = table;
     }
 
-    fn pause(&mut self) {
+    fn yield_now(&mut self) {
         self.pauses += 1;
     }
 }
@@ -111,7 +118,7 @@ pub struct SimDevice<const W: usize, const E: usize> {
     /// Its store.
     pub updater: Updater<NorSimulator<W, E>>,
     /// Its tables.
-    pub shelf: SimShelf,
+    pub tables: SimTables,
     layout: Layout,
     /// Milliseconds since it started.
     pub now_ms: u64,
@@ -128,17 +135,17 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
     /// One that finds this in its flash when it starts.
     #[must_use]
     pub fn start(flash: NorSimulator<W, E>, layout: Layout) -> Self {
-        let mut shelf = SimShelf {
+        let mut tables = SimTables {
             layout,
             selected: Err(PassThrough::NoTable),
             kept: [false; 2],
             pauses: 0,
         };
         let map = layout.map(&flash);
-        let updater = Updater::start(flash, map, &mut shelf);
+        let updater = Updater::start(flash, map, &mut tables);
         Self {
             updater,
-            shelf,
+            tables,
             layout,
             now_ms: 0,
         }
@@ -154,13 +161,13 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
 
     /// Asks it something.
     pub fn ask(&mut self, request: Request<'_>) -> Response {
-        self.updater.answer(request, self.now_ms, &mut self.shelf)
+        self.updater.answer(request, self.now_ms, &mut self.tables)
     }
 
     /// Time passes.
     pub fn wait(&mut self, milliseconds: u64) {
         self.now_ms += milliseconds;
-        self.updater.poll(self.now_ms, &mut self.shelf);
+        self.updater.poll(self.now_ms, &mut self.tables);
     }
 
     /// The flash.
@@ -182,7 +189,7 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
             return false;
         };
         let bytes = &self.flash().contents()[self.layout.slot(slot)];
-        self.shelf.selected == Ok(slot) && bytes.starts_with(file)
+        self.tables.selected == Ok(slot) && bytes.starts_with(file)
     }
 
     /// The whole way of a file into use, without a line: transfer, trial and, if
@@ -277,7 +284,7 @@ impl<const W: usize, const E: usize> Device for SimDevice<W, E> {
     }
 
     fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
-        self.updater.answer(request, now_ms, &mut self.shelf)
+        self.updater.answer(request, now_ms, &mut self.tables)
     }
 }
 

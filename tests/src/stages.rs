@@ -10,7 +10,7 @@ use crate::instructions::bench;
 use crate::made_up::MadeUp;
 use iltm::compile::image::StoredRow;
 use iltm::device::emulator::Board;
-use iltm_runtime::pipeline::Stage;
+use iltm_runtime::features::Stage;
 use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write as _;
 

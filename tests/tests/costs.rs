@@ -1,9 +1,9 @@
 //! The model of what a frame takes against the counts.
 
 use iltm::compile::cost;
+use iltm_runtime::features::Stage;
 use iltm_runtime::image::Table;
 use iltm_runtime::operator::Segment;
-use iltm_runtime::pipeline::Stage;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::{costs, instructions, stages};
 

@@ -7,7 +7,7 @@ use iltm::device::emulator::Board;
 use iltm::device::memory::Memory;
 use iltm::device::upload::{Parcel, Unwatched, Upload, UploadError};
 use iltm::device::{Client, DeviceError, Patience};
-use iltm_runtime::exchange::{Format, Layout, psram};
+use iltm_runtime::frame_buffers::{Format, Layout, psram};
 use iltm_runtime::image::{Table, crc32};
 use iltm_runtime::link::{Refusal, SlotState};
 use iltm_runtime::pipeline::Encoding;

@@ -2,10 +2,10 @@
 
 use ed25519_dalek::{Signer, SigningKey};
 use iltm::picture::Response as Projector;
-use iltm_runtime::fault::{ERASE_STAGES, NorSimulator, Violations};
 use iltm_runtime::image::Seal;
 use iltm_runtime::link::{Refusal, Request, Response, SlotState};
 use iltm_runtime::trust::Rejected;
+use iltm_tests::flash_simulator::{ERASE_STAGES, NorSimulator, Violations};
 use iltm_tests::slots::{Layout, SimDevice, Step, digest};
 use iltm_tests::wedge_table_for;
 

@@ -7,7 +7,7 @@ use iltm::device::emulator::{Board, Emulator};
 use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
 use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::operator::{Bounds, OperatorError};
 use iltm_runtime::pipeline::Encoding;

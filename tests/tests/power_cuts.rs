@@ -11,8 +11,8 @@
 use ed25519_dalek::SigningKey;
 use iltm::compile::sign::{SealTerms, sign};
 use iltm::picture::Response;
-use iltm_runtime::fault::Violations;
 use iltm_runtime::link::{Refusal, Request};
+use iltm_tests::flash_simulator::Violations;
 use iltm_tests::slots::{SimDevice, Step};
 use iltm_tests::wedge_table_for;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -107,8 +107,8 @@ fn cut_everywhere<const W: usize, const E: usize>(
         let _ = device.carry_out(file, step);
         let operation = *device.flash().last_cut().expect("it was cut");
         let count = match operation.work {
-            iltm_runtime::fault::Work::Program => &counts.writes,
-            iltm_runtime::fault::Work::Erase => &counts.erases,
+            iltm_tests::flash_simulator::Work::Program => &counts.writes,
+            iltm_tests::flash_simulator::Work::Erase => &counts.erases,
         };
         count.fetch_add(1, Ordering::Relaxed);
         let mut device = device.restarted();
@@ -335,8 +335,8 @@ fn a_worn_sector_is_found_when_it_is_written_and_the_old_table_stays() {
         new: wedge_table_for(Response::Linear, 8, 13, 3),
     };
     for wear in [
-        iltm_runtime::fault::Wear::StuckBits,
-        iltm_runtime::fault::Wear::LostBits,
+        iltm_tests::flash_simulator::Wear::StuckBits,
+        iltm_tests::flash_simulator::Wear::LostBits,
     ] {
         let mut device = in_use::<4, 4_096>(&files, 16);
         // The second sector of slot B, which the new table goes to.

@@ -1,9 +1,9 @@
 //! That `docs/protocol.md` says what host and device say: its byte examples and limits.
 
 use iltm_runtime::link::{
-    Channel, Device as _, Digest, Event, Fault, FaultyFrame, Frame, InUse, MAX_ENCODED,
+    Channel, Device as _, Digest, Event, Fault, FaultyFrame, InUse, LinkFrame, MAX_ENCODED,
     MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState,
-    Slots, TableName, TableReason, TierReason, encode,
+    Slots, TableName, TableReason, TierReason,
 };
 use iltm_runtime::store::MAX_CHUNK;
 use iltm_runtime::trust::Rejected;
@@ -20,12 +20,12 @@ struct Examples(BTreeMap<&'static str, (Vec<u8>, Vec<u8>)>);
 impl Examples {
     fn add(&mut self, name: &'static str, channel: Channel, sequence: u16, payload: &[u8]) {
         let mut line = [0; MAX_ENCODED];
-        let frame = Frame {
+        let frame = LinkFrame {
             channel,
             sequence,
             payload,
         };
-        let length = encode(frame, &mut line).expect("short enough");
+        let length = frame.emit(&mut line).expect("short enough");
         let [low, high] = u16::to_le_bytes(sequence);
         let mut content = [&[channel as u8, low, high], payload].concat();
         let crc = iltm_runtime::image::crc32(&[&content]);

@@ -3,10 +3,10 @@
 use ed25519_dalek::SigningKey;
 use iltm::compile::sign::{SealTerms, sign};
 use iltm::picture::Response as Projector;
-use iltm_runtime::fault::NorSimulator;
 use iltm_runtime::link::{PassThrough, Refusal, Request, Response, SlotState, Slots};
 use iltm_runtime::store::{Map, MapError};
 use iltm_runtime::trust::Rejected;
+use iltm_tests::flash_simulator::NorSimulator;
 use iltm_tests::slots::{SimDevice, Step, TRIAL_S, digest};
 use iltm_tests::wedge_table_for;
 
@@ -63,7 +63,7 @@ fn a_confirmed_table_counts_after_a_restart_and_one_on_trial_does_not() {
     device.update(&first, false).expect("a good table");
     assert!(device.runs(&first));
     let mut device = device.restarted();
-    assert_eq!(device.shelf.selected, Err(PassThrough::NoTable));
+    assert_eq!(device.tables.selected, Err(PassThrough::NoTable));
     device.update(&first, true).expect("a good table");
     device.update(&second, false).expect("a good table");
     assert!(device.runs(&second));
@@ -285,7 +285,7 @@ fn a_revoked_table_never_runs_again() {
     let flash = device.updater.flash_mut();
     flash.rot(slot..slot + new.len() as u32, 1).expect("there");
     let device = device.restarted();
-    assert_eq!(device.shelf.selected, Err(PassThrough::BrokenTable));
+    assert_eq!(device.tables.selected, Err(PassThrough::BrokenTable));
 }
 
 #[test]
@@ -298,7 +298,7 @@ fn a_stranger_s_table_is_refused_at_the_start_as_well() {
     flash.put(0, &vec![0xFF; SLOT * 256]).expect("there");
     flash.put(0, &stranger).expect("there");
     let device = device.restarted();
-    assert_eq!(device.shelf.selected, Err(PassThrough::BrokenTable));
+    assert_eq!(device.tables.selected, Err(PassThrough::BrokenTable));
 }
 
 #[test]

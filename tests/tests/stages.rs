@@ -10,10 +10,11 @@ use iltm::device::playback::Playback;
 use iltm::device::port::BAUD;
 use iltm::device::upload::{Parcel, Unwatched, Upload, UploadError};
 use iltm::device::{Client, DeviceError, Patience, Port};
-use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::features::Stage;
+use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{Fault, Mode, PassThrough, Refusal, SlotState};
-use iltm_runtime::pipeline::{Encoding, Stage};
+use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::trust::Rejected;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::executed::{Code, Executed};
@@ -32,13 +33,13 @@ fn code(stage: Stage) -> Vec<Code> {
     match stage {
         Stage::Operator => vec![
             File("runtime/src/operator/"),
-            File("runtime/src/kernel/gather/"),
-            File("runtime/src/kernel/levels/"),
+            File("runtime/src/kernel/arm/gather.rs"),
+            File("runtime/src/kernel/arm/levels.rs"),
             File("runtime/src/haar/analysis.rs"),
             File("runtime/src/haar/source.rs"),
             File("runtime/src/haar/synthesis.rs"),
             Function("runtime/src/pipeline/stages.rs", "operate"),
-            Function("runtime/src/pipeline/whole.rs", "average_frame"),
+            Function("runtime/src/pipeline/full_frames.rs", "average_frame"),
             Function("runtime/src/pipeline/full.rs", "correct_row"),
             Symbol("merge"),
             Symbol("split"),
@@ -69,9 +70,9 @@ fn code(stage: Stage) -> Vec<Code> {
         ],
         Stage::FullResolution => vec![
             File("runtime/src/pipeline/full.rs"),
-            File("runtime/src/pipeline/whole.rs"),
+            File("runtime/src/pipeline/full_frames.rs"),
             File("runtime/src/resample/"),
-            File("runtime/src/kernel/lines/"),
+            File("runtime/src/kernel/arm/lines.rs"),
             OneOf(&[
                 "iltm_add_1_dark",
                 "iltm_add_1_lit",

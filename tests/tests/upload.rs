@@ -4,10 +4,10 @@
 use iltm::device::fault::{Faults, Harm, LossyLine};
 use iltm::device::upload::{Parcel, Plan, Step, Unwatched, Upload, UploadError, Watch};
 use iltm::device::{Client, DeviceError, Patience};
-use iltm_runtime::fault::Wear;
 use iltm_runtime::link::SlotState;
 use iltm_tests::fake_device::{FakeDevice, FakeLine};
 use iltm_tests::fake_tables::{FakeTables, Flash, SECTOR, slot};
+use iltm_tests::flash_simulator::Wear;
 use iltm_tests::wedge_table;
 use std::ops::Range;
 use std::sync::OnceLock;

@@ -16,7 +16,7 @@ use crate::user::emulated::register;
 use crate::video::VideoError;
 use iltm_runtime::{
     FrameSize,
-    exchange::{Format, psram},
+    frame_buffers::{Format, psram},
     image::Table,
     pipeline::Encoding,
 };

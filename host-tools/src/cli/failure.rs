@@ -116,9 +116,11 @@ impl From<&DeviceError> for Kind {
                 Refusal::NoTransfer | Refusal::Incomplete | Refusal::Chunk => Self::Transfer,
                 Refusal::NotInUse { .. } | Refusal::NoOther => Self::NoTable,
                 Refusal::HasKey => Self::HasKey,
-                Refusal::HelloFirst | Refusal::Unknown | Refusal::Malformed | Refusal::ReadOnly => {
-                    Self::Device
-                }
+                Refusal::HelloFirst
+                | Refusal::Unknown
+                | Refusal::Malformed
+                | Refusal::ReadOnly
+                | Refusal::KeyLost => Self::Device,
             },
             DeviceError::Protocol { .. } | DeviceError::Exchanged | DeviceError::Answer { .. } => {
                 Self::Device

@@ -1,10 +1,7 @@
 //! The table slots of a device, in words.
 
 use super::status::table_name;
-use iltm_runtime::{
-    link::{SlotInfo, SlotState, Slots, TableName},
-    trust::KEY_ID,
-};
+use iltm_runtime::link::{SlotInfo, SlotState, Slots, TableName};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -97,8 +94,9 @@ pub(super) fn lines(slots: &Slots) -> Vec<String> {
 
 /// Whose tables the device takes.
 pub(super) fn trust(slots: &Slots) -> String {
-    slots.key.map_or_else(
-        || "none: this device takes tables from anybody (`iltm key install`)".to_owned(),
-        |id: [u8; KEY_ID]| format!("{}; versions from {} on", key_id(&id), slots.oldest),
-    )
+    match slots.key {
+        Some(id) => format!("{}; versions from {} on", key_id(&id), slots.oldest),
+        None if slots.oldest == u32::MAX => "lost: this device takes no table".to_owned(),
+        None => "none: this device takes tables from anybody (`iltm key install`)".to_owned(),
+    }
 }

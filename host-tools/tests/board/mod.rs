@@ -5,7 +5,7 @@ use ed25519_dalek::SigningKey;
 use iltm::device::emulator::{self, Emulator};
 use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
-use iltm_runtime::exchange::{Format, psram};
+use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::{Table, unseal};
 use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::{FrameSize, Grid};

@@ -1,4 +1,4 @@
-//! What a board provides.
+//! Board traits: what a board provides.
 //!
 //! A port is one file that implements [`Board`], and the traits here for its
 //! peripherals; `docs/porting.md` walks through one.
@@ -6,7 +6,7 @@
 use embedded_hal::digital::OutputPin;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use embedded_storage::nor_flash::NorFlash;
-use iltm_runtime::exchange::{Broken, Format, InputCounts};
+use iltm_runtime::frame_buffers::{Broken, Format, InputCounts};
 use iltm_runtime::link::SourceFault;
 use iltm_runtime::store::{Map, MapError, Slot};
 
@@ -32,7 +32,7 @@ pub trait Board: Sized {
     type Lamp: OutputPin;
 
     /// What happens while there is nothing to do.
-    type Rest: Rest;
+    type Idle: Idle;
 
     /// Sets the board up and hands out its peripherals, once; `None` after that.
     fn take() -> Option<Peripherals<Self>>;
@@ -54,8 +54,8 @@ pub struct Peripherals<B: Board> {
     pub watchdog: B::Watchdog,
     /// See [`Board::Lamp`].
     pub lamp: B::Lamp,
-    /// See [`Board::Rest`].
-    pub rest: B::Rest,
+    /// See [`Board::Idle`].
+    pub idle: B::Idle,
 }
 
 /// A clock that never runs backwards.
@@ -139,8 +139,8 @@ pub trait Watchdog {
 }
 
 /// A pause of the processor.
-pub trait Rest {
+pub trait Idle {
     /// Returns after the next interrupt, or after a small part of a frame's period
     /// if a new frame raises none; at once if the board has neither.
-    fn rest(&mut self);
+    fn idle(&mut self);
 }

@@ -1,8 +1,8 @@
-//! The loop: frames first, then the serial line.
+//! Main loop: frames first, then the serial line.
 //!
 //! ```text
 //! start: why it started -> slots -> table, or why none
-//! round: frame, if one waits -> serial line -> rest, if there was nothing to do
+//! round: frame, if one waits -> serial line -> idle, if there was nothing to do
 //! ```
 //!
 //! A frame comes before everything else, and what else there is takes a bounded
@@ -10,21 +10,21 @@
 //! the line a round, and no more log bytes than one message carries. What takes
 //! longer lets frames through meanwhile.
 
-use crate::board::{Board, Clock, Peripherals, Rest, TableFlash, Watchdog};
+use crate::board::{Board, Clock, Idle, Peripherals, TableFlash, Watchdog};
 use crate::fault;
 use crate::frames::{Frames, part};
+use crate::hooks::FrameHooks;
 use crate::logger;
 use crate::memory::{MAX_CELLS, Memory};
-use crate::rehearsal::Rehearsal;
 use crate::retained::{Restart, Retained};
-use crate::shelf;
 use crate::stack;
-use crate::vitals::Vitals;
+use crate::table_slots;
+use crate::telemetry::Telemetry;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
-    Device as Answering, Fault, Hello, Limits, MAX_PAYLOAD, Name, PROTOCOL_VERSION, Request,
-    Response, Session, Status, Version,
+    Device, Fault, Hello, Limits, MAX_PAYLOAD, Name, PROTOCOL_VERSION, Request, Response, Session,
+    Status, Version,
 };
 use iltm_runtime::store::{Map, Updater};
 
@@ -43,21 +43,21 @@ const READS: usize = 4;
 const PIECE: usize = 64;
 
 /// The device: a board and what it does with frames.
-struct Device<'a, B: Board, R> {
+struct MainLoop<'a, B: Board, H> {
     serial: B::Serial,
-    rest: B::Rest,
+    idle: B::Idle,
     session: Session,
-    desk: Desk<'a, B, R>,
+    handler: RequestHandler<'a, B, H>,
 }
 
 /// What a host can ask about.
-struct Desk<'a, B: Board, R> {
+struct RequestHandler<'a, B: Board, H> {
     updater: Updater<B::Flash>,
-    frames: &'a mut Frames<B, R>,
+    frames: &'a mut Frames<B, H>,
 }
 
 /// Sets the board up and runs the device for ever.
-pub fn start<B: Board, R: Rehearsal>(rehearsal: impl FnOnce() -> R) -> ! {
+pub fn start<B: Board, H: FrameHooks>(hooks: impl FnOnce() -> H) -> ! {
     stack::paint();
     let Some((mut board, memory)) = B::take().zip(Memory::take()) else {
         fault::restart();
@@ -69,7 +69,7 @@ pub fn start<B: Board, R: Rehearsal>(rehearsal: impl FnOnce() -> R) -> ! {
         // The board's own numbers are wrong: a defect of its port.
         fault::restart();
     };
-    run(board, map, memory, restart, rehearsal())
+    run(board, map, memory, restart, hooks())
 }
 
 fn run<B: Board>(
@@ -77,37 +77,41 @@ fn run<B: Board>(
     map: Map,
     memory: &'static mut Memory,
     restart: Restart,
-    rehearsal: impl Rehearsal,
+    hooks: impl FrameHooks,
 ) -> ! {
-    let Some(tables) = shelf::take() else {
+    let Some(tables) = table_slots::take() else {
         fault::restart();
     };
-    let (side, serial, flash, rest) = part(board);
-    let vitals = Vitals::new::<B>(restart);
-    let mut frames = Frames::<B, _>::new(side, memory, tables, rehearsal, vitals);
+    let (side, serial, flash, idle) = part(board);
+    let telemetry = Telemetry::new::<B>(restart);
+    let mut frames = Frames::<B, _>::new(side, memory, tables, hooks, telemetry);
     let updater = Updater::start(flash, map, &mut frames);
     if let Some(fault) = updater.fault() {
-        if let Fault::Table { slot, .. } = fault {
-            defmt::error!("the table in slot {=u8} is refused", slot);
+        match fault {
+            Fault::Table { slot, .. } => {
+                defmt::error!("the table in slot {=u8} is refused", slot);
+            }
+            Fault::KeyLost => defmt::error!("the key cannot be read"),
+            _ => {}
         }
-        frames.vitals.set_fault(fault);
+        frames.telemetry.set_fault(fault);
     }
     frames.begin(WATCHDOG_MS);
-    let mut device = Device {
+    let mut main_loop = MainLoop {
         serial,
-        rest,
+        idle,
         session: Session::new(),
-        desk: Desk {
+        handler: RequestHandler {
             updater,
             frames: &mut frames,
         },
     };
     loop {
-        device.round();
+        main_loop.round();
     }
 }
 
-impl<B: Board, R: Rehearsal> Answering for Desk<'_, B, R> {
+impl<B: Board, H: FrameHooks> Device for RequestHandler<'_, B, H> {
     fn identity(&self) -> Hello {
         Hello {
             protocol: PROTOCOL_VERSION,
@@ -128,7 +132,7 @@ impl<B: Board, R: Rehearsal> Answering for Desk<'_, B, R> {
         Status {
             table: self.updater.table(),
             slots: self.updater.states(),
-            ..self.frames.vitals.status()
+            ..self.frames.telemetry.status()
         }
     }
 
@@ -137,7 +141,7 @@ impl<B: Board, R: Rehearsal> Answering for Desk<'_, B, R> {
     }
 }
 
-impl<B: Board, R: Rehearsal> Desk<'_, B, R> {
+impl<B: Board, H: FrameHooks> RequestHandler<'_, B, H> {
     /// What happens to tables by itself.
     fn poll(&mut self, now_ms: u64) {
         self.updater.poll(now_ms, self.frames);
@@ -147,12 +151,12 @@ impl<B: Board, R: Rehearsal> Desk<'_, B, R> {
     }
 }
 
-impl<B: Board, R: Rehearsal> Device<'_, B, R> {
+impl<B: Board, H: FrameHooks> MainLoop<'_, B, H> {
     fn round(&mut self) {
-        let worked = self.desk.frames.round();
+        let worked = self.handler.frames.round();
         let talked = self.talk();
         if !worked && !talked {
-            self.rest.rest();
+            self.idle.idle();
         }
     }
 
@@ -160,15 +164,15 @@ impl<B: Board, R: Rehearsal> Device<'_, B, R> {
     /// went one way or the other. Errors of the line are the line's: what does not
     /// arrive is asked for again.
     fn talk(&mut self) -> bool {
-        let now = self.desk.frames.clock.ticks() * 1_000 / u64::from(B::Clock::HERTZ);
+        let now = self.handler.frames.clock.ticks() * 1_000 / u64::from(B::Clock::HERTZ);
         logger::set_time(now);
-        self.desk.frames.vitals.set_uptime(now);
+        self.handler.frames.telemetry.set_uptime(now);
         let heard = self.listen(now);
-        self.desk.poll(now);
-        while let Some(event) = self.desk.frames.take_event() {
+        self.handler.poll(now);
+        while let Some(event) = self.handler.frames.take_event() {
             self.session.event(&event);
         }
-        self.session.poll(now, &self.desk);
+        self.session.poll(now, &self.handler);
         self.log();
         self.say() || heard
     }
@@ -183,7 +187,7 @@ impl<B: Board, R: Rehearsal> Device<'_, B, R> {
             }
             let count = self.serial.read(&mut piece).unwrap_or(0);
             let bytes = piece.get(..count).unwrap_or_default();
-            self.session.receive(bytes, now, &mut self.desk);
+            self.session.receive(bytes, now, &mut self.handler);
             heard |= count > 0;
         }
         heard

@@ -1,4 +1,4 @@
-//! What happens when nothing else can: a note in retained memory, and a restart.
+//! Panic and fault handlers: a note in retained memory, and a restart.
 //!
 //! The runtime has no panics and the firmware knows of none; should one be left,
 //! the display keeps its last frame and the device is back within a frame or two.

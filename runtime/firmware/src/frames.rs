@@ -1,4 +1,4 @@
-//! Frames: from the source through the table in use to the display.
+//! Frame loop: from the source through the table in use to the display.
 //!
 //! ```text
 //! round: pet watchdog -> follow source -> frame, if one waits
@@ -6,19 +6,19 @@
 //! ```
 //!
 //! What takes longer than a frame, such as the check of a new table, calls
-//! [`Frames::round`] now and then (see [`Shelf::pause`](iltm_runtime::store::Shelf)),
+//! [`Frames::round`] now and then (see [`TableSlots::yield_now`](iltm_runtime::store::TableSlots)),
 //! so that no frame waits for it.
 
 use crate::board::{Board, Clock, FrameSink, FrameSource, Peripherals, Watchdog};
+use crate::frame_path::FramePath;
+use crate::hooks::{FrameHooks, Outcome};
 use crate::memory::Memory;
-use crate::rehearsal::{Outcome, Rehearsal};
-use crate::shelf::Tables;
-use crate::stage::Stage;
-use crate::vitals::Vitals;
+use crate::table_slots::Tables;
+use crate::telemetry::Telemetry;
 use embedded_hal::digital::OutputPin;
 use heapless::Deque;
-use iltm_runtime::exchange::{Format, Lateness};
-use iltm_runtime::governor::{Change, Governor, Reason};
+use iltm_runtime::frame_buffers::{Format, Lateness};
+use iltm_runtime::governor::{Governor, Reason, TierChange};
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{Event, Fault, Mode, PassThrough, TableName, TableReason, TierReason};
 use iltm_runtime::store::Slot;
@@ -28,17 +28,17 @@ use iltm_runtime::store::Slot;
 const NOTICES: usize = 8;
 
 /// The board's frame side, and what is done with frames.
-pub struct Frames<B: Board, R> {
+pub struct Frames<B: Board, H> {
     pub(crate) clock: B::Clock,
     source: B::Source,
     sink: B::Sink,
     watchdog: B::Watchdog,
     lamp: B::Lamp,
     memory: &'static mut Memory,
-    rehearsal: R,
+    hooks: H,
     pub(crate) tables: &'static mut Tables,
     pub(crate) in_use: Result<Slot, PassThrough>,
-    pub(crate) vitals: Vitals,
+    pub(crate) telemetry: Telemetry,
     stream: Option<Stream>,
     /// Late frames of earlier streams.
     late: u32,
@@ -53,7 +53,7 @@ pub struct Frames<B: Board, R> {
 /// Frames of one format.
 struct Stream {
     format: Format,
-    stage: Stage,
+    path: FramePath,
     governor: Governor,
     lateness: Lateness,
 }
@@ -61,18 +61,18 @@ struct Stream {
 /// Something to tell the host.
 #[derive(Clone, Copy)]
 enum Notice {
-    Tier(Change, u32),
+    Tier(TierChange, u32),
     Fault(Fault),
     Table(Option<TableName>, TableReason, u32),
 }
 
-impl<B: Board, R: Rehearsal> Frames<B, R> {
+impl<B: Board, H: FrameHooks> Frames<B, H> {
     pub(crate) fn new(
         board: FrameSide<B>,
         memory: &'static mut Memory,
         tables: &'static mut Tables,
-        rehearsal: R,
-        vitals: Vitals,
+        hooks: H,
+        telemetry: Telemetry,
     ) -> Self {
         Self {
             clock: board.clock,
@@ -81,10 +81,10 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
             watchdog: board.watchdog,
             lamp: board.lamp,
             memory,
-            rehearsal,
+            hooks,
             tables,
             in_use: Err(PassThrough::NoTable),
-            vitals,
+            telemetry,
             stream: None,
             late: 0,
             notices: Deque::new(),
@@ -106,7 +106,7 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
         if !self.live {
             return false;
         }
-        self.rehearsal.round(&self.clock);
+        self.hooks.round(&self.clock);
         self.follow();
         self.frame()
     }
@@ -188,27 +188,27 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
         }
         let mode = self.in_use;
         let mode = mode.map_or_else(Mode::PassThrough, |_| Mode::Compensating);
-        self.vitals.set_mode(mode, 0, 0, 0);
+        self.telemetry.set_mode(mode, 0, 0, 0);
     }
 
     fn stage(&mut self, format: Format, lateness: Lateness) {
         let table = self.table();
-        let stage = Stage::new(table, format);
+        let path = FramePath::new(table, format);
         let period = ticks::<B::Clock>(format.period_us());
         let samples = format.bytes() as u32;
         // An eighth of the time is for everything else.
         let budget = u32::try_from(period - period / 8).unwrap_or(u32::MAX);
-        let (governor, mode, top) = match (stage, table) {
-            (Stage::PassThrough(why), _) | (_, Err(why)) => {
+        let (governor, mode, top) = match (path, table) {
+            (FramePath::PassThrough(why), _) | (_, Err(why)) => {
                 (Governor::new([1], budget), Mode::PassThrough(why), 0)
             }
-            (Stage::Grid(_) | Stage::Full(..), Ok(table)) => (
+            (FramePath::Grid(_) | FramePath::Full(..), Ok(table)) => (
                 Governor::for_table(table, samples as usize, budget),
                 Mode::Compensating,
                 table.top_tier(),
             ),
         };
-        self.vitals.set_mode(mode, top, samples, budget);
+        self.telemetry.set_mode(mode, top, samples, budget);
         // Nothing to do about a lamp that fails.
         let _ = match mode {
             Mode::Compensating => self.lamp.set_high(),
@@ -217,7 +217,7 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
         defmt::info!("compensated: {=bool}", mode == Mode::Compensating);
         self.stream = Some(Stream {
             format,
-            stage,
+            path,
             governor,
             lateness,
         });
@@ -248,15 +248,15 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
         stream.lateness.arrived(start);
         self.next = sequence.wrapping_add(1);
         let chosen = stream.governor.tier();
-        let tier = self.rehearsal.tier(chosen);
+        let tier = self.hooks.tier(chosen);
         let wanted = self.source.wanted();
         let input = self.sink.begin(sequence);
         let table = self
             .in_use
             .ok()
             .and_then(|slot| slot.of(self.tables).as_ref());
-        let result = stream.stage.frame(table, tier, wanted, input, self.memory);
-        self.rehearsal.during_frame(sequence, tier, &self.clock);
+        let result = stream.path.frame(table, tier, wanted, input, self.memory);
+        self.hooks.during_frame(sequence, tier, &self.clock);
         let whole = self.source.release();
         if whole.is_ok() {
             self.sink.publish();
@@ -272,21 +272,21 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
             change,
         };
         match (whole, result) {
-            (Ok(()), Ok(clipped)) => self.vitals.frame(ticks, tier, clipped),
+            (Ok(()), Ok(clipped)) => self.telemetry.frame(ticks, tier, clipped),
             // No frame of the stage's format can fail; it was sized by it.
             (Ok(()), Err(_)) => defmt::error!("frame {=u32} could not be worked on", sequence),
             // Counted by the source.
             (Err(_), _) => {}
         }
         self.count();
-        self.rehearsal.after_frame(outcome, &self.vitals);
+        self.hooks.after_frame(outcome, &self.telemetry);
         if let Some(change) = change {
             self.changed(sequence, change);
         }
         true
     }
 
-    fn changed(&mut self, sequence: u32, change: Change) {
+    fn changed(&mut self, sequence: u32, change: TierChange) {
         match change.reason {
             Reason::OverBudget { took } => defmt::warn!(
                 "tier {=u8} -> {=u8}: a frame took {=u32} ticks",
@@ -312,9 +312,9 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
             Fault::Source(cause) => {
                 defmt::warn!("the source cannot be followed, cause {=u8}", cause as u8);
             }
-            Fault::Table { .. } | Fault::Watchdog | Fault::Crash => {}
+            Fault::Table { .. } | Fault::Watchdog | Fault::Crash | Fault::KeyLost => {}
         }
-        self.vitals.set_fault(fault);
+        self.telemetry.set_fault(fault);
         self.notice(Notice::Fault(fault));
     }
 
@@ -334,8 +334,8 @@ impl<B: Board, R: Rehearsal> Frames<B, R> {
             .map_or(0, |stream| stream.lateness.late());
         let late = self.late.saturating_add(now);
         let counts = self.source.counts();
-        let more_broken = counts.broken != self.vitals.frame_counts().broken;
-        self.vitals.set_inputs(counts, late);
+        let more_broken = counts.broken != self.telemetry.frame_counts().broken;
+        self.telemetry.set_inputs(counts, late);
         if let Some((sequence, broken)) = counts.last_broken.filter(|_| more_broken) {
             self.fault(Fault::Frame {
                 sequence,
@@ -354,10 +354,10 @@ pub(crate) struct FrameSide<B: Board> {
     lamp: B::Lamp,
 }
 
-/// Parts a board: frames, and the serial line, flash and rest.
+/// Parts a board: frames, and the serial line, flash and idling.
 pub(crate) fn part<B: Board>(
     board: Peripherals<B>,
-) -> (FrameSide<B>, B::Serial, B::Flash, B::Rest) {
+) -> (FrameSide<B>, B::Serial, B::Flash, B::Idle) {
     let frames = FrameSide {
         clock: board.clock,
         source: board.source,
@@ -365,7 +365,7 @@ pub(crate) fn part<B: Board>(
         watchdog: board.watchdog,
         lamp: board.lamp,
     };
-    (frames, board.serial, board.flash, board.rest)
+    (frames, board.serial, board.flash, board.idle)
 }
 
 fn ticks<C: Clock>(microseconds: u32) -> u64 {

@@ -1,4 +1,4 @@
-//! The firmware: the runtime, live on a Cortex-M board.
+//! Firmware: the runtime, live on a Cortex-M board.
 //!
 //! | module | what lives there |
 //! |---|---|
@@ -6,11 +6,11 @@
 //! | [`boards`] | the boards there are |
 //! | [`device`] | the loop: frames, then the serial line |
 //! | [`frames`] | from the source through the table in use to the display |
-//! | [`stage`] | one frame through a table, or past it |
-//! | [`shelf`] | the tables of both slots, and the one in use |
-//! | [`rehearsal`] | what a self-test may do to the loop |
+//! | [`frame_path`] | one frame through a table, or past it |
+//! | [`table_slots`] | the tables of both slots, and the one in use |
+//! | [`hooks`] | what a self-test may do to the loop |
 //! | [`memory`] | the workspace of a frame |
-//! | [`vitals`] | what the device knows of itself |
+//! | [`telemetry`] | what the device knows of itself |
 //! | [`logger`] | defmt frames on their way to the serial line |
 //! | [`stack`] | how deep the stack has been |
 //! | [`retained`] | what outlives a restart |
@@ -25,12 +25,12 @@ pub mod board;
 pub mod boards;
 pub mod device;
 pub mod fault;
+pub mod frame_path;
 pub mod frames;
+pub mod hooks;
 pub mod logger;
 pub mod memory;
-pub mod rehearsal;
 pub mod retained;
-pub mod shelf;
 pub mod stack;
-pub mod stage;
-pub mod vitals;
+pub mod table_slots;
+pub mod telemetry;

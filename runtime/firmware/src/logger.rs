@@ -1,4 +1,4 @@
-//! defmt frames on their way to the serial line.
+//! Logger: defmt frames on their way to the serial line.
 //!
 //! A frame is collected until it is whole, then goes into a ring with its length
 //! before it; one that is too long, or finds no room, is dropped and counted.

@@ -1,8 +1,9 @@
-//! The workspace of a frame: the one large piece of memory, taken once.
+//! Workspace of a frame: the one large piece of memory, taken once.
 
+use iltm_runtime::features::Stage;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{FlatMemory, Halfword, Row, Stage, Workspace};
-use iltm_runtime::units::InputCoefficient;
+use iltm_runtime::pipeline::{FullMemory, RowBuffers, Workspace};
+use iltm_runtime::units::{Halfword, InputCoefficient};
 use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
 
@@ -94,15 +95,15 @@ impl Memory {
         channels: usize,
         cells: usize,
         width: usize,
-    ) -> (FlatMemory<'_>, Workspace<'_>) {
+    ) -> (FullMemory<'_>, Workspace<'_>) {
         let [first, second] = &mut self.buffers;
-        let frame = FlatMemory {
+        let frame = FullMemory {
             gains: &mut self.gains,
             ambient: &mut self.ambient,
             sums: leading(&mut self.sums, channels * cells),
             corrections: leading(&mut self.corrections, channels * cells),
             columns: &mut self.columns,
-            row: Row {
+            row: RowBuffers {
                 line: &mut self.line,
                 spread: leading(&mut self.spread, width),
             },

@@ -1,5 +1,5 @@
-//! What outlives a restart: a few words of RAM that the start-up code leaves
-//! alone.
+//! Retained memory: a few words of RAM that outlive a restart, because the start-up code
+//! leaves them alone.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,4 +1,4 @@
-//! How deep the stack has been.
+//! Stack depth: how deep the stack has been.
 //!
 //! Before anything else runs, the free part of the stack is painted; what is no
 //! longer paint has been used. The stack is a region of its own in `memory.x`.

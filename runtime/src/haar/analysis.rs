@@ -1,9 +1,10 @@
-//! From cells to coefficients: `S^T x`.
+//! Haar analysis: from cells to coefficients, `S^T x`.
 
 use super::basis::{Basis, NodeShifts, input_shift};
-use super::level::{Level, Pair};
-use super::source::{Block, Cells, Row, Source};
+use super::level::{Level, NodePair};
+use super::source::{CellRow, CellSource, Cells};
 use super::{ShortSlice, front};
+use crate::kernel::Block;
 use crate::units::InputCoefficient;
 
 /// A coefficient as it is stored. `shift` is its function's
@@ -63,7 +64,7 @@ impl Coefficient for InputCoefficient {
 /// [`ShortSlice`] if a slice is too short.
 pub fn analyse<T: Coefficient>(
     basis: &Basis,
-    cells: &impl Source,
+    cells: &impl CellSource,
     [to, from]: [&mut [i32]; 2],
     coefficients: &mut [T],
 ) -> Result<(), ShortSlice> {
@@ -95,7 +96,7 @@ pub fn analyse<T: Coefficient>(
 /// returns what is left of them.
 fn merge<'c, T: Coefficient>(
     level: &Level,
-    values: &impl Source,
+    values: &impl CellSource,
     to: &mut [i32],
     details: &'c mut [T],
 ) -> &'c mut [T] {
@@ -167,7 +168,7 @@ fn merge<'c, T: Coefficient>(
 fn merge_block<T: Coefficient>(
     block: Block,
     shifts: NodeShifts,
-    values: &impl Source,
+    values: &impl CellSource,
     sums: &mut [i32],
     details: &mut [T],
 ) -> bool {
@@ -195,7 +196,7 @@ fn put_first<T>(details: &mut [T], value: T) -> &mut [T] {
 
 /// Nodes of four equal quarters, as many as `details` has room for.
 #[inline]
-fn merge_plain<R: Row, T: Coefficient>(
+fn merge_plain<R: CellRow, T: Coefficient>(
     shifts: NodeShifts,
     (top, bottom): (R, R),
     sums: &mut [i32],
@@ -228,8 +229,8 @@ struct Merged {
 }
 
 /// Any node.
-fn merge_weighted<R: Row>(
-    (rows, cols): (Pair, Pair),
+fn merge_weighted<R: CellRow>(
+    (rows, cols): (NodePair, NodePair),
     shifts: NodeShifts,
     (top, bottom): (R, Option<R>),
     col: usize,
@@ -242,7 +243,7 @@ fn merge_weighted<R: Row>(
         };
         (row.at(2 * col), second)
     };
-    let detail = |pair: Pair, first: i64, second: i64| {
+    let detail = |pair: NodePair, first: i64, second: i64| {
         let (first_weight, second_weight) =
             (i64::from(pair.first_weight), i64::from(pair.second_weight));
         first_weight

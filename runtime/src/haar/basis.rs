@@ -1,6 +1,6 @@
-//! The basis of a grid: its levels and its functions.
+//! Haar basis of a grid: its levels and its functions.
 
-use super::level::{Axis, Level, Pair};
+use super::level::{Level, LevelAxis, NodePair};
 use crate::Grid;
 use crate::units::INPUT_COEFFICIENT_MAX;
 use heapless::Vec;
@@ -39,8 +39,8 @@ pub struct Function {
     pub row: u16,
     /// First column it covers.
     pub col: u16,
-    rows: Pair,
-    cols: Pair,
+    rows: NodePair,
+    cols: NodePair,
 }
 
 impl Function {
@@ -53,7 +53,7 @@ impl Function {
     /// Value at a cell.
     #[must_use]
     pub fn at(&self, row: usize, col: usize) -> i64 {
-        let along = |pair: Pair, start: u16, at: usize, splits: bool| -> i64 {
+        let along = |pair: NodePair, start: u16, at: usize, splits: bool| -> i64 {
             match at.checked_sub(usize::from(start)) {
                 Some(offset) if offset < pair.first as usize => {
                     if splits {
@@ -96,7 +96,7 @@ impl Function {
     /// Largest magnitude of the function at any cell.
     #[must_use]
     pub fn peak(&self) -> u64 {
-        let along = |pair: Pair| u64::from(pair.first_weight.max(pair.second_weight));
+        let along = |pair: NodePair| u64::from(pair.first_weight.max(pair.second_weight));
         match self.split {
             Split::Columns => along(self.cols),
             Split::Rows => along(self.rows),
@@ -108,7 +108,7 @@ impl Function {
     /// Sum of the squares of the function's values.
     #[must_use]
     pub fn squared_norm(&self) -> u64 {
-        let along = |pair: Pair, splits: bool| {
+        let along = |pair: NodePair, splits: bool| {
             if splits {
                 u64::from(pair.first) * u64::from(pair.first_weight).pow(2)
                     + u64::from(pair.second) * u64::from(pair.second_weight).pow(2)
@@ -132,11 +132,11 @@ impl Function {
     }
 }
 
-const fn columns_mass(rows: Pair, cols: Pair) -> u64 {
+const fn columns_mass(rows: NodePair, cols: NodePair) -> u64 {
     rows.cells() as u64 * cols.positive_mass()
 }
 
-const fn both_mass(rows: Pair, cols: Pair) -> u64 {
+const fn both_mass(rows: NodePair, cols: NodePair) -> u64 {
     2 * rows.positive_mass() * cols.positive_mass()
 }
 
@@ -149,7 +149,7 @@ pub(crate) struct NodeShifts {
 }
 
 impl NodeShifts {
-    pub(crate) const fn new(rows: Pair, cols: Pair) -> Self {
+    pub(crate) const fn new(rows: NodePair, cols: NodePair) -> Self {
         Self {
             columns: input_shift(columns_mass(rows, cols)) as u8,
             rows: input_shift(columns_mass(cols, rows)) as u8,
@@ -185,7 +185,10 @@ impl Basis {
     /// Adds the levels in place: they are too large to have twice on a small stack.
     #[inline(never)]
     fn fill(&mut self) {
-        let (mut rows, mut cols) = (Axis::cells(self.grid.rows()), Axis::cells(self.grid.cols()));
+        let (mut rows, mut cols) = (
+            LevelAxis::cells(self.grid.rows()),
+            LevelAxis::cells(self.grid.cols()),
+        );
         let mut first = 0;
         while rows.nodes > 1 || cols.nodes > 1 {
             let level = Level::new(rows, cols, first);
@@ -258,7 +261,7 @@ impl Functions<'_> {
             return None;
         }
         self.ended = true;
-        let whole = |cells: usize| Pair {
+        let whole = |cells: usize| NodePair {
             first: cells as u16,
             second: 0,
             first_weight: 0,

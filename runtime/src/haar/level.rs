@@ -1,4 +1,4 @@
-//! One level of the pyramid: which nodes merge, and with what weights.
+//! Level of the Haar pyramid: which nodes merge, and with what weights.
 
 use super::basis::NodeShifts;
 
@@ -7,7 +7,7 @@ use super::basis::NodeShifts;
 /// `u16`, because every table keeps four of them a level, and a side has at most
 /// [`Grid::MAX_CELLS`](crate::Grid::MAX_CELLS).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Pair {
+pub(crate) struct NodePair {
     /// Cells in the first node.
     pub(crate) first: u16,
     /// Cells in the second node, 0 if the first stays alone.
@@ -18,7 +18,7 @@ pub(crate) struct Pair {
     pub(crate) second_weight: u16,
 }
 
-impl Pair {
+impl NodePair {
     fn new(first: u16, second: u16) -> Self {
         if second == 0 {
             return Self {
@@ -69,13 +69,13 @@ const fn greatest_common_divisor(mut a: u16, mut b: u16) -> u16 {
 
 /// One axis before a merge: every node has `full` cells but the last.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct LevelAxis {
     pub(crate) nodes: usize,
     full: u16,
     last: u16,
 }
 
-impl Axis {
+impl LevelAxis {
     pub(crate) const fn cells(cells: usize) -> Self {
         Self {
             nodes: cells,
@@ -99,13 +99,13 @@ impl Axis {
         }
     }
 
-    fn pair(self, index: usize) -> Pair {
+    fn pair(self, index: usize) -> NodePair {
         let last = self.nodes.saturating_sub(1);
         let first = 2 * index;
         let cells = |node: usize| if node == last { self.last } else { self.full };
         match first.cmp(&last) {
-            core::cmp::Ordering::Less => Pair::new(cells(first), cells(first + 1)),
-            _ => Pair::new(self.last, 0),
+            core::cmp::Ordering::Less => NodePair::new(cells(first), cells(first + 1)),
+            _ => NodePair::new(self.last, 0),
         }
     }
 }
@@ -113,12 +113,12 @@ impl Axis {
 /// One level: the axes before and after the merge and the four kinds of pairs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Level {
-    pub(crate) rows: Axis,
-    pub(crate) cols: Axis,
+    pub(crate) rows: LevelAxis,
+    pub(crate) cols: LevelAxis,
     /// Pair of rows anywhere but at the end, and the last one.
-    row_pairs: [Pair; 2],
+    row_pairs: [NodePair; 2],
     /// Pair of columns anywhere but at the end, and the last one.
-    col_pairs: [Pair; 2],
+    col_pairs: [NodePair; 2],
     /// Input shifts of the nodes, by kind of row pair and of column pair.
     shifts: [[NodeShifts; 2]; 2],
     /// Index of the level's first detail coefficient.
@@ -126,8 +126,8 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    pub(crate) fn new(rows: Axis, cols: Axis, first: usize) -> Self {
-        let pairs = |axis: Axis| [axis.pair(0), axis.pair(axis.nodes.div_ceil(2) - 1)];
+    pub(crate) fn new(rows: LevelAxis, cols: LevelAxis, first: usize) -> Self {
+        let pairs = |axis: LevelAxis| [axis.pair(0), axis.pair(axis.nodes.div_ceil(2) - 1)];
         let (row_pairs, col_pairs) = (pairs(rows), pairs(cols));
         Self {
             rows,
@@ -163,7 +163,7 @@ impl Level {
     }
 
     #[inline]
-    pub(crate) fn row_pair(&self, merged_row: usize) -> &Pair {
+    pub(crate) fn row_pair(&self, merged_row: usize) -> &NodePair {
         let [inner, last] = &self.row_pairs;
         if merged_row + 1 == self.merged_rows() {
             last
@@ -173,7 +173,7 @@ impl Level {
     }
 
     #[inline]
-    pub(crate) fn col_pair(&self, merged_col: usize) -> &Pair {
+    pub(crate) fn col_pair(&self, merged_col: usize) -> &NodePair {
         let [inner, last] = &self.col_pairs;
         if merged_col + 1 == self.merged_cols() {
             last
@@ -200,7 +200,7 @@ impl Level {
     /// Whether all nodes have four equal quarters.
     #[inline]
     pub(crate) fn is_plain(&self) -> bool {
-        let plain = |pairs: [Pair; 2]| pairs.iter().all(|pair| pair.is_plain());
+        let plain = |pairs: [NodePair; 2]| pairs.iter().all(|pair| pair.is_plain());
         plain(self.row_pairs) && plain(self.col_pairs)
     }
 

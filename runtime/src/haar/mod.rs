@@ -1,4 +1,4 @@
-//! The exact integer two-dimensional Haar transform, on a grid of any size.
+//! Haar transform: the exact integer two-dimensional one, on a grid of any size.
 //!
 //! The basis is the non-standard (quad-tree) one: at every level, adjacent pairs
 //! of rows and of columns merge into nodes twice as wide and high; an odd last
@@ -31,10 +31,11 @@ mod reconstruction;
 mod source;
 mod synthesis;
 
+pub use crate::kernel::Block;
 pub use analysis::{Coefficient, analyse};
 pub use basis::{Basis, Function, Functions, Split};
 pub use reconstruction::reconstruct;
-pub use source::{Block, Cells, Row, Source};
+pub use source::{CellRow, CellSource, Cells};
 pub use synthesis::synthesise;
 
 #[cfg(test)]

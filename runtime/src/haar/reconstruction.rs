@@ -1,8 +1,8 @@
-//! The exact inverse of the analysis.
+//! Haar reconstruction: the exact inverse of the analysis.
 
 use super::ShortSlice;
 use super::basis::Basis;
-use super::level::Pair;
+use super::level::NodePair;
 use super::synthesis::{Rule, descend};
 
 struct Solve;
@@ -11,7 +11,7 @@ struct Solve;
 ///
 /// `sum = x + y` and `detail = first_weight x - second_weight y`; the division
 /// leaves no remainder where both came from integer cells.
-fn halves(pair: Pair, sum: i64, detail: i64) -> (i64, i64) {
+fn halves(pair: NodePair, sum: i64, detail: i64) -> (i64, i64) {
     if !pair.splits() {
         return (sum, 0);
     }
@@ -27,7 +27,7 @@ fn halves(pair: Pair, sum: i64, detail: i64) -> (i64, i64) {
 
 impl Rule<i64> for Solve {
     fn plain(sum: i64, columns: i64, rows: i64, both: i64) -> [i64; 4] {
-        let equal = Pair {
+        let equal = NodePair {
             first: 1,
             second: 1,
             first_weight: 1,
@@ -36,7 +36,7 @@ impl Rule<i64> for Solve {
         Self::weighted(sum, columns, rows, both, (equal, equal))
     }
 
-    fn halves(sum: i64, detail: i64, pair: Pair) -> [i64; 2] {
+    fn halves(sum: i64, detail: i64, pair: NodePair) -> [i64; 2] {
         halves(pair, sum, detail).into()
     }
 
@@ -45,7 +45,7 @@ impl Rule<i64> for Solve {
         columns: i64,
         rows: i64,
         both: i64,
-        (row_pair, col_pair): (Pair, Pair),
+        (row_pair, col_pair): (NodePair, NodePair),
     ) -> [i64; 4] {
         let (top, bottom) = halves(row_pair, sum, rows);
         let (top_detail, bottom_detail) = halves(row_pair, columns, both);

@@ -1,15 +1,15 @@
-//! Where the values of the finest level come from.
+//! Cells of a grid, in memory or computed as they are read.
 
-use crate::kernel::levels;
+use crate::kernel::{Block, levels};
 use crate::units::InputCoefficient;
 
 /// The cells of a grid.
 ///
 /// They can be computed as they are read, from pixels for instance, so that a
 /// frame's light is not stored before it is transformed.
-pub trait Source {
+pub trait CellSource {
     /// One row of them.
-    type Row<'r>: Row
+    type Row<'r>: CellRow
     where
         Self: 'r;
 
@@ -32,28 +32,15 @@ pub trait Source {
     }
 }
 
-/// Some nodes of two by two cells: all of some rows, or the first of one row.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Block {
-    /// First row of cells.
-    pub row: usize,
-    /// Columns of the grid.
-    pub cols: usize,
-    /// Nodes of each row of nodes.
-    pub nodes: usize,
-    /// Rows of nodes.
-    pub rows: usize,
-}
-
 /// A row of cells.
-pub trait Row: Copy {
+pub trait CellRow: Copy {
     /// The values two by two, without a last odd one.
     fn pairs(self) -> impl Iterator<Item = [i32; 2]>;
     /// The value at an index; 0 past the end.
     fn at(self, index: usize) -> i32;
 }
 
-impl Row for &[i32] {
+impl CellRow for &[i32] {
     #[inline]
     fn pairs(self) -> impl Iterator<Item = [i32; 2]> {
         self.as_chunks::<2>().0.iter().copied()
@@ -74,7 +61,7 @@ pub struct Cells<'c> {
     pub cols: usize,
 }
 
-impl Source for Cells<'_> {
+impl CellSource for Cells<'_> {
     type Row<'r>
         = &'r [i32]
     where

@@ -1,10 +1,9 @@
-//! From coefficients to cells, level by level from the coarsest.
+//! Haar synthesis: from coefficients to cells, level by level from the coarsest.
 
 use super::basis::Basis;
-use super::level::{Level, Pair};
-use super::source::Block;
+use super::level::{Level, NodePair};
 use super::{ShortSlice, front};
-use crate::kernel::levels;
+use crate::kernel::{Block, levels};
 
 /// How the values of a node's four quarters follow from the node's own value and
 /// its details. Quarters: top left, top right, bottom left, bottom right.
@@ -12,9 +11,9 @@ pub(super) trait Rule<T> {
     /// A node of four equal quarters.
     fn plain(value: T, columns: T, rows: T, both: T) -> [T; 4];
     /// A node of two halves; a detail that it does not have is zero.
-    fn halves(value: T, detail: T, pair: Pair) -> [T; 2];
+    fn halves(value: T, detail: T, pair: NodePair) -> [T; 2];
     /// Any node; quarters and details that it does not have are ignored.
-    fn weighted(value: T, columns: T, rows: T, both: T, pairs: (Pair, Pair)) -> [T; 4];
+    fn weighted(value: T, columns: T, rows: T, both: T, pairs: (NodePair, NodePair)) -> [T; 4];
     /// The nodes of `block`, all of four equal quarters; `false`, and nothing done,
     /// where there is no faster way than node by node.
     fn split(block: Block, values: &[T], details: &[[T; 3]], to: &mut [T]) -> bool {
@@ -158,7 +157,12 @@ fn split_plain<T: Copy, R: Rule<T>>(
     }
 }
 
-fn store<T: Copy>(quarters: [T; 4], (top, bottom): (&mut [T], &mut [T]), col: usize, cols: Pair) {
+fn store<T: Copy>(
+    quarters: [T; 4],
+    (top, bottom): (&mut [T], &mut [T]),
+    col: usize,
+    cols: NodePair,
+) {
     let [a, b, c, d] = quarters;
     for (row, first, second) in [(top, a, b), (bottom, c, d)] {
         if let Some(slot) = row.get_mut(2 * col) {
@@ -188,7 +192,7 @@ impl Rule<i32> for Weigh {
     }
 
     #[inline]
-    fn halves(value: i32, detail: i32, pair: Pair) -> [i32; 2] {
+    fn halves(value: i32, detail: i32, pair: NodePair) -> [i32; 2] {
         [
             value.wrapping_add(i32::from(pair.first_weight).wrapping_mul(detail)),
             value.wrapping_sub(i32::from(pair.second_weight).wrapping_mul(detail)),
@@ -200,7 +204,7 @@ impl Rule<i32> for Weigh {
         columns: i32,
         rows: i32,
         both: i32,
-        (row_pair, col_pair): (Pair, Pair),
+        (row_pair, col_pair): (NodePair, NodePair),
     ) -> [i32; 4] {
         let [top, bottom] = Self::halves(value, rows, row_pair);
         let [top_detail, bottom_detail] = Self::halves(columns, both, row_pair);

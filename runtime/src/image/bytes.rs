@@ -1,4 +1,4 @@
-//! Reading fields of untrusted bytes.
+//! Fields of bytes that nobody vouches for.
 
 use core::ops::Range;
 
@@ -10,6 +10,14 @@ pub(super) fn u16_at(bytes: &[u8], field: Range<usize>) -> Option<u16> {
 /// The `u32` at `field`, little-endian.
 pub(super) fn u32_at(bytes: &[u8], field: Range<usize>) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.get(field)?.try_into().ok()?))
+}
+
+/// Writes a field, as much of it as there is room for.
+pub(super) fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
+    let places = bytes.get_mut(field).unwrap_or_default();
+    for (place, byte) in places.iter_mut().zip(value) {
+        *place = *byte;
+    }
 }
 
 /// Little-endian `u16`s as they lie in an image.

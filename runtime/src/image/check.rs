@@ -1,20 +1,18 @@
-//! The check of what an image's sections say.
+//! Check of an image: what its sections say, and that no frame can overflow.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
-use super::layout::{
-    MAX_PROVENANCE, MAX_SEGMENTS, MAX_TIERS, SectionKind, fine_gain, header, meta, tier,
-};
+use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, tier};
 use super::sections::{Section, Whole};
 use super::table::curve;
-use super::{FineGain, ImageError, SectionProblem, Table, TierInfo};
+use super::{FineGain, ImageError, Meta, SectionProblem, Table, TierInfo};
+use crate::features::Stage;
 use crate::haar::Basis;
+use crate::operator::layout::MAX_SEGMENTS;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
-use crate::pace::{Pace, cost};
-use crate::pipeline::codes::{CODES, code};
-use crate::pipeline::{RESPONSE_KNOTS, Stage};
+use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
 use crate::units::Light;
+use crate::yield_budget::{YieldBudget, cost};
 use crate::{FrameSize, Grid};
-use fixed::types::{U0F32, U1F15, U8F24};
 use heapless::Vec;
 
 /// An image that passed the check: small, and all that a [`Table`] is made from.
@@ -38,28 +36,28 @@ impl<'a> Checked<'a> {
     ///
     /// # Errors
     /// [`ImageError`] with the section and field at fault.
-    pub fn new(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
-        let mut pace = Pace::new(pause);
-        Self::of(Whole::new(image, &mut pace)?, &mut pace)
+    pub fn new(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+        let mut budget = YieldBudget::new(yield_now);
+        Self::of(Whole::new(image, &mut budget)?, &mut budget)
     }
 
     /// Checks what the sections of an image say whose checksums hold.
-    pub(crate) fn of(whole: Whole<'a>, pace: &mut Pace<'_>) -> Result<Self, ImageError> {
-        let meta = Meta::read(whole.required(SectionKind::Meta)?)?;
+    pub(crate) fn of(whole: Whole<'a>, budget: &mut YieldBudget<'_>) -> Result<Self, ImageError> {
+        let meta = Meta::parse(whole.required(SectionKind::Meta)?.bytes)?;
         let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
         let _ = tiers(whole.required(SectionKind::Tiers)?)?;
         check_stages(&whole, &meta)?;
         let gain = halfwords(whole.required(SectionKind::Gain)?, values)?;
         let ambient = of_stage(Stage::Ambient, &whole, SectionKind::Ambient)
-            .map(|section| ambient(section, values, pace))
+            .map(|section| ambient(section, values, budget))
             .transpose()?;
         let response = of_stage(Stage::Response, &whole, SectionKind::Response)
-            .map(|section| response(section, meta.channels, pace))
+            .map(|section| response(section, meta.channels, budget))
             .transpose()?;
         let fine_gain = of_stage(Stage::FullResolution, &whole, SectionKind::FineGain)
             .map(|section| fine_gains(section, grid, meta.channels))
             .transpose()?;
-        check_operator(&whole, &meta, pace)?;
+        check_operator(&whole, &meta, budget)?;
         Ok(Self {
             whole,
             meta,
@@ -69,11 +67,11 @@ impl<'a> Checked<'a> {
             fine_gain,
             provenance: whole
                 .optional(SectionKind::Provenance)
-                .map_or(Ok(&[][..]), |section| provenance(section, pace))?,
+                .map_or(Ok(&[][..]), |section| provenance(section, budget))?,
             codes: codes(
                 of_stage(Stage::Response, &whole, SectionKind::Codes),
                 response,
-                pace,
+                budget,
             )?,
         })
     }
@@ -112,87 +110,12 @@ impl<'a> Checked<'a> {
     }
 }
 
-/// The fields of the meta section.
-#[derive(Clone, Copy, Debug)]
-struct Meta {
-    grid: Grid,
-    channels: u8,
-    gain_fraction: u8,
-    reference_white: U8F24,
-    inverse_error: U0F32,
-    bounds: Bounds,
-    channel_scales: [U1F15; 3],
-}
-
-impl Meta {
-    fn read(section: Section<'_>) -> Result<Self, ImageError> {
-        if section.bytes.len() != meta::SIZE {
-            return Err(section.length_error());
-        }
-        let wide = |field| u32_at(section.bytes, field).unwrap_or(0);
-        let half = |field| u16_at(section.bytes, field).unwrap_or(0);
-        let byte = |at: usize| section.bytes.get(at).copied().unwrap_or(0);
-        let grid = Grid::new(half(meta::ROWS), half(meta::COLS)).map_err(ImageError::Grid)?;
-        let channels = byte(meta::CHANNELS);
-        if !matches!(channels, 1 | 3) {
-            return Err(section.field_error("channels", meta::CHANNELS));
-        }
-        let gain_fraction = byte(meta::GAIN_FRACTION);
-        if gain_fraction > 15 {
-            return Err(section.field_error("gain fraction", meta::GAIN_FRACTION));
-        }
-        for reserved in [meta::RESERVED, meta::RESERVED_END] {
-            let start = reserved.start;
-            let bytes = section.bytes.get(reserved).unwrap_or_default();
-            if bytes.iter().any(|byte| *byte != 0) {
-                return Err(section.field_error("reserved", start));
-            }
-        }
-        let reference_white = U8F24::from_bits(wide(meta::REFERENCE_WHITE));
-        if reference_white == U8F24::ZERO {
-            return Err(section.field_error("reference white", meta::REFERENCE_WHITE.start));
-        }
-        let mut channel_scales = [U1F15::ZERO; 3];
-        let scales = section.bytes.get(meta::CHANNEL_SCALES).unwrap_or_default();
-        for (channel, (scale, bytes)) in channel_scales
-            .iter_mut()
-            .zip(scales.as_chunks::<2>().0)
-            .enumerate()
-        {
-            *scale = U1F15::from_bits(u16::from_le_bytes(*bytes));
-            if channel >= usize::from(channels) && *scale != U1F15::ZERO {
-                let offset = meta::CHANNEL_SCALES.start + 2 * channel;
-                return Err(section.field_error("channel scale", offset));
-            }
-        }
-        Ok(Self {
-            grid,
-            channels,
-            gain_fraction,
-            reference_white,
-            inverse_error: U0F32::from_bits(wide(meta::INVERSE_ERROR)),
-            bounds: Bounds {
-                accumulator: wide(meta::ACCUMULATOR_BOUND),
-                correction: wide(meta::CORRECTION_BOUND),
-            },
-            channel_scales,
-        })
-    }
-}
-
 fn tiers(section: Section<'_>) -> Result<impl ExactSizeIterator<Item = TierInfo>, ImageError> {
     let (entries, rest) = section.bytes.as_chunks::<{ tier::SIZE }>();
     if !rest.is_empty() || entries.is_empty() || entries.len() > MAX_TIERS {
         return Err(section.length_error());
     }
-    Ok(entries.iter().map(|entry| {
-        let field = |field| u32_at(entry, field).unwrap_or(0);
-        TierInfo {
-            predicted_error: U0F32::from_bits(field(tier::PREDICTED_ERROR)),
-            entries: field(tier::ENTRIES),
-            multiplications: field(tier::MULTIPLICATIONS),
-        }
-    }))
+    Ok(entries.iter().map(TierInfo::parse))
 }
 
 fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageError> {
@@ -204,11 +127,11 @@ fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageE
 fn ambient<'a>(
     section: Section<'a>,
     count: usize,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = halfwords(section, count)?;
     let too_much = |bits| {
-        pace.done(1, cost::VALUE);
+        budget.spend(1, cost::VALUE);
         Light::from_bits(bits) > Light::ONE
     };
     match words.run(0, count).position(too_much) {
@@ -220,7 +143,7 @@ fn ambient<'a>(
 fn response<'a>(
     section: Section<'a>,
     channels: u8,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = Halfwords::new(section.bytes).ok_or(section.length_error())?;
     let own = usize::from(channels) * RESPONSE_KNOTS;
@@ -229,7 +152,7 @@ fn response<'a>(
     }
     for start in (0..words.len()).step_by(RESPONSE_KNOTS) {
         let falls = |index: &usize| {
-            pace.done(1, cost::VALUE);
+            budget.spend(1, cost::VALUE);
             words.get(*index) < words.get(index.saturating_sub(1))
         };
         if let Some(index) = (start + 1..start + RESPONSE_KNOTS).find(falls) {
@@ -243,7 +166,7 @@ fn response<'a>(
 fn codes<'a>(
     section: Option<Section<'a>>,
     response: Option<Halfwords<'_>>,
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> Result<&'a [[u8; CODES]], ImageError> {
     let Some(section) = section else {
         return match response {
@@ -262,8 +185,8 @@ fn codes<'a>(
     for (channel, of_channel) in codes.iter().enumerate() {
         let response = curve(response, channel);
         let differs = |(index, stored): (usize, &u8)| {
-            pace.done(1, cost::CODE);
-            *stored != code(index, response)
+            budget.spend(1, cost::CODE);
+            *stored != code_of_index(index, response)
         };
         if let Some(index) = of_channel.iter().enumerate().position(differs) {
             return Err(section.field_error("code", channel * CODES + index));
@@ -365,14 +288,18 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
 ///
 /// Not inlined: what it needs, other checks need not stand on.
 #[inline(never)]
-fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result<(), ImageError> {
+fn check_operator(
+    whole: &Whole<'_>,
+    meta: &Meta,
+    budget: &mut YieldBudget<'_>,
+) -> Result<(), ImageError> {
     let operator = if Stage::Operator.is_built() {
         operator(whole, meta)?
     } else {
         None
     };
     let bounds = match &operator {
-        Some(operator) => operator.prove(meta.grid, pace),
+        Some(operator) => operator.prove(meta.grid, budget),
         None => Ok(Bounds::default()),
     };
     if bounds.map_err(ImageError::Operator)? != meta.bounds {
@@ -381,7 +308,7 @@ fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result
     let tiers = tiers(whole.required(SectionKind::Tiers)?)?;
     for (tier, info) in (0_u8..).zip(tiers) {
         let cost = operator.as_ref().map_or((0, 0), |operator| {
-            operator.cost_with_pace(tier, meta.channels, pace)
+            operator.cost_yielding(tier, meta.channels, budget)
         });
         if cost != (info.entries, info.multiplications) {
             return Err(ImageError::Operator(OperatorError::CostDiffers { tier }));
@@ -391,7 +318,10 @@ fn check_operator(whole: &Whole<'_>, meta: &Meta, pace: &mut Pace<'_>) -> Result
 }
 
 /// Checks the text piece by piece, for it may be long.
-fn provenance<'a>(section: Section<'a>, pace: &mut Pace<'_>) -> Result<&'a [u8], ImageError> {
+fn provenance<'a>(
+    section: Section<'a>,
+    budget: &mut YieldBudget<'_>,
+) -> Result<&'a [u8], ImageError> {
     const PIECE: usize = 256;
     if section.bytes.len() > MAX_PROVENANCE {
         return Err(section.length_error());
@@ -411,7 +341,7 @@ fn provenance<'a>(section: Section<'a>, pace: &mut Pace<'_>) -> Result<&'a [u8],
             }
         };
         rest = rest.get(good..).unwrap_or_default();
-        pace.done(piece.len(), cost::VALUE);
+        budget.spend(piece.len(), cost::VALUE);
     }
     Ok(section.bytes)
 }

@@ -1,10 +1,10 @@
-//! Why an image is refused.
+//! Image errors: why an image or a seal is refused.
 
-use super::SealError;
 use super::layout::{FORMAT_VERSION, SectionKind};
+use super::seal::SEAL_VERSION;
 use crate::GridError;
+use crate::features::Stage;
 use crate::operator::OperatorError;
-use crate::pipeline::Stage;
 use core::fmt;
 
 /// Why bytes are not a table that this runtime can use.
@@ -89,6 +89,19 @@ pub enum SectionProblem {
     Selector,
 }
 
+/// Why the bytes behind an image are not a seal that this runtime can read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
+pub enum SealError {
+    /// It is of another version.
+    Version {
+        /// Version found.
+        found: u16,
+    },
+    /// Bytes that must be zero are not.
+    Reserved,
+}
+
 impl fmt::Display for SectionProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -151,3 +164,15 @@ impl fmt::Display for ImageError {
 }
 
 impl core::error::Error for ImageError {}
+
+impl fmt::Display for SealError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Version { found } => write!(
+                f,
+                "has version {found}; this runtime reads version {SEAL_VERSION}"
+            ),
+            Self::Reserved => f.write_str("has bytes other than zero in a reserved place"),
+        }
+    }
+}

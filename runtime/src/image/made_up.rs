@@ -1,7 +1,10 @@
-//! Small images for tests of this crate; the host tools write the real ones.
+//! Sample images for tests of this crate; the host tools write the real ones.
 
-use super::crc32;
-use super::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, meta, tier};
+use super::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, tier};
+use super::{Meta, crc32};
+use crate::Grid;
+use crate::operator::Bounds;
+use fixed::types::{U0F32, U1F15, U8F24};
 use std::vec;
 use std::vec::Vec;
 
@@ -31,15 +34,18 @@ pub(crate) fn image(sections: &[(SectionKind, Vec<u8>)]) -> Vec<u8> {
 
 /// The sections of a grey table of tier 0 alone for a dark, flat scene.
 pub(crate) fn flat(rows: u16, cols: u16) -> Vec<(SectionKind, Vec<u8>)> {
-    let mut meta = vec![0; meta::SIZE];
-    meta[meta::ROWS].copy_from_slice(&rows.to_le_bytes());
-    meta[meta::COLS].copy_from_slice(&cols.to_le_bytes());
-    meta[meta::CHANNELS] = 1;
-    meta[meta::GAIN_FRACTION] = 12;
-    meta[meta::REFERENCE_WHITE].copy_from_slice(&(1_u32 << 23).to_le_bytes());
+    let meta = Meta {
+        grid: Grid::new(rows, cols).expect("a small grid"),
+        channels: 1,
+        gain_fraction: 12,
+        reference_white: U8F24::from_bits(1 << 23),
+        inverse_error: U0F32::ZERO,
+        bounds: Bounds::default(),
+        channel_scales: [U1F15::ZERO; 3],
+    };
     let cells = usize::from(rows) * usize::from(cols);
     vec![
-        (SectionKind::Meta, meta),
+        (SectionKind::Meta, meta.emit().to_vec()),
         (SectionKind::Tiers, vec![0; tier::SIZE]),
         (SectionKind::Gain, 4_096_u16.to_le_bytes().repeat(cells)),
     ]

@@ -14,17 +14,19 @@ mod error;
 pub mod layout;
 #[cfg(test)]
 pub(crate) mod made_up;
+mod meta;
 pub mod seal;
 mod sections;
 mod table;
 
 pub use check::Checked;
-pub use error::{ImageError, SectionProblem};
-pub use seal::{Seal, SealError, content, unseal};
+pub use error::{ImageError, SealError, SectionProblem};
+pub use meta::{Meta, TierInfo};
+pub use seal::{Seal, content, unseal};
 pub(crate) use sections::Whole;
-pub use table::{FineGain, Table, TierInfo};
+pub use table::{FineGain, Table};
 
-use crate::pace::{Pace, cost};
+use crate::yield_budget::{YieldBudget, cost};
 
 /// CRC-32 (ISO-HDLC), piece by piece.
 pub(crate) static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -40,12 +42,12 @@ pub fn crc32(bytes: &[&[u8]]) -> u32 {
 }
 
 /// The same of bytes that may be many.
-fn checksum(bytes: &[&[u8]], pace: &mut Pace<'_>) -> u32 {
+fn checksum(bytes: &[&[u8]], budget: &mut YieldBudget<'_>) -> u32 {
     const PIECE: usize = 256;
     let mut digest = CRC_32.digest();
     for piece in bytes.iter().flat_map(|part| part.chunks(PIECE)) {
         digest.update(piece);
-        pace.done(piece.len(), cost::CRC_BYTE);
+        budget.spend(piece.len(), cost::CRC_BYTE);
     }
     digest.finalize()
 }

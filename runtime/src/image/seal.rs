@@ -1,13 +1,12 @@
-//! The seal behind a signed image: where its bytes are, and taking a file apart.
+//! Seal behind a signed image: where its bytes are, and taking a file apart.
 //!
 //! A file is an image, as long as its header says, and nothing more or one seal:
 //! who signed it, and on which terms. The signature covers the image and the seal
 //! before it. Whether a seal is good is for [`trust`](crate::trust) to say.
 
-use super::ImageError;
-use super::bytes::{u16_at, u32_at};
+use super::bytes::{put, u16_at, u32_at};
 use super::layout::{self, header};
-use core::fmt;
+use super::{ImageError, SealError};
 
 /// First bytes of every seal.
 pub const MAGIC: [u8; 4] = *b"SEAL";
@@ -56,19 +55,6 @@ pub struct Seal {
     pub signature: [u8; 64],
 }
 
-/// Why the bytes behind an image are not a seal that this runtime can read.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[non_exhaustive]
-pub enum SealError {
-    /// It is of another version.
-    Version {
-        /// Version found.
-        found: u16,
-    },
-    /// Bytes that must be zero are not.
-    Reserved,
-}
-
 impl Seal {
     /// What names a public key in a seal.
     #[must_use]
@@ -99,12 +85,7 @@ impl Seal {
     #[must_use]
     pub fn emit(&self) -> [u8; field::SIZE] {
         let mut bytes = [0; field::SIZE];
-        let mut put = |field, value: &[u8]| {
-            let place = bytes.get_mut::<core::ops::Range<usize>>(field);
-            for (to, from) in place.unwrap_or_default().iter_mut().zip(value) {
-                *to = *from;
-            }
-        };
+        let mut put = |field, value: &[u8]| put(&mut bytes, field, value);
         put(field::MAGIC, &MAGIC);
         put(field::SEAL_VERSION, &SEAL_VERSION.to_le_bytes());
         put(field::VERSION, &self.version.to_le_bytes());
@@ -193,18 +174,6 @@ pub fn content(slot: &[u8]) -> &[u8] {
         0
     };
     slot.get(..stated.saturating_add(seal)).unwrap_or(slot)
-}
-
-impl fmt::Display for SealError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Version { found } => write!(
-                f,
-                "has version {found}; this runtime reads version {SEAL_VERSION}"
-            ),
-            Self::Reserved => f.write_str("has bytes other than zero in a reserved place"),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! The sections of an image: header, section table and checksums.
+//! Sections of an image: header, section table and checksums.
 
 use super::bytes::{u16_at, u32_at};
 use super::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, MAX_SECTIONS, SectionKind, entry, header};
 use super::{ImageError, SectionProblem, checksum};
-use crate::pace::Pace;
+use crate::yield_budget::YieldBudget;
 
 /// An image whose checksums hold: every byte is as it was written. What they mean
 /// is not looked at yet.
@@ -23,7 +23,7 @@ pub(super) struct Section<'a> {
 
 impl<'a> Whole<'a> {
     /// Checks the header, the section table, and the checksum of every section.
-    pub(crate) fn new(image: &'a [u8], pace: &mut Pace<'_>) -> Result<Self, ImageError> {
+    pub(crate) fn new(image: &'a [u8], budget: &mut YieldBudget<'_>) -> Result<Self, ImageError> {
         let given = image.len();
         let truncated = |needed: usize| ImageError::Truncated { needed, given };
         let (head, rest) = image
@@ -48,19 +48,19 @@ impl<'a> Whole<'a> {
             .get(..count * entry::SIZE)
             .ok_or(truncated(header::SIZE + count * entry::SIZE))?;
         let covered = head.get(..header::CRC.start).unwrap_or_default();
-        if u32_at(head, header::CRC) != Some(checksum(&[covered, table], pace)) {
+        if u32_at(head, header::CRC) != Some(checksum(&[covered, table], budget)) {
             return Err(ImageError::HeaderChecksum);
         }
         let whole = Self {
             image,
             entries: table.as_chunks().0,
         };
-        whole.check(pace)?;
+        whole.check(budget)?;
         Ok(whole)
     }
 
     /// Sections stand in order, one behind the other, each with its checksum.
-    fn check(&self, pace: &mut Pace<'_>) -> Result<(), ImageError> {
+    fn check(&self, budget: &mut YieldBudget<'_>) -> Result<(), ImageError> {
         let given = self.image.len();
         let mut place = header::SIZE + self.entries.len() * entry::SIZE;
         let mut last = None;
@@ -70,7 +70,7 @@ impl<'a> Whole<'a> {
                 section: section.kind,
                 problem,
             };
-            if Some(checksum(&[section.bytes], pace)) != u32_at(entry, entry::CRC) {
+            if Some(checksum(&[section.bytes], budget)) != u32_at(entry, entry::CRC) {
                 return Err(ImageError::SectionChecksum {
                     section: section.kind,
                 });

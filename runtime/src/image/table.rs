@@ -1,11 +1,12 @@
-//! A checked table.
+//! Compensation table, checked: its accessors.
 
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
-use super::{Checked, ImageError};
+use super::{Checked, ImageError, TierInfo};
+use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
-use crate::pipeline::{CODES, RESPONSE_KNOTS, Response, Stage};
+use crate::response::{CODES, RESPONSE_KNOTS, ResponseCurve};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
 use fixed::types::{U0F32, U8F24};
@@ -32,20 +33,6 @@ pub struct Table<'a> {
     pub(super) provenance: &'a [u8],
     pub(super) bytes: usize,
     pub(super) id: u32,
-}
-
-/// What one tier promises and costs.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct TierInfo {
-    /// Predicted error of what the tier leaves out of the inverse: mean over
-    /// natural images of `|light with the tier - light with all entries|` over
-    /// `|wanted light|`. It adds to [`Table::inverse_error`], as the root of the
-    /// sum of squares.
-    pub predicted_error: U0F32,
-    /// Operator entries read a frame.
-    pub entries: u32,
-    /// Multiplications by operator entries a frame, all channels.
-    pub multiplications: u32,
 }
 
 /// Gains on a grid finer than the cells, for frames larger than the grid.
@@ -88,13 +75,13 @@ fn channel_row(
 }
 
 /// The response of a channel: its own, or that of all.
-pub(super) fn curve(response: Option<Halfwords<'_>>, channel: usize) -> Response<'_> {
+pub(super) fn curve(response: Option<Halfwords<'_>>, channel: usize) -> ResponseCurve<'_> {
     let knots = response.map_or(&[][..], Halfwords::words);
     let curve = |channel: usize| {
         let start = channel.checked_mul(RESPONSE_KNOTS)?;
         knots.get(start..)?.get(..RESPONSE_KNOTS)
     };
-    Response::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
+    ResponseCurve::new(curve(channel).or_else(|| curve(0)).unwrap_or_default())
 }
 
 impl<'a> Table<'a> {
@@ -113,13 +100,13 @@ impl<'a> Table<'a> {
         Self::check_with(image, &mut || {})
     }
 
-    /// The same, with a `pause` every few thousand instructions for what cannot wait
+    /// The same, with a `yield_now` every few thousand instructions for what cannot wait
     /// until the check is done.
     ///
     /// # Errors
     /// As [`check`](Self::check).
-    pub fn check_with(image: &'a [u8], pause: &mut dyn FnMut()) -> Result<Self, ImageError> {
-        Ok(Checked::new(image, pause)?.table())
+    pub fn check_with(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+        Ok(Checked::new(image, yield_now)?.table())
     }
 
     /// The grid of cells.
@@ -207,7 +194,7 @@ impl<'a> Table<'a> {
     /// The projector's response in a channel; [`has_response`](Self::has_response)
     /// says whether it is more than a straight line.
     #[must_use]
-    pub fn response(&self, channel: usize) -> Response<'a> {
+    pub fn response(&self, channel: usize) -> ResponseCurve<'a> {
         curve(self.response.filter(|_| self.has_response()), channel)
     }
 
@@ -219,7 +206,7 @@ impl<'a> Table<'a> {
     }
 
     /// 8-bit projector codes of a channel by the upper bits of the drive
-    /// ([`codes`](crate::pipeline::codes)); `None` if the projector is linear.
+    /// ([`codes`](crate::response)); `None` if the projector is linear.
     #[must_use]
     #[inline]
     pub fn codes(&self, channel: usize) -> Option<&'a [u8; CODES]> {

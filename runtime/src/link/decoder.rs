@@ -1,6 +1,6 @@
-//! From single bytes to checked frames.
+//! Frame decoder: from single bytes to checked frames.
 
-use super::frame::{Frame, FrameError, MAX_FRAME};
+use super::frame::{LinkFrame, LinkFrameError, MAX_FRAME};
 use cobs::{DecodeResult, DecoderState};
 
 /// Collects bytes into frames.
@@ -43,7 +43,7 @@ impl Decoder {
     /// Delimiters without anything between them are no frame and no error: a
     /// sender may put one before a frame to end what a receiver may have heard
     /// of the line before.
-    pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
+    pub fn push(&mut self, byte: u8) -> Option<Result<LinkFrame<'_>, LinkFrameError>> {
         match self.state.feed(byte) {
             Ok(DecodeResult::NoData) => None,
             Ok(DecodeResult::DataStart) => {
@@ -59,7 +59,9 @@ impl Decoder {
             }
             Ok(DecodeResult::DataComplete) => {
                 let whole = self.bytes.get(..self.length);
-                let frame = whole.ok_or(FrameError::TooLong).and_then(Frame::check);
+                let frame = whole
+                    .ok_or(LinkFrameError::TooLong)
+                    .and_then(LinkFrame::parse);
                 if frame.is_err() {
                     self.bad = self.bad.saturating_add(1);
                 }
@@ -68,9 +70,9 @@ impl Decoder {
             Err(_) => {
                 self.bad = self.bad.saturating_add(1);
                 Some(Err(if self.length > MAX_FRAME {
-                    FrameError::TooLong
+                    LinkFrameError::TooLong
                 } else {
-                    FrameError::Cobs
+                    LinkFrameError::Cobs
                 }))
             }
         }

@@ -1,4 +1,4 @@
-//! One frame on the line.
+//! Wire frame: one frame on the serial line.
 //!
 //! ```text
 //! COBS( channel u8 | sequence u16 | payload | CRC-32 u32 ) 0x00
@@ -65,7 +65,7 @@ impl Channel {
 
 /// A frame with its checksum verified, or one to send.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Frame<'a> {
+pub struct LinkFrame<'a> {
     /// What it is for.
     pub channel: Channel,
     /// Its number in the channel.
@@ -76,7 +76,7 @@ pub struct Frame<'a> {
 
 /// Why bytes between two delimiters are no frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum FrameError {
+pub enum LinkFrameError {
     /// They are not COBS: the delimiter came too early.
     Cobs,
     /// They are more than any frame has.
@@ -92,7 +92,7 @@ pub enum FrameError {
     },
 }
 
-impl fmt::Display for FrameError {
+impl fmt::Display for LinkFrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Cobs => f.write_str("the frame ends too early"),
@@ -104,53 +104,53 @@ impl fmt::Display for FrameError {
     }
 }
 
-impl core::error::Error for FrameError {}
+impl core::error::Error for LinkFrameError {}
 
-impl<'a> Frame<'a> {
-    /// Checks the bytes of a frame after COBS.
+impl<'a> LinkFrame<'a> {
+    /// Reads the bytes of a frame after COBS.
     ///
     /// # Errors
-    /// [`FrameError`], except for [`FrameError::Cobs`].
-    pub(super) fn check(bytes: &'a [u8]) -> Result<Self, FrameError> {
+    /// [`LinkFrameError`], except for [`LinkFrameError::Cobs`].
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, LinkFrameError> {
         let (checked, crc) = bytes
             .split_last_chunk::<{ field::CRC }>()
-            .ok_or(FrameError::TooShort)?;
+            .ok_or(LinkFrameError::TooShort)?;
         let (head, payload) = checked
             .split_first_chunk::<{ field::HEAD }>()
-            .ok_or(FrameError::TooShort)?;
+            .ok_or(LinkFrameError::TooShort)?;
         if crc32(&[checked]) != u32::from_le_bytes(*crc) {
-            return Err(FrameError::Checksum);
+            return Err(LinkFrameError::Checksum);
         }
         if payload.len() > MAX_PAYLOAD {
-            return Err(FrameError::TooLong);
+            return Err(LinkFrameError::TooLong);
         }
         let [number, low, high] = *head;
-        let channel = Channel::from_number(number).ok_or(FrameError::Channel { number })?;
+        let channel = Channel::from_number(number).ok_or(LinkFrameError::Channel { number })?;
         Ok(Self {
             channel,
             sequence: u16::from_le_bytes([low, high]),
             payload,
         })
     }
-}
 
-/// Writes a frame as it goes on the line, delimiter included, into `out`.
-///
-/// Returns its length, at most [`MAX_ENCODED`]; `None` if the payload is too long
-/// or `out` too short.
-#[must_use]
-pub fn encode(frame: Frame<'_>, out: &mut [u8]) -> Option<usize> {
-    if frame.payload.len() > MAX_PAYLOAD {
-        return None;
+    /// Writes it as it goes on the line, delimiter included, into `out`.
+    ///
+    /// Returns its length, at most [`MAX_ENCODED`]; `None` if the payload is too long
+    /// or `out` too short.
+    #[must_use]
+    pub fn emit(&self, out: &mut [u8]) -> Option<usize> {
+        if self.payload.len() > MAX_PAYLOAD {
+            return None;
+        }
+        let [low, high] = self.sequence.to_le_bytes();
+        let head = [self.channel as u8, low, high];
+        let crc = crc32(&[&head, self.payload]);
+        let mut encoder = CobsEncoder::new(out);
+        for part in [&head, self.payload, &crc.to_le_bytes()] {
+            encoder.push(part).ok()?;
+        }
+        let length = encoder.finalize();
+        *out.get_mut(length)? = DELIMITER;
+        Some(length + 1)
     }
-    let [low, high] = frame.sequence.to_le_bytes();
-    let head = [frame.channel as u8, low, high];
-    let crc = crc32(&[&head, frame.payload]);
-    let mut encoder = CobsEncoder::new(out);
-    for part in [&head, frame.payload, &crc.to_le_bytes()] {
-        encoder.push(part).ok()?;
-    }
-    let length = encoder.finalize();
-    *out.get_mut(length)? = DELIMITER;
-    Some(length + 1)
 }

@@ -1,4 +1,4 @@
-//! What host and device say to each other.
+//! Messages between host and device: requests, responses, refusals, events.
 //!
 //! Messages are postcard (version 1 of its wire format): integers as varints,
 //! an enum as the number of its variant and then its fields. **The order of
@@ -180,6 +180,8 @@ pub enum Refusal {
     HasKey,
     /// The device cannot be updated.
     ReadOnly,
+    /// The device was given a key that it cannot read any more: it takes no table.
+    KeyLost,
 }
 
 impl fmt::Display for Refusal {
@@ -209,6 +211,7 @@ impl fmt::Display for Refusal {
             Self::NoOther => "there is no other table",
             Self::HasKey => "the device has another key or number",
             Self::ReadOnly => "the device cannot be updated",
+            Self::KeyLost => "the device cannot read its key and takes no table",
         })
     }
 }

@@ -1,7 +1,7 @@
-//! The serial line between a host and a device.
+//! Serial link between a host and a device.
 //!
 //! ```text
-//! bytes -> Decoder -> Frame {channel, sequence, payload} -> Request | Response | Event | log bytes
+//! bytes -> Decoder -> LinkFrame {channel, sequence, payload} -> Request | Response | Event | log bytes
 //! ```
 //!
 //! A host asks and a device answers; the device sends nothing else unless the
@@ -27,7 +27,7 @@ mod update;
 
 pub use decoder::Decoder;
 pub use frame::{
-    Channel, DELIMITER, Frame, FrameError, MAX_ENCODED, MAX_FRAME, MAX_PAYLOAD, encode,
+    Channel, DELIMITER, LinkFrame, LinkFrameError, MAX_ENCODED, MAX_FRAME, MAX_PAYLOAD,
 };
 pub use message::{
     Event, Hello, Limits, PROTOCOL_VERSION, Refusal, Request, Response, TableReason, TierReason,

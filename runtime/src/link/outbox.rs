@@ -1,6 +1,6 @@
-//! Bytes that wait for the line.
+//! Send buffer: bytes that wait for the line.
 
-use super::frame::{Frame, MAX_ENCODED, encode};
+use super::frame::{LinkFrame, MAX_ENCODED};
 
 /// A ring of `N` bytes that takes frames whole or not at all.
 #[derive(Debug)]
@@ -32,9 +32,9 @@ impl<const N: usize> Outbox<N> {
 
     /// Encodes a frame behind the bytes that wait; `false`, and one more refused,
     /// if it has no room.
-    pub fn push(&mut self, frame: Frame<'_>) -> bool {
+    pub fn push(&mut self, frame: LinkFrame<'_>) -> bool {
         let mut encoded = [0; MAX_ENCODED];
-        let length = encode(frame, &mut encoded);
+        let length = frame.emit(&mut encoded);
         let encoded = length.and_then(|length| encoded.get(..length));
         let taken = encoded.is_some_and(|encoded| self.append(encoded));
         if !taken {

@@ -1,4 +1,4 @@
-//! The device's side of the conversation, without a line of its own.
+//! Session: the device's side of the conversation, without a line of its own.
 //!
 //! ```text
 //! bytes from the line -> receive -+            +-> pending, sent -> bytes to the line
@@ -7,7 +7,7 @@
 //! ```
 
 use super::decoder::Decoder;
-use super::frame::{Channel, Frame, MAX_ENCODED, MAX_PAYLOAD};
+use super::frame::{Channel, LinkFrame, MAX_ENCODED, MAX_PAYLOAD};
 use super::message::{Event, Hello, Refusal, Request, Response};
 use super::outbox::Outbox;
 use super::status::{SerialCounts, Status};
@@ -136,7 +136,7 @@ impl Session {
         if self.is_subscribed() {
             let sequence = self.talk.logs;
             self.talk.logs = sequence.wrapping_add(1);
-            self.talk.outbox.push(Frame {
+            self.talk.outbox.push(LinkFrame {
                 channel: Channel::Log,
                 sequence,
                 payload: frames,
@@ -238,7 +238,7 @@ impl Talk {
         let mut bytes = [0; MAX_PAYLOAD];
         // The longest message has room, which a test makes sure of.
         if let Ok(payload) = postcard::to_slice(message, &mut bytes) {
-            self.outbox.push(Frame {
+            self.outbox.push(LinkFrame {
                 channel,
                 sequence,
                 payload,

@@ -1,4 +1,4 @@
-//! A host talks to a session.
+//! Sessions against a host of the test's own.
 
 use super::test_device::{FullDevice, identity};
 use super::*;
@@ -54,12 +54,12 @@ impl Conversation {
 
     fn frame(&mut self, channel: Channel, sequence: u16, payload: &[u8]) -> Vec<Said> {
         let mut bytes = [0; MAX_ENCODED];
-        let frame = Frame {
+        let frame = LinkFrame {
             channel,
             sequence,
             payload,
         };
-        let length = encode(frame, &mut bytes).expect("short enough");
+        let length = frame.emit(&mut bytes).expect("short enough");
         self.session
             .receive(&bytes[..length], self.now, &mut FullDevice);
         self.said()

@@ -1,9 +1,9 @@
-//! How a device is.
+//! Status messages: tables, frames, faults and counters of a device.
 //!
 //! The order of variants and fields is the wire format: do not reorder.
 
 use super::message::Version;
-use crate::exchange::{AttachError, Broken};
+use crate::frame_buffers::{AttachError, Broken};
 use crate::trust::Rejected;
 use core::fmt;
 use heapless::String;
@@ -215,6 +215,8 @@ pub enum Fault {
     Watchdog,
     /// The firmware stopped itself and started anew: a defect.
     Crash,
+    /// The device was given a key that it cannot read any more: it takes no table.
+    KeyLost,
 }
 
 /// Why a frame is not shown.
@@ -275,6 +277,7 @@ impl fmt::Display for Fault {
             Self::Source(cause) => write!(f, "the source of frames {cause}"),
             Self::Watchdog => f.write_str("the watchdog restarted the device"),
             Self::Crash => f.write_str("the firmware crashed and started anew"),
+            Self::KeyLost => f.write_str("the key cannot be read: no table is taken"),
         }
     }
 }

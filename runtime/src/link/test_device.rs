@@ -1,4 +1,4 @@
-//! A device with every field at its longest.
+//! Test device with every field at its longest.
 
 use super::*;
 

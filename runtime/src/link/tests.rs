@@ -10,16 +10,16 @@ type Owned = (Channel, u16, Vec<u8>);
 
 fn encoded(channel: Channel, sequence: u16, payload: &[u8]) -> Vec<u8> {
     let mut bytes = [0; MAX_ENCODED];
-    let frame = Frame {
+    let frame = LinkFrame {
         channel,
         sequence,
         payload,
     };
-    let length = encode(frame, &mut bytes).expect("the payload is not too long");
+    let length = frame.emit(&mut bytes).expect("the payload is not too long");
     bytes[..length].to_vec()
 }
 
-fn decoded(decoder: &mut Decoder, bytes: &[u8]) -> Vec<Result<Owned, FrameError>> {
+fn decoded(decoder: &mut Decoder, bytes: &[u8]) -> Vec<Result<Owned, LinkFrameError>> {
     let mut frames = Vec::new();
     for byte in bytes {
         if let Some(frame) = decoder.push(*byte) {
@@ -99,7 +99,7 @@ fn a_frame_without_an_end_is_too_long_and_costs_nothing_after_it() {
     assert!(decoded(&mut decoder, &vec![1; 100_000]).is_empty());
     assert_eq!(
         decoded(&mut decoder, &[DELIMITER]),
-        [Err(FrameError::TooLong)]
+        [Err(LinkFrameError::TooLong)]
     );
     let frame = encoded(Channel::Event, 1, b"next");
     let next = Ok((Channel::Event, 1, b"next".to_vec()));
@@ -127,35 +127,35 @@ fn every_kind_of_bad_frame_says_what_it_is() {
         let crc = crate::image::crc32(&[content]).to_le_bytes();
         cobs(&[content, &crc].concat())
     };
-    assert_eq!(cobs(b"123456"), [Err(FrameError::TooShort)]);
-    assert_eq!(cobs(b"1234567"), [Err(FrameError::Checksum)]);
+    assert_eq!(cobs(b"123456"), [Err(LinkFrameError::TooShort)]);
+    assert_eq!(cobs(b"1234567"), [Err(LinkFrameError::Checksum)]);
     assert_eq!(
         with_crc(&[4, 0, 0]),
-        [Err(FrameError::Channel { number: 4 })]
+        [Err(LinkFrameError::Channel { number: 4 })]
     );
     assert_eq!(
         with_crc(&[0; 3 + MAX_PAYLOAD + 1]),
-        [Err(FrameError::TooLong)]
+        [Err(LinkFrameError::TooLong)]
     );
     assert_eq!(
         decoded(&mut Decoder::new(), &[5, 1, DELIMITER]),
-        [Err(FrameError::Cobs)]
+        [Err(LinkFrameError::Cobs)]
     );
 }
 
 #[test]
 fn a_payload_that_is_too_long_is_not_sent() {
     let long = [0; MAX_PAYLOAD + 1];
-    let frame = |payload| Frame {
+    let frame = |payload| LinkFrame {
         channel: Channel::Log,
         sequence: 0,
         payload,
     };
     let mut out = [0; 2 * MAX_ENCODED];
-    assert_eq!(encode(frame(&long), &mut out), None);
-    assert_eq!(encode(frame(b"abc"), &mut [0; 11]), None);
+    assert_eq!(frame(&long).emit(&mut out), None);
+    assert_eq!(frame(b"abc").emit(&mut [0; 11]), None);
     // 3 bytes of payload, 7 around them, 1 of COBS, 1 delimiter.
-    assert_eq!(encode(frame(b"abc"), &mut [0; 12]), Some(12));
+    assert_eq!(frame(b"abc").emit(&mut [0; 12]), Some(12));
 }
 
 proptest! {
@@ -169,7 +169,7 @@ proptest! {
         for (number, (length, sent)) in steps.into_iter().enumerate() {
             let payload = vec![number as u8; length];
             let frame = encoded(Channel::Log, number as u16, &payload);
-            let frame_value = Frame { channel: Channel::Log, sequence: number as u16, payload: &payload };
+            let frame_value = LinkFrame { channel: Channel::Log, sequence: number as u16, payload: &payload };
             if outbox.push(frame_value) {
                 expected.extend(frame);
             } else {

@@ -1,4 +1,4 @@
-//! What is said about tables on their way into a device.
+//! Update messages: tables on their way into a device.
 //!
 //! The order of variants and fields is the wire format: do not reorder.
 
@@ -39,7 +39,8 @@ pub struct Slots {
     pub target: u8,
     /// Milliseconds that the table in use is still on trial; 0 if it is not.
     pub trial_ms: u32,
-    /// Tables of a lower version than this are refused.
+    /// Tables of a lower version than this are refused; [`u32::MAX`] without a key where
+    /// the device has lost it and takes none.
     pub oldest: u32,
     /// First bytes of the public key that tables must be signed for; without one
     /// the device takes every whole table.

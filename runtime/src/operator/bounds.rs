@@ -1,4 +1,4 @@
-//! The proof that no frame can make the operator overflow.
+//! Overflow proof: no frame can make the operator overflow.
 //!
 //! Every input coefficient is at most [`INPUT_COEFFICIENT_MAX`] in magnitude, so
 //! the sum of a row is at most that times the sum of the magnitudes of its
@@ -6,11 +6,11 @@
 //! level do not overlap between nodes, so a correction is at most the sum over
 //! the levels of the largest node's `sum_i z_i * peak_i`.
 
+use super::layout::MAX_SHORT;
 use super::{Channels, OperatorError, Rows, Segment};
 use crate::haar::Basis;
-use crate::image::layout::segment::MAX_SHORT;
-use crate::pace::{Pace, cost};
 use crate::units::INPUT_COEFFICIENT_MAX;
+use crate::yield_budget::{YieldBudget, cost};
 use heapless::Vec;
 
 /// Largest magnitudes that any frame can lead to, at any tier.
@@ -35,7 +35,7 @@ impl Bounds {
         basis: &Basis,
         segments: &[Segment<'_>],
         tier: u8,
-        pace: &mut Pace<'_>,
+        budget: &mut YieldBudget<'_>,
     ) -> Result<Self, OperatorError> {
         let of_tier = segments.iter().enumerate();
         let of_tier = of_tier.filter(|(_, segment)| segment.tier == tier);
@@ -50,9 +50,9 @@ impl Bounds {
         for (row, function) in basis.functions().enumerate() {
             let mut shared = 0;
             let mut widest = 0;
-            pace.done(1, cost::FUNCTION);
+            budget.spend(1, cost::FUNCTION);
             for cursor in &mut cursors {
-                let Some((sum, coefficient)) = cursor.bounds_of(row, pace)? else {
+                let Some((sum, coefficient)) = cursor.bounds_of(row, budget)? else {
                     continue;
                 };
                 if sum > Self::MAX_ACCUMULATOR {
@@ -110,10 +110,10 @@ impl<'a> Cursor<'a> {
     fn bounds_of(
         &mut self,
         row: usize,
-        pace: &mut Pace<'_>,
+        budget: &mut YieldBudget<'_>,
     ) -> Result<Option<(u64, u64)>, OperatorError> {
         let mut found = None;
-        pace.done(1, cost::FUNCTION);
+        budget.spend(1, cost::FUNCTION);
         for rows in &mut self.groups {
             if rows
                 .next_index()
@@ -127,7 +127,7 @@ impl<'a> Cursor<'a> {
                 return Err(OperatorError::Row { segment, row });
             }
             let sum = next
-                .magnitude(pace)
+                .magnitude(budget)
                 .saturating_mul(INPUT_COEFFICIENT_MAX.into());
             // Rounding down can add one to the magnitude.
             found = Some((sum, (sum >> next.shift) + 1));

@@ -1,4 +1,4 @@
-//! Why an operator is refused.
+//! Operator errors: why operator entries are refused.
 
 use core::fmt;
 

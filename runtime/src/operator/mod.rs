@@ -1,4 +1,4 @@
-//! The sparse interreflection operator `K`, in the Haar domain.
+//! Interreflection operator `K`, sparse, in the Haar domain.
 //!
 //! With `S` the integer basis of [`haar`](crate::haar), `K d' = S M (S^T d')`
 //! where `M` is sparse. The input coefficients `S^T d'` arrive rounded to
@@ -29,6 +29,8 @@
 
 mod bounds;
 mod error;
+pub mod layout;
+mod reference;
 mod segment;
 
 pub use bounds::Bounds;
@@ -37,12 +39,12 @@ pub use segment::{Channels, Group, Groups, Pair, Row, Rows, Segment};
 
 use crate::Grid;
 use crate::haar::Basis;
-use crate::image::layout::MAX_SEGMENTS;
-use crate::kernel::gather::{self, Sums};
-use crate::pace::{Pace, cost};
+use crate::kernel::{self, Sums};
 use crate::units::InputCoefficient;
+use crate::yield_budget::{YieldBudget, cost};
 use fixed::types::{I2F30, U1F15};
 use heapless::Vec;
+use layout::MAX_SEGMENTS;
 
 /// An operator whose entries are well-formed and cannot overflow.
 #[derive(Clone, Debug)]
@@ -68,7 +70,7 @@ impl<'a> Operator<'a> {
     ) -> Result<Self, OperatorError> {
         let grid = basis.grid();
         let mut operator = Self::stated(grid, segments, channel_scales, Bounds::default());
-        operator.bounds = operator.prove(grid, &mut Pace::new(&mut || {}))?;
+        operator.bounds = operator.prove(grid, &mut YieldBudget::new(&mut || {}))?;
         Ok(operator)
     }
 
@@ -88,19 +90,23 @@ impl<'a> Operator<'a> {
     }
 
     /// Checks the segments, and computes the bounds from them.
-    pub(crate) fn prove(&self, grid: Grid, pace: &mut Pace<'_>) -> Result<Bounds, OperatorError> {
+    pub(crate) fn prove(
+        &self,
+        grid: Grid,
+        budget: &mut YieldBudget<'_>,
+    ) -> Result<Bounds, OperatorError> {
         if self.channel_scales.iter().any(|scale| *scale > U1F15::ONE) {
             return Err(OperatorError::ChannelScale);
         }
         let mut top = 0;
         for (index, segment) in self.segments.iter().enumerate() {
-            segment.check(index, grid.cells(), pace)?;
+            segment.check(index, grid.cells(), budget)?;
             top = segment.tier.max(top);
         }
         let basis = Basis::new(grid);
         let mut bounds = Bounds::default();
         for tier in 1..=top {
-            bounds = bounds.max(Bounds::prove(&basis, &self.segments, tier, pace)?);
+            bounds = bounds.max(Bounds::prove(&basis, &self.segments, tier, budget)?);
         }
         Ok(bounds)
     }
@@ -127,11 +133,16 @@ impl<'a> Operator<'a> {
     /// does in a table of `channels` channels: those by the zero in a pair count.
     #[must_use]
     pub fn cost(&self, tier: u8, channels: u8) -> (u32, u32) {
-        self.cost_with_pace(tier, channels, &mut Pace::new(&mut || {}))
+        self.cost_yielding(tier, channels, &mut YieldBudget::new(&mut || {}))
     }
 
     /// [`cost`](Self::cost) in short pieces.
-    pub(crate) fn cost_with_pace(&self, tier: u8, channels: u8, pace: &mut Pace<'_>) -> (u32, u32) {
+    pub(crate) fn cost_yielding(
+        &self,
+        tier: u8,
+        channels: u8,
+        budget: &mut YieldBudget<'_>,
+    ) -> (u32, u32) {
         let mut total = (0_u32, 0_u32);
         for segment in self.of_tier(tier) {
             let shared_by = match segment.channels {
@@ -140,9 +151,9 @@ impl<'a> Operator<'a> {
             };
             for row in segment.rows() {
                 let values = 2 * u32::from(row.pairs());
-                total.0 = total.0.saturating_add(row.entries_with_pace(pace) as u32);
+                total.0 = total.0.saturating_add(row.entries_yielding(budget) as u32);
                 total.1 = total.1.saturating_add(values.saturating_mul(shared_by));
-                pace.done(1, cost::ROW);
+                budget.spend(1, cost::ROW);
             }
         }
         total
@@ -188,12 +199,39 @@ impl<'a> Operator<'a> {
             };
             match (count, scales) {
                 (3, &[red, green, blue]) => {
-                    gather::gather(segment, [red, green, blue], fresh, &mut sums);
+                    add(segment, [red, green, blue], fresh, &mut sums);
                 }
-                (1, &[scale, ..]) => gather::gather(segment, [scale], fresh, &mut sums),
+                (1, &[scale, ..]) => add(segment, [scale], fresh, &mut sums),
                 _ => {}
             }
         }
+    }
+}
+
+/// Adds a segment, scaled by channel, to the sums of `C` channels. The segment was
+/// checked against a grid of `sums.cells` cells; too short slices stay as they are.
+///
+/// `fresh` says that the sums are all zero: a row is then stored, not added.
+fn add<const C: usize>(
+    segment: &Segment<'_>,
+    scales: [I2F30; C],
+    fresh: bool,
+    sums: &mut Sums<'_>,
+) {
+    let needed = C.saturating_mul(sums.cells);
+    if sums.inputs.len() < needed || sums.outputs.len() < needed {
+        return;
+    }
+    let rows = segment.groups().map(|group| kernel::GroupRows {
+        pairs: group.pairs.unwrap_or(0),
+        count: group.count,
+        words: group.words(),
+    });
+    if kernel::gather::gather(rows, &scales, fresh, sums) {
+        return;
+    }
+    for group in segment.groups() {
+        reference::add(&group, &scales, sums);
     }
 }
 

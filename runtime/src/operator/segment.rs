@@ -1,8 +1,8 @@
-//! One tier's entries, as they lie in the image.
+//! Operator segment: one tier's entries, as they lie in the image.
 
 use super::OperatorError;
-use crate::image::layout::segment::{MAX_SHORT, WORD, halves, pair_words};
-use crate::pace::{Pace, cost};
+use super::layout::{MAX_SHORT, WORD, halves, pair_words};
+use crate::yield_budget::{YieldBudget, cost};
 
 /// Which channels a segment applies to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -106,7 +106,7 @@ impl<'a> Segment<'a> {
         &self,
         segment: usize,
         cells: usize,
-        pace: &mut Pace<'_>,
+        budget: &mut YieldBudget<'_>,
     ) -> Result<(), OperatorError> {
         let mut groups = self.groups();
         let mut least = 1;
@@ -117,7 +117,7 @@ impl<'a> Segment<'a> {
                 return Err(OperatorError::Group { segment });
             }
             least = pairs + 1;
-            group.check(segment, cells, pace)?;
+            group.check(segment, cells, budget)?;
         }
         Ok(())
     }
@@ -135,8 +135,7 @@ impl<'a> Group<'a> {
     }
 
     /// The words of its rows.
-    #[cfg(target_arch = "arm")]
-    pub(crate) const fn words(&self) -> &'a [[u8; WORD]] {
+    pub(super) const fn words(&self) -> &'a [[u8; WORD]] {
         self.words
     }
 
@@ -144,7 +143,7 @@ impl<'a> Group<'a> {
         &self,
         segment: usize,
         cells: usize,
-        pace: &mut Pace<'_>,
+        budget: &mut YieldBudget<'_>,
     ) -> Result<(), OperatorError> {
         let mut least_row = 0;
         let mut rows = self.rows();
@@ -162,8 +161,8 @@ impl<'a> Group<'a> {
                 return Err(malformed);
             }
             least_row = index + 1;
-            row.check(segment, cells, pace)?;
-            pace.done(1, cost::ROW);
+            row.check(segment, cells, budget)?;
+            budget.spend(1, cost::ROW);
         }
         if rows.words.is_empty() {
             Ok(())
@@ -206,21 +205,21 @@ impl Row<'_> {
     /// Number of its entries that are not zero.
     #[must_use]
     pub fn entries(&self) -> usize {
-        self.entries_with_pace(&mut Pace::new(&mut || {}))
+        self.entries_yielding(&mut YieldBudget::new(&mut || {}))
     }
 
-    pub(super) fn entries_with_pace(&self, pace: &mut Pace<'_>) -> usize {
+    pub(super) fn entries_yielding(&self, budget: &mut YieldBudget<'_>) -> usize {
         self.fold(0, |sum, pair| {
-            pace.done(1, cost::PAIR);
+            budget.spend(1, cost::PAIR);
             sum + pair.values.iter().filter(|value| **value != 0).count()
         })
     }
 
     /// Sum of the magnitudes of its values.
-    pub(super) fn magnitude(&self, pace: &mut Pace<'_>) -> u64 {
+    pub(super) fn magnitude(&self, budget: &mut YieldBudget<'_>) -> u64 {
         let magnitude = |value: i16| u64::from(value.unsigned_abs());
         self.fold(0, |sum, Pair { values: [a, b], .. }| {
-            pace.done(1, cost::PAIR);
+            budget.spend(1, cost::PAIR);
             sum + magnitude(a) + magnitude(b)
         })
     }
@@ -230,10 +229,10 @@ impl Row<'_> {
         &self,
         segment: usize,
         cells: usize,
-        pace: &mut Pace<'_>,
+        budget: &mut YieldBudget<'_>,
     ) -> Result<(), OperatorError> {
         let (least, fits) = self.fold((0, true), |(least, fits), pair| {
-            pace.done(1, cost::PAIR);
+            budget.spend(1, cost::PAIR);
             let index = usize::from(pair.index);
             (index + 1, fits && index >= least && index + 1 < cells)
         });
@@ -258,14 +257,6 @@ impl Row<'_> {
 #[derive(Clone, Debug)]
 pub struct Groups<'a> {
     words: &'a [[u8; WORD]],
-}
-
-#[cfg(target_arch = "arm")]
-impl<'a> Groups<'a> {
-    /// The words that are left.
-    pub(crate) const fn words(&self) -> &'a [[u8; WORD]] {
-        self.words
-    }
 }
 
 impl<'a> Iterator for Groups<'a> {

@@ -1,9 +1,9 @@
 //! The operator against a dense `f64` one, on random and on extreme inputs.
 
+use super::layout::{MAX_SHORT, word};
 use super::*;
 use crate::Grid;
 use crate::haar::{Cells, analyse, synthesise};
-use crate::image::layout::segment::{MAX_SHORT, word};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::vec;

@@ -1,4 +1,4 @@
-//! Frames larger than the grid.
+//! Full-resolution rows: frames larger than the grid, row by row.
 //!
 //! `p(x) = g(x) d'(x) - (U K A d')(x)`. A frame passes twice: once to average
 //! its light over the cells ([`FullPipeline::average_row`]), once to apply gain
@@ -11,9 +11,10 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
+use super::FrameError;
 use super::stages::{Workspace, correct, drive_row, subtract_ambient};
-use super::{FrameError, Stage};
 use crate::FrameSize;
+use crate::features::Stage;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
 use crate::resample::area::AreaAverage;
@@ -39,7 +40,7 @@ pub struct FullPipeline<'t, 'a, const C: usize> {
 
 /// Memory for one row of one channel.
 #[derive(Debug)]
-pub struct Row<'w> {
+pub struct RowBuffers<'w> {
     /// Values of the cells that the row crosses,
     /// [`line_len`](FullPipeline::line_len) elements.
     pub line: &'w mut [i32],
@@ -121,7 +122,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         Ok(())
     }
 
-    /// Elements that [`Row::line`] needs.
+    /// Elements that [`RowBuffers::line`] needs.
     #[must_use]
     pub fn line_len(&self) -> usize {
         let fine = self.fine_gain.map_or(0, |fine| fine.size().width());
@@ -131,7 +132,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// Interpolates the ambient light of one channel along row `y` into `row.spread`,
     /// [`Light`] bits; `false` in a dark room.
     #[inline(always)]
-    pub fn ambient_row(&self, y: usize, channel: usize, row: &mut Row<'_>) -> bool {
+    pub fn ambient_row(&self, y: usize, channel: usize, row: &mut RowBuffers<'_>) -> bool {
         let [rows, cols] = self.cells;
         let place = rows.place(y);
         let (Some(before), Some(after)) = (
@@ -146,15 +147,22 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
             *slot = blend(widen(before), widen(after), place.fraction);
         }
         cols.expand(row.line.get(..count).unwrap_or_default(), row.spread);
+        // A step is rounded, so a row that falls to no light may end below it.
         for ambient in row.spread.iter_mut() {
-            *ambient >>= GAIN_GUARD_BITS;
+            *ambient = (*ambient >> GAIN_GUARD_BITS).max(0);
         }
         true
     }
 
     /// Takes the ambient light of one channel away from row `y`.
     #[inline(always)]
-    pub fn remove_ambient(&self, y: usize, channel: usize, light: &mut [Light], row: &mut Row<'_>) {
+    pub fn remove_ambient(
+        &self,
+        y: usize,
+        channel: usize,
+        light: &mut [Light],
+        row: &mut RowBuffers<'_>,
+    ) {
         if self.ambient_row(y, channel, row) {
             for (light, ambient) in light.iter_mut().zip(row.spread.iter()) {
                 *light = subtract_ambient(*light, Light::from_bits(*ambient as u16));
@@ -207,7 +215,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     ///
     /// They depend on the frame's size alone: whoever has the memory computes
     /// them once.
-    pub fn gain_row(&self, y: usize, channel: usize, row: &mut Row<'_>, gains: &mut [u16]) {
+    pub fn gain_row(&self, y: usize, channel: usize, row: &mut RowBuffers<'_>, gains: &mut [u16]) {
         let [rows, cols] = self.gains;
         let place = rows.place(y);
         let used = if let Some(fine) = self.fine_gain {
@@ -234,7 +242,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
 
     /// Interpolates the corrections of one channel along row `y` into `row.spread`.
     #[inline(always)]
-    pub fn correct_row(&self, y: usize, corrections: &[i32], row: &mut Row<'_>) {
+    pub fn correct_row(&self, y: usize, corrections: &[i32], row: &mut RowBuffers<'_>) {
         let [rows, cols] = self.cells;
         let place = rows.place(y);
         let count = self.table.grid().cols();
@@ -261,9 +269,10 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     pub fn finish_row(
         &self,
         y: usize,
-        (light, gain): (&[Light], &[u16]),
+        light: &[Light],
+        gain: &[u16],
         corrections: &[i32],
-        row: &mut Row<'_>,
+        row: &mut RowBuffers<'_>,
         drives: &mut [Drive],
     ) -> u32 {
         self.correct_row(y, corrections, row);

@@ -1,4 +1,4 @@
-//! Frames of one pixel a cell.
+//! Grid-size frames: one pixel a cell.
 
 use super::FrameError;
 use super::pixels::Pixels;
@@ -6,6 +6,7 @@ use super::sample::{Encoding, Sample};
 use super::stages::Workspace;
 use crate::haar::ShortSlice;
 use crate::image::Table;
+use crate::kernel::Plane;
 
 /// Compensates frames of the grid's own size, `C` channels side by side.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +53,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
             self.analyse(encoding, wanted, workspace)?;
             self.operate(tier, workspace)?;
         }
-        self.finish((tier, encoding), wanted, input, workspace)
+        self.finish(tier, encoding, wanted, input, workspace)
     }
 
     /// First stage: from pixels to input coefficients, which stay in the workspace.
@@ -91,7 +92,8 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
     /// [`FrameError::Short`] if a slice is too short.
     pub fn finish<S: Sample>(
         &self,
-        (tier, encoding): (u8, Encoding),
+        tier: u8,
+        encoding: Encoding,
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         workspace: &mut Workspace<'_>,
@@ -138,10 +140,12 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
     ) -> Pixels<'f, S, C> {
         let grid = self.table.grid();
         Pixels {
-            codes: wanted.get(..grid.cells()).unwrap_or_default(),
-            ambient: self.table.ambient().map(|light| light.as_chunks::<C>().0),
-            cols: grid.cols(),
-            channel,
+            plane: Plane {
+                codes: wanted.get(..grid.cells()).unwrap_or_default(),
+                ambient: self.table.ambient().map(|light| light.as_chunks::<C>().0),
+                cols: grid.cols(),
+                channel,
+            },
             curves: S::curves(self.table, encoding, channel),
         }
     }

@@ -1,4 +1,4 @@
-//! From a wanted frame to the projector's input.
+//! Frame pipeline: from a wanted frame to the projector's input.
 //!
 //! ```text
 //! codes -> light d -> d' = d - ambient -> Haar -> operator -> inverse Haar = K d'
@@ -10,7 +10,7 @@
 //! larger ones. Both run the stages that the table lists and no others: without
 //! an ambient section nothing is subtracted, without an operator no transform is
 //! made, without a response codes are proportional to drives. A build may have some
-//! of the stages only ([`Stage`]).
+//! of the stages only ([`features`](crate::features)).
 //!
 //! All arithmetic is in integers and rounds in named places only
 //! ([`Sample`], [`analyse`](crate::haar::analyse),
@@ -18,29 +18,24 @@
 //! [`resample`](crate::resample)), so a frame comes out the same, bit for bit, on
 //! the device and on the host.
 
-mod built;
-pub mod codes;
+mod dispatch;
 mod full;
+mod full_frames;
 mod grid;
 mod pixels;
-mod response;
 mod sample;
-mod samples;
 pub mod srgb;
 pub mod stages;
-mod whole;
 
-pub use built::Stage;
-pub use codes::CODES;
-pub use full::{FullPipeline, Row};
+pub use dispatch::{FrameJob, compensate_cells, compensate_pixels};
+pub use full::{FullPipeline, RowBuffers};
+pub use full_frames::FullMemory;
 pub use grid::GridPipeline;
-pub use pixels::{Halfword, Pixels};
-pub use response::{RESPONSE_KNOTS, Response, knot_drive, linear_code};
+pub use pixels::Pixels;
 pub use sample::{Encoding, Sample};
-pub use samples::{FlatMemory, compensate_cells, compensate_pixels};
 pub use stages::Workspace;
-pub use whole::FullMemory;
 
+use crate::features::Stage;
 use crate::haar::ShortSlice;
 use core::fmt;
 

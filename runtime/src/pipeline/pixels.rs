@@ -1,56 +1,37 @@
-//! The pixels of a frame of the grid's size, as the transforms read them.
+//! Pixels of a frame of the grid's size, as the transforms read them.
 
 use super::sample::Sample;
 use super::stages::subtract_ambient;
-use crate::haar::{Block, Row, Source};
+use crate::haar::{CellRow, CellSource};
+use crate::kernel::{Block, Plane};
 use crate::units::{InputCoefficient, Light};
 
-/// One `u16` of a table, little-endian.
-pub type Halfword = [u8; 2];
-
-/// One channel of pixels of `C` samples, a cell each.
+/// One channel of pixels of `C` samples, a cell each, and its curves.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixels<'f, S: Sample, const C: usize> {
-    /// The codes.
-    pub codes: &'f [[S; C]],
-    /// Ambient light; `None` in a dark room.
-    pub ambient: Option<&'f [[Halfword; C]]>,
-    /// Columns of the grid.
-    pub cols: usize,
-    /// The channel.
-    pub channel: usize,
-    /// Its curves.
+    /// The pixels.
+    pub plane: Plane<'f, S, C>,
+    /// The channel's curves.
     pub curves: S::Curves<'f>,
 }
 
 impl<S: Sample, const C: usize> Pixels<'_, S, C> {
-    /// Those from an index on.
-    #[inline]
-    #[must_use]
-    pub fn from(&self, start: usize) -> Self {
-        let ambient = self
-            .ambient
-            .map(|cells| cells.get(start..).unwrap_or_default());
-        Self {
-            codes: self.codes.get(start..).unwrap_or_default(),
-            ambient,
-            ..*self
-        }
-    }
-
     /// Light of a pixel without the ambient light; none past the end.
     #[inline]
     #[must_use]
     pub fn light(&self, index: usize) -> Light {
-        let code = self
+        let plane = &self.plane;
+        let code = plane
             .codes
             .get(index)
-            .and_then(|pixel| pixel.get(self.channel));
+            .and_then(|pixel| pixel.get(plane.channel));
         let light = code.map_or(Light::ZERO, |code| code.light(self.curves));
-        let Some(ambient) = self.ambient else {
+        let Some(ambient) = plane.ambient else {
             return light;
         };
-        let ambient = ambient.get(index).and_then(|pixel| pixel.get(self.channel));
+        let ambient = ambient
+            .get(index)
+            .and_then(|pixel| pixel.get(plane.channel));
         let ambient = ambient.map_or(Light::ZERO, |bits| {
             Light::from_bits(u16::from_le_bytes(*bits))
         });
@@ -65,10 +46,10 @@ pub struct PixelRow<'r, 'f, S: Sample, const C: usize> {
     start: usize,
 }
 
-impl<S: Sample, const C: usize> Row for PixelRow<'_, '_, S, C> {
+impl<S: Sample, const C: usize> CellRow for PixelRow<'_, '_, S, C> {
     #[inline]
     fn pairs(self) -> impl Iterator<Item = [i32; 2]> {
-        (0..self.pixels.cols / 2).map(move |pair| [self.at(2 * pair), self.at(2 * pair + 1)])
+        (0..self.pixels.plane.cols / 2).map(move |pair| [self.at(2 * pair), self.at(2 * pair + 1)])
     }
 
     #[inline]
@@ -77,7 +58,7 @@ impl<S: Sample, const C: usize> Row for PixelRow<'_, '_, S, C> {
     }
 }
 
-impl<'f, S: Sample, const C: usize> Source for Pixels<'f, S, C> {
+impl<'f, S: Sample, const C: usize> CellSource for Pixels<'f, S, C> {
     type Row<'r>
         = PixelRow<'r, 'f, S, C>
     where
@@ -85,7 +66,7 @@ impl<'f, S: Sample, const C: usize> Source for Pixels<'f, S, C> {
 
     #[inline]
     fn rows(&self) -> impl Iterator<Item = PixelRow<'_, 'f, S, C>> {
-        let starts = (0..self.codes.len()).step_by(self.cols.max(1));
+        let starts = (0..self.plane.codes.len()).step_by(self.plane.cols.max(1));
         starts.map(|start| PixelRow {
             pixels: self,
             start,
@@ -100,6 +81,6 @@ impl<'f, S: Sample, const C: usize> Source for Pixels<'f, S, C> {
         sums: &mut [i32],
         details: &mut [[InputCoefficient; 3]],
     ) -> bool {
-        S::merge(self, (block, shift), sums, details)
+        S::merge(self, block, shift, sums, details)
     }
 }

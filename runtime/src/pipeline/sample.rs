@@ -1,15 +1,12 @@
-//! Frame samples: from codes to light, and from drive to codes.
+//! Samples of a frame: from codes to light, and from drive to codes.
 
-use super::codes::{self, CODES, INDEX_SHIFT};
-use super::pixels::{Halfword, Pixels};
-use super::response::{Response, linear_code};
+use super::pixels::Pixels;
 use super::srgb;
-use super::stages::drive;
-use super::whole::add_plainly;
-use crate::haar::Block;
+use super::stages::{clip, drive};
 use crate::image::Table;
-use crate::kernel::pixels;
-use crate::units::{Drive, InputCoefficient, Light};
+use crate::kernel::{Block, pixels};
+use crate::response::{CODES, INDEX_SHIFT, ResponseCurve, code_at, linear_code, linear_code_8};
+use crate::units::{Halfword, InputCoefficient, Light};
 use core::fmt;
 
 /// What the codes of a frame mean.
@@ -38,11 +35,12 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
     /// whether it did.
     fn code(wanted: i32, curves: Self::Curves<'_>) -> (Self, bool);
 
-    /// [`Source::merge`](crate::haar::Source::merge) of pixels.
+    /// [`CellSource::merge`](crate::haar::CellSource::merge) of pixels.
     #[inline]
     fn merge<const C: usize>(
         pixels: &Pixels<'_, Self, C>,
-        (block, shift): (Block, u32),
+        block: Block,
+        shift: u32,
         sums: &mut [i32],
         details: &mut [[InputCoefficient; 3]],
     ) -> bool {
@@ -68,6 +66,18 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
     }
 }
 
+/// [`Sample::add_light`] sample by sample.
+fn add_plainly<S: Sample, const C: usize>(
+    pixels: &Pixels<'_, S, C>,
+    weight: u32,
+    columns: &mut [u32],
+) {
+    for (index, column) in columns.iter_mut().enumerate() {
+        let light = u32::from(Light::to_bits(pixels.light(index)));
+        *column = column.wrapping_add(weight.wrapping_mul(light));
+    }
+}
+
 /// [`Sample::finish`] sample by sample.
 fn finish_plainly<S: Sample, const C: usize>(
     wanted: &Pixels<'_, S, C>,
@@ -79,11 +89,11 @@ fn finish_plainly<S: Sample, const C: usize>(
     let mut clipped = 0;
     let pixels = input.iter_mut().zip(gains).zip(corrections);
     for (index, ((pixel, gain), correction)) in pixels.enumerate() {
-        let gain = gain.get(wanted.channel).copied().unwrap_or_default();
+        let gain = gain.get(wanted.plane.channel).copied().unwrap_or_default();
         let light = wanted.light(index);
         let wanted_drive = drive(light, u16::from_le_bytes(gain), gain_fraction, *correction);
         let (code, was_clipped) = S::code(wanted_drive, wanted.curves);
-        if let Some(sample) = pixel.get_mut(wanted.channel) {
+        if let Some(sample) = pixel.get_mut(wanted.plane.channel) {
             *sample = code;
         }
         clipped += u32::from(was_clipped);
@@ -126,7 +136,7 @@ impl Sample for u8 {
     fn code(wanted: i32, curves: Curves<'_>) -> (Self, bool) {
         let Some(codes) = curves.codes else {
             let (drive, clipped) = clip(wanted);
-            return (codes::proportional(drive), clipped);
+            return (linear_code_8(drive), clipped);
         };
         // Negative drives become the largest indices.
         let index = (wanted.cast_unsigned() >> INDEX_SHIFT) as usize;
@@ -134,21 +144,29 @@ impl Sample for u8 {
             return (*code, false);
         }
         let (drive, clipped) = clip(wanted);
-        (codes::at(codes, drive), clipped)
+        (code_at(codes, drive), clipped)
     }
 
     #[inline]
     fn merge<const C: usize>(
         pixels: &Pixels<'_, Self, C>,
-        block: (Block, u32),
+        block: Block,
+        shift: u32,
         sums: &mut [i32],
         details: &mut [[InputCoefficient; 3]],
     ) -> bool {
-        pixels::merge(pixels, pixels.curves.light, block, sums, details)
+        pixels::merge(
+            &pixels.plane,
+            pixels.curves.light,
+            block,
+            shift,
+            sums,
+            details,
+        )
     }
 
     fn add_light<const C: usize>(pixels: &Pixels<'_, Self, C>, weight: u32, columns: &mut [u32]) {
-        if !pixels::add_light(pixels, pixels.curves.light, weight, columns) {
+        if !pixels::add_light(&pixels.plane, pixels.curves.light, weight, columns) {
             add_plainly(pixels, weight, columns);
         }
     }
@@ -160,8 +178,17 @@ impl Sample for u8 {
         corrections: &[i32],
         input: &mut [[Self; C]],
     ) -> u32 {
-        let curves = (wanted.curves.light, wanted.curves.codes);
-        let done = pixels::finish(wanted, curves, gain_fraction, gains, corrections, input);
+        let Curves { light, codes } = wanted.curves;
+        let plane = &wanted.plane;
+        let done = pixels::finish(
+            plane,
+            light,
+            codes,
+            gain_fraction,
+            gains,
+            corrections,
+            input,
+        );
         done.unwrap_or_else(|| finish_plainly(wanted, gain_fraction, gains, corrections, input))
     }
 }
@@ -170,7 +197,7 @@ impl Sample for u8 {
 #[derive(Clone, Copy, Debug)]
 pub struct WideCurves<'a> {
     encoding: Encoding,
-    response: Response<'a>,
+    response: ResponseCurve<'a>,
 }
 
 impl Sample for u16 {
@@ -209,14 +236,6 @@ impl Sample for u16 {
     }
 }
 
-/// A drive between 0 and 1; says whether it was outside.
-#[inline]
-#[must_use]
-pub(super) fn clip(wanted: i32) -> (Drive, bool) {
-    let reached = wanted.clamp(0, i32::from(Drive::ONE.to_bits()));
-    (Drive::from_bits(reached as u16), wanted != reached)
-}
-
 /// Light of every 8-bit code that is in proportion to it, to nearest.
 static LINEAR_LIGHT: [u16; 256] = {
     let mut light = [0; 256];
@@ -234,6 +253,7 @@ static LINEAR_LIGHT: [u16; 256] = {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::response::code_of_index;
 
     #[test]
     fn linear_codes_round_to_the_nearest_light() {
@@ -246,7 +266,7 @@ mod tests {
     #[test]
     fn what_is_clipped_is_what_lies_outside() {
         let of_response: [u8; CODES] =
-            core::array::from_fn(|index| codes::code(index, Response::new(&[])));
+            core::array::from_fn(|index| code_of_index(index, ResponseCurve::new(&[])));
         for codes in [None, Some(&of_response)] {
             let curves = Curves {
                 light: &LINEAR_LIGHT,

@@ -1,4 +1,4 @@
-//! The sRGB transfer function (IEC 61966-2-1) at the 256 codes of 8-bit frames.
+//! sRGB transfer function (IEC 61966-2-1) at the 256 codes of 8-bit frames.
 
 use crate::units::Light;
 

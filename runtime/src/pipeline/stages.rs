@@ -1,4 +1,4 @@
-//! What is done to a row of samples of one channel, and to the grid.
+//! Stages of the pipeline over a row of samples of one channel, and over the grid.
 //!
 //! Each stage is one function over slices; slices of different lengths are
 //! worked up to the shortest. The grid path and the full-resolution path are
@@ -9,8 +9,7 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use super::sample::clip;
-use crate::haar::{Cells, ShortSlice, Source, analyse, synthesise};
+use crate::haar::{CellSource, Cells, ShortSlice, analyse, synthesise};
 use crate::image::Table;
 use crate::units::{CORRECTION_GUARD_BITS, Drive, InputCoefficient, Light};
 
@@ -39,6 +38,14 @@ pub fn drive(light: Light, gain: u16, gain_fraction: u32, correction: i32) -> i3
     let half = 1_u32.wrapping_shl(gain_fraction) >> 1;
     let direct = product.wrapping_add(half).wrapping_shr(gain_fraction) as i32;
     direct.wrapping_sub(correction >> CORRECTION_GUARD_BITS)
+}
+
+/// A drive between 0 and 1; says whether it was outside.
+#[inline]
+#[must_use]
+pub(super) fn clip(wanted: i32) -> (Drive, bool) {
+    let reached = wanted.clamp(0, i32::from(Drive::ONE.to_bits()));
+    (Drive::from_bits(reached as u16), wanted != reached)
 }
 
 /// A row of [`drive`]s between 0 and 1; returns how many were clipped.
@@ -98,7 +105,7 @@ impl Workspace<'_> {
         &mut self,
         table: &Table<'_>,
         channel: usize,
-        cells: &impl Source,
+        cells: &impl CellSource,
     ) -> Result<(), ShortSlice> {
         let start = channel * table.grid().cells();
         let inputs = self.inputs.get_mut(start..).unwrap_or_default();

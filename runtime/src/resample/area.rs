@@ -1,4 +1,4 @@
-//! `A`: the exact mean of the light over each cell.
+//! Area average `A`: the exact mean of the light over each cell.
 //!
 //! Along an axis of `length` pixels and `cells` cells, a pixel is `cells` units
 //! long and a cell `length` units, so every overlap is an integer.

@@ -1,4 +1,4 @@
-//! `U`: linear interpolation between cell centres.
+//! Linear interpolation `U` between cell centres.
 //!
 //! Along an axis of `length` pixels and `cells` cells, the centre of pixel `x`
 //! lies `((2 x + 1) cells - length) / (2 length)` cell widths after the centre of
@@ -12,7 +12,7 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use crate::kernel::lines::{self, Between};
+use crate::kernel::{Between, lines};
 
 /// One axis of an interpolation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,4 +1,4 @@
-//! Between a frame's pixels and the grid's cells.
+//! Resampling between a frame's pixels and the grid's cells.
 //!
 //! A frame larger than the grid is compensated as
 //! `p(x) = g(x) d'(x) - (U K A d')(x)`: `A` averages the pixels of each cell

@@ -1,4 +1,4 @@
-//! Why flash cannot be used.
+//! Store errors: why flash cannot be used.
 
 use core::fmt;
 

@@ -1,12 +1,9 @@
-//! Flash in pieces of any length.
+//! Flash access in pieces of any length.
 
 use super::StoreError;
-use super::map::Part;
+use super::map::{MAX_WRITE, Part};
 use crate::image::CRC_32;
 use embedded_storage::nor_flash::NorFlash;
-
-/// Most bytes of the unit in which a flash is written.
-pub(super) const MAX_WRITE: usize = 32;
 
 /// Bytes that are read at once: a multiple of every unit.
 pub(super) const PIECE: usize = 64;

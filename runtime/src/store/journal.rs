@@ -1,9 +1,9 @@
-//! Commit records, one behind the other, in two parts of the flash in turn.
+//! Journal of commit records, one behind the other, in two parts of the flash in turn.
 
 use super::StoreError;
 use super::flash;
 use super::map::Part;
-use super::record::{self, Commit, Place, places};
+use super::record::{self, Commit, Contents, places};
 use embedded_storage::nor_flash::NorFlash;
 
 /// Where the last record is and where the next one goes.
@@ -17,48 +17,49 @@ pub(super) struct Journal {
     last: Option<Commit>,
     /// Places between the last record and the next one, which hold something that is
     /// no record now.
-    spoiled: u32,
+    corrupt: u32,
     /// Whether that part was erased since the start.
     is_fresh: bool,
-    /// Whether the record that counts was written whole, beyond doubt: its twin is
+    /// Whether the record that counts was written whole, beyond doubt: its duplicate is
     /// there.
-    is_firm: bool,
+    has_duplicate: bool,
     /// Whether the other part holds something behind its last record that is none now.
     is_other_cut: bool,
 }
 
 impl Journal {
-    /// Finds the record that counts. A place that cannot be read counts as spoiled.
+    /// Finds the record that counts. A place that cannot be read counts as corrupt.
     pub(super) fn find<F: NorFlash>(flash: &mut F, parts: [Part; 2]) -> Self {
         let mut journal = Self {
             parts,
             part: 0,
             next: 0,
             last: None,
-            spoiled: 0,
+            corrupt: 0,
             is_fresh: false,
-            is_firm: false,
+            has_duplicate: false,
             is_other_cut: false,
         };
         for (index, part) in parts.into_iter().enumerate() {
-            let (mut newest, mut next, mut spoiled) = (None::<Commit>, 0, 0);
-            let (mut before, mut firm) = (None::<Commit>, false);
+            let (mut newest, mut next, mut corrupt) = (None::<Commit>, 0, 0);
+            let (mut before, mut duplicated) = (None::<Commit>, false);
             for place in 0..places(part) {
                 let found = record::look::<F, Commit>(flash, part, place);
                 let previous = before.take();
-                match found.unwrap_or(Place::Spoiled) {
-                    Place::Blank => {}
-                    Place::Spoiled => {
+                match found.unwrap_or(Contents::Corrupt) {
+                    Contents::Blank => {}
+                    Contents::Corrupt => {
                         next = place + 1;
-                        spoiled += 1;
+                        corrupt += 1;
                     }
-                    Place::Record(commit) => {
+                    Contents::Record(commit) => {
                         next = place + 1;
                         before = Some(commit);
                         if newest.is_none_or(|newest| newest.sequence <= commit.sequence) {
                             newest = Some(commit);
-                            spoiled = 0;
-                            firm = previous.is_some_and(|previous| previous.is_twin(&commit));
+                            corrupt = 0;
+                            duplicated =
+                                previous.is_some_and(|previous| previous.is_duplicate(&commit));
                         }
                     }
                 }
@@ -71,14 +72,14 @@ impl Journal {
                 (None, Some(_)) => false,
             };
             if index == 0 || newer {
-                journal.is_other_cut = index > 0 && journal.spoiled > 0;
+                journal.is_other_cut = index > 0 && journal.corrupt > 0;
                 journal.part = index;
                 journal.next = next;
                 journal.last = newest;
-                journal.spoiled = spoiled;
-                journal.is_firm = firm;
+                journal.corrupt = corrupt;
+                journal.has_duplicate = duplicated;
             } else {
-                journal.is_other_cut = spoiled > 0;
+                journal.is_other_cut = corrupt > 0;
             }
         }
         journal
@@ -91,16 +92,16 @@ impl Journal {
 
     /// Whether a record was cut, the one that counts or one after it. It might be read
     /// otherwise another time; a record behind it, with a higher number, ends that.
-    pub(super) const fn is_doubtful(&self) -> bool {
+    pub(super) const fn is_uncertain(&self) -> bool {
         let [part, _] = self.parts;
-        self.spoiled > 0 || self.is_other_cut || !self.is_firm && has_twins(part)
+        self.corrupt > 0 || self.is_other_cut || !self.has_duplicate && has_duplicates(part)
     }
 
     /// Writes a record; from then on it counts. Returns how many parts were erased for
     /// it.
     ///
-    /// Its twin follows at once: where that has begun, the record before it is whole
-    /// however often it is read. A part with room for one record only has no twins.
+    /// Its duplicate follows at once: where that has begun, the record before it is whole
+    /// however often it is read. A part with room for one record only has no duplicates.
     ///
     /// The first one after a start goes to the other part, erased anew: a place behind
     /// the last record may look blank and yet have been cut before any of its bits
@@ -118,7 +119,7 @@ impl Journal {
             Some(last) => last.sequence.saturating_add(1),
             None => 0,
         };
-        commit.sequence = commit.sequence.saturating_add(self.spoiled);
+        commit.sequence = commit.sequence.saturating_add(self.corrupt);
         let [first, second] = self.parts;
         let parts = if self.part == 0 {
             [first, second]
@@ -149,41 +150,41 @@ impl Journal {
 
     /// Writes to the first place that takes it.
     fn try_places<F: NorFlash>(&mut self, flash: &mut F, part: Part, commit: &Commit) -> bool {
-        let twins = has_twins(part);
-        while self.next + u32::from(twins) < places(part) {
+        let duplicates = has_duplicates(part);
+        while self.next + u32::from(duplicates) < places(part) {
             let place = self.next;
             self.next += 1;
             if record::write(flash, part, place, commit).is_ok() {
                 self.last = Some(*commit);
-                self.spoiled = 0;
-                if twins {
-                    self.add_twin(flash, part, commit);
+                self.corrupt = 0;
+                if duplicates {
+                    self.add_duplicate(flash, part, commit);
                 }
                 return true;
             }
-            self.spoiled += 1;
+            self.corrupt += 1;
         }
         false
     }
 
     /// Writes the record that counts once more. Where that fails, the next start does it.
-    fn add_twin<F: NorFlash>(&mut self, flash: &mut F, part: Part, commit: &Commit) {
-        let twin = Commit {
+    fn add_duplicate<F: NorFlash>(&mut self, flash: &mut F, part: Part, commit: &Commit) {
+        let duplicate = Commit {
             sequence: commit.sequence.saturating_add(1),
             ..*commit
         };
         let place = self.next;
         self.next += 1;
-        self.is_firm = record::write(flash, part, place, &twin).is_ok();
-        if self.is_firm {
-            self.last = Some(twin);
+        self.has_duplicate = record::write(flash, part, place, &duplicate).is_ok();
+        if self.has_duplicate {
+            self.last = Some(duplicate);
         } else {
-            self.spoiled += 1;
+            self.corrupt += 1;
         }
     }
 }
 
-/// Whether a part has room for a record and its twin.
-const fn has_twins(part: Part) -> bool {
+/// Whether a part has room for a record and its duplicate.
+const fn has_duplicates(part: Part) -> bool {
     places(part) > 1
 }

@@ -1,11 +1,18 @@
-//! What lies where in the flash.
+//! Flash map: where slots, commit records and identity lie.
 
 use super::Slot;
-use super::flash::MAX_WRITE;
-use super::transfer::{MAX_CHUNK, MAX_SECTORS};
 use core::fmt;
 use core::ops::Range;
 use embedded_storage::nor_flash::NorFlash;
+
+/// Most bytes of the unit in which a flash is written.
+pub(super) const MAX_WRITE: usize = 32;
+
+/// Most bytes of a chunk: with a message around it, it fits a frame.
+pub const MAX_CHUNK: usize = 512;
+
+/// Most sectors of a slot, as [`Map::sector`] counts them.
+pub(super) const MAX_SECTORS: usize = 512;
 
 /// Parts of a flash, in bytes from its start. Each is a whole number of the flash's
 /// sectors.

@@ -1,9 +1,9 @@
-//! Two table slots in NOR flash, and updates that may be cut anywhere.
+//! Table store: two slots in NOR flash, and updates that may be cut anywhere.
 //!
 //! ```text
 //! Request -> Updater -> Response
 //!            |     \
-//!            |      Shelf: checked tables, and which one frames go through
+//!            |      TableSlots: checked tables, and which one frames go through
 //!            flash: slot A | slot B | commit records | identity
 //! ```
 //!
@@ -11,12 +11,14 @@
 //!
 //! 1. Chunks go to the slot that is *not* in use. Nothing says that there is a table
 //!    in it, so however it is cut, the next start uses the other one.
-//! 2. A table that has arrived is checked ([`Shelf::load`]) and used on trial. That
+//! 2. A table that has arrived is checked ([`TableSlots::load`]) and used on trial. That
 //!    is written nowhere: a restart ends the trial.
 //! 3. Confirming writes one commit record. A record counts only when its CRC-32
 //!    holds; until then the record before it does.
 //! 4. Records go to two sectors in turn. The one that is erased is never the one
 //!    with the record that counts.
+//! 5. The device's key is written once, before a commit record says that it is there; see
+//!    `identity` for what a start makes of one that it cannot read.
 //!
 //! A transfer that was cut goes on where it stopped, because a host asks for the
 //! CRC-32 of every sector and sends those that differ; nothing about a transfer is
@@ -33,10 +35,9 @@ mod updater;
 
 pub use error::StoreError;
 pub use identity::identity_record;
-pub use map::{Map, MapError};
+pub use map::{MAX_CHUNK, Map, MapError};
 pub use record::RECORD;
-pub use transfer::MAX_CHUNK;
-pub use updater::{Change, Updater};
+pub use updater::{TableChange, Updater};
 
 use crate::link::PassThrough;
 use crate::trust::{Accepted, Rejected, Terms};
@@ -89,7 +90,7 @@ impl Slot {
 }
 
 /// Where checked tables are kept, one a slot, and where frames are worked on.
-pub trait Shelf<F> {
+pub trait TableSlots<F> {
     /// Checks the file of `length` bytes in a slot with
     /// [`admit`](crate::trust::admit) and keeps its table; where nobody has noted the
     /// length, [`content`](crate::image::content) tells it. Frames go on with the table
@@ -114,5 +115,5 @@ pub trait Shelf<F> {
     fn select(&mut self, table: Result<Slot, PassThrough>);
 
     /// Called now and then while something takes long.
-    fn pause(&mut self);
+    fn yield_now(&mut self);
 }

@@ -35,6 +35,8 @@ mod commit {
     pub(super) const OTHER: Range<usize> = 40..44;
     /// 1 if there is such a table; anything else is none.
     pub(super) const HAS_OTHER: Range<usize> = 44..48;
+    /// 1 if the device has a key; anything else is none.
+    pub(super) const HAS_KEY: Range<usize> = 48..52;
 }
 
 /// The fields of an identity record.
@@ -60,16 +62,18 @@ pub(super) struct Commit {
     pub(super) floor: u32,
     /// Times that sectors of slot A, slot B and the records were erased.
     pub(super) erases: [u32; 3],
+    /// Whether the device has a key.
+    pub(super) has_key: bool,
 }
 
 impl Commit {
     /// Whether `next` says the same and was written right after it.
-    pub(super) fn is_twin(&self, next: &Self) -> bool {
-        let twin = Self {
+    pub(super) fn is_duplicate(&self, next: &Self) -> bool {
+        let duplicate = Self {
             sequence: self.sequence.saturating_add(1),
             ..*self
         };
-        twin == *next
+        duplicate == *next
     }
 }
 
@@ -83,8 +87,8 @@ pub(super) struct Identity {
 /// What can be written as a record.
 pub(super) trait Record: Sized {
     const MAGIC: [u8; 4];
-    fn read(bytes: &[u8; RECORD]) -> Self;
-    fn write(&self, bytes: &mut [u8; RECORD]);
+    fn parse(bytes: &[u8; RECORD]) -> Self;
+    fn emit(&self, bytes: &mut [u8; RECORD]);
 }
 
 fn u32_at(bytes: &[u8; RECORD], field: Range<usize>) -> u32 {
@@ -102,7 +106,7 @@ fn put(bytes: &mut [u8; RECORD], field: Range<usize>, value: &[u8]) {
 impl Record for Commit {
     const MAGIC: [u8; 4] = *b"ILTC";
 
-    fn read(bytes: &[u8; RECORD]) -> Self {
+    fn parse(bytes: &[u8; RECORD]) -> Self {
         let slot = match u32_at(bytes, commit::SLOT) {
             0 => Some(Slot::A),
             1 => Some(Slot::B),
@@ -117,10 +121,11 @@ impl Record for Commit {
             floor: u32_at(bytes, commit::FLOOR),
             lengths: lengths.map(|field| u32_at(bytes, field)),
             erases: erases.map(|field| u32_at(bytes, field)),
+            has_key: u32_at(bytes, commit::HAS_KEY) == 1,
         }
     }
 
-    fn write(&self, bytes: &mut [u8; RECORD]) {
+    fn emit(&self, bytes: &mut [u8; RECORD]) {
         let slot = self.table.map_or(u32::MAX, |(slot, _)| slot as u32);
         let id = self.table.map_or(0, |(_, id)| id);
         let [a, b, records] = self.erases;
@@ -137,6 +142,7 @@ impl Record for Commit {
             (commit::LENGTH_B, length_b),
             (commit::OTHER, self.other.unwrap_or(0)),
             (commit::HAS_OTHER, self.other.is_some().into()),
+            (commit::HAS_KEY, self.has_key.into()),
         ] {
             put(bytes, field, &value.to_le_bytes());
         }
@@ -146,7 +152,7 @@ impl Record for Commit {
 impl Record for Identity {
     const MAGIC: [u8; 4] = *b"ILTI";
 
-    fn read(bytes: &[u8; RECORD]) -> Self {
+    fn parse(bytes: &[u8; RECORD]) -> Self {
         let key = bytes.get(identity::KEY).and_then(|key| key.try_into().ok());
         let device = bytes.get(identity::DEVICE);
         let device = device.and_then(|device| device.try_into().ok());
@@ -156,7 +162,7 @@ impl Record for Identity {
         }
     }
 
-    fn write(&self, bytes: &mut [u8; RECORD]) {
+    fn emit(&self, bytes: &mut [u8; RECORD]) {
         put(bytes, identity::KEY, &self.key);
         put(bytes, identity::DEVICE, &self.device.to_le_bytes());
     }
@@ -164,13 +170,13 @@ impl Record for Identity {
 
 /// What is at a record's place.
 #[derive(Debug)]
-pub(super) enum Place<R> {
+pub(super) enum Contents<R> {
     /// Erased bytes.
     Blank,
     /// A whole record.
     Record(R),
     /// Something else, such as a record that was cut.
-    Spoiled,
+    Corrupt,
 }
 
 /// Looks at place `index` of a part.
@@ -178,7 +184,7 @@ pub(super) fn look<F: NorFlash, R: Record>(
     flash: &mut F,
     part: Part,
     index: u32,
-) -> Result<Place<R>, StoreError> {
+) -> Result<Contents<R>, StoreError> {
     let mut bytes = [0; RECORD];
     flash::read(flash, part, place(index), RECORD as u32, |piece| {
         if let Ok(piece) = piece.try_into() {
@@ -187,15 +193,15 @@ pub(super) fn look<F: NorFlash, R: Record>(
         true
     })?;
     if bytes.iter().all(|byte| *byte == ERASED) {
-        return Ok(Place::Blank);
+        return Ok(Contents::Blank);
     }
     let covered = bytes.get(..field::CRC.start).unwrap_or_default();
     let whole = u32_at(&bytes, field::CRC) == crc32(&[covered]);
     let ours = bytes.get(field::MAGIC) == Some(&R::MAGIC);
     Ok(if whole && ours {
-        Place::Record(R::read(&bytes))
+        Contents::Record(R::parse(&bytes))
     } else {
-        Place::Spoiled
+        Contents::Corrupt
     })
 }
 
@@ -213,7 +219,7 @@ pub(super) fn write<F: NorFlash, R: Record>(
 pub(super) fn bytes<R: Record>(record: &R) -> [u8; RECORD] {
     let mut bytes = [0; RECORD];
     put(&mut bytes, field::MAGIC, &R::MAGIC);
-    record.write(&mut bytes);
+    record.emit(&mut bytes);
     let covered = bytes.get(..field::CRC.start).unwrap_or_default();
     let crc = crc32(&[covered]);
     put(&mut bytes, field::CRC, &crc.to_le_bytes());

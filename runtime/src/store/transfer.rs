@@ -1,17 +1,11 @@
-//! A file on its way into a slot.
+//! Transfer of a file into a slot.
 
 use super::flash::{self, PIECE};
-use super::map::Part;
+use super::map::{MAX_SECTORS, Part};
 use super::{Map, StoreError};
 use crate::link::{Digest, Refusal};
 use embedded_storage::nor_flash::NorFlash;
 use sha2::{Digest as _, Sha512};
-
-/// Most bytes of a chunk: with a message around it, it fits a frame.
-pub const MAX_CHUNK: usize = 512;
-
-/// Most sectors of a slot, as [`Map::sector`] counts them.
-pub(super) const MAX_SECTORS: usize = 512;
 
 /// What is known of it, in RAM only.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +90,7 @@ impl Transfer {
         &self,
         flash: &mut F,
         slot: Part,
-        mut pause: impl FnMut(),
+        mut yield_now: impl FnMut(),
     ) -> Result<bool, StoreError> {
         let mut hash = Sha512::new();
         let mut pieces = 0_usize;
@@ -105,7 +99,7 @@ impl Transfer {
             pieces += piece.len();
             // A block of the hash takes some 12,000 instructions.
             if pieces.is_multiple_of(2 * PIECE) {
-                pause();
+                yield_now();
             }
             true
         })?;

@@ -7,7 +7,7 @@
 //! order of the steps and the pauses between them. All of it is public, so nothing
 //! takes care to run in constant time.
 
-use crate::pace::{Pace, cost};
+use crate::yield_budget::{YieldBudget, cost};
 use curve25519_dalek::constants::ED25519_BASEPOINT_POINT;
 use curve25519_dalek::edwards::{CompressedEdwardsY, EdwardsPoint};
 use curve25519_dalek::scalar::Scalar;
@@ -22,7 +22,7 @@ pub(super) fn verify(
     key: &[u8; 32],
     signature: &[u8; 64],
     message: &[u8],
-    pace: &mut Pace<'_>,
+    budget: &mut YieldBudget<'_>,
 ) -> bool {
     let (Some((r, _)), Some((_, s))) = (
         signature.split_first_chunk::<32>(),
@@ -36,53 +36,58 @@ pub(super) fn verify(
     let Some(a) = CompressedEdwardsY(*key).decompress() else {
         return false;
     };
-    pace.done(1, cost::ROOT);
+    budget.spend(1, cost::ROOT);
     if a.is_small_order() {
         return false;
     }
-    pace.done(2, cost::POINT);
-    let k = challenge(r, key, message, pace);
-    let expected = combination(&k, -a, &s, pace);
+    budget.spend(2, cost::POINT);
+    let k = challenge(r, key, message, budget);
+    let expected = combination(&k, -a, &s, budget);
     // Equal encodings are equal points, so `R` need not be decoded to learn its order.
     let small = expected.is_small_order();
-    pace.done(2, cost::POINT);
+    budget.spend(2, cost::POINT);
     let equal = expected.compress().as_bytes() == r;
-    pace.done(1, cost::ROOT);
+    budget.spend(1, cost::ROOT);
     equal && !small
 }
 
 /// `k`: the hash of `R`, the key and the message, modulo the order of the group.
-fn challenge(r: &[u8; 32], key: &[u8; 32], message: &[u8], pace: &mut Pace<'_>) -> Scalar {
+fn challenge(r: &[u8; 32], key: &[u8; 32], message: &[u8], budget: &mut YieldBudget<'_>) -> Scalar {
     let mut hash = Sha512::new();
     hash.update(r);
     hash.update(key);
     for piece in message.chunks(PIECE) {
         hash.update(piece);
-        pace.done(piece.len(), cost::HASH_BYTE);
+        budget.spend(piece.len(), cost::HASH_BYTE);
     }
     let hash = hash.finalize().into();
-    pace.done(1, cost::POINT);
+    budget.spend(1, cost::POINT);
     let k = Scalar::from_bytes_mod_order_wide(&hash);
-    pace.done(1, cost::POINT);
+    budget.spend(1, cost::POINT);
     k
 }
 
 /// `[k] point + [s] B`, a bit of both a step, the highest first.
-fn combination(k: &Scalar, point: EdwardsPoint, s: &Scalar, pace: &mut Pace<'_>) -> EdwardsPoint {
+fn combination(
+    k: &Scalar,
+    point: EdwardsPoint,
+    s: &Scalar,
+    budget: &mut YieldBudget<'_>,
+) -> EdwardsPoint {
     let base = ED25519_BASEPOINT_POINT;
     let both = point + base;
     let mut sum = EdwardsPoint::identity();
     for (k, s) in k.as_bytes().iter().rev().zip(s.as_bytes().iter().rev()) {
         for bit in (0..u8::BITS).rev() {
             sum = sum + sum;
-            pace.done(1, cost::POINT);
+            budget.spend(1, cost::POINT);
             match ((k >> bit) & 1, (s >> bit) & 1) {
                 (0, 0) => continue,
                 (0, _) => sum += base,
                 (_, 0) => sum += point,
                 _ => sum += both,
             }
-            pace.done(1, cost::POINT);
+            budget.spend(1, cost::POINT);
         }
     }
     sum

@@ -2,7 +2,7 @@
 //! with what is tested but neither the steps nor the checks.
 
 use super::ed25519;
-use crate::pace::Pace;
+use crate::yield_budget::YieldBudget;
 use curve25519_dalek::constants::EIGHT_TORSION;
 use curve25519_dalek::{EdwardsPoint, Scalar};
 use ed25519_dalek::{Signature, Signer, SigningKey, Verifier, VerifyingKey};
@@ -11,7 +11,7 @@ use sha2::{Digest, Sha512};
 use std::vec::Vec;
 
 fn verify(key: &[u8; 32], signature: &[u8; 64], message: &[u8]) -> bool {
-    ed25519::verify(key, signature, message, &mut Pace::new(&mut || {}))
+    ed25519::verify(key, signature, message, &mut YieldBudget::new(&mut || {}))
 }
 
 fn strict(key: &[u8; 32], signature: &[u8; 64], message: &[u8]) -> bool {

@@ -1,10 +1,10 @@
-//! Who signed a table, and whether it may run here.
+//! Trust: who signed a table, and whether it may run here.
 //!
 //! [`examine`] is the one gate: before a new table becomes active, and again for what
 //! lies in flash at every start. What a device demands is its [`Terms`]; a device
 //! that was never given a key demands only that the table is whole.
 
-mod admit;
+mod admission;
 mod ed25519;
 mod rejected;
 
@@ -13,7 +13,7 @@ mod ed25519_tests;
 #[cfg(test)]
 mod tests;
 
-pub use admit::{admit, examine};
+pub use admission::{admit, examine};
 pub use rejected::Rejected;
 
 use crate::image::Seal;

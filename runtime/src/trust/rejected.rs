@@ -1,7 +1,7 @@
-//! Why a table may not run here.
+//! Rejections: why a table may not run here.
 
+use crate::features::Stage;
 use crate::image::{ImageError, SealError, SectionProblem};
-use crate::pipeline::Stage;
 use core::fmt;
 use serde::{Deserialize, Serialize};
 

@@ -1,11 +1,11 @@
-//! The gate, by files that are wrong in one way each.
+//! Admission of files that are wrong in one way each.
 
 use super::*;
+use crate::features::Stage;
 use crate::image::layout::{SectionKind, header, meta};
 use crate::image::made_up::{flat, image};
 use crate::image::{ImageError, Seal, Table, seal::field};
-use crate::pace::{Pace, cost};
-use crate::pipeline::Stage;
+use crate::yield_budget::{YieldBudget, cost};
 use ed25519_dalek::{Signer, SigningKey};
 use std::collections::BTreeSet;
 use std::string::ToString;
@@ -222,7 +222,7 @@ fn pauses_come_as_often_as_the_work_asks_for() {
     ] {
         let more = pauses(Some(section)) - without;
         // No stride is half as long again, for no single piece of work is so long.
-        assert!(more >= work / (Pace::STRIDE * 3 / 2), "{more}");
+        assert!(more >= work / (YieldBudget::STRIDE * 3 / 2), "{more}");
     }
 }
 

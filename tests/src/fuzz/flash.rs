@@ -1,8 +1,8 @@
 //! A device that starts on any flash, records that look right among them.
 
 use super::files::{DEVICES, Owner, files, keys};
+use crate::flash_simulator::{NorSimulator, Violations};
 use crate::slots::{Layout, SimDevice};
-use iltm_runtime::fault::{NorSimulator, Violations};
 use iltm_runtime::image::crc32;
 
 /// Bytes of something that is put into the flash.

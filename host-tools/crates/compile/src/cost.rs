@@ -10,7 +10,7 @@
 //! | last | nodes of the levels, pixels of each channel |
 //!
 //! Rows and pairs have the numbers of instructions of the kernel's loops, read off
-//! `runtime/src/kernel/gather/arm.rs`. All other numbers were fitted by least squares
+//! `runtime/src/kernel/arm/gather.rs`. All other numbers were fitted by least squares
 //! to the 33 kinds of frames of `docs/costs.csv` (`cargo run --release -p iltm-tests
 //! --bin costs`) and to `docs/instructions.csv`: no frame there is off by more than
 //! 1.1 %. Those of `docs/stages.csv`, to which nothing was fitted, are off by up to

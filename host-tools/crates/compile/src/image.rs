@@ -2,9 +2,12 @@
 
 use super::ladder::Part;
 use super::quantise::Quantised;
-use iltm_runtime::image::{
-    crc32,
-    layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, segment},
+use iltm_runtime::{
+    image::{
+        crc32,
+        layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header},
+    },
+    operator::layout as segment,
 };
 use std::ops::Range;
 

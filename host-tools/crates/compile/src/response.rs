@@ -1,9 +1,7 @@
 //! Projector codes at the knots of a table's response section.
 
 use iltm_picture::{DeviceResponse, ProjectorResponse};
-use iltm_runtime::pipeline::{
-    CODES, RESPONSE_KNOTS, Response as RuntimeResponse, codes, knot_drive,
-};
+use iltm_runtime::response::{CODES, RESPONSE_KNOTS, ResponseCurve, code_of_index, knot_drive};
 
 /// The codes, full scale 65,535, of every knot's drive, one curve after the other:
 /// one for all channels, or one for each of the table's `channels`. `None` for a
@@ -33,8 +31,8 @@ fn curve(response: &DeviceResponse) -> Vec<u16> {
 #[must_use]
 pub fn codes(knots: &[u16]) -> Vec<u8> {
     let knots: Vec<[u8; 2]> = knots.iter().map(|code| code.to_le_bytes()).collect();
-    let curves = knots.chunks_exact(RESPONSE_KNOTS).map(RuntimeResponse::new);
-    let of_curve = |response| (0..CODES).map(move |index| codes::code(index, response));
+    let curves = knots.chunks_exact(RESPONSE_KNOTS).map(ResponseCurve::new);
+    let of_curve = |response| (0..CODES).map(move |index| code_of_index(index, response));
     curves.flat_map(of_curve).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use super::content::natural_images;
 use super::gain::FineGains;
-use super::image::{ImageWriter, halfwords, operator_sections, put};
+use super::image::{ImageWriter, halfwords, operator_sections};
 use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
 use super::response;
@@ -12,8 +12,8 @@ use iltm_picture::ProjectorResponse;
 use iltm_runtime::{
     haar::Basis,
     image::{
-        ImageError, Table,
-        layout::{MAX_PROVENANCE, SectionKind, fine_gain, meta, tier},
+        ImageError, Meta, Table, TierInfo,
+        layout::{MAX_PROVENANCE, SectionKind},
     },
     operator::{Bounds, Channels, Operator, OperatorError, Segment},
     units::Light,
@@ -184,36 +184,16 @@ pub fn compile(
     let channels = inverse.channels.len() as u8;
 
     let mut image = ImageWriter::default();
-    let mut head = vec![0; meta::SIZE];
-    put(
-        &mut head,
-        meta::ROWS,
-        &(inverse.grid.rows() as u16).to_le_bytes(),
-    );
-    put(
-        &mut head,
-        meta::COLS,
-        &(inverse.grid.cols() as u16).to_le_bytes(),
-    );
-    head[meta::CHANNELS] = channels;
-    head[meta::GAIN_FRACTION] = gains.fraction;
-    let light = U8F24::saturating_from_num(white.light).max(U8F24::DELTA);
-    put(&mut head, meta::REFERENCE_WHITE, &light.to_le_bytes());
-    let error = U0F32::saturating_from_num(options.inverse_error.max(0.0));
-    put(&mut head, meta::INVERSE_ERROR, &error.to_le_bytes());
-    put(
-        &mut head,
-        meta::ACCUMULATOR_BOUND,
-        &operator.bounds.accumulator.to_le_bytes(),
-    );
-    put(
-        &mut head,
-        meta::CORRECTION_BOUND,
-        &operator.bounds.correction.to_le_bytes(),
-    );
-    let scales = halfwords(operator.scales.map(U1F15::to_bits));
-    put(&mut head, meta::CHANNEL_SCALES, &scales);
-    image.section(SectionKind::Meta, 0, head);
+    let head = Meta {
+        grid: inverse.grid,
+        channels,
+        gain_fraction: gains.fraction,
+        reference_white: U8F24::saturating_from_num(white.light).max(U8F24::DELTA),
+        inverse_error: U0F32::saturating_from_num(options.inverse_error.max(0.0)),
+        bounds: operator.bounds,
+        channel_scales: operator.scales,
+    };
+    image.section(SectionKind::Meta, 0, head.emit().to_vec());
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));
     image.section(SectionKind::Gain, 0, halfwords(gains.cells));
     if let Some(ambient) = ambient(inverse, white.light) {
@@ -224,17 +204,8 @@ pub fn compile(
         image.section(SectionKind::Response, 0, halfwords(knots));
     }
     if let (Some(fine), Some(values)) = (fine, gains.fine) {
-        let mut bytes = vec![0; fine_gain::SIZE];
-        put(
-            &mut bytes,
-            fine_gain::ROWS,
-            &(fine.size.height() as u16).to_le_bytes(),
-        );
-        put(
-            &mut bytes,
-            fine_gain::COLS,
-            &(fine.size.width() as u16).to_le_bytes(),
-        );
+        let sides = [fine.size.height(), fine.size.width()];
+        let mut bytes = halfwords(sides.map(|side| side as u16));
         bytes.extend(halfwords(values));
         image.section(SectionKind::FineGain, 0, bytes);
     }
@@ -382,17 +353,14 @@ fn load<'a>(
 fn tiers(ladder: &Ladder, operator: &StoredOperator) -> Vec<u8> {
     let errors = ladder.tiers.iter().map(|tier| tier.error);
     let errors = std::iter::once(ladder.gain_only).chain(errors);
-    let entry = |(error, (entries, multiplications)): (f64, &(u32, u32))| {
-        let mut bytes = [0; tier::SIZE];
-        let error = U0F32::saturating_from_num(error.max(0.0));
-        put(&mut bytes, tier::PREDICTED_ERROR, &error.to_le_bytes());
-        put(&mut bytes, tier::ENTRIES, &entries.to_le_bytes());
-        put(
-            &mut bytes,
-            tier::MULTIPLICATIONS,
-            &multiplications.to_le_bytes(),
-        );
-        bytes
+    let entry = |(error, &(entries, multiplications)): (f64, &(u32, u32))| {
+        let predicted_error = U0F32::saturating_from_num(error.max(0.0));
+        TierInfo {
+            predicted_error,
+            entries,
+            multiplications,
+        }
+        .emit()
     };
     errors.zip(&operator.costs).flat_map(entry).collect()
 }

@@ -1,7 +1,7 @@
 //! A reference board in QEMU, its serial line as a port of this machine.
 
 use super::memory::Memory;
-use iltm_runtime::exchange::psram;
+use iltm_runtime::frame_buffers::psram;
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};

@@ -135,6 +135,9 @@ const fn after(refusal: &Refusal) -> &'static str {
         Refusal::ReadOnly => {
             "The device has no flash for tables, or no room for records: ask who built its firmware."
         }
+        Refusal::KeyLost => {
+            "Restart the device. If it says so again, its key has rotted in its flash: it must be written anew through the debug port."
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! cost little beside a frame and need no unsafe code.
 
 use iltm_runtime::{
-    exchange::{ControlWords, layout::CONTROL_WORDS, psram},
+    frame_buffers::{ControlWords, layout::CONTROL_WORDS, psram},
     store::identity_record,
 };
 use std::fs::{File, OpenOptions};

@@ -3,7 +3,7 @@
 //! it.
 
 use super::memory::{FileWords, Memory};
-use iltm_runtime::exchange::{Display, Format, Layout, RegionError, Shown, Source, psram};
+use iltm_runtime::frame_buffers::{Display, Format, Layout, RegionError, Shown, Source, psram};
 use std::io;
 use std::ops::Range;
 
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use iltm_runtime::{
         FrameSize,
-        exchange::{Presenter, Receiver},
+        frame_buffers::{Presenter, Receiver},
         pipeline::Encoding,
     };
 

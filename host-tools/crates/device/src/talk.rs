@@ -4,7 +4,7 @@ use super::client::{Incoming, Patience};
 use super::error::Heard;
 use super::{DeviceError, Line};
 use iltm_runtime::link::{
-    Channel, DELIMITER, Decoder, Frame, MAX_ENCODED, MAX_PAYLOAD, Request, Response, encode,
+    Channel, DELIMITER, Decoder, LinkFrame, MAX_ENCODED, MAX_PAYLOAD, Request, Response,
 };
 use std::collections::VecDeque;
 use std::io;
@@ -212,12 +212,12 @@ fn encoded(sequence: u16, request: Request<'_>) -> Vec<u8> {
     let mut payload = [0; MAX_PAYLOAD];
     let mut bytes = [DELIMITER; 1 + MAX_ENCODED];
     let payload = postcard::to_slice(&request, &mut payload).expect("a request fits a frame");
-    let frame = Frame {
+    let frame = LinkFrame {
         channel: Channel::Request,
         sequence,
         payload,
     };
-    let length = encode(frame, &mut bytes[1..]).expect("a payload fits a frame");
+    let length = frame.emit(&mut bytes[1..]).expect("a payload fits a frame");
     bytes[..=length].to_vec()
 }
 

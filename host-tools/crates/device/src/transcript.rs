@@ -2,7 +2,7 @@
 
 use super::Line;
 use iltm_runtime::{
-    link::{Channel, Decoder, Event, Frame, Request, Response},
+    link::{Channel, Decoder, Event, LinkFrame, Request, Response},
     trust::KEY_ID,
 };
 use std::fmt::Write as _;
@@ -104,7 +104,7 @@ impl<L: Line> Line for Transcribed<L> {
 }
 
 /// What a frame says.
-fn words(frame: Frame<'_>) -> String {
+fn words(frame: LinkFrame<'_>) -> String {
     let unread = || format!("{:?}: {} bytes", frame.channel, frame.payload.len());
     match frame.channel {
         Channel::Request => Request::parse(frame.payload).map_or_else(|_| unread(), asked),

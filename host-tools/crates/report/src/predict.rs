@@ -18,7 +18,7 @@ use iltm_picture::{Lattice, LightPicture};
 use iltm_runtime::{
     FrameSize,
     image::Table,
-    pipeline::{FullPipeline, Row},
+    pipeline::{FullPipeline, RowBuffers},
 };
 use iltm_solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
@@ -178,7 +178,7 @@ fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f
     let mut planes = vec![Vec::with_capacity(size.pixels()); C];
     for (channel, plane) in planes.iter_mut().enumerate() {
         for y in 0..size.height() {
-            let mut row = Row {
+            let mut row = RowBuffers {
                 line: &mut line,
                 spread: &mut spread,
             };

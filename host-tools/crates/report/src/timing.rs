@@ -6,8 +6,9 @@ use iltm_runtime::{
     FrameSize, Grid,
     image::Table,
     pipeline::{
-        Encoding, FlatMemory, FrameError, Halfword, Row, compensate_cells, compensate_pixels,
+        Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells, compensate_pixels,
     },
+    units::Halfword,
 };
 use iltm_video::OperatorMemory;
 use std::time::Instant;
@@ -50,16 +51,22 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
     let mut medians = Vec::new();
     let mut prepared = false;
     for tier in 0..=table.top_tier() {
-        let how = (tier, Encoding::Display);
+        let encoding = Encoding::Display;
         let mut runs = Vec::with_capacity(RUNS);
         for image in images.iter().cycle().take(RUNS) {
             let mut workspace = memory.workspace();
             let start = Instant::now();
             if of_grid {
-                compensate_cells(table, how, image, &mut input, &mut workspace)?;
+                compensate_cells(table, tier, encoding, image, &mut input, &mut workspace)?;
             } else {
-                let what = (table, size, prepared);
-                compensate_pixels(what, how, image, &mut input, frame.flat(), &mut workspace)?;
+                let job = FrameJob {
+                    table,
+                    size,
+                    prepared,
+                    tier,
+                    encoding,
+                };
+                compensate_pixels(&job, image, &mut input, &mut frame.lent(), &mut workspace)?;
                 prepared = true;
             }
             runs.push(start.elapsed().as_secs_f64() * 1e6);
@@ -70,7 +77,7 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
     Ok(medians)
 }
 
-/// What the runtime's [`FlatMemory`] borrows.
+/// What the runtime's [`FullMemory`] borrows.
 struct FrameMemory {
     gains: Vec<Halfword>,
     ambient: Vec<Halfword>,
@@ -101,14 +108,14 @@ impl FrameMemory {
         }
     }
 
-    fn flat(&mut self) -> FlatMemory<'_> {
-        FlatMemory {
+    fn lent(&mut self) -> FullMemory<'_> {
+        FullMemory {
             gains: &mut self.gains,
             ambient: &mut self.ambient,
             sums: &mut self.sums,
             corrections: &mut self.corrections,
             columns: &mut self.columns,
-            row: Row {
+            row: RowBuffers {
                 line: &mut self.line,
                 spread: &mut self.spread,
             },

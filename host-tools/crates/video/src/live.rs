@@ -12,7 +12,7 @@ use super::y4m::Reader;
 use super::{Compensator, Settings, Summary, VideoError};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
-    governor::{Change, Governor, Reason},
+    governor::{Governor, Reason, TierChange},
     image::{ImageError, Table, layout::MAX_TIERS, unseal},
 };
 use rayon::ThreadPool;
@@ -28,7 +28,7 @@ pub enum Event {
         /// Frames before it.
         frame: u64,
         /// From which to which, and why; times in microseconds.
-        change: Change,
+        change: TierChange,
     },
     /// A newer table took over.
     Table {

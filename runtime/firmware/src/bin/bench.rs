@@ -1,4 +1,4 @@
-//! Counts what a frame takes, stage by stage, at every tier.
+//! Instruction counter: what a frame takes, stage by stage, at every tier.
 //!
 //! The table lies in slot A, the frame in the frame memory, its size in the first
 //! word of the self-test's part (width in the low half, height in the high half),
@@ -16,7 +16,7 @@ use iltm_firmware::boards::{Chosen, psram};
 use iltm_firmware::fault;
 use iltm_firmware::memory::{MAX_PIXELS, Memory};
 use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::ControlWords;
+use iltm_runtime::frame_buffers::ControlWords;
 use iltm_runtime::image::{Table, content, unseal};
 use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 use iltm_runtime::store::Slot;
@@ -66,7 +66,8 @@ impl<'c, K: Clock> Laps<'c, K> {
 fn grid<const C: usize>(
     table: &Table<'_>,
     tier: u8,
-    (wanted, input): (&[u8], &mut [u8]),
+    wanted: &[u8],
+    input: &mut [u8],
     memory: &mut Memory,
     clock: &impl Clock,
 ) -> Result<([u64; 4], u32), FrameError> {
@@ -82,7 +83,7 @@ fn grid<const C: usize>(
         pipeline.operate(tier, &mut workspace)?;
     }
     laps.mark();
-    let clipped = pipeline.finish((tier, ENCODING), wanted, input, &mut workspace)?;
+    let clipped = pipeline.finish(tier, ENCODING, wanted, input, &mut workspace)?;
     laps.mark();
     Ok((laps.instructions(), clipped))
 }
@@ -90,16 +91,17 @@ fn grid<const C: usize>(
 #[inline(never)]
 fn full<const C: usize>(
     table: &Table<'_>,
-    (tier, size): (u8, FrameSize),
-    (wanted, input): (&[u8], &mut [u8]),
+    tier: u8,
+    size: FrameSize,
+    wanted: &[u8],
+    input: &mut [u8],
     memory: &mut Memory,
     clock: &impl Clock,
 ) -> Result<([u64; 4], u32), FrameError> {
     let pipeline = FullPipeline::<C>::new(table, size)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     let prepared = memory.is_prepared(table, size);
-    let (flat, mut workspace) = memory.full(C, table.grid().cells(), size.width());
-    let mut frame = flat.channels::<C>();
+    let (mut frame, mut workspace) = memory.full(C, table.grid().cells(), size.width());
     if !prepared {
         pipeline.prepare(&mut frame)?;
     }
@@ -112,7 +114,7 @@ fn full<const C: usize>(
         pipeline.correct(tier, frame.sums, frame.corrections, &mut workspace)?;
     }
     laps.mark();
-    let clipped = pipeline.finish_frame((tier, ENCODING), wanted, input, &mut frame)?;
+    let clipped = pipeline.finish_frame(tier, ENCODING, wanted, input, &mut frame)?;
     laps.mark();
     Ok((laps.instructions(), clipped))
 }
@@ -137,13 +139,13 @@ fn main() -> ! {
     let wanted = psram::outside_pixels(0..bytes);
     let input = &mut input[..bytes];
     for tier in 0..=table.top_tier() {
-        let pixels = (wanted, &mut *input);
         let alike = size == FrameSize::of_grid(table.grid());
+        let clock = &board.clock;
         let counted = match (table.channels(), alike) {
-            (1, true) => grid::<1>(&table, tier, pixels, memory, &board.clock),
-            (_, true) => grid::<3>(&table, tier, pixels, memory, &board.clock),
-            (1, false) => full::<1>(&table, (tier, size), pixels, memory, &board.clock),
-            (_, false) => full::<3>(&table, (tier, size), pixels, memory, &board.clock),
+            (1, true) => grid::<1>(&table, tier, wanted, input, memory, clock),
+            (_, true) => grid::<3>(&table, tier, wanted, input, memory, clock),
+            (1, false) => full::<1>(&table, tier, size, wanted, input, memory, clock),
+            (_, false) => full::<3>(&table, tier, size, wanted, input, memory, clock),
         };
         match counted {
             Ok(([first, second, third, whole], clipped)) => {

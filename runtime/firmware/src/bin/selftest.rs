@@ -1,4 +1,4 @@
-//! The product's frame loop under orders of a test.
+//! Self-test binary: the product's frame loop under orders of a test.
 //!
 //! The orders are words in the self-test's part of the PSRAM, which the test has
 //! written before the start; the findings go there too. With a
@@ -14,12 +14,12 @@ use cortex_m_semihosting::debug;
 use iltm_firmware::board::{Board, Clock};
 use iltm_firmware::boards::{Chosen, psram};
 use iltm_firmware::device::start;
-use iltm_firmware::rehearsal::{Outcome, Rehearsal};
+use iltm_firmware::hooks::{FrameHooks, Outcome};
 use iltm_firmware::stack;
-use iltm_firmware::vitals::Vitals;
+use iltm_firmware::telemetry::Telemetry;
 use iltm_runtime::FrameSize;
-use iltm_runtime::exchange::layout::{BUFFERS, descriptor};
-use iltm_runtime::exchange::{
+use iltm_runtime::frame_buffers::layout::{BUFFERS, descriptor};
+use iltm_runtime::frame_buffers::{
     ControlWords, Display, Format, Layout, NativeWords, Source, psram as map,
 };
 use iltm_runtime::image::crc32;
@@ -208,7 +208,7 @@ fn tear(sequence: u32) {
     }
 }
 
-impl Rehearsal for Orders {
+impl FrameHooks for Orders {
     fn round(&mut self, clock: &impl Clock) {
         self.outside(clock.ticks());
     }
@@ -245,9 +245,9 @@ impl Rehearsal for Orders {
         self.outside(clock.ticks());
     }
 
-    fn after_frame(&mut self, outcome: Outcome, vitals: &Vitals) {
+    fn after_frame(&mut self, outcome: Outcome, telemetry: &Telemetry) {
         self.add(finding::OVER, u32::from(outcome.over));
-        let frames = vitals.frame_counts();
+        let frames = telemetry.frame_counts();
         self.words.store(finding::LATE, frames.late);
         self.words.store(finding::DROPPED, frames.dropped);
         self.words.store(finding::BROKEN, frames.broken);

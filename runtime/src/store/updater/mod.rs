@@ -1,4 +1,4 @@
-//! What becomes of tables: transfer, trial, confirmation, and the way back.
+//! Updater: transfer, trial, confirmation, and the way back.
 //!
 //! | what | file |
 //! |---|---|
@@ -13,7 +13,7 @@ mod state;
 use super::journal::Journal;
 use super::record::Identity;
 use super::transfer::Transfer;
-use super::{Map, Shelf, Slot};
+use super::{Map, Slot, TableSlots};
 use crate::link::{Fault, Refusal, Request, Response, SlotState, TableName, TableReason};
 use crate::trust::{Accepted, Trust};
 use embedded_storage::nor_flash::NorFlash;
@@ -24,6 +24,8 @@ pub struct Updater<F> {
     flash: F,
     map: Map,
     trust: Trust,
+    /// Whether the device was given a key that cannot be read: it takes no table.
+    has_lost_key: bool,
     journal: Journal,
     /// Sectors erased so far: slot A, slot B, records.
     erases: [u32; 3],
@@ -33,7 +35,7 @@ pub struct Updater<F> {
     transfer: Option<Transfer>,
     trial: Option<Trial>,
     fault: Option<Fault>,
-    change: Option<Change>,
+    change: Option<TableChange>,
 }
 
 /// A table in use that nobody has confirmed.
@@ -47,7 +49,7 @@ struct Trial {
 
 /// Another table in use.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Change {
+pub struct TableChange {
     /// It; none passes frames through.
     pub table: Option<TableName>,
     /// Why.
@@ -60,23 +62,28 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         request: Request<'_>,
         now_ms: u64,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Response {
         let answer = match request {
+            Request::Begin { .. } | Request::Rollback { .. } | Request::Provision { .. }
+                if self.has_lost_key =>
+            {
+                Err(Refusal::KeyLost)
+            }
             Request::Slots => Ok(Response::Slots(self.slots(now_ms))),
-            Request::Sectors { length, first } => self.sectors(length, first, shelf),
+            Request::Sectors { length, first } => self.sectors(length, first, slots),
             Request::Begin { length, digest } => self.begin(length, digest),
             Request::Write {
                 transfer,
                 offset,
                 bytes,
-            } => self.write(transfer, offset, bytes, shelf),
+            } => self.write(transfer, offset, bytes, slots),
             Request::Activate { transfer, trial_s } => {
-                self.activate(transfer, trial_s, now_ms, shelf)
+                self.activate(transfer, trial_s, now_ms, slots)
             }
             Request::Confirm { table } => self.confirm(table, now_ms),
-            Request::Rollback { table } => self.roll_back(table, now_ms, shelf),
-            Request::Provision { key, device } => self.provision(Identity { key, device }, shelf),
+            Request::Rollback { table } => self.roll_back(table, now_ms, slots),
+            Request::Provision { key, device } => self.provision(Identity { key, device }, slots),
             // The session answers these.
             Request::Hello { .. } | Request::Status | Request::Subscribe { .. } => {
                 Err(Refusal::Unknown)
@@ -86,14 +93,14 @@ impl<F: NorFlash> Updater<F> {
     }
 
     /// Ends a trial whose time is over.
-    pub fn poll(&mut self, now_ms: u64, shelf: &mut impl Shelf<F>) {
+    pub fn poll(&mut self, now_ms: u64, slots: &mut impl TableSlots<F>) {
         if let Some(trial) = self.trial.filter(|trial| now_ms >= trial.ends_ms) {
-            self.end_trial(trial, TableReason::TrialOver, shelf);
+            self.end_trial(trial, TableReason::TrialOver, slots);
         }
     }
 
     /// The last change that nobody has asked for yet.
-    pub const fn take_change(&mut self) -> Option<Change> {
+    pub const fn take_change(&mut self) -> Option<TableChange> {
         self.change.take()
     }
 

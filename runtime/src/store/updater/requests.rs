@@ -1,10 +1,10 @@
-//! What each request does.
+//! Requests about tables, carried out.
 
 use super::{Trial, Updater};
 use crate::link::{Digest, Receiving, Refusal, Response, Sectors, SlotInfo, Slots, TableReason};
 use crate::store::record::Identity;
 use crate::store::transfer::Transfer;
-use crate::store::{Shelf, Slot, flash, identity};
+use crate::store::{Slot, TableSlots, flash, identity};
 use crate::trust::{Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
 use heapless::Vec;
@@ -43,7 +43,7 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         length: u32,
         first: u32,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         self.check_length(length)?;
         let part = self.map.slot(self.target());
@@ -56,7 +56,7 @@ impl<F: NorFlash> Updater<F> {
             // Not full.
             let _ = crcs.push(crc);
             start = start.saturating_add(sector);
-            shelf.pause();
+            slots.yield_now();
         }
         Ok(Response::Sectors(Sectors { first, crcs }))
     }
@@ -75,11 +75,7 @@ impl<F: NorFlash> Updater<F> {
             return Err(Refusal::OnTrial);
         }
         self.check_length(length)?;
-        if self.journal.last().is_none() {
-            // Without a record, a whole table that nobody confirmed would count at
-            // the next start.
-            self.commit(self.in_use, 0)?;
-        }
+        self.need_record()?;
         let same = |transfer: &Transfer| transfer.digest == digest && transfer.length == length;
         if !self.transfer.as_ref().is_some_and(same) {
             self.transfer = Some(Transfer::new(digest, length));
@@ -97,7 +93,7 @@ impl<F: NorFlash> Updater<F> {
         transfer: u32,
         offset: u32,
         bytes: &[u8],
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         let slot = self.target();
         let running = self.transfer.as_mut();
@@ -105,7 +101,7 @@ impl<F: NorFlash> Updater<F> {
         let running = running.ok_or(Refusal::NoTransfer)?;
         running.check(&self.map, offset, bytes)?;
         // Its bytes are about to change.
-        shelf.unload(slot);
+        slots.unload(slot);
         *slot.of_mut(&mut self.tables) = None;
         *slot.of_mut(&mut self.broken) = true;
         let part = self.map.slot(slot);
@@ -122,7 +118,7 @@ impl<F: NorFlash> Updater<F> {
         transfer: u32,
         trial_s: u16,
         now_ms: u64,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         // The answer to the first such request may have been lost.
         if self.trial.is_some_and(|trial| trial.transfer == transfer) {
@@ -136,7 +132,7 @@ impl<F: NorFlash> Updater<F> {
         let running = *running.ok_or(Refusal::NoTransfer)?;
         let slot = self.target();
         let part = self.map.slot(slot);
-        let whole = running.is_whole(&mut self.flash, part, || shelf.pause());
+        let whole = running.is_whole(&mut self.flash, part, || slots.yield_now());
         if !whole.map_err(|_| Refusal::Incomplete)? {
             return Err(Refusal::Incomplete);
         }
@@ -145,10 +141,10 @@ impl<F: NorFlash> Updater<F> {
             floor: self.oldest(),
         };
         let before = *slot.of(&self.tables);
-        if let Err(rejected) = self.take(slot, running.length, &terms, shelf) {
+        if let Err(rejected) = self.take(slot, running.length, &terms, slots) {
             // What lay there already is still good to go back to.
             if let Some(before) = before {
-                let _ = self.take(slot, before.length, &self.terms(), shelf);
+                let _ = self.take(slot, before.length, &self.terms(), slots);
             }
             return Err(Refusal::Table(rejected));
         }
@@ -159,7 +155,7 @@ impl<F: NorFlash> Updater<F> {
             before: self.in_use,
         });
         self.transfer = None;
-        self.use_slot(Some(slot), TableReason::Trial, shelf);
+        self.use_slot(Some(slot), TableReason::Trial, slots);
         Ok(self.use_now(now_ms))
     }
 
@@ -169,9 +165,9 @@ impl<F: NorFlash> Updater<F> {
         slot: Slot,
         length: u32,
         terms: &Terms,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<(), Rejected> {
-        let loaded = shelf.load(&self.flash, slot, Some(length), terms);
+        let loaded = slots.load(&self.flash, slot, Some(length), terms);
         *slot.of_mut(&mut self.tables) = loaded.ok();
         *slot.of_mut(&mut self.broken) = loaded.is_err();
         loaded.map(|_| ())
@@ -194,11 +190,11 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         table: u32,
         now_ms: u64,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         self.check_in_use(table)?;
         if let Some(trial) = self.trial {
-            self.end_trial(trial, TableReason::RolledBack, shelf);
+            self.end_trial(trial, TableReason::RolledBack, slots);
             return Ok(self.use_now(now_ms));
         }
         let other = self.target();
@@ -211,11 +207,11 @@ impl<F: NorFlash> Updater<F> {
         // Since it was checked last, its version may have been revoked, or the device
         // have got a key.
         let terms = self.terms();
-        let taken = self.take(other, there.length, &terms, shelf);
+        let taken = self.take(other, there.length, &terms, slots);
         taken.map_err(Refusal::Table)?;
         self.commit(Some(other), 0)?;
         self.transfer = None;
-        self.use_slot(Some(other), TableReason::RolledBack, shelf);
+        self.use_slot(Some(other), TableReason::RolledBack, slots);
         Ok(self.use_now(now_ms))
     }
 
@@ -223,7 +219,7 @@ impl<F: NorFlash> Updater<F> {
     pub(super) fn provision(
         &mut self,
         identity: Identity,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) -> Result<Response, Refusal> {
         let wanted = Trust {
             key: Some(identity.key),
@@ -233,15 +229,22 @@ impl<F: NorFlash> Updater<F> {
             if self.trial.is_some() {
                 return Err(Refusal::OnTrial);
             }
+            self.need_record()?;
             let part = self.map.identity();
             let written = identity::write(&mut self.flash, part, &identity);
             written.map_err(|_| Refusal::ReadOnly)?;
             self.trust = wanted;
+            if let Err(refusal) = self.renew_record() {
+                // What was refused must not count at the next start.
+                let _ = identity::erase(&mut self.flash, part);
+                self.trust = Trust::default();
+                return Err(refusal);
+            }
             // From now on nobody goes back to a table that the next start would refuse.
             // The one in use stays until then.
             for slot in Slot::ALL {
                 if self.in_use != Some(slot) {
-                    self.look(slot, shelf);
+                    self.look(slot, slots);
                 }
             }
         }

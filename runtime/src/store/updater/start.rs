@@ -1,11 +1,12 @@
-//! What an updater finds when the device starts.
+//! Start of an updater: the tables and records that it finds.
 
 use super::Updater;
 use crate::image::layout::header;
 use crate::link::{Fault, PassThrough};
+use crate::store::identity::Found;
 use crate::store::journal::Journal;
-use crate::store::record::Commit;
-use crate::store::{Map, Shelf, Slot, flash, identity};
+use crate::store::record::{Commit, Identity};
+use crate::store::{Map, Slot, TableSlots, flash, identity};
 use crate::trust::{Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
 
@@ -13,22 +14,22 @@ impl<F: NorFlash> Updater<F> {
     /// After a start: finds the table that counts, checks it and has it used; with
     /// the other one if that fails, or none.
     #[inline(never)]
-    pub fn start(mut flash: F, map: Map, shelf: &mut impl Shelf<F>) -> Self {
-        let identity = identity::find(&mut flash, map.identity());
-        if identity.is_none() {
-            // A flash that fails here leaves things as they are.
-            let _ = identity::settle(&mut flash, map.identity());
-        }
-        let trust = identity.map_or_else(Trust::default, |identity| Trust {
-            key: Some(identity.key),
-            device: identity.device,
-        });
+    pub fn start(mut flash: F, map: Map, slots: &mut impl TableSlots<F>) -> Self {
         let journal = Journal::find(&mut flash, map.records());
+        let found = identity::find(&mut flash, map.identity(), journal.last());
+        let trust = match found {
+            Found::Identity(Identity { key, device }) => Trust {
+                key: Some(key),
+                device,
+            },
+            Found::Nothing | Found::Lost => Trust::default(),
+        };
         let erases = journal.last().unwrap_or_default().erases;
         let mut updater = Self {
             flash,
             map,
             trust,
+            has_lost_key: found == Found::Lost,
             journal,
             erases,
             tables: [None; 2],
@@ -41,25 +42,29 @@ impl<F: NorFlash> Updater<F> {
         };
         updater.settle();
         for slot in Slot::ALL {
-            updater.look(slot, shelf);
+            updater.look(slot, slots);
         }
         updater.in_use = updater.choose();
+        if updater.has_lost_key {
+            updater.fault = Some(Fault::KeyLost);
+        }
         let chosen = updater.in_use.ok_or(updater.absence());
-        shelf.select(chosen);
+        slots.select(chosen);
         updater
     }
 
-    /// Ends the doubt about a record that may have been cut. A flash that fails here leaves
-    /// things as they are.
+    /// Ends the doubt about a record that may have been cut, and has the last one say that
+    /// there is a key. A flash that fails here leaves things as they are.
     fn settle(&mut self) {
-        if let Some(last) = self.journal.last().filter(|_| self.journal.is_doubtful()) {
-            let _ = self.append(last);
+        let noted = self.journal.last().is_none_or(|last| last.has_key);
+        if self.journal.is_uncertain() || self.trust.key.is_some() && !noted {
+            let _ = self.renew_record();
         }
     }
 
     /// Checks what is in a slot.
     #[inline(never)]
-    pub(super) fn look(&mut self, slot: Slot, shelf: &mut impl Shelf<F>) {
+    pub(super) fn look(&mut self, slot: Slot, slots: &mut impl TableSlots<F>) {
         let part = self.map.slot(slot);
         let head = header::SIZE as u32;
         let empty = flash::is_blank(&mut self.flash, part, 0, head).unwrap_or(false);
@@ -69,14 +74,19 @@ impl<F: NorFlash> Updater<F> {
             return;
         }
         let last = self.journal.last();
+        let meant = last.and_then(|last| last.table);
+        if self.has_lost_key && meant.is_none_or(|(meant, _)| meant != slot) {
+            // Who signed it cannot be told. What was confirmed may run on.
+            *slot.of_mut(&mut self.broken) = true;
+            return;
+        }
         let noted = last.map(|last| *slot.of(&last.lengths));
         let length = noted.filter(|length| *length > 0);
-        let loaded = shelf.load(&self.flash, slot, length, &self.terms());
-        let meant = last.and_then(|last| last.table);
+        let loaded = slots.load(&self.flash, slot, length, &self.terms());
         let loaded = loaded.and_then(|accepted| match meant {
             // Something else was put there past this code.
             Some((meant, id)) if meant == slot && id != accepted.id => {
-                shelf.unload(slot);
+                slots.unload(slot);
                 Err(Rejected::NotATable)
             }
             _ => Ok(accepted),

@@ -1,9 +1,9 @@
-//! What requests have in common: the slot in use, the trial, the record that counts.
+//! State of an updater: the slot in use, the trial, the record that counts.
 
-use super::{Change, Trial, Updater};
+use super::{TableChange, Trial, Updater};
 use crate::link::{InUse, Refusal, Response, TableName, TableReason};
 use crate::store::record::Commit;
-use crate::store::{Shelf, Slot, StoreError};
+use crate::store::{Slot, StoreError, TableSlots};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<F: NorFlash> Updater<F> {
@@ -25,8 +25,12 @@ impl<F: NorFlash> Updater<F> {
     }
 
     /// The lowest version of a table that may come: not below the one that counts,
-    /// and not a revoked one. Without a key nobody vouches for versions: any.
+    /// and not a revoked one. Without a key nobody vouches for versions: any. With a
+    /// lost one, none.
     pub(super) fn oldest(&self) -> u32 {
+        if self.has_lost_key {
+            return u32::MAX;
+        }
         if self.trust.key.is_none() {
             return 0;
         }
@@ -47,26 +51,26 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         trial: Trial,
         reason: TableReason,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) {
         self.trial = None;
-        self.use_slot(trial.before, reason, shelf);
+        self.use_slot(trial.before, reason, slots);
     }
 
     pub(super) fn use_slot(
         &mut self,
         slot: Option<Slot>,
         reason: TableReason,
-        shelf: &mut impl Shelf<F>,
+        slots: &mut impl TableSlots<F>,
     ) {
         self.in_use = slot;
-        shelf.select(slot.ok_or(self.absence()));
+        slots.select(slot.ok_or(self.absence()));
         self.changed(reason);
     }
 
     pub(super) fn changed(&mut self, reason: TableReason) {
         let table = self.table();
-        self.change = Some(Change { table, reason });
+        self.change = Some(TableChange { table, reason });
     }
 
     /// Makes the table of a slot the one that counts; `oldest` is the lowest version
@@ -91,15 +95,38 @@ impl<F: NorFlash> Updater<F> {
             floor,
             lengths: Slot::ALL.map(|slot| slot.of(&self.tables).map_or(0, |table| table.length)),
             erases: self.erases,
+            has_key: self.trust.key.is_some(),
         };
-        self.append(commit).map_err(|error| match error {
-            StoreError::Flash { offset } => Refusal::Flash { offset },
-            StoreError::Full => Refusal::ReadOnly,
+        self.append(commit)
+    }
+
+    /// Writes the record that counts once more; it says then whether there is a key.
+    pub(super) fn renew_record(&mut self) -> Result<(), Refusal> {
+        let Some(last) = self.journal.last() else {
+            return Ok(());
+        };
+        self.append(Commit {
+            has_key: last.has_key || self.trust.key.is_some(),
+            erases: self.erases,
+            ..last
         })
     }
 
-    pub(super) fn append(&mut self, commit: Commit) -> Result<(), StoreError> {
-        let erases = self.journal.append(&mut self.flash, commit)?;
+    /// Without a record, a whole table that nobody confirmed would count at the next
+    /// start, and a key that was cut would pass for a lost one.
+    pub(super) fn need_record(&mut self) -> Result<(), Refusal> {
+        match self.journal.last() {
+            Some(_) => Ok(()),
+            None => self.commit(self.in_use, 0),
+        }
+    }
+
+    fn append(&mut self, commit: Commit) -> Result<(), Refusal> {
+        let appended = self.journal.append(&mut self.flash, commit);
+        let erases = appended.map_err(|error| match error {
+            StoreError::Flash { offset } => Refusal::Flash { offset },
+            StoreError::Full => Refusal::ReadOnly,
+        })?;
         let [.., records] = &mut self.erases;
         *records = records.saturating_add(erases);
         Ok(())

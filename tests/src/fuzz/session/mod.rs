@@ -17,8 +17,8 @@ mod wire;
 pub(super) use op::OP;
 
 use super::files::{Owner, files};
+use crate::flash_simulator::{NorSimulator, Violations};
 use crate::slots::{Layout, SimDevice};
-use iltm_runtime::fault::{NorSimulator, Violations};
 use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
 use iltm_runtime::store::Slot;
 use model::{Model, Record, Sizes};
@@ -537,6 +537,16 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         for (before, after) in before.iter_mut().zip(&after) {
             before.touched.clone_from(&after.touched);
         }
+        // The first record comes before a key: there may be the one without the other.
+        let mut noted = Vec::new();
+        for (before, after) in before.iter().zip(&after) {
+            if before.owner != after.owner {
+                let mut between = before.clone();
+                between.record = after.record;
+                noted.push(between);
+            }
+        }
+        before.extend(noted);
         before.extend(after);
         for model in &mut before {
             if let Some((slot, range)) = model.touched.clone() {
@@ -646,7 +656,7 @@ fn agrees<const W: usize, const E: usize>(
     let updater = &device.updater;
     let in_use = updater.in_use().map(Slot::index);
     same("in use", in_use == model.in_use, &in_use, &model.in_use)?;
-    let selected = device.shelf.selected.ok().map(Slot::index);
+    let selected = device.tables.selected.ok().map(Slot::index);
     same("frames", selected == model.in_use, &selected, &model.in_use)?;
     let (states, wanted) = (updater.states(), model.states());
     same("states", states == wanted, &states, &wanted)?;

@@ -425,6 +425,10 @@ impl Model {
             return Err(Refusal::OnTrial);
         }
         if self.owner.is_none() {
+            // From then on it is noted whether there is a key.
+            if self.record.is_none() {
+                self.note(self.in_use, 0);
+            }
             self.owner = Some(owner);
             // The table in use stays until something else is.
             let others = [0, 1].into_iter().filter(|slot| self.in_use != Some(*slot));

@@ -2,7 +2,7 @@
 
 use crate::slots::SimDevice;
 use iltm_runtime::link::{Channel, Decoder, Event, MAX_PAYLOAD, Response, Session};
-use iltm_runtime::link::{DELIMITER, Frame, MAX_ENCODED, Request, encode};
+use iltm_runtime::link::{DELIMITER, LinkFrame, MAX_ENCODED, Request};
 
 /// What a device said.
 #[derive(Debug, Default)]
@@ -76,7 +76,7 @@ impl<const W: usize, const E: usize> Wire<W, E> {
 }
 
 impl Said {
-    fn take(&mut self, frame: Frame<'_>, next_event: &mut u16) {
+    fn take(&mut self, frame: LinkFrame<'_>, next_event: &mut u16) {
         match frame.channel {
             Channel::Response => {
                 let response = postcard::from_bytes(frame.payload).expect("a response");
@@ -103,12 +103,12 @@ pub(super) fn payload(request: &Request<'_>) -> Vec<u8> {
 /// A frame as it goes on the line.
 pub(super) fn framed(channel: Channel, sequence: u16, payload: &[u8]) -> Vec<u8> {
     let mut encoded = [0; MAX_ENCODED];
-    let frame = Frame {
+    let frame = LinkFrame {
         channel,
         sequence,
         payload,
     };
-    let length = encode(frame, &mut encoded).expect("it fits");
+    let length = frame.emit(&mut encoded).expect("it fits");
     encoded[..length].to_vec()
 }
 

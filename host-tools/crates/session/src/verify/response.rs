@@ -2,7 +2,7 @@
 
 use iltm_runtime::{
     image::Table,
-    pipeline::codes::{INDEX_SHIFT, at, proportional},
+    response::{INDEX_SHIFT, code_at, linear_code_8},
     units::Drive,
 };
 
@@ -25,7 +25,7 @@ impl ProjectorCurves {
                 let code = |index: u16| {
                     let drive = Drive::from_bits(index << INDEX_SHIFT);
                     let own = table.codes(channel);
-                    own.map_or_else(|| proportional(drive), |codes| at(codes, drive))
+                    own.map_or_else(|| linear_code_8(drive), |codes| code_at(codes, drive))
                 };
                 let last = Drive::ONE.to_bits() >> INDEX_SHIFT;
                 (0..=last).map(code).collect()

@@ -2,7 +2,7 @@
 
 use super::super::bands::STRIP;
 use super::Work;
-use iltm_runtime::{pipeline::Row, units::Drive};
+use iltm_runtime::{pipeline::RowBuffers, units::Drive};
 use std::sync::{Mutex, PoisonError};
 
 /// What one thread needs beside the frame.
@@ -33,8 +33,8 @@ impl RowMemory {
     }
 
     /// The runtime's part of it, and the drives.
-    pub(super) fn split(&mut self) -> (Row<'_>, &mut [Drive]) {
-        let row = Row {
+    pub(super) fn split(&mut self) -> (RowBuffers<'_>, &mut [Drive]) {
+        let row = RowBuffers {
             line: &mut self.line,
             spread: &mut self.spread,
         };
@@ -51,7 +51,7 @@ pub(super) struct Memories<S, M> {
 }
 
 impl<S: Copy + Default, M: Default> Memories<S, M> {
-    /// For rows whose [`Row::line`] needs `line` elements.
+    /// For rows whose [`RowBuffers::line`] needs `line` elements.
     pub(super) fn new(line: usize, cells: usize, work: Work) -> Self {
         Self {
             free: Mutex::default(),

@@ -224,7 +224,8 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
                 let (mut row, drives) = memory.row.split();
                 clipped += u64::from(stages.pipeline.finish_row(
                     y,
-                    (light, gain),
+                    light,
+                    gain,
                     &self.corrections[colour * cells..][..cells],
                     &mut row,
                     drives,

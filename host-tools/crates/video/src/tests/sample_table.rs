@@ -8,9 +8,9 @@ use fixed::types::U1F15;
 use iltm_runtime::{
     Grid,
     haar::Basis,
-    image::layout::{SectionKind, meta, tier},
-    operator::{Channels, Operator, Segment},
-    pipeline::{RESPONSE_KNOTS, knot_drive},
+    image::{Meta, TierInfo, layout::SectionKind},
+    operator::{Bounds, Channels, Operator, Segment},
+    response::{RESPONSE_KNOTS, knot_drive},
 };
 use std::ops::Range;
 
@@ -116,15 +116,21 @@ impl SampleTable {
                 .expect("a sample operator does not overflow")
         });
         let mut writer = ImageWriter::default();
-        writer.section(SectionKind::Meta, 0, self.meta(operator.as_ref()));
+        writer.section(
+            SectionKind::Meta,
+            0,
+            self.meta(operator.as_ref()).emit().to_vec(),
+        );
         let tiers = (0..=self.tiers.len() as u8).flat_map(|number| {
-            let mut entry = vec![0; tier::SIZE];
             let cost = operator.as_ref().map_or((0, 0), |operator| {
                 operator.cost(number, self.channels as u8)
             });
-            put(&mut entry, tier::ENTRIES, &cost.0.to_le_bytes());
-            put(&mut entry, tier::MULTIPLICATIONS, &cost.1.to_le_bytes());
-            entry
+            TierInfo {
+                predicted_error: U0F32::ZERO,
+                entries: cost.0,
+                multiplications: cost.1,
+            }
+            .emit()
         });
         writer.section(SectionKind::Tiers, 0, tiers.collect());
         writer.section(SectionKind::Gain, 0, halfwords(&self.gains));
@@ -159,41 +165,16 @@ impl SampleTable {
         segment_bytes(self.grid.cells(), &rows.collect::<Vec<_>>())
     }
 
-    fn meta(&self, operator: Option<&Operator<'_>>) -> Vec<u8> {
-        let mut head = vec![0; meta::SIZE];
-        put(
-            &mut head,
-            meta::ROWS,
-            &(self.grid.rows() as u16).to_le_bytes(),
-        );
-        put(
-            &mut head,
-            meta::COLS,
-            &(self.grid.cols() as u16).to_le_bytes(),
-        );
-        head[meta::CHANNELS] = self.channels as u8;
-        head[meta::GAIN_FRACTION] = self.gain_fraction;
-        put(
-            &mut head,
-            meta::REFERENCE_WHITE,
-            &(1_u32 << 23).to_le_bytes(),
-        );
-        let scales: Vec<u16> = self.channel_scales.iter().map(|s| s.to_bits()).collect();
-        put(&mut head, meta::CHANNEL_SCALES, &halfwords(&scales));
-        if let Some(operator) = operator {
-            let bounds = operator.bounds();
-            put(
-                &mut head,
-                meta::ACCUMULATOR_BOUND,
-                &bounds.accumulator.to_le_bytes(),
-            );
-            put(
-                &mut head,
-                meta::CORRECTION_BOUND,
-                &bounds.correction.to_le_bytes(),
-            );
+    fn meta(&self, operator: Option<&Operator<'_>>) -> Meta {
+        Meta {
+            grid: self.grid,
+            channels: self.channels as u8,
+            gain_fraction: self.gain_fraction,
+            reference_white: U8F24::from_bits(1 << 23),
+            inverse_error: U0F32::ZERO,
+            bounds: operator.map_or(Bounds::default(), Operator::bounds),
+            channel_scales: self.channel_scales,
         }
-        head
     }
 }
 
@@ -216,8 +197,4 @@ fn halfwords(values: &[u16]) -> Vec<u8> {
         .iter()
         .flat_map(|value| value.to_le_bytes())
         .collect()
-}
-
-fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
-    bytes[field].copy_from_slice(value);
 }

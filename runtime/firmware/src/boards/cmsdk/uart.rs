@@ -1,11 +1,10 @@
-//! UART 0: bytes in and out through rings that its interrupts fill and empty.
+//! UART 0, the serial line: bytes in and out through rings that its interrupts fill and empty.
 //!
 //! A ring that is full masks its interrupt until the loop has made room, so
 //! whatever comes in on the line costs at most [`RECEIVED`] bytes of interrupts
 //! between two rounds of the loop. What the hardware loses meanwhile is counted.
 
-use super::interrupts::Interrupt;
-use super::{HERTZ, Registers};
+use super::{HERTZ, Interrupt, Registers};
 use core::convert::Infallible;
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::NVIC;

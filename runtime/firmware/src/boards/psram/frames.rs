@@ -1,8 +1,8 @@
-//! Frames through the frame memory, with the host at the other end.
+//! Frame source and sink in the PSRAM's frame memory, with the host at the other end.
 
 use crate::board::{FrameSink, FrameSource};
 use core::ops::Range;
-use iltm_runtime::exchange::{
+use iltm_runtime::frame_buffers::{
     AttachError, Broken, Claim, Format, InputCounts, Layout, NativeWords, Presenter, Receiver,
     psram,
 };

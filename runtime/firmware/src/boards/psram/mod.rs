@@ -1,4 +1,4 @@
-//! The emulated boards' PSRAM, which stands for table flash and frame memory.
+//! PSRAM of the emulated boards, which stands for table flash and frame memory.
 //!
 //! This is the one place that turns its addresses into slices.
 
@@ -10,8 +10,8 @@ pub use frames::{PsramSink, PsramSource};
 
 use core::ops::Range;
 use core::sync::atomic::AtomicU32;
-use iltm_runtime::exchange::layout::CONTROL_WORDS;
-use iltm_runtime::exchange::{NativeWords, psram};
+use iltm_runtime::frame_buffers::layout::CONTROL_WORDS;
+use iltm_runtime::frame_buffers::{NativeWords, psram};
 
 unsafe extern "C" {
     /// The PSRAM: a symbol of `memory.x`. Atomics, because the host writes it too.

@@ -1,0 +1,86 @@
+//! Frame path: one frame through a table, or past it.
+
+use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
+use iltm_runtime::frame_buffers::Format;
+use iltm_runtime::image::Table;
+use iltm_runtime::link::PassThrough;
+use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells, compensate_pixels};
+use iltm_runtime::{FrameSize, features};
+
+/// What is done to the frames of a format.
+#[derive(Clone, Copy)]
+pub enum FramePath {
+    /// They are shown as they are.
+    PassThrough(PassThrough),
+    /// They have one pixel a cell.
+    Grid(Encoding),
+    /// They are larger than the grid.
+    Full(Encoding, FrameSize),
+}
+
+impl FramePath {
+    /// What can be done to frames of `format` with a table, and if nothing, why.
+    #[must_use]
+    pub fn new(table: Result<&Table<'_>, PassThrough>, format: Format) -> Self {
+        let table = match table {
+            Ok(table) => table,
+            Err(why) => return Self::PassThrough(why),
+        };
+        let size = format.size();
+        if table.channels() != format.channels() || !size.holds(table.grid()) {
+            return Self::PassThrough(PassThrough::OtherFrames);
+        }
+        if table.grid().cells() > MAX_CELLS {
+            return Self::PassThrough(PassThrough::Memory);
+        }
+        if size == FrameSize::of_grid(table.grid()) {
+            return Self::Grid(format.encoding());
+        }
+        if !features::Stage::FullResolution.is_built() {
+            return Self::PassThrough(PassThrough::OtherFrames);
+        }
+        if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
+            return Self::PassThrough(PassThrough::Memory);
+        }
+        Self::Full(format.encoding(), size)
+    }
+
+    /// Makes the projector's input of a wanted frame with the table that the stage
+    /// was made for; returns how many samples were clipped.
+    ///
+    /// # Errors
+    /// [`FrameError`], which no frame of the stage's format gives.
+    pub fn frame(
+        &self,
+        table: Option<&Table<'static>>,
+        tier: u8,
+        wanted: &[u8],
+        input: &mut [u8],
+        memory: &mut Memory,
+    ) -> Result<u32, FrameError> {
+        match (*self, table) {
+            (Self::PassThrough(_), _) | (_, None) => {
+                for (input, wanted) in input.iter_mut().zip(wanted) {
+                    *input = *wanted;
+                }
+                Ok(0)
+            }
+            (Self::Grid(encoding), Some(table)) => {
+                let mut workspace = memory.workspace();
+                compensate_cells(table, tier, encoding, wanted, input, &mut workspace)
+            }
+            (Self::Full(encoding, size), Some(table)) => {
+                let job = FrameJob {
+                    table,
+                    size,
+                    prepared: memory.is_prepared(table, size),
+                    tier,
+                    encoding,
+                };
+                let (channels, cells) = (table.channels().into(), table.grid().cells());
+                let (mut pixels, mut workspace) = memory.full(channels, cells, size.width());
+                compensate_pixels(&job, wanted, input, &mut pixels, &mut workspace)
+            }
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Table slots: the tables of both, checked, and the one that frames go through.
+
+use crate::board::{Board, TableFlash};
+use crate::frames::Frames;
+use crate::hooks::FrameHooks;
+use iltm_runtime::image::{Checked, Table, content};
+use iltm_runtime::link::PassThrough;
+use iltm_runtime::store::{Slot, TableSlots};
+use iltm_runtime::trust::{Accepted, Rejected, Terms, examine};
+use static_cell::StaticCell;
+
+/// The tables of slot A and slot B, where they are good.
+pub type Tables = [Option<Table<'static>>; 2];
+
+/// Not on the stack: each has room for all segments that an operator may have.
+/// Written at the start rather than copied from the image, which would hold it twice.
+static TABLES: StaticCell<Tables> = StaticCell::new();
+
+/// The places for the tables, once.
+pub(crate) fn take() -> Option<&'static mut Tables> {
+    TABLES.try_init_with(|| [None, None])
+}
+
+/// Not inlined: the table on its way to its place would lie on the stack under the
+/// check, and under the frames that go on meanwhile.
+#[inline(never)]
+fn put(place: &mut Option<Table<'static>>, checked: &Checked<'static>) {
+    *place = Some(checked.table());
+}
+
+impl<B: Board, H: FrameHooks> TableSlots<B::Flash> for Frames<B, H> {
+    fn load(
+        &mut self,
+        flash: &B::Flash,
+        slot: Slot,
+        length: Option<u32>,
+        terms: &Terms,
+    ) -> Result<Accepted, Rejected> {
+        *slot.of_mut(self.tables) = None;
+        let bytes = flash.slot(slot);
+        let file = match length {
+            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
+            None => content(bytes),
+        };
+        let (checked, accepted) = examine(file, terms, &mut || {
+            self.round();
+        })?;
+        put(slot.of_mut(self.tables), &checked);
+        Ok(accepted)
+    }
+
+    fn unload(&mut self, slot: Slot) {
+        *slot.of_mut(self.tables) = None;
+    }
+
+    fn select(&mut self, table: Result<Slot, PassThrough>) {
+        self.in_use = table;
+        self.restage();
+    }
+
+    fn yield_now(&mut self) {
+        self.round();
+    }
+}

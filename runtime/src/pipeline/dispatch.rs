@@ -1,0 +1,89 @@
+//! Dispatch by channels: frames as a device has them, bytes with the channels of a pixel side
+//! by side.
+
+use super::full::FullPipeline;
+use super::grid::GridPipeline;
+use super::sample::Encoding;
+use super::stages::Workspace;
+use super::{FrameError, FullMemory};
+use crate::FrameSize;
+use crate::image::Table;
+
+/// Compensates a frame of one pixel a cell at a tier; returns how many samples were
+/// clipped.
+///
+/// # Errors
+/// As [`GridPipeline::compensate`].
+pub fn compensate_cells(
+    table: &Table<'_>,
+    tier: u8,
+    encoding: Encoding,
+    wanted: &[u8],
+    input: &mut [u8],
+    workspace: &mut Workspace<'_>,
+) -> Result<u32, FrameError> {
+    match table.channels() {
+        1 => cells::<1>(table, tier, encoding, wanted, input, workspace),
+        _ => cells::<3>(table, tier, encoding, wanted, input, workspace),
+    }
+}
+
+fn cells<const C: usize>(
+    table: &Table<'_>,
+    tier: u8,
+    encoding: Encoding,
+    wanted: &[u8],
+    input: &mut [u8],
+    workspace: &mut Workspace<'_>,
+) -> Result<u32, FrameError> {
+    let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
+    GridPipeline::<C>::new(table)?.compensate(tier, encoding, wanted, input, workspace)
+}
+
+/// What is done to a frame larger than the grid.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameJob<'t, 'a> {
+    /// The table that it goes through.
+    pub table: &'t Table<'a>,
+    /// Its size.
+    pub size: FrameSize,
+    /// Whether the memory is prepared for table and size.
+    pub prepared: bool,
+    /// The tier that it goes through.
+    pub tier: u8,
+    /// What its codes mean.
+    pub encoding: Encoding,
+}
+
+/// Compensates a frame larger than the grid, preparing the memory first unless it is;
+/// returns how many samples were clipped.
+///
+/// # Errors
+/// As [`FullPipeline::new`] and [`FullPipeline::compensate`].
+pub fn compensate_pixels(
+    job: &FrameJob<'_, '_>,
+    wanted: &[u8],
+    input: &mut [u8],
+    memory: &mut FullMemory<'_>,
+    workspace: &mut Workspace<'_>,
+) -> Result<u32, FrameError> {
+    match job.table.channels() {
+        1 => pixels::<1>(job, wanted, input, memory, workspace),
+        _ => pixels::<3>(job, wanted, input, memory, workspace),
+    }
+}
+
+fn pixels<const C: usize>(
+    job: &FrameJob<'_, '_>,
+    wanted: &[u8],
+    input: &mut [u8],
+    memory: &mut FullMemory<'_>,
+    workspace: &mut Workspace<'_>,
+) -> Result<u32, FrameError> {
+    let pipeline = FullPipeline::<C>::new(job.table, job.size)?;
+    if !job.prepared {
+        pipeline.prepare(memory)?;
+    }
+    let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
+    pipeline.compensate(job.tier, job.encoding, wanted, input, memory, workspace)
+}
