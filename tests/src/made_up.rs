@@ -1,7 +1,7 @@
 //! Tables that are made up: any gains, ambient light, response and operator, without a
 //! scene behind them.
 
-use fixed::types::U1F15;
+use fixed::types::{U0F32, U1F15, U8F24};
 use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
 use iltm::compile::response;
 use iltm::picture::Response;

@@ -4,7 +4,7 @@
 //! The bench includes this file too, so it takes the writer from its parent.
 
 use super::{ImageWriter, StoredRow, response_codes, segment_bytes};
-use fixed::types::U1F15;
+use fixed::types::{U0F32, U1F15, U8F24};
 use iltm_runtime::{
     Grid,
     haar::Basis,
@@ -12,7 +12,6 @@ use iltm_runtime::{
     operator::{Bounds, Channels, Operator, Segment},
     response::{RESPONSE_KNOTS, knot_drive},
 };
-use std::ops::Range;
 
 /// What a table is to hold.
 #[derive(Clone)]
