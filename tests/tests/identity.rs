@@ -2,8 +2,8 @@
 //! has a key need not fear that it takes tables without.
 
 use ed25519_dalek::SigningKey;
-use iltm::capture::Response as Projector;
 use iltm::compile::sign::{SealTerms, sign};
+use iltm::picture::Response as Projector;
 use iltm_runtime::link::{Fault, Refusal, Request, Response};
 use iltm_runtime::store::identity_record;
 use iltm_runtime::trust::{Rejected, Trust};
