@@ -132,7 +132,9 @@ fn message(attributes: &[Attribute]) -> Option<String> {
     for argument in arguments.iter().skip(1) {
         words = words.replacen("{}", &format!("{{{}}}", named(argument)), 1);
     }
-    Some(words.split_whitespace().collect::<Vec<_>>().join(" "))
+    let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
+    // A brace that is meant is written twice.
+    Some(words.replace("{{", "{").replace("}}", "}"))
 }
 
 /// What an argument of a message is called: the name it is made from.
