@@ -32,12 +32,13 @@ new_enough() {
 missing=()
 command -v cc >/dev/null || missing+=(gcc libc6-dev)
 new_enough || missing+=(cargo-web rustc-web)
+command -v git >/dev/null || missing+=(git)
 command -v qemu-system-arm >/dev/null || missing+=(qemu-system-arm)
 # A desktop without a screen, and what a window on it needs.
 command -v Xvfb >/dev/null || missing+=(xvfb libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 libxrandr2)
 if [ ${#missing[@]} -gt 0 ]; then
     command -v apt-get >/dev/null || {
-        echo "error: this needs Rust $wanted or newer, a C linker, qemu-system-arm and Xvfb; missing: ${missing[*]}. Install them and run this again" >&2
+        echo "error: this needs Rust $wanted or newer, a C linker, git, qemu-system-arm and Xvfb; missing: ${missing[*]}. Install them and run this again" >&2
         exit 1
     }
     install_packages "${missing[@]}"

@@ -54,15 +54,8 @@ pub fn elf_of(board: Board, stages: &str, bin: &'static str) -> PathBuf {
         return path.clone();
     }
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../runtime/firmware/build.sh");
-    // What cargo tells its tests about this build is not meant for that one.
-    let cargos = std::env::vars_os().map(|(name, _)| name).filter(|name| {
-        let name = name.to_string_lossy();
-        name.starts_with("CARGO_") && name != "CARGO_HOME" || name.starts_with("RUSTUP_TOOLCHAIN")
-    });
     let mut command = Command::new("bash");
-    for name in cargos {
-        command.env_remove(name);
-    }
+    without_cargos_variables(&mut command);
     let output = command
         .arg(script)
         .args([board.name(), bin])
@@ -78,6 +71,19 @@ pub fn elf_of(board: Board, stages: &str, bin: &'static str) -> PathBuf {
     let path = PathBuf::from(said.lines().last().expect("the script prints the path"));
     built.insert(key, path.clone());
     path
+}
+
+/// Takes away what cargo tells its tests about their build: it is not meant for another one
+/// that the command starts.
+pub fn without_cargos_variables(command: &mut Command) {
+    for (name, _) in std::env::vars_os() {
+        let text = name.to_string_lossy();
+        if text.starts_with("CARGO_") && text != "CARGO_HOME"
+            || text.starts_with("RUSTUP_TOOLCHAIN")
+        {
+            command.env_remove(name);
+        }
+    }
 }
 
 /// Bytes of flash that an ELF file takes.

@@ -8,7 +8,6 @@ use iltm_tests::reference_pages::{pages, root};
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -102,31 +101,6 @@ fn ranges(rows: &[Vec<&str>]) -> Vec<Range<usize>> {
     };
     let all = rows.iter().flat_map(|row| row[0].split(','));
     all.map(range).collect()
-}
-
-/// `cargo run` without a name must know which program is meant: of the packages that it
-/// takes by itself, one has a binary, and only one binary.
-#[test]
-fn the_command_that_the_readme_begins_with_finds_its_program() {
-    let readme = read(&root().join("README.md"));
-    let first = readme.lines().find(|line| line.starts_with("    "));
-    assert_eq!(first, Some("    cargo run --release -- demo"));
-    let metadata = Command::new(env!("CARGO"))
-        .args(["metadata", "--no-deps", "--format-version=1", "--locked"])
-        .current_dir(root())
-        .output()
-        .unwrap();
-    let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
-    let default = metadata["workspace_default_members"].as_array().unwrap();
-    let packages = metadata["packages"].as_array().unwrap().iter();
-    let targets = packages
-        .filter(|package| default.contains(&package["id"]))
-        .flat_map(|package| package["targets"].as_array().unwrap());
-    let binaries: Vec<&str> = targets
-        .filter(|target| target["kind"][0] == "bin")
-        .filter_map(|target| target["name"].as_str())
-        .collect();
-    assert_eq!(binaries, ["iltm"]);
 }
 
 #[test]

@@ -11,7 +11,9 @@ This page is for those who want to know the limits of the method. It lists scene
 grids and frames that are difficult, the bound that must hold with its theory, and the measured
 result. This command writes the page:
 
-    cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md
+```sh long
+cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md
+```
 
 `cargo test -p iltm-tests --test hard_cases` checks every case.
 

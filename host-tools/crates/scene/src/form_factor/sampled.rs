@@ -12,7 +12,7 @@ const IN_ONE_PLANE: f64 = 1e-15;
 
 /// How much larger than `ellipse^(-2 order)` the error of a Gauss rule on the kernel
 /// gets. With this, 50,000 random pairs stay within their tolerance (`PROPTEST_CASES=50000
-/// cargo test -p iltm --lib far_polygons`).
+/// cargo test -p iltm-scene --lib far_polygons`).
 const KERNEL: f64 = 8.0;
 
 /// A polygon with places on it for Gauss rules of every order.

@@ -1,0 +1,132 @@
+//! Printed commands are run: those of the README and of every page of the site, each page
+//! from its first to its last command, in a fresh clone of the repository.
+//!
+//! **For whoever writes a page:** commands stand in a fenced block marked ```` ```sh ````,
+//! and bash runs the block as it is printed, from the root of the clone. Commands that look
+//! like some but stand in another block fail the test, and so does a page that is not in the
+//! list below. Words behind `sh` say what a block needs:
+//!
+//! | mark | meaning |
+//! |---|---|
+//! | `exit=N` | its last command ends with this code |
+//! | `given=NAME` | the reader has this already: a scene, a picture, a video, a table, or a folder of photographs |
+//! | `hardware=SCENE` | `iltm capture` has a camera and a projector, before this scene of `host-tools/scenes` |
+//! | `device` | a device is connected; `PORT` in a command is its port |
+//! | `keeps-running` | its last command does not end by itself; it goes on until the page ends |
+//! | `long` | takes minutes, or what it does is part of `bash tests/run.sh` anyway |
+//!
+//! Hardware and programs of others are stand-ins: the board is the emulated one, a camera
+//! copies simulated photographs, slides are shown to nobody. Of a long block only programs,
+//! packages, targets and options are looked up, and how many blocks that were is printed. The
+//! full run leaves nothing out, `bash tests/run.sh` in a clone without a target folder
+//! included; it takes about an hour, and the name of a test below chooses one page:
+//!
+//! ```sh
+//! ILTM_PAGES=full cargo test -p iltm --test printed_commands
+//! ```
+
+#![cfg(unix)]
+
+mod follower;
+mod names;
+mod page;
+
+use follower::{Follower, video};
+use page::{Page, pages_in};
+use std::collections::BTreeSet;
+use std::env;
+use std::fs;
+use std::io::{Write, stderr};
+use std::path::{Path, PathBuf};
+
+/// The repository that this test was built from.
+fn root() -> PathBuf {
+    iltm_tests::reference_pages::root()
+}
+
+/// Follows a page; returns the clone in which this was done.
+fn follow(page: &str) -> PathBuf {
+    let full = env::var("ILTM_PAGES").is_ok_and(|pages| pages == "full");
+    let mut follower = Follower::new(page, full);
+    let (mut run, mut left) = (0, 0);
+    for block in Page::read(page).commands() {
+        if follower.follow(block) {
+            run += 1;
+        } else {
+            left += 1;
+        }
+    }
+    // Past the harness, which keeps to itself what a test prints that passes.
+    let _ = writeln!(
+        stderr(),
+        "{page}: {run} blocks run, {left} left to the full run"
+    );
+    follower.finish()
+}
+
+/// A test for each page, with what must be there at its end.
+macro_rules! pages {
+    ($($test:ident, $page:literal, $check:expr;)*) => {
+        /// Pages that print commands.
+        const PAGES: &[&str] = &[$($page),*];
+
+        $(
+            #[test]
+            fn $test() {
+                let check: fn(&Path) = $check;
+                check(&follow($page));
+            }
+        )*
+    };
+}
+
+pages! {
+    the_readme, "README.md", |clone| {
+        there(clone, &["iltm-demo/report.html", "TRADEOFF/tradeoff.html", "BOUNCES", "COMPARE/index.html"]);
+    };
+    the_quick_start, "docs/quick-start.md", |clone| {
+        let page = fs::read_to_string(clone.join("man/iltm-solve.1")).expect("a manual page");
+        assert!(page.contains("iltm\\-solve"), "{page}");
+        let script = fs::read_to_string(clone.join("iltm.bash")).expect("completions");
+        assert!(script.contains("complete -F _iltm"), "{script}");
+    };
+    the_technicians_guide, "docs/guide.md", |clone| {
+        there(clone, &[
+            "foyer-check/check.html",
+            "foyer-report/report.html",
+            "foyer-verify/verdict/verdict.html",
+        ]);
+        let played = fs::read(clone.join("played.y4m")).expect("the player got a video");
+        assert_eq!(played.len(), video(3).len());
+    };
+    the_page_of_the_firmware, "docs/firmware.md", |_| ();
+    the_page_of_flashing, "docs/flashing.md", |_| ();
+    the_page_of_scenes, "docs/scenes.md", |_| ();
+    the_page_of_figures, "docs/measured.md", |_| ();
+    the_results, "docs/results/README.md", |_| ();
+    the_hard_cases, "docs/hard-cases.md", |_| ();
+    the_page_of_gates, "docs/gates.md", |_| ();
+    the_page_of_fuzzing, "docs/fuzzing.md", |_| ();
+    the_page_of_porting, "docs/porting.md", |_| ();
+}
+
+fn there(clone: &Path, names: &[&str]) {
+    for name in names {
+        assert!(clone.join(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn every_page_that_prints_commands_is_followed() {
+    let mut with_commands = BTreeSet::new();
+    for path in pages_in(&root()) {
+        let page = Page::read(&path);
+        let loose = page.loose_commands();
+        assert!(loose.is_empty(), "not in blocks marked ```sh: {loose:?}");
+        if page.commands().next().is_some() {
+            with_commands.insert(page.path);
+        }
+    }
+    let followed: BTreeSet<String> = PAGES.iter().map(|&page| page.to_owned()).collect();
+    assert_eq!(with_commands, followed);
+}
