@@ -13,7 +13,6 @@
 //! | the emulated board, its serial line as a port | [`emulator`] |
 //! | the emulated board's memory, which is a file here | [`memory`] |
 //! | frames for it | [`frames`], [`playback`] |
-//! | lines that fail by order, with the feature `fault-tools` | `fault` |
 //!
 //! What goes over the line is defined in [`iltm_runtime::link`], which the device
 //! uses as well.
@@ -23,8 +22,6 @@ pub mod client;
 #[cfg(unix)]
 pub mod emulator;
 mod error;
-#[cfg(feature = "fault-tools")]
-pub mod fault;
 #[cfg(unix)]
 pub mod frames;
 pub mod logs;
