@@ -5,7 +5,7 @@ use crate::report::ReportError;
 use crate::video::test_scene::TestScene;
 use crate::video::y4m::{Frame, Header, Range, Sampling, Writer, Y4mError};
 use crate::video::{Compensator, Settings, Summary, VideoError};
-use iltm_picture::{LightPicture, Picture, Response, WholeFile, progress::Progress};
+use iltm_picture::{Picture, WholeFile, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use std::io::BufWriter;
 use std::path::Path;
@@ -16,27 +16,12 @@ const RATE: u32 = 25;
 /// Three seconds.
 pub(super) const FRAMES: u64 = 75;
 
-/// What the scene's motion and colours follow from.
-const SEED: u64 = 1;
-
-/// The frame that the report shows: in the middle of things.
+/// The frame that the report shows.
 const STILL: u64 = 40;
 
-/// One frame of the video in another size, from one twice as large: that has less
-/// of the grain, which would be most of a page with many pictures.
+/// One frame of the video, in another size.
 pub(super) fn still(size: FrameSize) -> Picture {
-    let doubled = |side: usize| u16::try_from(2 * side).ok();
-    let large = doubled(size.width()).zip(doubled(size.height()));
-    let large = large.and_then(|(width, height)| FrameSize::new(width, height));
-    let draw = |size| TestScene::new(size, RATE as f32, SEED).frame(STILL);
-    large.map_or_else(
-        || draw(size),
-        |large| {
-            LightPicture::decode(&draw(large), Response::Srgb)
-                .halved()
-                .for_display()
-        },
-    )
+    TestScene::new(size, RATE as f32).frame(STILL)
 }
 
 /// Writes the video, 4:2:0.
@@ -46,7 +31,7 @@ pub(super) fn write(
     progress: &dyn Progress,
 ) -> Result<(), DemoError> {
     let header = Header::new(size, (RATE, 1), Sampling::Chroma420, Range::Limited);
-    let scene = TestScene::new(size, RATE as f32, SEED);
+    let scene = TestScene::new(size, RATE as f32);
     let mut whole = WholeFile::create(path)?;
     let mut writer = Writer::new(BufWriter::new(whole.file()), &header).map_err(wrap)?;
     progress.begin("drawing the test video", FRAMES);

@@ -83,7 +83,7 @@ fn mono_video_that_is_not_changed_comes_back_exactly() {
 /// Frames of the test scene.
 fn scene_stream(line: &str, frames: usize) -> Vec<u8> {
     let header = Header::parse(line.as_bytes()).expect("a header");
-    let scene = TestScene::new(header.size(), 25.0, 1);
+    let scene = TestScene::new(header.size(), 25.0);
     let mut stream = format!("{line}\n").into_bytes();
     for number in 0..frames {
         stream.extend(b"FRAME\n");
