@@ -187,15 +187,13 @@ fn run(case: &Case) -> (f64, f64) {
             std::fs::write(file.path(), &image).expect("a table's file");
             let (bytes, watch) = FileWatch::read(file.path()).expect("the same");
             let live = Live {
-                settings: Settings {
-                    tier: None,
-                    ..settings
-                },
                 budget: Some(Duration::from_millis(16)),
                 newer: &mut || watch.newer(),
                 said: &mut |_| {},
             };
-            let summary = live.y4m(&bytes, input, output, &Silent);
+            let table = Table::check(&bytes).expect("the same table");
+            let compensator = Compensator::new(&table, settings).expect("threads");
+            let summary = compensator.live(live, input, output, &Silent);
             summary.expect("a whole stream").frames.frames
         } else {
             let summary = compensator.y4m(input, output, &Silent);

@@ -9,12 +9,10 @@
 //! full resolution; a smaller one is refused. The result has the size and the
 //! kind of the input.
 
-use super::bands::Bands;
+use super::VideoError;
+use super::bands::{Bands, Interleaved};
 use super::engine::{Engine, Work};
-use super::planar::{Layout, Planar};
-use super::y4m::Reader;
-use super::{VideoError, stream};
-use crate::interleaved::Interleaved;
+use super::live::Live;
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -62,9 +60,9 @@ pub struct Summary {
 /// Compensates frames with one table.
 #[derive(Debug)]
 pub struct Compensator<'t, 'a> {
-    table: &'t Table<'a>,
+    pub(super) table: &'t Table<'a>,
+    settings: Settings,
     tier: u8,
-    encoding: Encoding,
     threads: Arc<ThreadPool>,
 }
 
@@ -75,11 +73,23 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// [`VideoError::NoSuchTier`], or [`VideoError::Threads`] if the threads cannot
     /// be started.
     pub fn new(table: &'t Table<'a>, settings: Settings) -> Result<Self, VideoError> {
-        Self::on(table, settings, Arc::new(threads(settings.threads)?))
+        let threads = ThreadPoolBuilder::new().num_threads(settings.threads);
+        let threads = threads.build().map_err(|error| VideoError::Threads {
+            threads: settings.threads,
+            reason: error.to_string(),
+        })?;
+        Self::on(table, settings, Arc::new(threads))
     }
 
-    /// The same on threads that are there already.
-    pub(super) fn on(
+    /// One for another table, with the same settings, on the same threads.
+    pub(super) fn with_table<'u, 'b>(
+        &self,
+        table: &'u Table<'b>,
+    ) -> Result<Compensator<'u, 'b>, VideoError> {
+        Compensator::on(table, self.settings, Arc::clone(&self.threads))
+    }
+
+    fn on(
         table: &'t Table<'a>,
         settings: Settings,
         threads: Arc<ThreadPool>,
@@ -91,8 +101,8 @@ impl<'t, 'a> Compensator<'t, 'a> {
         }
         Ok(Self {
             table,
+            settings,
             tier,
-            encoding: settings.encoding,
             threads,
         })
     }
@@ -180,7 +190,12 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 },
             ),
         };
-        Ok(summary(work, 1, clipped?))
+        Ok(Summary {
+            size,
+            frames: 1,
+            samples: work.samples() as u64,
+            clipped: clipped?,
+        })
     }
 
     /// Compensates a Y4M stream, frame by frame: memory does not depend on its
@@ -198,50 +213,13 @@ impl<'t, 'a> Compensator<'t, 'a> {
         output: W,
         progress: &dyn Progress,
     ) -> Result<Summary, VideoError> {
-        let reader = Reader::new(input)?;
-        let header = reader.header();
-        let work = self.work(header.size(), Layout::new(header).colours())?;
-        progress.begin("compensate", 0);
-        let result = match self.table.channels() {
-            1 => self.frames::<_, _, 1>(work, reader, output, progress),
-            _ => self.frames::<_, _, 3>(work, reader, output, progress),
+        let unwatched = Live {
+            budget: None,
+            newer: &mut || None,
+            said: &mut |_| (),
         };
-        progress.end();
-        let (frames, clipped) = result?;
-        Ok(summary(work, frames, clipped))
-    }
-
-    /// Every frame of a stream through a table of `C` channels; how many there
-    /// were and how many samples were clipped.
-    fn frames<R: Read + Send, W: Write + Send, const C: usize>(
-        &self,
-        work: Work,
-        reader: Reader<R>,
-        output: W,
-        progress: &dyn Progress,
-    ) -> Result<(u64, u64), VideoError> {
-        let layout = Layout::new(reader.header());
-        let mut engine = self.engine::<Planar, C>(work)?;
-        let mut clipped = 0;
-        let frames = stream::run(reader, output, |frames| {
-            let mut worked = || {
-                frames.work(|frame| {
-                    let mut planar = Planar {
-                        layout,
-                        frame: std::mem::take(frame),
-                    };
-                    let clipped = engine.compensate(&mut planar)?;
-                    *frame = planar.frame;
-                    Ok(clipped)
-                })
-            };
-            while let Some(more) = worked()? {
-                clipped += more;
-                progress.advance(1);
-            }
-            Ok(())
-        })?;
-        Ok((frames, clipped))
+        let summary = unwatched.run(self, input, output, progress)?;
+        Ok(summary.frames)
     }
 
     /// What is to be done to frames of this size and number of colours, if that is
@@ -260,7 +238,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
             size,
             colours,
             tier: self.tier,
-            encoding: self.encoding,
+            encoding: self.settings.encoding,
         })
     }
 
@@ -272,7 +250,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         }
     }
 
-    fn engine<P: Bands, const C: usize>(
+    pub(super) fn engine<P: Bands, const C: usize>(
         &self,
         work: Work,
     ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
@@ -280,26 +258,8 @@ impl<'t, 'a> Compensator<'t, 'a> {
     }
 }
 
-/// Threads that work on the rows, 0 for one a core.
-pub(super) fn threads(threads: usize) -> Result<ThreadPool, VideoError> {
-    let builder = ThreadPoolBuilder::new().num_threads(threads);
-    builder.build().map_err(|error| VideoError::Threads {
-        threads,
-        reason: error.to_string(),
-    })
-}
-
-fn summary(work: Work, frames: u64, clipped: u64) -> Summary {
-    Summary {
-        size: work.size,
-        frames,
-        samples: frames * (work.size.pixels() * work.colours) as u64,
-        clipped,
-    }
-}
-
 /// As many bytes as it takes to know what the input is, or all there are.
-pub fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
+pub(super) fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
     let mut first = Vec::new();
     input
         .take(png::SIGNATURE.len() as u64)

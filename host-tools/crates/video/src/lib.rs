@@ -6,7 +6,7 @@
 //! | YUV to RGB and back | [`yuv`] |
 //! | frames through a table, on all cores | [`compensate`] |
 //! | a table that is replaced while a stream runs, a budget of time | [`live`], [`watch`] |
-//! | a moving picture made by arithmetic, to show and test with | [`test_scene`] |
+//! | a moving scene made by arithmetic, to show and test with | [`test_scene`] |
 //!
 //! The pixels are worked on by [`iltm_runtime::pipeline`], so that every frame
 //! is what the device would show; here is only what brings them to it fast.
@@ -32,7 +32,6 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
-mod interleaved;
 pub mod live;
 mod operator_memory;
 mod planar;

@@ -5,10 +5,9 @@
     reason = "compiled into `engine::rows`, which chooses the processor's instructions"
 )]
 
-use super::bands::{Band, Bands, STRIP};
+use super::bands::{Band, Bands, Interleaved, STRIP};
 use super::y4m::{Frame, Header, Sampling};
 use super::yuv::{Conversion, Standard, repeat_pairs, sum_squares};
-use crate::interleaved::Interleaved;
 use iltm_picture::{Picture, Samples};
 
 /// How the planes of every frame of a stream are laid out and converted.

@@ -19,7 +19,6 @@ pub(super) struct Frames {
     finished: SyncSender<Frame>,
     /// Read and not yet worked on.
     next: Option<Frame>,
-    done: u64,
 }
 
 impl Frames {
@@ -45,16 +44,12 @@ impl Frames {
             return Ok(None);
         };
         let worked = work(&mut frame)?;
-        if self.finished.send(frame).is_err() {
-            return Ok(None);
-        }
-        self.done += 1;
-        Ok(Some(worked))
+        Ok(self.finished.send(frame).is_ok().then_some(worked))
     }
 }
 
 /// Sends the frames of `reader` through `work`, which takes them one after the other, to
-/// `output`; returns how many.
+/// `output`.
 ///
 /// # Errors
 /// What reading, `work` or writing returns. What came before it has been written.
@@ -62,7 +57,7 @@ pub(super) fn run<R: Read + Send, W: Write + Send>(
     reader: Reader<R>,
     output: W,
     work: impl FnOnce(&mut Frames) -> Result<(), VideoError>,
-) -> Result<u64, VideoError> {
+) -> Result<(), VideoError> {
     let header = reader.header().clone();
     let (free, empty) = sync_channel(FRAMES);
     let (filled, read) = sync_channel(FRAMES);
@@ -78,15 +73,13 @@ pub(super) fn run<R: Read + Send, W: Write + Send>(
             read,
             finished,
             next: None,
-            done: 0,
         };
         let worked = work(&mut frames);
-        let count = frames.done;
         // Both threads end when nobody is at the other end.
         drop(frames);
         finish(writing.join())?;
         finish(reading.join())?;
-        worked.map(|()| count)
+        worked
     })
 }
 

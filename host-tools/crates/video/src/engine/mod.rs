@@ -43,6 +43,13 @@ pub(super) struct Work {
     pub(super) encoding: Encoding,
 }
 
+impl Work {
+    /// Samples of a frame.
+    pub(super) const fn samples(&self) -> usize {
+        self.size.pixels() * self.colours
+    }
+}
+
 enum Path<'t, 'a, P: Bands, const C: usize> {
     /// One pixel a cell.
     Cells(Cells<'t, 'a, P::Code, C>),

@@ -69,8 +69,9 @@ fn live(
         });
     };
     let mut output = Vec::new();
-    let summary = Live {
-        settings: settings(Encoding::Display),
+    let table = Table::check(image).unwrap();
+    let compensator = Compensator::new(&table, settings(Encoding::Display)).unwrap();
+    let live = Live {
         budget,
         newer: &mut || {
             asked += 1;
@@ -78,10 +79,9 @@ fn live(
             due.then(|| waiting.pop_front().unwrap().1.to_vec())
         },
         said: &mut events_of,
-    }
-    .y4m(image, input, &mut output, &Silent)
-    .unwrap();
-    (output, summary, events)
+    };
+    let summary = compensator.live(live, input, &mut output, &Silent);
+    (output, summary.unwrap(), events)
 }
 
 fn tables() -> [Vec<u8>; 2] {
