@@ -3,12 +3,12 @@
 use iltm_picture::{Picture, Samples, png};
 use iltm_runtime::FrameSize;
 use iltm_video::{
-    VideoError,
+    Input, VideoError,
     test_scene::TestScene,
-    y4m::{Frame, Reader, Y4mError},
+    y4m::{Frame, Range, Reader, Y4mError},
+    yuv::{Conversion, Standard},
 };
-use std::fs::File;
-use std::io::{Read, Seek};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Frames without an end.
@@ -29,10 +29,12 @@ enum Kind {
     Still(Picture),
     Video {
         path: PathBuf,
-        reader: Box<Reader<File>>,
+        reader: Video,
         frame: Frame,
     },
 }
+
+type Video = Reader<Box<dyn Read + Send>>;
 
 impl Frames {
     /// The moving test scene, `rate` frames a second, each of `channels` (1 or 3)
@@ -55,32 +57,24 @@ impl Frames {
     /// # Errors
     /// [`VideoError`] if the file cannot be read.
     pub fn file(path: &Path, channels: Option<u8>, rate: Option<f64>) -> Result<Self, VideoError> {
-        let mut file = open(path)?;
-        let mut first = [0; png::SIGNATURE.len()];
-        let read = file.read(&mut first).and_then(|count| {
-            file.rewind()?;
-            Ok(count)
-        });
-        let count = read.map_err(|source| VideoError::Read { source })?;
-        if first == png::SIGNATURE {
-            let picture = png::read(file)?;
-            return Ok(Self {
-                size: picture.size(),
-                channels: channels.unwrap_or(picture.channels() as u8),
-                rate: rate.unwrap_or(25.0),
-                kind: Kind::Still(picture),
-            });
-        }
-        if !first[..count].starts_with(b"YUV4MPEG") {
-            return Err(VideoError::UnknownFormat);
-        }
-        let reader = Box::new(Reader::new(file)?);
+        let reader = match Input::open(path)? {
+            Input::Png(file) => {
+                let picture = png::read(file)?;
+                return Ok(Self {
+                    size: picture.size(),
+                    channels: channels.unwrap_or(picture.channels() as u8),
+                    rate: rate.unwrap_or(25.0),
+                    kind: Kind::Still(picture),
+                });
+            }
+            Input::Y4m(file) => video(file)?,
+        };
         let header = reader.header();
         let colours = if header.chroma() == (0, 0) { 1 } else { 3 };
         Ok(Self {
             size: header.size(),
             channels: channels.unwrap_or(colours),
-            rate: rate.or_else(|| own_rate(header.line())).unwrap_or(25.0),
+            rate: rate.or(header.rate()).unwrap_or(25.0),
             kind: Kind::Video {
                 path: path.to_owned(),
                 reader,
@@ -111,9 +105,6 @@ impl Frames {
     ///
     /// # Errors
     /// [`VideoError`] if the file does not go on.
-    ///
-    /// # Panics
-    /// Never: the reader gives frames of the stream's size only.
     pub fn next_frame(&mut self) -> Result<Vec<u8>, VideoError> {
         let picture = match &mut self.kind {
             Kind::Scene { scene, next } => {
@@ -126,43 +117,34 @@ impl Frames {
                 reader,
                 frame,
             } => {
-                if !reader.read_frame(frame)? {
-                    **reader = Reader::new(open(path)?)?;
-                    if !reader.read_frame(frame)? {
-                        return Err(VideoError::Y4m(Y4mError::Truncated {
-                            place: "the first frame".to_owned(),
-                            offset: reader.header().line().len() as u64 + 1,
-                            needed: reader.header().frame_bytes() as u64,
-                            given: 0,
-                        }));
-                    }
+                let mut is_read = reader.read_frame(frame)?;
+                if !is_read {
+                    let Input::Y4m(file) = Input::open(path)? else {
+                        return Err(VideoError::Still);
+                    };
+                    *reader = video(file)?;
+                    is_read = reader.read_frame(frame)?;
                 }
-                let picture = frame.to_picture(reader.header());
-                picture.expect("a frame of the stream")
+                let header = reader.header();
+                let picture = frame.to_picture(header).filter(|_| is_read);
+                picture.ok_or_else(|| Y4mError::Truncated {
+                    place: "the first frame".to_owned(),
+                    offset: header.line().len() as u64 + 1,
+                    needed: header.frame_bytes() as u64,
+                    given: 0,
+                })?
             }
         };
         Ok(samples(&picture, self.channels))
     }
 }
 
-fn open(path: &Path) -> Result<File, VideoError> {
-    File::open(path).map_err(|source| VideoError::File {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-/// The rate in a stream header, such as `F25:1`.
-fn own_rate(line: &[u8]) -> Option<f64> {
-    let line = std::str::from_utf8(line).ok()?;
-    let rate = line.split(' ').find_map(|word| word.strip_prefix('F'))?;
-    let (number, over) = rate.split_once(':')?;
-    let rate = number.parse::<f64>().ok()? / over.parse::<f64>().ok()?;
-    (rate.is_finite() && rate > 0.0).then_some(rate)
+fn video(file: impl Read + Send + 'static) -> Result<Video, Y4mError> {
+    Reader::new(Box::new(file))
 }
 
 /// The samples of a picture in 8 bits and this many channels. Grey of a colour is
-/// its luma by BT.601, in 256ths.
+/// its luma by BT.601.
 fn samples(picture: &Picture, channels: u8) -> Vec<u8> {
     let eight = match picture.samples() {
         Samples::Eight(samples) => samples.clone(),
@@ -172,11 +154,8 @@ fn samples(picture: &Picture, channels: u8) -> Vec<u8> {
         (1, 3) => eight.iter().flat_map(|grey| [*grey; 3]).collect(),
         (3, 1) => {
             let (pixels, _) = eight.as_chunks::<3>();
-            let luma = |[red, green, blue]: &[u8; 3]| {
-                let sum = 77 * u16::from(*red) + 150 * u16::from(*green) + 29 * u16::from(*blue);
-                (sum >> 8) as u8
-            };
-            pixels.iter().map(luma).collect()
+            let conversion = Conversion::new(Standard::Bt601, Range::Full);
+            pixels.iter().map(|pixel| conversion.luma(*pixel)).collect()
         }
         _ => eight,
     }

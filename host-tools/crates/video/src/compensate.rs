@@ -9,10 +9,10 @@
 //! full resolution; a smaller one is refused. The result has the size and the
 //! kind of the input.
 
-use super::VideoError;
 use super::bands::{Bands, Interleaved};
 use super::engine::{Engine, Work};
 use super::live::Live;
+use super::{Input, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -135,18 +135,13 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// [`VideoError::UnknownFormat`].
     pub fn stream<R: Read + Send, W: Write + Send>(
         &self,
-        mut input: R,
+        input: R,
         output: W,
         progress: &dyn Progress,
     ) -> Result<Summary, VideoError> {
-        let first = first_bytes(&mut input).map_err(|source| VideoError::Read { source })?;
-        let whole = first.as_slice().chain(input);
-        if first.starts_with(&png::SIGNATURE) {
-            self.png(whole, output)
-        } else if first.starts_with(b"YUV4MPEG") {
-            self.y4m(whole, output, progress)
-        } else {
-            Err(VideoError::UnknownFormat)
+        match Input::of(input)? {
+            Input::Png(input) => self.png(input, output),
+            Input::Y4m(input) => self.y4m(input, output, progress),
         }
     }
 
@@ -256,13 +251,4 @@ impl<'t, 'a> Compensator<'t, 'a> {
     ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
         Engine::new(self.table, &self.threads, work).map_err(VideoError::Runtime)
     }
-}
-
-/// As many bytes as it takes to know what the input is, or all there are.
-pub(super) fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
-    let mut first = Vec::new();
-    input
-        .take(png::SIGNATURE.len() as u64)
-        .read_to_end(&mut first)?;
-    Ok(first)
 }

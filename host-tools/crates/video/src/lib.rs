@@ -32,10 +32,10 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
+mod input;
 pub mod live;
 mod operator_memory;
 mod planar;
-mod sampled;
 mod stream;
 pub mod test_scene;
 pub mod watch;
@@ -44,8 +44,8 @@ pub mod yuv;
 
 pub use compensate::{Compensator, Settings, Summary};
 pub use error::VideoError;
+pub use input::{Input, sampled_frames};
 pub use operator_memory::OperatorMemory;
-pub use sampled::sampled_frames;
 
 #[cfg(test)]
 mod tests;

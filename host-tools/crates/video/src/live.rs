@@ -5,12 +5,11 @@
 //! [`Governor`] may choose another tier, as on the device. A newer table that cannot be
 //! used changes nothing.
 
-use super::compensate::first_bytes;
 use super::planar::{Layout, Planar};
 use super::stream::{self, Frames};
 use super::y4m::Reader;
-use super::{Compensator, Summary, VideoError};
-use iltm_picture::{png, progress::Progress};
+use super::{Compensator, Input, Summary, VideoError};
+use iltm_picture::progress::Progress;
 use iltm_runtime::{
     governor::{Governor, Reason, TierChange},
     image::{ImageError, Table, unseal},
@@ -88,19 +87,19 @@ impl Compensator<'_, '_> {
     /// only, and with this tier only without a budget.
     ///
     /// # Errors
-    /// Those of [`y4m`](Self::y4m); [`VideoError::Still`] for a picture.
+    /// Those of [`y4m`](Self::y4m), [`VideoError::UnknownFormat`], and
+    /// [`VideoError::Still`] for a picture.
     pub fn live<R: Read + Send, W: Write + Send>(
         &self,
         live: Live<'_>,
-        mut input: R,
+        input: R,
         output: W,
         progress: &dyn Progress,
     ) -> Result<LiveSummary, VideoError> {
-        let first = first_bytes(&mut input).map_err(|source| VideoError::Read { source })?;
-        if first.starts_with(&png::SIGNATURE) {
-            return Err(VideoError::Still);
+        match Input::of(input)? {
+            Input::Png(_) => Err(VideoError::Still),
+            Input::Y4m(input) => live.run(self, input, output, progress),
         }
-        live.run(self, first.chain(input), output, progress)
     }
 }
 

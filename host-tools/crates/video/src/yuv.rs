@@ -167,6 +167,14 @@ impl Conversion {
         }
     }
 
+    /// Luma of a pixel.
+    #[must_use]
+    pub fn luma(&self, [red, green, blue]: [u8; 3]) -> u8 {
+        let mut luma = [0];
+        self.luma_row([&[red], &[green], &[blue]], &mut luma);
+        luma[0]
+    }
+
     /// Luma of a row of colours.
     #[inline(always)]
     pub(super) fn luma_row(&self, [red, green, blue]: [&[u8]; 3], luma: &mut [u8]) {

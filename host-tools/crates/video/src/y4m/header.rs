@@ -5,7 +5,7 @@ use iltm_picture::MAX_PIXELS;
 use iltm_runtime::FrameSize;
 
 /// First bytes of every stream.
-pub(super) const MAGIC: &[u8] = b"YUV4MPEG2";
+pub(crate) const MAGIC: &[u8] = b"YUV4MPEG2";
 
 /// Longest stream header in bytes, its newline included. `FFmpeg` reads at most
 /// 128; comments may be longer.
@@ -37,6 +37,7 @@ pub enum Range {
 pub struct Header {
     line: Vec<u8>,
     size: FrameSize,
+    rate: Option<(u32, u32)>,
     sampling: Sampling,
     range: Range,
 }
@@ -66,6 +67,7 @@ impl Header {
         Self {
             line: line.into_bytes(),
             size,
+            rate: Some(rate),
             sampling,
             range,
         }
@@ -100,6 +102,7 @@ impl Header {
         Ok(Self {
             line: line.to_vec(),
             size: size(width, height)?,
+            rate: fields.rate,
             sampling,
             range: fields.range.unwrap_or(default_range),
         })
@@ -115,6 +118,15 @@ impl Header {
     #[must_use]
     pub const fn size(&self) -> FrameSize {
         self.size
+    }
+
+    /// Frames a second, if the header says so.
+    #[must_use]
+    pub fn rate(&self) -> Option<f64> {
+        let (number, over) = self
+            .rate
+            .filter(|(number, over)| *number > 0 && *over > 0)?;
+        Some(f64::from(number) / f64::from(over))
     }
 
     /// How chroma is sampled.
@@ -196,6 +208,7 @@ impl Tag<'_> {
 struct Fields {
     width: Option<u64>,
     height: Option<u64>,
+    rate: Option<(u32, u32)>,
     sampling: Option<Sampling>,
     range: Option<Range>,
 }
@@ -208,6 +221,10 @@ impl Fields {
         match name {
             b'W' => tag.store(&mut self.width, side(tag, value)?),
             b'H' => tag.store(&mut self.height, side(tag, value)?),
+            b'F' => {
+                self.rate = rate(value);
+                Ok(())
+            }
             b'C' => tag.store(&mut self.sampling, sampling(tag, value)?),
             b'I' => match value {
                 b"p" | b"?" => Ok(()),
@@ -242,6 +259,12 @@ fn side(tag: Tag<'_>, value: &[u8]) -> Result<u64, Y4mError> {
         return Err(tag.error("is zero; a frame has at least one pixel"));
     }
     Ok(number)
+}
+
+/// A fraction such as `30000:1001`.
+fn rate(value: &[u8]) -> Option<(u32, u32)> {
+    let (number, over) = std::str::from_utf8(value).ok()?.split_once(':')?;
+    Some((number.parse().ok()?, over.parse().ok()?))
 }
 
 fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<Sampling, Y4mError> {
