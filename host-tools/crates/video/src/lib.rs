@@ -34,7 +34,6 @@ mod engine;
 mod error;
 mod input;
 pub mod live;
-mod operator_memory;
 mod planar;
 mod stream;
 pub mod test_scene;
@@ -43,9 +42,9 @@ pub mod y4m;
 pub mod yuv;
 
 pub use compensate::{Compensator, Settings, Summary};
+pub use engine::OperatorMemory;
 pub use error::VideoError;
 pub use input::{Input, sampled_frames};
-pub use operator_memory::OperatorMemory;
 
 #[cfg(test)]
 mod tests;

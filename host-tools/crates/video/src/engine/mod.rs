@@ -14,8 +14,10 @@ mod cells;
 mod memory;
 mod rows;
 
+use super::VideoError;
 use super::bands::Bands;
-use super::{OperatorMemory, VideoError};
+pub use memory::OperatorMemory;
+
 use cells::Cells;
 use iltm_runtime::{
     FrameSize,
