@@ -1,7 +1,9 @@
 //! A table's file on its way to a device, whatever happens meanwhile: the host's
 //! transfer against the runtime's own updater over a simulated flash.
 
-use iltm::device::upload::{Parcel, Plan, Step, Unwatched, Upload, UploadError, Watch};
+use iltm::device::upload::{
+    NoObserver, Parcel, Upload, UploadError, UploadObserver, UploadPlan, UploadStep,
+};
 use iltm::device::{Client, DeviceError, Patience};
 use iltm_runtime::link::SlotState;
 use iltm_tests::fake_device::{FakeDevice, FakeLine};
@@ -44,18 +46,18 @@ fn of_device(client: &mut Client<Lossy>) -> &mut FakeTables {
 /// Everything that happens, and an end after some bytes.
 #[derive(Default)]
 struct Seen {
-    steps: Vec<Step>,
+    steps: Vec<UploadStep>,
     stop_at: Option<u32>,
 }
 
-impl Watch for Seen {
-    fn step(&mut self, step: Step) {
+impl UploadObserver for Seen {
+    fn step(&mut self, step: UploadStep) {
         self.steps.push(step);
     }
 
     fn stopped(&self) -> bool {
         let done = self.steps.iter().rev().find_map(|step| match step {
-            Step::Progress { done, .. } => Some(*done),
+            UploadStep::Progress { done, .. } => Some(*done),
             _ => None,
         });
         self.stop_at
@@ -76,7 +78,7 @@ fn a_first_table_arrives_and_is_used_on_trial() {
     assert_eq!((summary.skipped, summary.restarts), (0, 0));
     let in_use = upload.activate(TRIAL, &mut seen).expect("a good table");
     assert!(in_use.table.is_some() && in_use.trial_ms > 290_000);
-    assert_eq!(seen.steps.last(), Some(&Step::Verified));
+    assert_eq!(seen.steps.last(), Some(&UploadStep::Verified));
     let tables = of_device(&mut client);
     assert_eq!(tables.updater().states()[0], SlotState::Trial);
     assert_eq!(tables.contents()[slot(0)][..file.len()], *file);
@@ -98,13 +100,13 @@ fn what_is_there_already_is_not_sent_again() {
     };
     let stopped = Upload::new(&mut client, &parcel).run(&mut seen);
     assert!(matches!(stopped, Err(UploadError::Stopped)), "{stopped:?}");
-    let plan = Plan::make(&mut client, &parcel, || false).expect("a good line");
+    let plan = UploadPlan::make(&mut client, &parcel, || false).expect("a good line");
     // What was on its way has arrived by then.
     let before = of_device(&mut client).writes.len();
     assert!(plan.bytes() <= half + SECTOR as u32 && plan.bytes() > 0);
 
     let mut upload = Upload::new(&mut client, &parcel);
-    let summary = upload.run(&mut Unwatched).expect("a good line");
+    let summary = upload.run(&mut NoObserver).expect("a good line");
     assert_eq!(
         summary.sent,
         u64::from(plan.bytes()),
@@ -114,7 +116,7 @@ fn what_is_there_already_is_not_sent_again() {
     let after = of_device(&mut client).writes.len();
     assert_eq!(after - before, plan.bytes().div_ceil(512) as usize);
 
-    let again = Upload::new(&mut client, &parcel).run(&mut Unwatched);
+    let again = Upload::new(&mut client, &parcel).run(&mut NoObserver);
     assert_eq!(again.expect("a good line").sent, 0);
     assert_eq!(of_device(&mut client).writes.len(), after);
 }
@@ -130,7 +132,7 @@ fn a_device_that_restarts_in_the_middle_gets_the_rest() {
         let mut upload = Upload::new(&mut client, &parcel);
         let summary = upload.run(&mut seen).expect("it goes on");
         assert_eq!(summary.restarts, 1);
-        assert!(seen.steps.contains(&Step::Restarted));
+        assert!(seen.steps.contains(&UploadStep::Restarted));
         upload.activate(TRIAL, &mut seen).expect("all of it");
         let writes = of_device(&mut client).writes.len();
         let (chunks, sector) = (table().len().div_ceil(512), SECTOR / 512);
@@ -143,10 +145,10 @@ fn a_device_that_restarts_before_the_activation_gets_it_again() {
     let parcel = Parcel::new(table());
     let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     let mut upload = Upload::new(&mut client, &parcel);
-    upload.run(&mut Unwatched).expect("a good line");
+    upload.run(&mut NoObserver).expect("a good line");
     client.line().line_mut().far_end_mut().restart();
     let mut upload = Upload::new(&mut client, &parcel);
-    let in_use = upload.activate(TRIAL, &mut Unwatched).expect("again");
+    let in_use = upload.activate(TRIAL, &mut NoObserver).expect("again");
     assert!(in_use.trial_ms > 0);
     let chunks = table().len().div_ceil(512);
     assert_eq!(of_device(&mut client).writes.len(), chunks);
@@ -167,9 +169,9 @@ fn flash(line: &mut Lossy, file: &[u8]) -> Result<(), (Stage, UploadError)> {
     let mut client = client.map_err(|error| (Stage::Hello, error.into()))?;
     let parcel = Parcel::new(file);
     let mut upload = Upload::new(&mut client, &parcel);
-    let sent = upload.run(&mut Unwatched);
+    let sent = upload.run(&mut NoObserver);
     sent.map_err(|error| (Stage::Transfer, error))?;
-    let in_use = upload.activate(TRIAL, &mut Unwatched);
+    let in_use = upload.activate(TRIAL, &mut NoObserver);
     let in_use = in_use.map_err(|error| (Stage::Activate, error))?;
     let table = in_use.table.expect("on trial");
     let confirmed = client.confirm(table.id);
@@ -296,7 +298,7 @@ fn a_device_that_falls_silent_ends_the_transfer_after_half_a_minute() {
     let quiet = seen
         .steps
         .iter()
-        .filter(|step| matches!(step, Step::Quiet { .. }));
+        .filter(|step| matches!(step, UploadStep::Quiet { .. }));
     assert!(quiet.count() > 3, "it is said meanwhile");
     let took = client.line().line().elapsed();
     assert!(
@@ -310,7 +312,7 @@ fn a_line_that_is_cut_ends_the_transfer_at_once() {
     let parcel = Parcel::new(table());
     let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     client.line().unplug_after(20);
-    let error = Upload::new(&mut client, &parcel).run(&mut Unwatched);
+    let error = Upload::new(&mut client, &parcel).run(&mut NoObserver);
     let error = error.expect_err("there is no line any more");
     let gone = matches!(error, UploadError::Device(DeviceError::Gone { .. }));
     assert!(gone, "{error}");
@@ -321,10 +323,10 @@ fn a_clean_line_is_used_to_85_percent() {
     let parcel = Parcel::new(table());
     let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     let before = client.line().line().elapsed();
-    let plan = Plan::make(&mut client, &parcel, || false).expect("a good line");
+    let plan = UploadPlan::make(&mut client, &parcel, || false).expect("a good line");
     assert_eq!(plan.bytes() as usize, table().len());
     Upload::new(&mut client, &parcel)
-        .run(&mut Unwatched)
+        .run(&mut NoObserver)
         .expect("a good line");
     let took = client.line().line().elapsed().saturating_sub(before);
     let share = 10.0 * table().len() as f64 / f64::from(BAUD) / took.as_secs_f64();
@@ -355,7 +357,7 @@ fn a_sector_that_does_not_hold_anything_is_named_after_three_attempts() {
     let repeated = seen
         .steps
         .iter()
-        .filter(|step| **step == Step::Repeated { sector: 2 });
+        .filter(|step| **step == UploadStep::Repeated { sector: 2 });
     assert_eq!(repeated.count(), 2);
     assert_eq!(of_device(&mut client).updater().table(), None);
 }

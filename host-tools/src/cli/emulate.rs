@@ -8,7 +8,7 @@ use super::interrupt;
 use super::output::{Output, cannot_read, cannot_write, read_file};
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
-use crate::device::frames::Frames;
+use crate::device::frame_source::FrameSource;
 use crate::device::memory::Memory;
 use crate::device::playback::{Playback, PlaybackError};
 use crate::user::Folders;
@@ -129,10 +129,10 @@ fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> 
     })
 }
 
-fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<Frames, Failure> {
+fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameSource, Failure> {
     let channels = table.map(Table::channels);
     if let Some(path) = &arguments.frames {
-        let frames = Frames::file(path, channels, arguments.fps);
+        let frames = FrameSource::file(path, channels, arguments.fps);
         return frames.map_err(|error| match error {
             VideoError::File { path, source } => cannot_read(&path, &source),
             error => compensate::failed(&error),
@@ -140,7 +140,7 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<Frames, Fail
     }
     let size = arguments.size.unwrap_or_else(|| scene_size(table));
     let rate = arguments.fps.unwrap_or(RATE);
-    Ok(Frames::scene(size, channels.unwrap_or(3), rate))
+    Ok(FrameSource::scene(size, channels.unwrap_or(3), rate))
 }
 
 /// A size that the emulated board can keep up with.
@@ -153,7 +153,7 @@ fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
     FrameSize::new(width, side(96, FrameSize::height)).expect("neither side is zero")
 }
 
-fn format(frames: &Frames) -> Result<Format, Failure> {
+fn format(frames: &FrameSource) -> Result<Format, Failure> {
     let period = (1e6 / frames.rate()).round().clamp(1.0, 1e8) as u32;
     let format = Format::new(frames.size(), frames.channels(), Encoding::Display, period);
     format.ok_or_else(|| {
@@ -244,7 +244,7 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 fn play(
     emulator: &mut Emulator,
     playback: &mut Playback<'_>,
-    frames: &mut Frames,
+    frames: &mut FrameSource,
 ) -> Result<(), Failure> {
     let period = Duration::from_secs_f64(1.0 / frames.rate());
     let mut due = Instant::now();

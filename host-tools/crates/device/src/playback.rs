@@ -26,12 +26,12 @@ pub struct Playback<'m> {
     source: Source<FileWords>,
     /// Once the board has taken the announcement.
     display: Option<Display<FileWords>>,
-    counts: Counts,
+    counts: PlaybackCounts,
 }
 
 /// What became of the frames, as seen from outside.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Counts {
+pub struct PlaybackCounts {
     /// Given to the board.
     pub given: u64,
     /// That the board had no buffer for.
@@ -54,7 +54,7 @@ impl<'m> Playback<'m> {
             layout: Layout::new(format, region)?,
             source: Source::announce(memory.words()?, region, format)?,
             display: None,
-            counts: Counts::default(),
+            counts: PlaybackCounts::default(),
         })
     }
 
@@ -109,7 +109,7 @@ impl<'m> Playback<'m> {
 
     /// What became of the frames so far.
     #[must_use]
-    pub const fn counts(&self) -> Counts {
+    pub const fn counts(&self) -> PlaybackCounts {
         self.counts
     }
 }
