@@ -7,7 +7,7 @@ use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
 use iltm::{
     picture::{Picture, Response, Samples},
-    video::{Compensator, Settings},
+    video::{CompensateOptions, Compensator},
 };
 use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
@@ -246,7 +246,7 @@ pub fn wait_for_frame(playback: &mut Playback<'_>, end: Instant) -> Vec<u8> {
 /// If it cannot: tables and frames of tests fit each other.
 #[must_use]
 pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Vec<u8>, u64) {
-    let settings = Settings {
+    let settings = CompensateOptions {
         tier: Some(tier),
         encoding: format.encoding(),
         threads: 1,

@@ -5,10 +5,10 @@ use super::failure::{Failure, Kind};
 use super::inspect::check;
 use super::output::{Output, cannot_read, read_file};
 use super::progress::progress;
-use crate::video::live::{Event, Live, LiveSummary, words};
+use crate::video::live::{Live, LiveEvent, LiveSummary, words};
 use crate::video::watch::FileWatch;
 use crate::video::y4m::Y4mError;
-use crate::video::{Compensator, Settings, Summary, VideoError};
+use crate::video::{CompensateOptions, Compensator, FrameTotals, VideoError};
 use iltm_picture::{WholeFile, png::PngError};
 use iltm_runtime::pipeline::Encoding;
 use serde_json::{Value, json};
@@ -60,15 +60,15 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     Ok(())
 }
 
-fn settings(arguments: &Compensate) -> Settings {
-    Settings {
+fn settings(arguments: &Compensate) -> CompensateOptions {
+    CompensateOptions {
         tier: arguments.tier,
         encoding: if arguments.linear {
             Encoding::Linear
         } else {
             Encoding::Display
         },
-        ..Settings::default()
+        ..CompensateOptions::default()
     }
 }
 
@@ -102,7 +102,7 @@ fn is_pipe(path: &Path) -> bool {
 }
 
 /// What was done, for programs and for people.
-fn totals(summary: &Summary, seconds: f64) -> (Value, String) {
+fn totals(summary: &FrameTotals, seconds: f64) -> (Value, String) {
     let share = 100.0 * summary.clipped as f64 / summary.samples.max(1) as f64;
     let data = json!({
         "width": summary.size.width(),
@@ -124,10 +124,10 @@ fn totals(summary: &Summary, seconds: f64) -> (Value, String) {
 }
 
 /// Tells at once what happened between two frames.
-fn say(event: &Event, arguments: &Compensate, output: &Output) {
+fn say(event: &LiveEvent, arguments: &Compensate, output: &Output) {
     let table = arguments.table.display();
     let (data, text) = match event {
-        Event::Tier { frame, change } => (
+        LiveEvent::Tier { frame, change } => (
             json!({
                 "event": "tier",
                 "frame": frame,
@@ -137,13 +137,13 @@ fn say(event: &Event, arguments: &Compensate, output: &Output) {
             }),
             None,
         ),
-        Event::Table { frame, id } => (
+        LiveEvent::Table { frame, id } => (
             json!({ "event": "table", "frame": frame, "id": format!("{id:08x}") }),
             Some(format!(
                 "{table}: the new table {id:08x} is used from frame {frame} on\n"
             )),
         ),
-        Event::Refused { frame, why } => (
+        LiveEvent::Refused { frame, why } => (
             json!({ "event": "refused", "frame": frame, "reason": why.to_string() }),
             Some(format!(
                 "{table}: changed, but {why}; the table before stays in use\n"

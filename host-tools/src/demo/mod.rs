@@ -16,7 +16,7 @@ use crate::capture::CaptureOptions;
 use crate::learn::{Learned, learn};
 use crate::report::{Example, Report, Wanted, stills};
 use crate::solve::SolveOptions;
-use crate::video::Summary;
+use crate::video::FrameTotals;
 use iltm_picture::progress::Progress;
 use iltm_runtime::FrameSize;
 use sample::{make_folder, write_bytes};
@@ -71,7 +71,7 @@ pub struct Outcome {
     /// and compensated, as predicted by the learned transport.
     pub images: Vec<(&'static str, [f64; 3])>,
     /// The video: frames, and how many samples were clipped.
-    pub video: Summary,
+    pub video: FrameTotals,
     /// Bytes of the page.
     pub report_bytes: usize,
     /// Wall-clock seconds by step.

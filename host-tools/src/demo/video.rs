@@ -3,8 +3,8 @@
 use super::DemoError;
 use crate::report::ReportError;
 use crate::video::test_scene::TestScene;
-use crate::video::y4m::{Frame, Header, Range, Sampling, Writer, Y4mError};
-use crate::video::{Compensator, Settings, Summary, VideoError};
+use crate::video::y4m::{ChromaSampling, CodeRange, Header, Writer, Y4mError, YuvFrame};
+use crate::video::{CompensateOptions, Compensator, FrameTotals, VideoError};
 use iltm_picture::{Picture, WholeFile, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use std::io::BufWriter;
@@ -30,7 +30,12 @@ pub(super) fn write(
     size: FrameSize,
     progress: &dyn Progress,
 ) -> Result<(), DemoError> {
-    let header = Header::new(size, (RATE, 1), Sampling::Chroma420, Range::Limited);
+    let header = Header::new(
+        size,
+        (RATE, 1),
+        ChromaSampling::Chroma420,
+        CodeRange::Limited,
+    );
     let scene = TestScene::new(size, RATE as f32);
     let mut whole = WholeFile::create(path)?;
     let mut writer = Writer::new(BufWriter::new(whole.file()), &header).map_err(wrap)?;
@@ -38,7 +43,7 @@ pub(super) fn write(
     for number in 0..FRAMES {
         let picture = scene.frame(number);
         // The scene is as large as the header says, and has the colours of 4:2:0.
-        let frame = Frame::from_picture(&header, &picture).expect("a frame of the stream");
+        let frame = YuvFrame::from_picture(&header, &picture).expect("a frame of the stream");
         writer.write_frame(&frame).map_err(wrap)?;
         progress.advance(1);
     }
@@ -58,8 +63,8 @@ pub(super) fn compensate(
     video: &Path,
     compensated: &Path,
     progress: &dyn Progress,
-) -> Result<Summary, DemoError> {
+) -> Result<FrameTotals, DemoError> {
     let table = Table::check(image).map_err(ReportError::Table)?;
-    let compensator = Compensator::new(&table, Settings::default())?;
+    let compensator = Compensator::new(&table, CompensateOptions::default())?;
     Ok(compensator.file(video, compensated, progress)?)
 }

@@ -5,7 +5,7 @@ use iltm_runtime::FrameSize;
 use iltm_video::{
     Input, VideoError,
     test_scene::TestScene,
-    y4m::{Frame, Range, Reader, Y4mError},
+    y4m::{CodeRange, Reader, Y4mError, YuvFrame},
     yuv::{Conversion, Standard},
 };
 use std::io::Read;
@@ -30,7 +30,7 @@ enum Kind {
     Video {
         path: PathBuf,
         reader: Video,
-        frame: Frame,
+        frame: YuvFrame,
     },
 }
 
@@ -78,7 +78,7 @@ impl FrameSource {
             kind: Kind::Video {
                 path: path.to_owned(),
                 reader,
-                frame: Frame::default(),
+                frame: YuvFrame::default(),
             },
         })
     }
@@ -154,7 +154,7 @@ fn samples(picture: &Picture, channels: u8) -> Vec<u8> {
         (1, 3) => eight.iter().flat_map(|grey| [*grey; 3]).collect(),
         (3, 1) => {
             let (pixels, _) = eight.as_chunks::<3>();
-            let conversion = Conversion::new(Standard::Bt601, Range::Full);
+            let conversion = Conversion::new(Standard::Bt601, CodeRange::Full);
             pixels.iter().map(|pixel| conversion.luma(*pixel)).collect()
         }
         _ => eight,

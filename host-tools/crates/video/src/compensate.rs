@@ -10,7 +10,7 @@
 //! kind of the input.
 
 use super::bands::{Bands, Interleaved};
-use super::engine::{Engine, Work};
+use super::engine::{Engine, FrameJob};
 use super::live::Live;
 use super::{Input, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 /// How frames are to be compensated.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Settings {
+pub struct CompensateOptions {
     /// The tier; by default the table's top one.
     pub tier: Option<u8>,
     /// What the codes of the frames mean.
@@ -33,7 +33,7 @@ pub struct Settings {
     pub threads: usize,
 }
 
-impl Default for Settings {
+impl Default for CompensateOptions {
     fn default() -> Self {
         Self {
             tier: None,
@@ -45,7 +45,7 @@ impl Default for Settings {
 
 /// What has been done.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Summary {
+pub struct FrameTotals {
     /// Size of the frames.
     pub size: FrameSize,
     /// How many frames there were.
@@ -61,7 +61,7 @@ pub struct Summary {
 #[derive(Debug)]
 pub struct Compensator<'t, 'a> {
     pub(super) table: &'t Table<'a>,
-    settings: Settings,
+    settings: CompensateOptions,
     tier: u8,
     threads: Arc<ThreadPool>,
 }
@@ -72,7 +72,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// # Errors
     /// [`VideoError::NoSuchTier`], or [`VideoError::Threads`] if the threads cannot
     /// be started.
-    pub fn new(table: &'t Table<'a>, settings: Settings) -> Result<Self, VideoError> {
+    pub fn new(table: &'t Table<'a>, settings: CompensateOptions) -> Result<Self, VideoError> {
         let threads = ThreadPoolBuilder::new().num_threads(settings.threads);
         let threads = threads.build().map_err(|error| VideoError::Threads {
             threads: settings.threads,
@@ -91,7 +91,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
 
     fn on(
         table: &'t Table<'a>,
-        settings: Settings,
+        settings: CompensateOptions,
         threads: Arc<ThreadPool>,
     ) -> Result<Self, VideoError> {
         let top = table.top_tier();
@@ -117,7 +117,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         input: &Path,
         output: &Path,
         progress: &dyn Progress,
-    ) -> Result<Summary, VideoError> {
+    ) -> Result<FrameTotals, VideoError> {
         let opened = File::open(input).map_err(|source| VideoError::File {
             path: input.to_owned(),
             source,
@@ -138,7 +138,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         input: R,
         output: W,
         progress: &dyn Progress,
-    ) -> Result<Summary, VideoError> {
+    ) -> Result<FrameTotals, VideoError> {
         match Input::of(input)? {
             Input::Png(input) => self.png(input, output),
             Input::Y4m(input) => self.y4m(input, output, progress),
@@ -151,7 +151,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// [`VideoError`] if the input is no readable picture, is smaller than the
     /// grid, is grey with a table of three channels, or the output cannot be
     /// written.
-    pub fn png(&self, input: impl Read, output: impl Write) -> Result<Summary, VideoError> {
+    pub fn png(&self, input: impl Read, output: impl Write) -> Result<FrameTotals, VideoError> {
         let mut picture = png::read(input)?;
         let summary = self.picture(&mut picture)?;
         png::write(output, &picture)?;
@@ -163,13 +163,13 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// # Errors
     /// [`VideoError`] if it is smaller than the grid, or grey with a table of three
     /// channels.
-    pub fn picture(&self, picture: &mut Picture) -> Result<Summary, VideoError> {
+    pub fn picture(&self, picture: &mut Picture) -> Result<FrameTotals, VideoError> {
         let (size, channels) = (picture.size(), picture.channels());
-        let work = self.work(size, channels)?;
+        let job = self.job(size, channels)?;
         let width = size.width();
         let clipped = match picture.samples_mut() {
             Samples::Eight(samples) => self.one(
-                work,
+                job,
                 &mut Interleaved {
                     width,
                     channels,
@@ -177,7 +177,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 },
             ),
             Samples::Sixteen(samples) => self.one(
-                work,
+                job,
                 &mut Interleaved {
                     width,
                     channels,
@@ -185,10 +185,10 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 },
             ),
         };
-        Ok(Summary {
+        Ok(FrameTotals {
             size,
             frames: 1,
-            samples: work.samples() as u64,
+            samples: job.samples() as u64,
             clipped: clipped?,
         })
     }
@@ -207,7 +207,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         input: R,
         output: W,
         progress: &dyn Progress,
-    ) -> Result<Summary, VideoError> {
+    ) -> Result<FrameTotals, VideoError> {
         let unwatched = Live {
             budget: None,
             newer: &mut || None,
@@ -219,7 +219,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
 
     /// What is to be done to frames of this size and number of colours, if that is
     /// possible.
-    pub(super) fn work(&self, size: FrameSize, colours: usize) -> Result<Work, VideoError> {
+    pub(super) fn job(&self, size: FrameSize, colours: usize) -> Result<FrameJob, VideoError> {
         if colours < usize::from(self.table.channels()) {
             return Err(VideoError::GreyFrame);
         }
@@ -229,7 +229,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 grid: self.table.grid(),
             });
         }
-        Ok(Work {
+        Ok(FrameJob {
             size,
             colours,
             tier: self.tier,
@@ -238,17 +238,17 @@ impl<'t, 'a> Compensator<'t, 'a> {
     }
 
     /// A single frame in place; how many samples were clipped.
-    fn one<P: Bands>(&self, work: Work, frame: &mut P) -> Result<u64, VideoError> {
+    fn one<P: Bands>(&self, job: FrameJob, frame: &mut P) -> Result<u64, VideoError> {
         match self.table.channels() {
-            1 => self.engine::<P, 1>(work)?.compensate(frame),
-            _ => self.engine::<P, 3>(work)?.compensate(frame),
+            1 => self.engine::<P, 1>(job)?.compensate(frame),
+            _ => self.engine::<P, 3>(job)?.compensate(frame),
         }
     }
 
     pub(super) fn engine<P: Bands, const C: usize>(
         &self,
-        work: Work,
+        job: FrameJob,
     ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
-        Engine::new(self.table, &self.threads, work).map_err(VideoError::Runtime)
+        Engine::new(self.table, &self.threads, job).map_err(VideoError::Runtime)
     }
 }

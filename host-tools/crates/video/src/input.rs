@@ -1,7 +1,7 @@
 //! Inputs, told apart by their first bytes: PNG pictures and Y4M streams.
 
 use super::VideoError;
-use super::y4m::{Frame, MAGIC, Reader};
+use super::y4m::{MAGIC, Reader, YuvFrame};
 use iltm_picture::{Picture, png};
 use std::fs::File;
 use std::io::{Chain, Cursor, Read};
@@ -68,7 +68,7 @@ pub fn sampled_frames(path: &Path, most: usize) -> Result<Vec<Picture>, VideoErr
     let most = most.max(2);
     let mut reader = Reader::new(whole)?;
     let header = reader.header().clone();
-    let (mut frame, mut frames) = (Frame::default(), Vec::new());
+    let (mut frame, mut frames) = (YuvFrame::default(), Vec::new());
     let (mut number, mut step) = (0_usize, 1_usize);
     while reader.read_frame(&mut frame)? {
         if number.is_multiple_of(step) {

@@ -41,7 +41,7 @@ pub mod watch;
 pub mod y4m;
 pub mod yuv;
 
-pub use compensate::{Compensator, Settings, Summary};
+pub use compensate::{CompensateOptions, Compensator, FrameTotals};
 pub use engine::OperatorMemory;
 pub use error::VideoError;
 pub use input::{Input, sampled_frames};

@@ -5,10 +5,10 @@
 //! [`Governor`] may choose another tier, as on the device. A newer table that cannot be
 //! used changes nothing.
 
-use super::planar::{Layout, Planar};
-use super::stream::{self, Frames};
+use super::planar::{Planar, PlaneLayout};
+use super::stream::{self, FrameQueue};
 use super::y4m::Reader;
-use super::{Compensator, Input, Summary, VideoError};
+use super::{Compensator, FrameTotals, Input, VideoError};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
     governor::{Governor, Reason, TierChange},
@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 /// What happens between two frames.
 #[derive(Debug)]
-pub enum Event {
+pub enum LiveEvent {
     /// The governor chose another tier.
     Tier {
         /// Frames before it.
@@ -39,13 +39,13 @@ pub enum Event {
         /// Frames before that.
         frame: u64,
         /// Why.
-        why: Refusal,
+        why: UnusableTable,
     },
 }
 
 /// Why a newer table was not taken.
 #[derive(Debug, thiserror::Error)]
-pub enum Refusal {
+pub enum UnusableTable {
     /// Its bytes are no table.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -62,14 +62,14 @@ pub struct Live<'l> {
     /// on.
     pub newer: &'l mut dyn FnMut() -> Option<Vec<u8>>,
     /// Told what happens.
-    pub said: &'l mut dyn FnMut(&Event),
+    pub said: &'l mut dyn FnMut(&LiveEvent),
 }
 
 /// What has been done live.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LiveSummary {
     /// Frames, samples, clipped samples.
-    pub frames: Summary,
+    pub frames: FrameTotals,
     /// Frames at each tier, from 0.
     pub tiers: Vec<u64>,
     /// Frames that took longer than the budget to compute.
@@ -113,14 +113,14 @@ impl Live<'_> {
         progress: &dyn Progress,
     ) -> Result<LiveSummary, VideoError> {
         let reader = Reader::new(input)?;
-        let (size, layout) = (reader.header().size(), Layout::new(reader.header()));
-        first.work(size, layout.colours())?;
+        let (size, layout) = (reader.header().size(), PlaneLayout::new(reader.header()));
+        first.job(size, layout.colours())?;
         let mut run = Run {
             live: self,
             layout,
             progress,
             done: LiveSummary {
-                frames: Summary {
+                frames: FrameTotals {
                     size,
                     frames: 0,
                     samples: 0,
@@ -150,7 +150,7 @@ impl Live<'_> {
 /// A stream under way.
 struct Run<'r, 'l> {
     live: Live<'l>,
-    layout: Layout,
+    layout: PlaneLayout,
     progress: &'r dyn Progress,
     done: LiveSummary,
 }
@@ -161,7 +161,7 @@ impl Run<'_, '_> {
     fn frames(
         &mut self,
         compensator: &Compensator<'_, '_>,
-        frames: &mut Frames,
+        frames: &mut FrameQueue,
     ) -> Result<Option<Vec<u8>>, VideoError> {
         match compensator.table.channels() {
             1 => self.frames_of::<1>(compensator, frames),
@@ -173,20 +173,20 @@ impl Run<'_, '_> {
     fn frames_of<const C: usize>(
         &mut self,
         compensator: &Compensator<'_, '_>,
-        frames: &mut Frames,
+        frames: &mut FrameQueue,
     ) -> Result<Option<Vec<u8>>, VideoError> {
         let layout = self.layout;
-        let work = compensator.work(self.done.frames.size, layout.colours())?;
-        let mut engine = compensator.engine::<Planar, C>(work)?;
+        let job = compensator.job(self.done.frames.size, layout.colours())?;
+        let mut engine = compensator.engine::<Planar, C>(job)?;
         let budget = self.live.budget.map(microseconds);
         let mut governor =
-            budget.map(|budget| Governor::for_table(compensator.table, work.samples(), budget));
+            budget.map(|budget| Governor::for_table(compensator.table, job.samples(), budget));
         // Waits for a frame first, so that a table is asked for as late as can be.
         while frames.wait() {
             if let Some(newer) = self.newer(compensator) {
                 return Ok(Some(newer));
             }
-            let tier = governor.as_ref().map_or(work.tier, Governor::tier);
+            let tier = governor.as_ref().map_or(job.tier, Governor::tier);
             let start = Instant::now();
             let worked = frames.work(|frame| {
                 let mut planar = Planar {
@@ -201,13 +201,13 @@ impl Run<'_, '_> {
             let Some(clipped) = worked? else {
                 break;
             };
-            self.done.add(tier, took, work.samples(), clipped);
+            self.done.add(tier, took, job.samples(), clipped);
             self.progress.advance(1);
             if let Some(governor) = &mut governor {
                 let overruns = governor.overruns();
                 if let Some(change) = governor.frame(microseconds(took)) {
                     let frame = self.done.frames.frames;
-                    (self.live.said)(&Event::Tier { frame, change });
+                    (self.live.said)(&LiveEvent::Tier { frame, change });
                 }
                 self.done.overruns += u64::from(governor.overruns() - overruns);
             }
@@ -222,12 +222,12 @@ impl Run<'_, '_> {
         match self.checked(&bytes, compensator) {
             Ok((content, id)) => {
                 self.done.tables += 1;
-                (self.live.said)(&Event::Table { frame, id });
+                (self.live.said)(&LiveEvent::Table { frame, id });
                 Some(content)
             }
             Err(why) => {
                 self.done.refused += 1;
-                (self.live.said)(&Event::Refused { frame, why });
+                (self.live.said)(&LiveEvent::Refused { frame, why });
                 None
             }
         }
@@ -237,11 +237,11 @@ impl Run<'_, '_> {
         &self,
         bytes: &[u8],
         compensator: &Compensator<'_, '_>,
-    ) -> Result<(Vec<u8>, u32), Refusal> {
+    ) -> Result<(Vec<u8>, u32), UnusableTable> {
         let content = unseal(bytes)?.0;
         let table = Table::check(content)?;
         let newer = compensator.with_table(&table)?;
-        newer.work(self.done.frames.size, self.layout.colours())?;
+        newer.job(self.done.frames.size, self.layout.colours())?;
         Ok((content.to_vec(), table.id()))
     }
 }

@@ -5,7 +5,7 @@
 //! for a moment stops nobody, and memory does not depend on the stream's length.
 
 use super::VideoError;
-use super::y4m::{Frame, Header, Reader, Writer, Y4mError};
+use super::y4m::{Header, Reader, Writer, Y4mError, YuvFrame};
 use std::io::{Read, Write};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
@@ -14,14 +14,14 @@ use std::thread;
 const FRAMES: usize = 5;
 
 /// The frames of a stream, one after the other.
-pub(super) struct Frames {
-    read: Receiver<Frame>,
-    finished: SyncSender<Frame>,
+pub(super) struct FrameQueue {
+    read: Receiver<YuvFrame>,
+    finished: SyncSender<YuvFrame>,
     /// Read and not yet worked on.
-    next: Option<Frame>,
+    next: Option<YuvFrame>,
 }
 
-impl Frames {
+impl FrameQueue {
     /// Waits for the next frame; `false` if there is none any more.
     pub(super) fn wait(&mut self) -> bool {
         if self.next.is_none() {
@@ -37,7 +37,7 @@ impl Frames {
     /// What `work` returns; the frame is not handed on then.
     pub(super) fn work<T>(
         &mut self,
-        work: impl FnOnce(&mut Frame) -> Result<T, VideoError>,
+        work: impl FnOnce(&mut YuvFrame) -> Result<T, VideoError>,
     ) -> Result<Option<T>, VideoError> {
         self.wait();
         let Some(mut frame) = self.next.take() else {
@@ -56,7 +56,7 @@ impl Frames {
 pub(super) fn run<R: Read + Send, W: Write + Send>(
     reader: Reader<R>,
     output: W,
-    work: impl FnOnce(&mut Frames) -> Result<(), VideoError>,
+    work: impl FnOnce(&mut FrameQueue) -> Result<(), VideoError>,
 ) -> Result<(), VideoError> {
     let header = reader.header().clone();
     let (free, empty) = sync_channel(FRAMES);
@@ -64,12 +64,12 @@ pub(super) fn run<R: Read + Send, W: Write + Send>(
     let (finished, done) = sync_channel(FRAMES);
     for _ in 0..FRAMES {
         // The channel has room for all, and its other end is here.
-        let _ = free.send(Frame::default());
+        let _ = free.send(YuvFrame::default());
     }
     thread::scope(|scope| {
         let reading = scope.spawn(move || read_all(reader, &empty, &filled));
         let writing = scope.spawn(move || write_all(output, &header, &done, &free));
-        let mut frames = Frames {
+        let mut frames = FrameQueue {
             read,
             finished,
             next: None,
@@ -90,8 +90,8 @@ fn finish(result: thread::Result<Result<(), Y4mError>>) -> Result<(), Y4mError> 
 /// Reads until the end, an error, or nobody takes frames any more.
 fn read_all<R: Read>(
     mut reader: Reader<R>,
-    empty: &Receiver<Frame>,
-    filled: &SyncSender<Frame>,
+    empty: &Receiver<YuvFrame>,
+    filled: &SyncSender<YuvFrame>,
 ) -> Result<(), Y4mError> {
     for mut frame in empty {
         if !reader.read_frame(&mut frame)? || filled.send(frame).is_err() {
@@ -105,8 +105,8 @@ fn read_all<R: Read>(
 fn write_all<W: Write>(
     output: W,
     header: &Header,
-    done: &Receiver<Frame>,
-    free: &SyncSender<Frame>,
+    done: &Receiver<YuvFrame>,
+    free: &SyncSender<YuvFrame>,
 ) -> Result<(), Y4mError> {
     let mut writer = Writer::new(output, header)?;
     for frame in done {

@@ -1,7 +1,7 @@
 //! Memory that is sized once and used for every frame.
 
 use super::super::bands::STRIP;
-use super::Work;
+use super::FrameJob;
 use iltm_runtime::{
     image::Table,
     pipeline::{RowBuffers, Workspace},
@@ -85,17 +85,17 @@ impl RowMemory {
 pub(super) struct Memories<S, M> {
     free: Mutex<Vec<BandMemory<S, M>>>,
     line: usize,
-    work: Work,
+    job: FrameJob,
     cells: usize,
 }
 
 impl<S: Copy + Default, M: Default> Memories<S, M> {
     /// For rows whose [`RowBuffers::line`] needs `line` elements.
-    pub(super) fn new(line: usize, cells: usize, work: Work) -> Self {
+    pub(super) fn new(line: usize, cells: usize, job: FrameJob) -> Self {
         Self {
             free: Mutex::default(),
             line,
-            work,
+            job,
             cells,
         }
     }
@@ -116,7 +116,7 @@ impl<S: Copy + Default, M: Default> Memories<S, M> {
     }
 
     fn create(&self) -> BandMemory<S, M> {
-        let (width, colours) = (self.work.size.width(), self.work.colours);
+        let (width, colours) = (self.job.size.width(), self.job.colours);
         BandMemory {
             conversion: M::default(),
             codes: vec![S::default(); STRIP * width * colours],

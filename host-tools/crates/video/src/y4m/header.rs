@@ -13,7 +13,7 @@ pub(super) const MAX_HEADER: usize = 4096;
 
 /// How many chroma samples there are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Sampling {
+pub enum ChromaSampling {
     /// None: the luma plane is all there is.
     Mono,
     /// One for every square of 2 x 2 pixels; an odd last row or column has its
@@ -25,7 +25,7 @@ pub enum Sampling {
 
 /// Which codes are black and white.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Range {
+pub enum CodeRange {
     /// Luma 16 to 235, chroma 16 to 240.
     Limited,
     /// 0 to 255.
@@ -38,8 +38,8 @@ pub struct Header {
     line: Vec<u8>,
     size: FrameSize,
     rate: Option<(u32, u32)>,
-    sampling: Sampling,
-    range: Range,
+    sampling: ChromaSampling,
+    range: CodeRange,
 }
 
 impl Header {
@@ -47,15 +47,20 @@ impl Header {
     ///
     /// `rate` is the frame rate as a fraction.
     #[must_use]
-    pub fn new(size: FrameSize, rate: (u32, u32), sampling: Sampling, range: Range) -> Self {
+    pub fn new(
+        size: FrameSize,
+        rate: (u32, u32),
+        sampling: ChromaSampling,
+        range: CodeRange,
+    ) -> Self {
         let colour = match sampling {
-            Sampling::Mono => "mono",
-            Sampling::Chroma420 => "420jpeg",
-            Sampling::Chroma444 => "444",
+            ChromaSampling::Mono => "mono",
+            ChromaSampling::Chroma420 => "420jpeg",
+            ChromaSampling::Chroma444 => "444",
         };
         let name = match range {
-            Range::Limited => "LIMITED",
-            Range::Full => "FULL",
+            CodeRange::Limited => "LIMITED",
+            CodeRange::Full => "FULL",
         };
         let line = format!(
             "YUV4MPEG2 W{} H{} F{}:{} Ip A1:1 C{colour} XCOLORRANGE={name}",
@@ -94,10 +99,10 @@ impl Header {
         }
         let side = |tag, value: Option<u64>| value.ok_or(Y4mError::NoSize { tag });
         let (width, height) = (side('W', fields.width)?, side('H', fields.height)?);
-        let sampling = fields.sampling.unwrap_or(Sampling::Chroma420);
+        let sampling = fields.sampling.unwrap_or(ChromaSampling::Chroma420);
         let default_range = match sampling {
-            Sampling::Mono => Range::Full,
-            Sampling::Chroma420 | Sampling::Chroma444 => Range::Limited,
+            ChromaSampling::Mono => CodeRange::Full,
+            ChromaSampling::Chroma420 | ChromaSampling::Chroma444 => CodeRange::Limited,
         };
         Ok(Self {
             line: line.to_vec(),
@@ -131,13 +136,13 @@ impl Header {
 
     /// How chroma is sampled.
     #[must_use]
-    pub const fn sampling(&self) -> Sampling {
+    pub const fn sampling(&self) -> ChromaSampling {
         self.sampling
     }
 
     /// Which codes are black and white.
     #[must_use]
-    pub const fn range(&self) -> Range {
+    pub const fn range(&self) -> CodeRange {
         self.range
     }
 
@@ -145,12 +150,12 @@ impl Header {
     #[must_use]
     pub const fn chroma(&self) -> (usize, usize) {
         match self.sampling {
-            Sampling::Mono => (0, 0),
-            Sampling::Chroma420 => (
+            ChromaSampling::Mono => (0, 0),
+            ChromaSampling::Chroma420 => (
                 self.size.width().div_ceil(2),
                 self.size.height().div_ceil(2),
             ),
-            Sampling::Chroma444 => (self.size.width(), self.size.height()),
+            ChromaSampling::Chroma444 => (self.size.width(), self.size.height()),
         }
     }
 
@@ -209,8 +214,8 @@ struct Fields {
     width: Option<u64>,
     height: Option<u64>,
     rate: Option<(u32, u32)>,
-    sampling: Option<Sampling>,
-    range: Option<Range>,
+    sampling: Option<ChromaSampling>,
+    range: Option<CodeRange>,
 }
 
 impl Fields {
@@ -235,8 +240,8 @@ impl Fields {
                 _ => Err(tag.error("is not a kind of interlacing")),
             },
             b'X' => match value.strip_prefix(b"COLORRANGE=") {
-                Some(b"LIMITED") => tag.store(&mut self.range, Range::Limited),
-                Some(b"FULL") => tag.store(&mut self.range, Range::Full),
+                Some(b"LIMITED") => tag.store(&mut self.range, CodeRange::Limited),
+                Some(b"FULL") => tag.store(&mut self.range, CodeRange::Full),
                 Some(_) => Err(tag.error("is neither LIMITED nor FULL")),
                 None => Ok(()),
             },
@@ -267,11 +272,11 @@ fn rate(value: &[u8]) -> Option<(u32, u32)> {
     Some((number.parse().ok()?, over.parse().ok()?))
 }
 
-fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<Sampling, Y4mError> {
+fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<ChromaSampling, Y4mError> {
     match value {
-        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok(Sampling::Chroma420),
-        b"444" => Ok(Sampling::Chroma444),
-        b"mono" => Ok(Sampling::Mono),
+        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok(ChromaSampling::Chroma420),
+        b"444" => Ok(ChromaSampling::Chroma444),
+        b"mono" => Ok(ChromaSampling::Mono),
         _ => Err(Y4mError::Colour {
             tag: tag.text(),
             offset: tag.offset,

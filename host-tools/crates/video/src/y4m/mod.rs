@@ -26,8 +26,8 @@ mod writer;
 
 pub use error::Y4mError;
 pub(crate) use header::MAGIC;
-pub use header::{Header, Range, Sampling};
-pub use reader::{Frame, Reader};
+pub use header::{ChromaSampling, CodeRange, Header};
+pub use reader::{Reader, YuvFrame};
 pub use writer::Writer;
 
 #[cfg(test)]
