@@ -1,4 +1,4 @@
-//! Finding the device that is meant, and beginning to talk.
+//! Connection to the device that is meant: its port is found and it is greeted.
 
 use super::args::SerialLine;
 use super::failure::{Failure, Kind};

@@ -1,4 +1,4 @@
-//! Why the demo did not come to its end.
+//! Errors of the demo.
 
 use crate::learn::LearnError;
 use crate::report::ReportError;

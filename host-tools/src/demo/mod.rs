@@ -1,4 +1,4 @@
-//! The whole job without hardware: photographs, table, compensated video, report.
+//! Demo of the whole job without hardware: photographs, table, compensated video, report.
 //!
 //! The photographs are real in all but one respect: a path tracer took them, with
 //! a noisy camera. From there on nothing is prepared. The sample is written out,

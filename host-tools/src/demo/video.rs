@@ -1,4 +1,4 @@
-//! A moving picture to compensate.
+//! Video of the demo: the test scene, and its compensation.
 
 use super::DemoError;
 use crate::report::ReportError;

@@ -1,4 +1,4 @@
-//! The host's side of the conversation.
+//! Client of a device: greeting, status, and subscription to its events.
 
 use super::transport::{Incoming, Patience, Transport, name};
 use super::{DeviceError, Line};

@@ -1,4 +1,4 @@
-//! Which ports a device answers at, and at which speed.
+//! Discovery of devices: every port is asked, at one speed after the other.
 
 use super::port::{BAUD, Port};
 use super::port_scan::ListedPort;

@@ -1,4 +1,4 @@
-//! A reference board in QEMU, its serial line as a port of this machine.
+//! Emulator: a reference board in QEMU, its serial line as a port of this machine.
 
 use super::memory::Memory;
 use iltm_runtime::frame_buffers::psram;

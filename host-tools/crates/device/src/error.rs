@@ -1,4 +1,4 @@
-//! Why a device could not be spoken to.
+//! Errors of a conversation with a device, and what to do about each.
 
 use iltm_runtime::{
     link::{PROTOCOL_VERSION, Refusal},

@@ -1,4 +1,4 @@
-//! Wanted frames for a board: the test scene, a picture, or a video over and over.
+//! Sources of frames for a board: the test scene, a picture, or a video over and over.
 
 use iltm_picture::{Picture, Samples, png};
 use iltm_runtime::FrameSize;

@@ -1,4 +1,4 @@
-//! The memory of an emulated board, as a file.
+//! Memory of an emulated board, as a file.
 //!
 //! The emulator maps the file; what either side writes, the other sees. Here it is
 //! read and written through the file rather than mapped, since the system calls

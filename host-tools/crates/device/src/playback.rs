@@ -1,4 +1,4 @@
-//! The projector cable of an emulated board, both ends: frames in, as a capture
+//! Playback to an emulated board, both ends of its projector cable: frames in, as a capture
 //! port's DMA would bring them, and projector input out, as a display would fetch
 //! it.
 

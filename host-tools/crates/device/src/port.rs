@@ -1,4 +1,4 @@
-//! Lines that carry bytes both ways.
+//! Serial ports, and other lines that carry bytes both ways.
 
 use super::DeviceError;
 use serialport::{ClearBuffer, SerialPort};

@@ -1,4 +1,5 @@
-//! Which ports there are, and which of them may be asked.
+//! Scan for serial ports: those of this machine and of emulated boards, and which of them
+//! may be asked.
 //!
 //! Whoever asks a port writes to it, and what is behind it may be no device of ours: a
 //! console, a modem, a relay. So only ports that were plugged in are asked (USB,

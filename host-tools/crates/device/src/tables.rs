@@ -1,4 +1,4 @@
-//! What a host asks about tables. Each request may be repeated without harm, and is
+//! Requests about tables. Each may be repeated without harm, and is
 //! until it is answered.
 
 use super::client::{Client, unexpected};

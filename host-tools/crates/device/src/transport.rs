@@ -1,4 +1,5 @@
-//! Frames out, frames in: what every request has in common.
+//! Transport below the client: requests and answers as frames on a line, sent again until
+//! they are answered.
 
 use super::error::Heard;
 use super::{DeviceError, Line};

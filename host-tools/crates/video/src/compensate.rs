@@ -1,4 +1,4 @@
-//! Frames through a table: pictures, and video as a stream.
+//! Compensation of frames with a table: pictures, and video as a stream.
 //!
 //! | frame | table of one channel | table of three |
 //! |---|---|---|

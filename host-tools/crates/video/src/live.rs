@@ -1,5 +1,5 @@
-//! A stream whose table may be replaced while it runs, and whose tier follows a budget of
-//! time.
+//! Live streams: the table may be replaced while a stream runs, and the tier follows a
+//! budget of time. A stream without either takes the same way.
 //!
 //! Between two frames, and nowhere else, a newer table takes over and the runtime's
 //! [`Governor`] may choose another tier, as on the device. A newer table that cannot be

@@ -1,4 +1,4 @@
-//! Y4M frames as rows of colours.
+//! Planar frames of Y4M as rows of colours, and as pictures.
 
 #![allow(
     clippy::inline_always,

@@ -1,4 +1,4 @@
-//! Reading, working and writing at the same time.
+//! Pipeline of three threads: reading, working and writing at the same time.
 //!
 //! Three threads pass a fixed number of frames round: one reads into them, the
 //! caller's works on them in place, one writes them out. So a pipe that is slow

@@ -1,4 +1,4 @@
-//! Between YUV and RGB codes, in integers.
+//! YUV to RGB codes and back, in integers.
 //!
 //! With `K_r`, `K_b` of the standard, `K_g = 1 - K_r - K_b`, black `y_0` and the
 //! widths `Y` of luma and `C` of chroma of the range, in exact numbers

@@ -1,4 +1,4 @@
-//! What the host can tell before anything is sent.
+//! Preflight: checks of a table against a device before anything is sent.
 
 use super::super::failure::{Failure, Kind};
 use super::super::inspect::check_sealed;

@@ -1,4 +1,4 @@
-//! The live view on a terminal.
+//! Live view on a terminal: draws the lines of the view again as they change.
 
 use super::Show;
 use super::event::MonitorEvent;

@@ -1,4 +1,4 @@
-//! What the live view says, as lines of a given width.
+//! View of a monitored device, as lines of a given width.
 
 use super::super::status;
 use super::event::MonitorEvent;

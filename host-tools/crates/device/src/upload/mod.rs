@@ -1,4 +1,5 @@
-//! Brings a file into the slot that a device does not use, whatever breaks meanwhile.
+//! Upload of a table's file into the slot that a device does not use, whatever breaks
+//! meanwhile.
 //!
 //! ```text
 //! compare the slot's sectors -> begin -> chunks of those that differ -> compare again

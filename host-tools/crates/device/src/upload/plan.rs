@@ -1,4 +1,4 @@
-//! What has to be sent.
+//! Plan of an upload: the sectors that have to be sent.
 
 use super::UploadError;
 use crate::{Client, DeviceError, Line};

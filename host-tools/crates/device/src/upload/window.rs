@@ -1,4 +1,4 @@
-//! Several chunks on their way at once, each until it is in the flash.
+//! Window of an upload: several chunks on their way at once, each until it is in the flash.
 
 use super::plan::{Parcel, UploadPlan};
 use super::{PATIENCE, UploadError, UploadObserver, UploadStep};

@@ -1,4 +1,4 @@
-//! Frames of one pixel a cell.
+//! Cell by cell: frames of one pixel a cell.
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;

@@ -1,4 +1,4 @@
-//! Frames of one size and layout through one table.
+//! Engine of the compensation: frames of one size and layout through one table.
 //!
 //! A frame larger than the grid passes twice, in bands of rows spread over the
 //! threads ([`rows`]): once to become light and to be averaged over the cells,

@@ -1,4 +1,4 @@
-//! Frames larger than the grid, in bands of rows.
+//! Row by row: frames larger than the grid, in bands of rows.
 
 #![allow(
     clippy::inline_always,

@@ -1,4 +1,4 @@
-//! What must not change a single bit.
+//! Exactness: tables and frames that must not change a single bit.
 
 use super::*;
 use proptest::prelude::*;

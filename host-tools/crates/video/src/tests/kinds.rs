@@ -1,4 +1,4 @@
-//! Which frames go with which tables.
+//! Kinds of frames and of tables, and which go together.
 
 use super::*;
 use iltm_picture::{png, png::PngError, progress::Silent};

@@ -1,4 +1,4 @@
-//! The stream header: one line of tags.
+//! Header of a Y4M stream: one line of tags.
 
 use super::Y4mError;
 use iltm_picture::MAX_PIXELS;

@@ -1,4 +1,4 @@
-//! Reading a stream, one frame at a time.
+//! Reader of a Y4M stream, one frame at a time.
 
 use super::Y4mError;
 use super::header::{Header, MAGIC, MAX_HEADER};

@@ -1,4 +1,4 @@
-//! Writing a stream, one frame at a time.
+//! Writer of a Y4M stream, one frame at a time.
 
 use super::reader::FRAME;
 use super::{Header, Y4mError, YuvFrame};
