@@ -3,7 +3,7 @@
 use crate::wedge;
 use iltm::compile::{CompileOptions, FineGains, compile};
 use iltm::device::emulator::Board;
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
 use iltm::{
     picture::{Picture, Response, Samples},
@@ -157,7 +157,7 @@ pub mod word {
 ///
 /// # Panics
 /// If the memory's file cannot be written.
-pub fn order(memory: &Memory, word: usize, value: u32) {
+pub fn order(memory: &BoardMemory, word: usize, value: u32) {
     let at = psram::SELF_TEST.start + 4 * word;
     let written = memory.write(&(at..at + 4), &value.to_le_bytes());
     written.expect("the memory's file can be written");
@@ -168,7 +168,7 @@ pub fn order(memory: &Memory, word: usize, value: u32) {
 /// # Panics
 /// If the memory's file cannot be read.
 #[must_use]
-pub fn finding(memory: &Memory, word: usize) -> u32 {
+pub fn finding(memory: &BoardMemory, word: usize) -> u32 {
     let at = psram::SELF_TEST.start + 4 * word;
     let mut bytes = [0; 4];
     let read = memory.read(&(at..at + 4), &mut bytes);
@@ -179,7 +179,7 @@ pub fn finding(memory: &Memory, word: usize) -> u32 {
 /// QEMU with every instruction taking a nanosecond, so that each run is the same;
 /// `serial` is its option of that name.
 #[must_use]
-pub fn counted(board: Board, elf: &Path, memory: &Memory, serial: &str) -> Command {
+pub fn counted(board: Board, elf: &Path, memory: &BoardMemory, serial: &str) -> Command {
     let mut qemu = Command::new("qemu-system-arm");
     qemu.arg("-machine")
         .arg(format!("{board},memory-backend=psram"))

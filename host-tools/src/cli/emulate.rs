@@ -9,7 +9,7 @@ use super::output::{Output, cannot_read, cannot_write, read_file};
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameSource;
-use crate::device::memory::Memory;
+use crate::device::memory::BoardMemory;
 use crate::device::playback::{Playback, PlaybackError};
 use crate::user::Folders;
 use crate::user::emulated::register;
@@ -83,13 +83,13 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     played
 }
 
-fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
+fn memory(arguments: &Emulate) -> Result<BoardMemory, Failure> {
     let memory = match &arguments.memory {
-        Some(path) => Memory::kept(path).map_err(|error| {
+        Some(path) => BoardMemory::kept(path).map_err(|error| {
             let message = format!("{}: cannot be the board's memory: {error}", path.display());
             Failure::new(Kind::Write, message, "Name a file that is not there yet.")
         })?,
-        None => Memory::temporary().map_err(|error| {
+        None => BoardMemory::temporary().map_err(|error| {
             let message = format!("no file for the board's memory can be made: {error}");
             Failure::new(
                 Kind::Write,
@@ -101,7 +101,7 @@ fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
     Ok(memory)
 }
 
-fn provision(memory: &Memory, path: &Path, device: u64) -> Result<(), Failure> {
+fn provision(memory: &BoardMemory, path: &Path, device: u64) -> Result<(), Failure> {
     let key = read_public_key(path)?;
     let provisioned = memory.provision(key.to_bytes(), device);
     provisioned.map_err(|error| match error.kind() {
@@ -117,7 +117,7 @@ fn provision(memory: &Memory, path: &Path, device: u64) -> Result<(), Failure> {
     })
 }
 
-fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> {
+fn put_table(memory: &BoardMemory, path: &Path, image: &[u8]) -> Result<(), Failure> {
     memory.put_table(image).map_err(|error| {
         let message = format!(
             "{}: does not fit the board's flash: {error}; a slot has {} bytes and the table {}",

@@ -2,7 +2,7 @@
 //! port's DMA would bring them, and projector input out, as a display would fetch
 //! it.
 
-use super::memory::{FileWords, Memory};
+use super::memory::{BoardMemory, FileWords};
 use iltm_runtime::frame_buffers::{Display, Format, Layout, RegionError, Shown, Source, psram};
 use std::io;
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub enum PlaybackError {
 /// Plays frames to a board and takes what it shows.
 #[derive(Debug)]
 pub struct Playback<'m> {
-    memory: &'m Memory,
+    memory: &'m BoardMemory,
     layout: Layout,
     source: Source<FileWords>,
     /// Once the board has taken the announcement.
@@ -47,7 +47,7 @@ impl<'m> Playback<'m> {
     ///
     /// # Errors
     /// [`PlaybackError`].
-    pub fn new(memory: &'m Memory, format: Format) -> Result<Self, PlaybackError> {
+    pub fn new(memory: &'m BoardMemory, format: Format) -> Result<Self, PlaybackError> {
         let region = psram::FRAMES.len();
         Ok(Self {
             memory,
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn frames_go_through_the_file_to_a_board_and_back() {
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         let size = FrameSize::new(4, 2).expect("small");
         let format = Format::new(size, 1, Encoding::Display, 40_000).expect("a format");
         let mut playback = Playback::new(&memory, format).expect("it fits");

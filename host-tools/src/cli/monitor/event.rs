@@ -1,7 +1,7 @@
 //! Events of a monitored device, in words for people and as data for programs.
 
 use super::super::status;
-use crate::device::logs::Message;
+use crate::device::logs::LogMessage;
 use iltm_runtime::link::{Event, Hello, TableReason, TierReason};
 use serde_json::{Value, json};
 
@@ -11,7 +11,7 @@ pub(super) enum MonitorEvent {
     Connected(Hello),
     /// The device says so.
     Device(Event),
-    Log(Message),
+    Log(LogMessage),
     /// Log messages whose words nobody gave.
     UnreadLog {
         bytes: usize,

@@ -50,11 +50,11 @@ pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
     // A first failure ends the command; later ones are the device's business.
     let mut connection = connect(&arguments.line, output)?;
     connection.remember(output);
-    let place = Place {
+    let endpoint = Endpoint {
         port: connection.port,
         baud: connection.baud,
     };
-    let line = &place;
+    let line = &endpoint;
     let first = MonitoredDevice::of(connection.client, period, logs.as_ref());
     let first = first.map_err(|error| Failure::of_device(&line.port, &error))?;
     interrupt::catch();
@@ -86,7 +86,7 @@ pub(super) fn words(firmware: &Path) -> Result<Logs, Failure> {
 }
 
 /// Where the device was found.
-struct Place {
+struct Endpoint {
     port: String,
     baud: u32,
 }
@@ -94,7 +94,7 @@ struct Place {
 /// Shows what happens until somebody stops it.
 fn watch(
     first: MonitoredDevice<'_>,
-    line: &Place,
+    line: &Endpoint,
     period: Duration,
     logs: Option<&Logs>,
     show: &mut dyn Show,
@@ -147,7 +147,11 @@ struct MonitoredDevice<'l> {
 }
 
 impl<'l> MonitoredDevice<'l> {
-    fn begin(line: &Place, period: Duration, logs: Option<&'l Logs>) -> Result<Self, DeviceError> {
+    fn begin(
+        line: &Endpoint,
+        period: Duration,
+        logs: Option<&'l Logs>,
+    ) -> Result<Self, DeviceError> {
         let port = Port::open(&line.port, line.baud)?;
         let client = Client::greet(Wire::new(port), Patience::default())?;
         Self::of(client, period, logs)
