@@ -39,13 +39,13 @@ pub enum LiveEvent {
         /// Frames before that.
         frame: u64,
         /// Why.
-        why: UnusableTable,
+        why: NewTableError,
     },
 }
 
 /// Why a newer table was not taken.
 #[derive(Debug, thiserror::Error)]
-pub enum UnusableTable {
+pub enum NewTableError {
     /// Its bytes are no table.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -237,7 +237,7 @@ impl Run<'_, '_> {
         &self,
         bytes: &[u8],
         compensator: &Compensator<'_, '_>,
-    ) -> Result<(Vec<u8>, u32), UnusableTable> {
+    ) -> Result<(Vec<u8>, u32), NewTableError> {
         let content = unseal(bytes)?.0;
         let table = Table::check(content)?;
         let newer = compensator.with_table(&table)?;
