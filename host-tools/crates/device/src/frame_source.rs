@@ -8,10 +8,11 @@ use iltm_video::{
     y4m::{CodeRange, Reader, Y4mError, YuvFrame},
     yuv::{Conversion, Standard},
 };
-use std::io::Read;
+use std::fs::File;
+use std::io::{Chain, Cursor};
 use std::path::{Path, PathBuf};
 
-/// FrameSource without an end.
+/// Frames without an end.
 #[derive(Debug)]
 pub struct FrameSource {
     kind: Kind,
@@ -29,12 +30,10 @@ enum Kind {
     Still(Picture),
     Video {
         path: PathBuf,
-        reader: Video,
+        reader: Reader<Chain<Cursor<Vec<u8>>, File>>,
         frame: YuvFrame,
     },
 }
-
-type Video = Reader<Box<dyn Read + Send>>;
 
 impl FrameSource {
     /// The moving test scene, `rate` frames a second, each of `channels` (1 or 3)
@@ -67,7 +66,7 @@ impl FrameSource {
                     kind: Kind::Still(picture),
                 });
             }
-            Input::Y4m(file) => video(file)?,
+            Input::Y4m(file) => Reader::new(file)?,
         };
         let header = reader.header();
         let colours = if header.chroma() == (0, 0) { 1 } else { 3 };
@@ -122,7 +121,7 @@ impl FrameSource {
                     let Input::Y4m(file) = Input::open(path)? else {
                         return Err(VideoError::Still);
                     };
-                    *reader = video(file)?;
+                    *reader = Reader::new(file)?;
                     is_read = reader.read_frame(frame)?;
                 }
                 let header = reader.header();
@@ -137,10 +136,6 @@ impl FrameSource {
         };
         Ok(samples(&picture, self.channels))
     }
-}
-
-fn video(file: impl Read + Send + 'static) -> Result<Video, Y4mError> {
-    Reader::new(Box::new(file))
 }
 
 /// The samples of a picture in 8 bits and this many channels. Grey of a colour is
