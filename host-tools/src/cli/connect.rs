@@ -43,9 +43,9 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
     let folders = Folders::of_user();
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
-    let candidates = folders.map(|folders| PortScan::find(&folders, &config));
-    let candidates = candidates.unwrap_or_default();
-    let may_be_asked = |port: &String| !config.excludes(port) && candidates.may_ask_again(port);
+    let scan = folders.map(|folders| PortScan::find(&folders, &config));
+    let scan = scan.unwrap_or_default();
+    let may_be_asked = |port: &String| !config.excludes(port) && scan.may_ask_again(port);
     if let Some(port) = config.port.clone().filter(may_be_asked) {
         let greeted = discovery::greet(&port, line.baud, REMEMBERED, Transcribed::new);
         match greeted {
@@ -56,9 +56,9 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
             Err(_) => output.remark(&format!("no device at {port}; asking the other ports")),
         }
     }
-    let (mut found, silent) = discovery::ask(&candidates.asked, line.baud);
+    let (mut found, silent) = discovery::ask(&scan.asked, line.baud);
     let found = match found.len() {
-        0 => return Err(nobody(&silent, &candidates.unasked)),
+        0 => return Err(nobody(&silent, &scan.unasked)),
         1 => found.remove(0),
         _ => choose(found, output)?,
     };

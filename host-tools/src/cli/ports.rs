@@ -15,8 +15,8 @@ pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
     let folders = Folders::of_user();
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
-    let candidates = folders.map(|folders| PortScan::find(&folders, &config));
-    let PortScan { asked, unasked } = candidates.unwrap_or_default();
+    let scan = folders.map(|folders| PortScan::find(&folders, &config));
+    let PortScan { asked, unasked } = scan.unwrap_or_default();
     let (found, silent) = ask(&asked, arguments.baud);
     let devices = found.iter().map(|found| {
         let mut data = identity(&found.device);

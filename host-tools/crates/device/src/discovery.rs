@@ -34,11 +34,11 @@ pub struct FoundDevice {
 /// have none.
 #[must_use]
 pub fn ask(
-    candidates: &[ListedPort],
+    ports: &[ListedPort],
     baud: Option<u32>,
 ) -> (Vec<FoundDevice>, Vec<(ListedPort, DeviceError)>) {
     let answers = thread::scope(|scope| {
-        let asked: Vec<_> = candidates
+        let asked: Vec<_> = ports
             .iter()
             .map(|port| scope.spawn(move || ask_one(port, baud)))
             .collect();
@@ -47,7 +47,7 @@ pub fn ask(
     });
     let mut found = Vec::new();
     let mut silent = Vec::new();
-    for (port, answer) in candidates.iter().zip(answers) {
+    for (port, answer) in ports.iter().zip(answers) {
         match answer {
             Ok(device) => found.push(device),
             Err(error) => silent.push((port.clone(), error)),
