@@ -18,7 +18,7 @@ use iltm::compile::response::codes as response_codes;
 use iltm::progress::Silent;
 use iltm::video::live::Live;
 use iltm::video::watch::FileWatch;
-use iltm::video::{Compensator, Settings};
+use iltm::video::{CompensateOptions, Compensator};
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
 use sample_table::SampleTable;
@@ -143,10 +143,10 @@ fn run(case: &Case) -> (f64, f64) {
     let grid = Grid::new(case.grid.0, case.grid.1).expect("a small grid");
     let image = SampleTable::random(grid, case.channels, ENTRIES, 1).image();
     let table = Table::check(&image).expect("a sample table is whole");
-    let settings = Settings {
+    let settings = CompensateOptions {
         tier: Some(case.tier),
         threads: case.threads,
-        ..Settings::default()
+        ..CompensateOptions::default()
     };
     let compensator = Compensator::new(&table, settings).expect("threads start");
     let pixels = usize::from(case.width) * usize::from(case.height);
@@ -187,15 +187,13 @@ fn run(case: &Case) -> (f64, f64) {
             std::fs::write(file.path(), &image).expect("a table's file");
             let (bytes, watch) = FileWatch::read(file.path()).expect("the same");
             let live = Live {
-                settings: Settings {
-                    tier: None,
-                    ..settings
-                },
                 budget: Some(Duration::from_millis(16)),
                 newer: &mut || watch.newer(),
                 said: &mut |_| {},
             };
-            let summary = live.y4m(&bytes, input, output, &Silent);
+            let table = Table::check(&bytes).expect("the same table");
+            let compensator = Compensator::new(&table, settings).expect("threads");
+            let summary = compensator.live(live, input, output, &Silent);
             summary.expect("a whole stream").frames.frames
         } else {
             let summary = compensator.y4m(input, output, &Silent);

@@ -2,7 +2,7 @@
 //! of a line in memory or of a pseudo-terminal.
 
 use crate::fake_tables::FakeTables;
-use iltm::device::fault::{FarEnd, PacedLine};
+use crate::line_faults::{FarEnd, PacedLine};
 use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
     Clipping, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode, Name,

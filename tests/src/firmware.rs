@@ -3,11 +3,11 @@
 use crate::wedge;
 use iltm::compile::{CompileOptions, FineGains, compile};
 use iltm::device::emulator::Board;
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
 use iltm::{
     picture::{Picture, Response, Samples},
-    video::{Compensator, Settings},
+    video::{CompensateOptions, Compensator},
 };
 use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::Table;
@@ -163,7 +163,7 @@ pub mod word {
 ///
 /// # Panics
 /// If the memory's file cannot be written.
-pub fn order(memory: &Memory, word: usize, value: u32) {
+pub fn order(memory: &BoardMemory, word: usize, value: u32) {
     let at = psram::SELF_TEST.start + 4 * word;
     let written = memory.write(&(at..at + 4), &value.to_le_bytes());
     written.expect("the memory's file can be written");
@@ -174,7 +174,7 @@ pub fn order(memory: &Memory, word: usize, value: u32) {
 /// # Panics
 /// If the memory's file cannot be read.
 #[must_use]
-pub fn finding(memory: &Memory, word: usize) -> u32 {
+pub fn finding(memory: &BoardMemory, word: usize) -> u32 {
     let at = psram::SELF_TEST.start + 4 * word;
     let mut bytes = [0; 4];
     let read = memory.read(&(at..at + 4), &mut bytes);
@@ -185,7 +185,7 @@ pub fn finding(memory: &Memory, word: usize) -> u32 {
 /// QEMU with every instruction taking a nanosecond, so that each run is the same;
 /// `serial` is its option of that name.
 #[must_use]
-pub fn counted(board: Board, elf: &Path, memory: &Memory, serial: &str) -> Command {
+pub fn counted(board: Board, elf: &Path, memory: &BoardMemory, serial: &str) -> Command {
     let mut qemu = Command::new("qemu-system-arm");
     qemu.arg("-machine")
         .arg(format!("{board},memory-backend=psram"))
@@ -252,7 +252,7 @@ pub fn wait_for_frame(playback: &mut Playback<'_>, end: Instant) -> Vec<u8> {
 /// If it cannot: tables and frames of tests fit each other.
 #[must_use]
 pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Vec<u8>, u64) {
-    let settings = Settings {
+    let settings = CompensateOptions {
         tier: Some(tier),
         encoding: format.encoding(),
         threads: 1,

@@ -10,7 +10,7 @@ use crate::firmware::{counted, elf, order};
 use iltm::compile::content::natural_images;
 use iltm::compile::{CompileOptions, compile};
 use iltm::device::emulator::Board;
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::solve::{ChannelInverse, SolveOptions};
@@ -177,7 +177,7 @@ pub fn count(case: &Case) -> Vec<Count> {
 #[must_use]
 pub fn bench(elf: &Path, image: &[u8], size: FrameSize, executed: Option<&Path>) -> Vec<[u64; 6]> {
     let table = Table::check(image).expect("a table");
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.write(&psram::SLOT_A, image).expect("room");
     let wanted = frame(size, usize::from(table.channels()));
     let frames = psram::FRAMES.start..psram::FRAMES.start + wanted.len();

@@ -12,6 +12,7 @@ pub mod gates;
 pub mod hard_cases;
 pub mod hard_frames;
 pub mod instructions;
+pub mod line_faults;
 pub mod made_up;
 pub mod reference_pages;
 pub mod slots;

@@ -3,7 +3,7 @@
 use iltm::demo::{self, DemoError};
 use iltm::picture::png;
 use iltm::progress::Silent;
-use iltm::video::y4m::{Frame, Reader};
+use iltm::video::y4m::{Reader, YuvFrame};
 use iltm_runtime::image::Table;
 use std::fs::{self, File};
 use std::path::Path;
@@ -25,7 +25,7 @@ fn half_written(folder: &Path) -> Vec<String> {
 
 fn frames(path: &Path) -> u64 {
     let mut reader = Reader::new(File::open(path).expect("a video")).expect("a header");
-    let mut frame = Frame::default();
+    let mut frame = YuvFrame::default();
     let mut frames = 0;
     while reader.read_frame(&mut frame).expect("whole frames") {
         frames += 1;

@@ -2,7 +2,7 @@
 
 use iltm::device::emulator::{Board, Emulator};
 use iltm::device::logs::Logs;
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
 use iltm::device::port::BAUD;
 use iltm::device::{Client, Incoming, Line, Patience, Port};
@@ -56,7 +56,7 @@ fn every_frame_equals_the_hosts(board: Board) {
         let grid = Grid::new(rows, cols).expect("a small grid");
         let image = random_table(grid, channels, effects, seed);
         let table = Table::check(&image).expect("compile checked it");
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         memory.write(&psram::SLOT_A, &image).expect("room");
         let _running = Emulator::start(board, &firmware, &memory).expect("QEMU runs");
         let larger = size(3 * cols + 5, 4 * rows + 1);
@@ -92,8 +92,8 @@ fn every_frame_of_the_an386_equals_the_hosts() {
 }
 
 /// A board that runs the product with this in slot A.
-fn product(board: Board, slot: &[u8]) -> (Memory, Emulator) {
-    let memory = Memory::temporary().expect("a temporary file");
+fn product(board: Board, slot: &[u8]) -> (BoardMemory, Emulator) {
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.write(&psram::SLOT_A, slot).expect("room");
     let firmware = elf(board, "firmware");
     let emulator = Emulator::start(board, &firmware, &memory).expect("QEMU runs");
@@ -221,7 +221,7 @@ fn a_device_without_a_usable_table_passes_frames_through_and_says_why() {
 fn a_good_table_in_the_other_slot_is_used_where_the_first_is_broken() {
     let image = small_table();
     let table = Table::check(&image).expect("compile checked it");
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory
         .write(&psram::SLOT_A, b"ILTM, but no table")
         .expect("room");
@@ -392,8 +392,8 @@ fn the_firmware_fits_in_96_kib_of_flash_and_24_kib_of_ram() {
 
 /// A board that runs the self-test with the small table and one order; frames are
 /// worked on at tier 1.
-fn ordered(board: Board, orders: &[(usize, u32)]) -> (Memory, Emulator) {
-    let memory = Memory::temporary().expect("a temporary file");
+fn ordered(board: Board, orders: &[(usize, u32)]) -> (BoardMemory, Emulator) {
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.write(&psram::SLOT_A, &small_table()).expect("room");
     order(&memory, word::TIER, 2);
     for (word, value) in orders {
@@ -472,7 +472,7 @@ fn a_panic_restarts_the_device_which_says_so_and_compensates_again() {
 }
 
 /// Orders the self-test to play frames of the small table's size by itself.
-fn play(memory: &Memory, frames: u32, period_us: u32) {
+fn play(memory: &BoardMemory, frames: u32, period_us: u32) {
     order(memory, word::FRAMES, frames);
     order(memory, word::SIZE, 8 | 6 << 16);
     order(memory, word::CHANNELS, 3);
@@ -489,7 +489,7 @@ fn play(memory: &Memory, frames: u32, period_us: u32) {
 
 /// One run of the governor under a slow stage: what the self-test found.
 fn governed(board: Board) -> Vec<u32> {
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.write(&psram::SLOT_A, &small_table()).expect("room");
     play(&memory, 1_200, 1_000);
     // Ticks are 40 ns: from frame 300 on a frame takes .28 ms longer and .1 ms more
@@ -554,7 +554,7 @@ fn the_governor_keeps_every_frame_under_a_stage_that_becomes_slow() {
 fn a_million_bytes_of_garbage_on_the_line_disturb_no_frame() {
     let image = small_table();
     let table = Table::check(&image).expect("compile checked it");
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.write(&psram::SLOT_A, &image).expect("room");
     play(&memory, u32::MAX, 1_000);
     // Frames that leave a tenth of their period for everything else. Time passes

@@ -5,7 +5,7 @@ use ed25519_dalek::SigningKey;
 use iltm::compile::sign::{SealTerms, sign};
 use iltm::device::emulator::Board;
 use iltm::device::memory::Memory;
-use iltm::device::upload::{Parcel, Unwatched, Upload, UploadError};
+use iltm::device::upload::{NoObserver, Parcel, Upload, UploadError};
 use iltm::device::{Client, DeviceError, Patience};
 use iltm_runtime::frame_buffers::{Format, Layout, psram};
 use iltm_runtime::image::{Table, crc32};
@@ -134,9 +134,9 @@ fn an_update_misses_no_frame_and_the_new_table_comes_between_two() {
     let before = client.status().expect("an answer");
     let parcel = Parcel::new(&new);
     let mut upload = Upload::new(client, &parcel);
-    let summary = upload.run(&mut Unwatched).expect("a good line");
+    let summary = upload.run(&mut NoObserver).expect("a good line");
     upload
-        .activate(TRIAL, &mut Unwatched)
+        .activate(TRIAL, &mut NoObserver)
         .expect("a good table");
     let slots = client.slots().expect("an answer");
     assert_eq!(slots.slots[1].state, SlotState::Trial);
@@ -186,9 +186,9 @@ fn a_trial_that_nobody_confirms_ends_with_the_old_table() {
     let first = client.status().expect("an answer").table;
     let parcel = Parcel::new(&new);
     let mut upload = Upload::new(client, &parcel);
-    upload.run(&mut Unwatched).expect("a good line");
+    upload.run(&mut NoObserver).expect("a good line");
     let used = upload
-        .activate(Duration::from_secs(2), &mut Unwatched)
+        .activate(Duration::from_secs(2), &mut NoObserver)
         .expect("a good table");
     assert_ne!(used.table, first);
     let end = std::time::Instant::now() + PATIENCE;
@@ -264,9 +264,9 @@ fn the_firmware_refuses_each_bad_table_for_its_own_reason_and_keeps_the_old_one(
     for (file, reason) in cases {
         let parcel = Parcel::new(&file);
         let mut upload = Upload::new(client, &parcel);
-        upload.run(&mut Unwatched).expect("a good line");
+        upload.run(&mut NoObserver).expect("a good line");
         let error = upload
-            .activate(TRIAL, &mut Unwatched)
+            .activate(TRIAL, &mut NoObserver)
             .expect_err("a bad table");
         let refused = match &error {
             UploadError::Device(DeviceError::Refused {
@@ -282,8 +282,8 @@ fn the_firmware_refuses_each_bad_table_for_its_own_reason_and_keeps_the_old_one(
     }
     let parcel = Parcel::new(&good);
     let mut upload = Upload::new(client, &parcel);
-    upload.run(&mut Unwatched).expect("a good line");
+    upload.run(&mut NoObserver).expect("a good line");
     upload
-        .activate(TRIAL, &mut Unwatched)
+        .activate(TRIAL, &mut NoObserver)
         .expect("the same table, good");
 }

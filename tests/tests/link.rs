@@ -1,11 +1,11 @@
 //! Host and device at the two ends of one line, good and bad.
 
-use iltm::device::fault::{Faults, Harm, LossyLine, LossyProxy};
 use iltm::device::port::BAUD;
 use iltm::device::{Client, DeviceError, Incoming, Patience, Port};
 use iltm_runtime::link::{Channel, Decoder, Event, Request, SlotState};
 use iltm_tests::fake_device::{FakeDevice, FakeLine, FakePort};
 use iltm_tests::fuzz;
+use iltm_tests::line_faults::{FaultRates, Faults, LossyLine, LossyProxy};
 use std::time::Duration;
 
 /// Time on a line in memory costs nothing.
@@ -14,15 +14,15 @@ const PATIENT: Patience = Patience {
     tries: 40,
 };
 
-fn client(harm: Harm, seed: u64) -> Client<LossyLine<FakeLine>> {
+fn client(rates: FaultRates, seed: u64) -> Client<LossyLine<FakeLine>> {
     let line = FakeDevice::default().line(BAUD);
-    let line = LossyLine::new(line, Faults::both_ways(harm, seed));
+    let line = LossyLine::new(line, Faults::both_ways(rates, seed));
     Client::greet(line, PATIENT).expect("40 tries are enough")
 }
 
 #[test]
 fn a_host_learns_who_the_device_is_and_how_it_is() {
-    let mut client = client(Harm::default(), 1);
+    let mut client = client(FaultRates::default(), 1);
     assert_eq!(client.device(), &FakeDevice::default().identity());
     let status = client.status().expect("an answer");
     assert_eq!(status.tier, 3);
@@ -31,9 +31,9 @@ fn a_host_learns_who_the_device_is_and_how_it_is() {
 }
 
 #[test]
-fn a_line_that_harms_a_fifth_of_all_frames_carries_every_request() {
+fn a_line_that_damages_a_fifth_of_all_frames_carries_every_request() {
     for seed in 0..50 {
-        let mut client = client(Harm::evenly(200), seed);
+        let mut client = client(FaultRates::evenly(200), seed);
         for _ in 0..20 {
             let status = client.status().expect("40 tries are enough");
             assert_eq!((status.tier, status.top_tier), (3, 5), "seed {seed}");
@@ -43,7 +43,7 @@ fn a_line_that_harms_a_fifth_of_all_frames_carries_every_request() {
 
 #[test]
 fn a_line_that_is_unplugged_is_gone_and_serves_the_next_client_when_it_is_back() {
-    let faults = Faults::both_ways(Harm::default(), 1).unplugged_after(6);
+    let faults = Faults::both_ways(FaultRates::default(), 1).unplugged_after(6);
     let mut line = LossyLine::new(FakeDevice::default().line(BAUD), faults);
     let mut client = Client::greet(&mut line, PATIENT).expect("two frames");
     for _ in 0..2 {
@@ -58,9 +58,9 @@ fn a_line_that_is_unplugged_is_gone_and_serves_the_next_client_when_it_is_back()
 
 #[cfg(unix)]
 #[test]
-fn a_proxy_harms_frames_between_a_port_and_any_client() {
+fn a_proxy_damages_frames_between_a_port_and_any_client() {
     let device = FakePort::new(FakeDevice::default());
-    let faults = Faults::both_ways(Harm::evenly(200), 1);
+    let faults = Faults::both_ways(FaultRates::evenly(200), 1);
     let proxy = LossyProxy::start(device.path(), BAUD, faults).expect("a port");
     for _ in 0..2 {
         let patience = Patience {
@@ -79,7 +79,7 @@ fn a_proxy_harms_frames_between_a_port_and_any_client() {
         "{there:?} {back:?}"
     );
     assert!(
-        there.harmed() > 0 && back.harmed() > 0,
+        there.faulty() > 0 && back.faulty() > 0,
         "{there:?} {back:?}"
     );
 }
@@ -88,7 +88,7 @@ fn a_proxy_harms_frames_between_a_port_and_any_client() {
 #[test]
 fn a_proxy_that_is_unplugged_takes_its_port_with_it() {
     let device = FakePort::new(FakeDevice::default());
-    let faults = Faults::both_ways(Harm::default(), 1).unplugged_after(4);
+    let faults = Faults::both_ways(FaultRates::default(), 1).unplugged_after(4);
     let proxy = LossyProxy::start(device.path(), BAUD, faults).expect("a port");
     let port = Port::open(proxy.path(), BAUD).expect("a pseudo-terminal");
     let mut client = Client::greet(port, Patience::default()).expect("two frames");
@@ -104,11 +104,11 @@ fn a_proxy_that_is_unplugged_takes_its_port_with_it() {
 
 #[test]
 fn events_that_are_lost_on_the_way_are_missed() {
-    let harm = Harm {
+    let rates = FaultRates {
         drop: 300,
-        ..Harm::default()
+        ..FaultRates::default()
     };
-    let mut client = client(harm, 3);
+    let mut client = client(rates, 3);
     let granted = client.subscribe(Duration::from_millis(100));
     assert_eq!(granted.expect("an answer").period.as_millis(), 100);
     let (mut came, mut missed) = (0, 0);
@@ -148,7 +148,7 @@ fn a_silent_line_is_told_from_one_that_talks_nonsense() {
         answer: Duration::from_millis(5),
         tries: 3,
     };
-    let all = Faults::both_ways(Harm::silence(), 1);
+    let all = Faults::both_ways(FaultRates::silence(), 1);
     let line = LossyLine::new(FakeDevice::default().line(BAUD), all);
     let silent = Client::greet(line, patience).expect_err("nothing comes through");
     assert!(silent.to_string().contains("silent"), "{silent}");

@@ -8,7 +8,7 @@ use iltm::device::emulator::{Board, Emulator};
 use iltm::device::memory::Memory;
 use iltm::device::playback::Playback;
 use iltm::device::port::BAUD;
-use iltm::device::upload::{Parcel, Unwatched, Upload, UploadError};
+use iltm::device::upload::{NoObserver, Parcel, Upload, UploadError};
 use iltm::device::{Client, DeviceError, Patience, Port};
 use iltm_runtime::features::Stage;
 use iltm_runtime::frame_buffers::{Format, psram};
@@ -238,9 +238,9 @@ fn a_device_built_without_a_stage_refuses_tables_that_list_it_and_names_it() {
         let image = table_of_one(stage);
         let parcel = Parcel::new(&image);
         let mut upload = Upload::new(&mut client, &parcel);
-        upload.run(&mut Unwatched).expect("a good line");
+        upload.run(&mut NoObserver).expect("a good line");
         let error = upload
-            .activate(Duration::from_mins(5), &mut Unwatched)
+            .activate(Duration::from_mins(5), &mut NoObserver)
             .expect_err("the stage is not there");
         let UploadError::Device(DeviceError::Refused { refusal, .. }) = &error else {
             panic!("{stage:?}: {error}");

@@ -1,13 +1,15 @@
 //! A table's file on its way to a device, whatever happens meanwhile: the host's
 //! transfer against the runtime's own updater over a simulated flash.
 
-use iltm::device::fault::{Faults, Harm, LossyLine};
-use iltm::device::upload::{Parcel, Plan, Step, Unwatched, Upload, UploadError, Watch};
+use iltm::device::upload::{
+    NoObserver, Parcel, Upload, UploadError, UploadObserver, UploadPlan, UploadStep,
+};
 use iltm::device::{Client, DeviceError, Patience};
 use iltm_runtime::link::SlotState;
 use iltm_tests::fake_device::{FakeDevice, FakeLine};
 use iltm_tests::fake_tables::{FakeTables, Flash, SECTOR, slot};
 use iltm_tests::flash_simulator::Wear;
+use iltm_tests::line_faults::{FaultRates, Faults, LossyLine};
 use iltm_tests::wedge_table;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -26,9 +28,9 @@ fn table() -> &'static [u8] {
 
 type Lossy = LossyLine<FakeLine>;
 
-fn client(tables: FakeTables, harm: Harm, seed: u64) -> Client<Lossy> {
+fn client(tables: FakeTables, rates: FaultRates, seed: u64) -> Client<Lossy> {
     let line = FakeDevice::with_tables(tables).line(BAUD);
-    let line = LossyLine::new(line, Faults::both_ways(harm, seed));
+    let line = LossyLine::new(line, Faults::both_ways(rates, seed));
     let patience = Patience {
         tries: 20,
         ..Patience::default()
@@ -44,18 +46,18 @@ fn of_device(client: &mut Client<Lossy>) -> &mut FakeTables {
 /// Everything that happens, and an end after some bytes.
 #[derive(Default)]
 struct Seen {
-    steps: Vec<Step>,
+    steps: Vec<UploadStep>,
     stop_at: Option<u32>,
 }
 
-impl Watch for Seen {
-    fn step(&mut self, step: Step) {
+impl UploadObserver for Seen {
+    fn step(&mut self, step: UploadStep) {
         self.steps.push(step);
     }
 
     fn stopped(&self) -> bool {
         let done = self.steps.iter().rev().find_map(|step| match step {
-            Step::Progress { done, .. } => Some(*done),
+            UploadStep::Progress { done, .. } => Some(*done),
             _ => None,
         });
         self.stop_at
@@ -68,7 +70,7 @@ fn a_first_table_arrives_and_is_used_on_trial() {
     let file = table();
     assert!(file.len() > 6 * SECTOR, "{} bytes", file.len());
     let parcel = Parcel::new(file);
-    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     let mut seen = Seen::default();
     let mut upload = Upload::new(&mut client, &parcel);
     let summary = upload.run(&mut seen).expect("a good line");
@@ -76,7 +78,7 @@ fn a_first_table_arrives_and_is_used_on_trial() {
     assert_eq!((summary.skipped, summary.restarts), (0, 0));
     let in_use = upload.activate(TRIAL, &mut seen).expect("a good table");
     assert!(in_use.table.is_some() && in_use.trial_ms > 290_000);
-    assert_eq!(seen.steps.last(), Some(&Step::Verified));
+    assert_eq!(seen.steps.last(), Some(&UploadStep::Verified));
     let tables = of_device(&mut client);
     assert_eq!(tables.updater().states()[0], SlotState::Trial);
     assert_eq!(tables.contents()[slot(0)][..file.len()], *file);
@@ -90,7 +92,7 @@ fn a_first_table_arrives_and_is_used_on_trial() {
 #[test]
 fn what_is_there_already_is_not_sent_again() {
     let parcel = Parcel::new(table());
-    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     let half = table().len() as u32 / 2;
     let mut seen = Seen {
         stop_at: Some(half),
@@ -98,13 +100,13 @@ fn what_is_there_already_is_not_sent_again() {
     };
     let stopped = Upload::new(&mut client, &parcel).run(&mut seen);
     assert!(matches!(stopped, Err(UploadError::Stopped)), "{stopped:?}");
-    let plan = Plan::make(&mut client, &parcel, || false).expect("a good line");
+    let plan = UploadPlan::make(&mut client, &parcel, || false).expect("a good line");
     // What was on its way has arrived by then.
     let before = of_device(&mut client).writes.len();
     assert!(plan.bytes() <= half + SECTOR as u32 && plan.bytes() > 0);
 
     let mut upload = Upload::new(&mut client, &parcel);
-    let summary = upload.run(&mut Unwatched).expect("a good line");
+    let summary = upload.run(&mut NoObserver).expect("a good line");
     assert_eq!(
         summary.sent,
         u64::from(plan.bytes()),
@@ -114,7 +116,7 @@ fn what_is_there_already_is_not_sent_again() {
     let after = of_device(&mut client).writes.len();
     assert_eq!(after - before, plan.bytes().div_ceil(512) as usize);
 
-    let again = Upload::new(&mut client, &parcel).run(&mut Unwatched);
+    let again = Upload::new(&mut client, &parcel).run(&mut NoObserver);
     assert_eq!(again.expect("a good line").sent, 0);
     assert_eq!(of_device(&mut client).writes.len(), after);
 }
@@ -125,12 +127,12 @@ fn a_device_that_restarts_in_the_middle_gets_the_rest() {
     for after in [1, 9, 20, 41] {
         let mut tables = FakeTables::default();
         tables.restart_after = Some(after);
-        let mut client = client(tables, Harm::default(), 1);
+        let mut client = client(tables, FaultRates::default(), 1);
         let mut seen = Seen::default();
         let mut upload = Upload::new(&mut client, &parcel);
         let summary = upload.run(&mut seen).expect("it goes on");
         assert_eq!(summary.restarts, 1);
-        assert!(seen.steps.contains(&Step::Restarted));
+        assert!(seen.steps.contains(&UploadStep::Restarted));
         upload.activate(TRIAL, &mut seen).expect("all of it");
         let writes = of_device(&mut client).writes.len();
         let (chunks, sector) = (table().len().div_ceil(512), SECTOR / 512);
@@ -141,12 +143,12 @@ fn a_device_that_restarts_in_the_middle_gets_the_rest() {
 #[test]
 fn a_device_that_restarts_before_the_activation_gets_it_again() {
     let parcel = Parcel::new(table());
-    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     let mut upload = Upload::new(&mut client, &parcel);
-    upload.run(&mut Unwatched).expect("a good line");
+    upload.run(&mut NoObserver).expect("a good line");
     client.line().line_mut().far_end_mut().restart();
     let mut upload = Upload::new(&mut client, &parcel);
-    let in_use = upload.activate(TRIAL, &mut Unwatched).expect("again");
+    let in_use = upload.activate(TRIAL, &mut NoObserver).expect("again");
     assert!(in_use.trial_ms > 0);
     let chunks = table().len().div_ceil(512);
     assert_eq!(of_device(&mut client).writes.len(), chunks);
@@ -167,9 +169,9 @@ fn flash(line: &mut Lossy, file: &[u8]) -> Result<(), (Stage, UploadError)> {
     let mut client = client.map_err(|error| (Stage::Hello, error.into()))?;
     let parcel = Parcel::new(file);
     let mut upload = Upload::new(&mut client, &parcel);
-    let sent = upload.run(&mut Unwatched);
+    let sent = upload.run(&mut NoObserver);
     sent.map_err(|error| (Stage::Transfer, error))?;
-    let in_use = upload.activate(TRIAL, &mut Unwatched);
+    let in_use = upload.activate(TRIAL, &mut NoObserver);
     let in_use = in_use.map_err(|error| (Stage::Activate, error))?;
     let table = in_use.table.expect("on trial");
     let confirmed = client.confirm(table.id);
@@ -204,7 +206,7 @@ const NEW: usize = 1;
 
 /// One update a seed from a confirmed old table to a new one. However it ends, frames
 /// go through one of them, whole, and the error fits which.
-fn updates(seeds: Range<u64>, harm: impl Fn(u64) -> Harm) -> Ends {
+fn updates(seeds: Range<u64>, rates: impl Fn(u64) -> FaultRates) -> Ends {
     let (old, new) = (wedge_table(8, 10, 1), wedge_table(8, 12, 1));
     assert!(new.len() > 3 * SECTOR, "{} bytes", new.len());
     let line = FakeDevice::with_tables(FakeTables::default()).line(BAUD);
@@ -215,7 +217,7 @@ fn updates(seeds: Range<u64>, harm: impl Fn(u64) -> Harm) -> Ends {
     let mut ends = Ends::default();
     for seed in seeds {
         let device = FakeDevice::with_tables(FakeTables::new(with_old.clone()));
-        let mut line = LossyLine::new(device.line(BAUD), Faults::both_ways(harm(seed), seed));
+        let mut line = LossyLine::new(device.line(BAUD), Faults::both_ways(rates(seed), seed));
         let result = flash(&mut line, &new);
         ends.longest = ends.longest.max(line.line().elapsed());
         let tables = line.line_mut().far_end_mut().device.tables();
@@ -256,21 +258,23 @@ fn updates(seeds: Range<u64>, harm: impl Fn(u64) -> Harm) -> Ends {
     ends
 }
 
-/// Up to a fifth of the frames come to harm, both ways. `ILTM_TRANSFERS` says in how
+/// Up to a fifth of the frames are faulty, in both directions. `ILTM_TRANSFERS` says in how
 /// many updates.
 #[test]
 fn on_a_bad_line_updates_get_through_to_the_confirmation() {
     let count = std::env::var("ILTM_TRANSFERS").map_or(Ok(1_000), |count| count.parse());
     let count: u64 = count.expect("a number");
-    let ends = updates(0..count, |seed| Harm::evenly((seed % 5 * 50) as u16));
+    let ends = updates(0..count, |seed| FaultRates::evenly((seed % 5 * 50) as u16));
     assert!(ends.whole * 100 >= count * 99, "{ends:?}");
     assert!(ends.longest < Duration::from_mins(2), "{ends:?}");
 }
 
-/// More than half of all frames come to harm.
+/// More than half of all frames are faulty.
 #[test]
 fn on_a_line_that_is_nearly_dead_every_error_says_what_may_be_in_use() {
-    let ends = updates(0..400, |seed| Harm::evenly((500 + seed % 4 * 100) as u16));
+    let ends = updates(0..400, |seed| {
+        FaultRates::evenly((500 + seed % 4 * 100) as u16)
+    });
     let [hello, transfer, activate, confirm] = ends.failed;
     let some = [ends.whole, hello, transfer, activate, confirm];
     assert!(some.iter().all(|count| *count > 0), "{ends:?}");
@@ -286,7 +290,7 @@ fn a_device_that_falls_silent_ends_the_transfer_after_half_a_minute() {
     let parcel = Parcel::new(table());
     let mut tables = FakeTables::default();
     tables.mute_after = Some(7);
-    let mut client = client(tables, Harm::default(), 1);
+    let mut client = client(tables, FaultRates::default(), 1);
     let mut seen = Seen::default();
     let error = Upload::new(&mut client, &parcel).run(&mut seen);
     let error = error.expect_err("nothing comes any more");
@@ -294,7 +298,7 @@ fn a_device_that_falls_silent_ends_the_transfer_after_half_a_minute() {
     let quiet = seen
         .steps
         .iter()
-        .filter(|step| matches!(step, Step::Quiet { .. }));
+        .filter(|step| matches!(step, UploadStep::Quiet { .. }));
     assert!(quiet.count() > 3, "it is said meanwhile");
     let took = client.line().line().elapsed();
     assert!(
@@ -306,9 +310,9 @@ fn a_device_that_falls_silent_ends_the_transfer_after_half_a_minute() {
 #[test]
 fn a_line_that_is_cut_ends_the_transfer_at_once() {
     let parcel = Parcel::new(table());
-    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     client.line().unplug_after(20);
-    let error = Upload::new(&mut client, &parcel).run(&mut Unwatched);
+    let error = Upload::new(&mut client, &parcel).run(&mut NoObserver);
     let error = error.expect_err("there is no line any more");
     let gone = matches!(error, UploadError::Device(DeviceError::Gone { .. }));
     assert!(gone, "{error}");
@@ -317,12 +321,12 @@ fn a_line_that_is_cut_ends_the_transfer_at_once() {
 #[test]
 fn a_clean_line_is_used_to_85_percent() {
     let parcel = Parcel::new(table());
-    let mut client = client(FakeTables::default(), Harm::default(), 1);
+    let mut client = client(FakeTables::default(), FaultRates::default(), 1);
     let before = client.line().line().elapsed();
-    let plan = Plan::make(&mut client, &parcel, || false).expect("a good line");
+    let plan = UploadPlan::make(&mut client, &parcel, || false).expect("a good line");
     assert_eq!(plan.bytes() as usize, table().len());
     Upload::new(&mut client, &parcel)
-        .run(&mut Unwatched)
+        .run(&mut NoObserver)
         .expect("a good line");
     let took = client.line().line().elapsed().saturating_sub(before);
     let share = 10.0 * table().len() as f64 / f64::from(BAUD) / took.as_secs_f64();
@@ -339,7 +343,7 @@ fn a_sector_that_does_not_hold_anything_is_named_after_three_attempts() {
     let parcel = Parcel::new(table());
     let mut flash = Flash::new(67, 1);
     flash.wear_out(2, 0, Wear::StuckBits).expect("a sector");
-    let mut client = client(FakeTables::new(flash), Harm::default(), 1);
+    let mut client = client(FakeTables::new(flash), FaultRates::default(), 1);
     let mut seen = Seen::default();
     let error = Upload::new(&mut client, &parcel).run(&mut seen);
     match error {
@@ -353,7 +357,7 @@ fn a_sector_that_does_not_hold_anything_is_named_after_three_attempts() {
     let repeated = seen
         .steps
         .iter()
-        .filter(|step| **step == Step::Repeated { sector: 2 });
+        .filter(|step| **step == UploadStep::Repeated { sector: 2 });
     assert_eq!(repeated.count(), 2);
     assert_eq!(of_device(&mut client).updater().table(), None);
 }

@@ -1,4 +1,4 @@
-//! Which table a device uses, for whoever wants to know after something went wrong.
+//! Active table of a device, for whoever wants to know after something went wrong.
 
 use super::status::table_name;
 use crate::device::{Client, DeviceError, Line};

@@ -1,4 +1,4 @@
-//! What can be typed.
+//! Arguments of the command line.
 
 use super::failure::Kind;
 use crate::capture::CameraSettings;

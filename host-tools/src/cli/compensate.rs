@@ -1,67 +1,74 @@
 //! `iltm compensate`
 
-mod live;
-
 use super::args::Compensate;
 use super::failure::{Failure, Kind};
 use super::inspect::check;
 use super::output::{Output, cannot_read, read_file};
 use super::progress::progress;
+use crate::video::live::{Live, LiveEvent, LiveSummary, words};
+use crate::video::watch::FileWatch;
 use crate::video::y4m::Y4mError;
-use crate::video::{Compensator, Settings, Summary, VideoError};
+use crate::video::{CompensateOptions, Compensator, FrameTotals, VideoError};
 use iltm_picture::{WholeFile, png::PngError};
 use iltm_runtime::pipeline::Encoding;
 use serde_json::{Value, json};
+use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::Path;
 use std::time::Instant;
 
 pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure> {
-    let piped = is_pipe(&arguments.output);
-    if piped && output.is_json() {
+    if is_pipe(&arguments.output) && output.is_json() {
         return Err(Failure::new(
             Kind::Usage,
             "standard output cannot carry both the frames and JSON",
             "Give a file with --output, or leave --json away.",
         ));
     }
-    if arguments.watch || arguments.budget.is_some() {
-        return live::run(arguments, piped, output);
-    }
-    let image = read_file(&arguments.table)?;
-    let table = check(&arguments.table, &image)?;
+    let path = &arguments.table;
+    let (image, watch) = if arguments.watch {
+        let read = FileWatch::read(path).map_err(|error| cannot_read(path, &error))?;
+        (read.0, Some(read.1))
+    } else {
+        (read_file(path)?, None)
+    };
+    let table = check(path, &image)?;
     let settings = settings(arguments);
     let compensator = Compensator::new(&table, settings).map_err(|error| failed(&error))?;
     let input = opened(&arguments.input)?;
     let bars = progress(output);
     let start = Instant::now();
-    let summary = if piped {
-        let summary = compensator.stream(input, io::stdout(), bars.as_ref());
-        summary.map_err(|error| failed(&error))?
-    } else {
-        let mut whole =
-            WholeFile::create(&arguments.output).map_err(|e| of_kind(Kind::Write, &e.into()))?;
-        let summary = compensator.stream(input, whole.file(), bars.as_ref());
-        let summary = summary.map_err(|error| failed(&error))?;
-        whole
-            .finish()
-            .map_err(|e| of_kind(Kind::Write, &e.into()))?;
-        summary
-    };
-    report(&summary, start.elapsed().as_secs_f64(), output);
+    let (summary, live) = written(&arguments.output, |out| {
+        if watch.is_none() && arguments.budget.is_none() {
+            let summary = compensator.stream(input, out, bars.as_ref())?;
+            return Ok((summary, None));
+        }
+        let live = Live {
+            budget: arguments.budget,
+            newer: &mut || watch.as_ref().and_then(FileWatch::newer),
+            said: &mut |event| say(event, arguments, output),
+        };
+        let summary = compensator.live(live, input, out, bars.as_ref())?;
+        Ok((summary.frames, Some(summary)))
+    })?;
+    let (mut data, mut text) = totals(&summary, start.elapsed().as_secs_f64());
+    if let Some(live) = live {
+        add_live(&live, arguments, &mut data, &mut text);
+    }
+    output.result(&data, &text);
     Ok(())
 }
 
-fn settings(arguments: &Compensate) -> Settings {
-    Settings {
+fn settings(arguments: &Compensate) -> CompensateOptions {
+    CompensateOptions {
         tier: arguments.tier,
         encoding: if arguments.linear {
             Encoding::Linear
         } else {
             Encoding::Display
         },
-        ..Settings::default()
+        ..CompensateOptions::default()
     }
 }
 
@@ -74,18 +81,28 @@ fn opened(input: &Path) -> Result<Box<dyn Read + Send>, Failure> {
     Ok(Box::new(file))
 }
 
+/// What `write` writes, on standard output, or in a file that is there whole or not at all.
+fn written<T>(
+    path: &Path,
+    write: impl FnOnce(&mut (dyn Write + Send)) -> Result<T, VideoError>,
+) -> Result<T, Failure> {
+    if is_pipe(path) {
+        return write(&mut io::stdout()).map_err(|error| failed(&error));
+    }
+    let unwritten = |error| of_kind(Kind::Write, &VideoError::from(error));
+    let mut whole = WholeFile::create(path).map_err(unwritten)?;
+    let done = write(whole.file()).map_err(|error| failed(&error))?;
+    whole.finish().map_err(unwritten)?;
+    Ok(done)
+}
+
 /// `-` stands for standard input or output.
 fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-fn report(summary: &Summary, seconds: f64, output: &Output) {
-    let (data, text) = said(summary, seconds);
-    output.result(&data, &text);
-}
-
 /// What was done, for programs and for people.
-fn said(summary: &Summary, seconds: f64) -> (Value, String) {
+fn totals(summary: &FrameTotals, seconds: f64) -> (Value, String) {
     let share = 100.0 * summary.clipped as f64 / summary.samples.max(1) as f64;
     let data = json!({
         "width": summary.size.width(),
@@ -106,6 +123,82 @@ fn said(summary: &Summary, seconds: f64) -> (Value, String) {
     (data, text)
 }
 
+/// Tells at once what happened between two frames.
+fn say(event: &LiveEvent, arguments: &Compensate, output: &Output) {
+    let table = arguments.table.display();
+    let (data, text) = match event {
+        LiveEvent::Tier { frame, change } => (
+            json!({
+                "event": "tier",
+                "frame": frame,
+                "from": change.from,
+                "to": change.to,
+                "reason": words(change.reason),
+            }),
+            None,
+        ),
+        LiveEvent::Table { frame, id } => (
+            json!({ "event": "table", "frame": frame, "id": format!("{id:08x}") }),
+            Some(format!(
+                "{table}: the new table {id:08x} is used from frame {frame} on\n"
+            )),
+        ),
+        LiveEvent::Refused { frame, why } => (
+            json!({ "event": "refused", "frame": frame, "reason": why.to_string() }),
+            Some(format!(
+                "{table}: changed, but {why}; the table before stays in use\n"
+            )),
+        ),
+    };
+    output.event(&data);
+    if let Some(text) = text {
+        output.people(&text);
+    }
+}
+
+/// Adds what happened with `--watch` and `--budget`.
+fn add_live(summary: &LiveSummary, arguments: &Compensate, data: &mut Value, text: &mut String) {
+    data["event"] = json!("end");
+    data["tiers"] = tiers(summary);
+    data["slowest_ms"] = json!(1e3 * summary.slowest.as_secs_f64());
+    data["tables"] = json!(summary.tables);
+    data["refused"] = json!(summary.refused);
+    if let Some(budget) = arguments.budget {
+        let budget = 1e3 * budget.as_secs_f64();
+        data["budget_ms"] = json!(budget);
+        data["overruns"] = json!(summary.overruns);
+        let used = summary
+            .tiers
+            .iter()
+            .enumerate()
+            .filter(|(_, count)| **count > 0);
+        let used: Vec<String> = used
+            .map(|(tier, count)| format!("{count} at tier {tier}"))
+            .collect();
+        let _ = writeln!(
+            text,
+            "budget {budget} ms: frames {}; {} took longer, {:.1} ms the longest",
+            used.join(", "),
+            summary.overruns,
+            1e3 * summary.slowest.as_secs_f64()
+        );
+    }
+    if summary.tables + summary.refused > 0 {
+        let _ = writeln!(
+            text,
+            "new tables: {} taken, {} refused",
+            summary.tables, summary.refused
+        );
+    }
+}
+
+fn tiers(summary: &LiveSummary) -> Value {
+    let tiers = summary.tiers.iter().enumerate();
+    tiers
+        .map(|(tier, frames)| json!({ "tier": tier, "frames": frames }))
+        .collect()
+}
+
 /// What a failure while frames flow is counted as.
 pub(super) fn failed(error: &VideoError) -> Failure {
     let kind = match error {
@@ -113,14 +206,12 @@ pub(super) fn failed(error: &VideoError) -> Failure {
             Kind::Usage
         }
         VideoError::Table(_) => Kind::Table,
-        VideoError::Read { .. } => Kind::Read,
-        VideoError::File { .. } => Kind::Write,
-        VideoError::Y4m(Y4mError::Write { .. }) | VideoError::Png(PngError::Write { .. }) => {
-            Kind::Write
-        }
-        VideoError::Y4m(Y4mError::Read { .. }) | VideoError::Png(PngError::Read { .. }) => {
-            Kind::Read
-        }
+        VideoError::File { .. }
+        | VideoError::Y4m(Y4mError::Write { .. })
+        | VideoError::Png(PngError::Write { .. }) => Kind::Write,
+        VideoError::Read { .. }
+        | VideoError::Y4m(Y4mError::Read { .. })
+        | VideoError::Png(PngError::Read { .. }) => Kind::Read,
         _ => Kind::Frames,
     };
     of_kind(kind, error)

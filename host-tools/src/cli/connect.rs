@@ -1,10 +1,10 @@
-//! Finding the device that is meant, and beginning to talk.
+//! Connection to the device that is meant: its port is found and it is greeted.
 
 use super::args::SerialLine;
 use super::failure::{Failure, Kind};
 use super::output::Output;
-use crate::device::candidates::{Candidate, Candidates};
-use crate::device::ports::{self, Found};
+use crate::device::discovery::{self, FoundDevice};
+use crate::device::port_scan::{ListedPort, PortScan};
 use crate::device::transcript::Transcribed;
 use crate::device::{Client, DeviceError, Patience, Port};
 use crate::user::{Config, Folders};
@@ -36,18 +36,18 @@ pub(super) struct Connection {
 /// else to the only one that answers; else asks.
 pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, Failure> {
     if let Some(port) = &line.port {
-        let greeted = ports::greet(port, line.baud, Patience::default(), Transcribed::new);
+        let greeted = discovery::greet(port, line.baud, Patience::default(), Transcribed::new);
         let (client, baud) = greeted.map_err(|error| Failure::of_device(port, &error))?;
         return Ok(Connection::new(client, port, baud, None));
     }
     let folders = Folders::of_user();
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
-    let candidates = folders.map(|folders| Candidates::find(&folders, &config));
-    let candidates = candidates.unwrap_or_default();
-    let may_be_asked = |port: &String| !config.excludes(port) && candidates.may_ask_again(port);
+    let scan = folders.map(|folders| PortScan::find(&folders, &config));
+    let scan = scan.unwrap_or_default();
+    let may_be_asked = |port: &String| !config.excludes(port) && scan.may_ask_again(port);
     if let Some(port) = config.port.clone().filter(may_be_asked) {
-        let greeted = ports::greet(&port, line.baud, REMEMBERED, Transcribed::new);
+        let greeted = discovery::greet(&port, line.baud, REMEMBERED, Transcribed::new);
         match greeted {
             Ok((client, baud)) => return Ok(Connection::new(client, &port, baud, None)),
             Err(error @ DeviceError::Protocol { .. }) => {
@@ -56,16 +56,16 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
             Err(_) => output.remark(&format!("no device at {port}; asking the other ports")),
         }
     }
-    let (mut found, silent) = ports::ask(&candidates.asked, line.baud);
+    let (mut found, silent) = discovery::ask(&scan.asked, line.baud);
     let found = match found.len() {
-        0 => return Err(nobody(&silent, &candidates.unasked)),
+        0 => return Err(nobody(&silent, &scan.unasked)),
         1 => found.remove(0),
         _ => choose(found, output)?,
     };
-    let port = &found.candidate.path;
+    let port = &found.port.path;
     let board = &found.device.board;
     output.remark(&format!("found {board} at {port}"));
-    let greeted = ports::greet(
+    let greeted = discovery::greet(
         port,
         Some(found.baud),
         Patience::default(),
@@ -114,7 +114,7 @@ impl Connection {
     /// Goes on at the next lower speed that the device answers at; returns whether there
     /// is one.
     pub(super) fn slow_down(&mut self) -> bool {
-        for baud in ports::speeds(Some(self.baud)).into_iter().skip(1) {
+        for baud in discovery::speeds(Some(self.baud)).into_iter().skip(1) {
             let wire = self.client.line();
             if wire.line().set_speed(baud).is_err() {
                 continue;
@@ -133,14 +133,14 @@ impl Connection {
     }
 }
 
-fn nobody(silent: &[(Candidate, DeviceError)], unasked: &[Candidate]) -> Failure {
+fn nobody(silent: &[(ListedPort, DeviceError)], unasked: &[ListedPort]) -> Failure {
     let mut message = if silent.is_empty() {
         "there is no serial port to ask".to_owned()
     } else {
         "no device answers".to_owned()
     };
-    for (candidate, error) in silent {
-        let _ = write!(message, "; {}: {error}", candidate.path);
+    for (port, error) in silent {
+        let _ = write!(message, "; {}: {error}", port.path);
     }
     if !unasked.is_empty() {
         let names: Vec<_> = unasked.iter().map(|port| port.path.as_str()).collect();
@@ -165,15 +165,11 @@ fn nobody(silent: &[(Candidate, DeviceError)], unasked: &[Candidate]) -> Failure
 }
 
 /// One of several devices: a question on a terminal, an error elsewhere.
-fn choose(mut found: Vec<Found>, output: &Output) -> Result<Found, Failure> {
-    let several = |found: &[Found]| {
+fn choose(mut found: Vec<FoundDevice>, output: &Output) -> Result<FoundDevice, Failure> {
+    let several = |found: &[FoundDevice]| {
         let mut message = "several devices answer".to_owned();
         for device in found {
-            let _ = write!(
-                message,
-                "; {}: {}",
-                device.candidate.path, device.device.board
-            );
+            let _ = write!(message, "; {}: {}", device.port.path, device.device.board);
         }
         Failure::new(Kind::SeveralDevices, message, "Name one with --port.")
     };
@@ -186,7 +182,7 @@ fn choose(mut found: Vec<Found>, output: &Output) -> Result<Found, Failure> {
         let _ = writeln!(
             err,
             "  {number}  {}  {} {}, firmware {}",
-            device.candidate.path,
+            device.port.path,
             device.device.board,
             super::status::number(device.device.device),
             device.device.firmware

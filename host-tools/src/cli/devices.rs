@@ -1,4 +1,4 @@
-//! What was found out about projector, camera and cells, for people and programs.
+//! Projector, camera and cells as a capture shows them, for people and programs.
 
 use crate::capture::calibration::CameraFit;
 use crate::capture::{Devices, Diagnostics, FileFormat, LeftOut, Measurements, Why};

@@ -8,8 +8,8 @@ use super::interrupt;
 use super::output::{Output, cannot_read, cannot_write, read_file};
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
-use crate::device::frames::Frames;
-use crate::device::memory::Memory;
+use crate::device::frame_source::FrameSource;
+use crate::device::memory::BoardMemory;
 use crate::device::playback::{Playback, PlaybackError};
 use crate::user::Folders;
 use crate::user::emulated::register;
@@ -83,13 +83,13 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     played
 }
 
-fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
+fn memory(arguments: &Emulate) -> Result<BoardMemory, Failure> {
     let memory = match &arguments.memory {
-        Some(path) => Memory::kept(path).map_err(|error| {
+        Some(path) => BoardMemory::kept(path).map_err(|error| {
             let message = format!("{}: cannot be the board's memory: {error}", path.display());
             Failure::new(Kind::Write, message, "Name a file that is not there yet.")
         })?,
-        None => Memory::temporary().map_err(|error| {
+        None => BoardMemory::temporary().map_err(|error| {
             let message = format!("no file for the board's memory can be made: {error}");
             Failure::new(
                 Kind::Write,
@@ -101,7 +101,7 @@ fn memory(arguments: &Emulate) -> Result<Memory, Failure> {
     Ok(memory)
 }
 
-fn provision(memory: &Memory, path: &Path, device: u64) -> Result<(), Failure> {
+fn provision(memory: &BoardMemory, path: &Path, device: u64) -> Result<(), Failure> {
     let key = read_public_key(path)?;
     let provisioned = memory.provision(key.to_bytes(), device);
     provisioned.map_err(|error| match error.kind() {
@@ -117,7 +117,7 @@ fn provision(memory: &Memory, path: &Path, device: u64) -> Result<(), Failure> {
     })
 }
 
-fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> {
+fn put_table(memory: &BoardMemory, path: &Path, image: &[u8]) -> Result<(), Failure> {
     memory.put_table(image).map_err(|error| {
         let message = format!(
             "{}: does not fit the board's flash: {error}; a slot has {} bytes and the table {}",
@@ -129,10 +129,10 @@ fn put_table(memory: &Memory, path: &Path, image: &[u8]) -> Result<(), Failure> 
     })
 }
 
-fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<Frames, Failure> {
+fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameSource, Failure> {
     let channels = table.map(Table::channels);
     if let Some(path) = &arguments.frames {
-        let frames = Frames::file(path, channels, arguments.fps);
+        let frames = FrameSource::file(path, channels, arguments.fps);
         return frames.map_err(|error| match error {
             VideoError::File { path, source } => cannot_read(&path, &source),
             error => compensate::failed(&error),
@@ -140,7 +140,7 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<Frames, Fail
     }
     let size = arguments.size.unwrap_or_else(|| scene_size(table));
     let rate = arguments.fps.unwrap_or(RATE);
-    Ok(Frames::scene(size, channels.unwrap_or(3), rate))
+    Ok(FrameSource::scene(size, channels.unwrap_or(3), rate))
 }
 
 /// A size that the emulated board can keep up with.
@@ -153,7 +153,7 @@ fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
     FrameSize::new(width, side(96, FrameSize::height)).expect("neither side is zero")
 }
 
-fn format(frames: &Frames) -> Result<Format, Failure> {
+fn format(frames: &FrameSource) -> Result<Format, Failure> {
     let period = (1e6 / frames.rate()).round().clamp(1.0, 1e8) as u32;
     let format = Format::new(frames.size(), frames.channels(), Encoding::Display, period);
     format.ok_or_else(|| {
@@ -244,7 +244,7 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 fn play(
     emulator: &mut Emulator,
     playback: &mut Playback<'_>,
-    frames: &mut Frames,
+    frames: &mut FrameSource,
 ) -> Result<(), Failure> {
     let period = Duration::from_secs_f64(1.0 / frames.rate());
     let mut due = Instant::now();

@@ -1,4 +1,4 @@
-//! What a command failed for: words for people, a code for scripts.
+//! Failures of a command: words for people, an exit code for scripts.
 
 use super::active::Active;
 use super::check;

@@ -7,7 +7,7 @@ use super::slots::key_id;
 use super::solve::lines;
 use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
-use crate::device::cure;
+use crate::device::rejection_next_step;
 use crate::learn::{recovery_in, white_in};
 use crate::report::steps;
 use ed25519_dalek::VerifyingKey;
@@ -65,7 +65,11 @@ fn verify(
         _ => "the table's signature is false",
     };
     let message = format!("{}: {why}", path.display());
-    Err(Failure::new((&rejected).into(), message, cure(&rejected)))
+    Err(Failure::new(
+        (&rejected).into(),
+        message,
+        rejection_next_step(&rejected),
+    ))
 }
 
 fn seal_data(seal: &Seal, verified: bool) -> Value {

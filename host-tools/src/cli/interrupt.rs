@@ -1,4 +1,4 @@
-//! Commands that go on until somebody stops them.
+//! Interrupt by ctrl-C, for commands that go on until somebody stops them.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};

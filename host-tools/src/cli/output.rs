@@ -1,4 +1,4 @@
-//! Where words and data go.
+//! Output of a command: words for people, JSON for programs, files whole or not at all.
 
 use super::active::Active;
 use super::failure::{Failure, Kind};

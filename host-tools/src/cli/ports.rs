@@ -5,8 +5,8 @@ use super::failure::Failure;
 use super::output::Output;
 use super::status::{identity, table_name};
 use crate::device::DeviceError;
-use crate::device::candidates::{Candidate, Candidates};
-use crate::device::ports::{Found, ask};
+use crate::device::discovery::{FoundDevice, ask};
+use crate::device::port_scan::{ListedPort, PortScan};
 use crate::user::{Config, Folders};
 use serde_json::json;
 use std::fmt::Write;
@@ -15,21 +15,21 @@ pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
     let folders = Folders::of_user();
     let config = folders.as_ref().map(Config::read).transpose()?;
     let config = config.unwrap_or_default();
-    let candidates = folders.map(|folders| Candidates::find(&folders, &config));
-    let Candidates { asked, unasked } = candidates.unwrap_or_default();
+    let scan = folders.map(|folders| PortScan::find(&folders, &config));
+    let PortScan { asked, unasked } = scan.unwrap_or_default();
     let (found, silent) = ask(&asked, arguments.baud);
     let devices = found.iter().map(|found| {
         let mut data = identity(&found.device);
-        data["port"] = json!(found.candidate.path);
-        data["about"] = json!(found.candidate.about);
+        data["port"] = json!(found.port.path);
+        data["about"] = json!(found.port.about);
         data["baud"] = json!(found.baud);
         data["table"] = json!(found.status.as_ref().map(|status| table_name(status.table)));
         data
     });
-    let others = silent.iter().map(|(candidate, error)| {
+    let others = silent.iter().map(|(port, error)| {
         json!({
-            "port": candidate.path,
-            "about": candidate.about,
+            "port": port.path,
+            "about": port.about,
             "reason": error.to_string(),
         })
     });
@@ -50,12 +50,16 @@ pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn text(found: &[Found], silent: &[(Candidate, DeviceError)], remembered: Option<&str>) -> String {
+fn text(
+    found: &[FoundDevice],
+    silent: &[(ListedPort, DeviceError)],
+    remembered: Option<&str>,
+) -> String {
     let mut rows = vec![["port", "board", "firmware", "number", "table"].map(str::to_owned)];
     for device in found {
         let table = device.status.as_ref().map(super::status::table);
         rows.push([
-            device.candidate.path.clone(),
+            device.port.path.clone(),
             device.device.board.to_string(),
             device.device.firmware.to_string(),
             match device.device.device {
@@ -85,17 +89,17 @@ fn text(found: &[Found], silent: &[(Candidate, DeviceError)], remembered: Option
         }
         if found
             .iter()
-            .any(|found| Some(found.candidate.path.as_str()) == remembered)
+            .any(|found| Some(found.port.path.as_str()) == remembered)
         {
             let _ = writeln!(text, "* is the one that is asked first.");
         }
     }
-    for (candidate, error) in silent {
+    for (port, error) in silent {
         let why = match error {
             DeviceError::NoAnswer { heard, .. } => format!("no answer: {heard}"),
             other => other.to_string(),
         };
-        let _ = writeln!(text, "  {}  {why}", candidate.path);
+        let _ = writeln!(text, "  {}  {why}", port.path);
     }
     text
 }

@@ -151,7 +151,7 @@ fn of_user(files: &mut Files) {
     {
         files.push(("config.toml".to_owned(), text));
     }
-    for path in transcripts::list(&folders) {
+    for path in transcripts(&folders) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if let Ok(text) = fs::read(&path) {
             files.push((format!("flash/{name}"), text));

@@ -1,23 +1,20 @@
-//! The whole job without hardware: photographs, table, compensated video, report.
+//! Demo of the whole job without hardware: photographs, table, compensated video, report.
 //!
 //! The photographs are real in all but one respect: a path tracer took them, with
 //! a noisy camera. From there on nothing is prepared. The sample is written out,
 //! read back and solved like any capture, the table compensates a video, and the
 //! report says what came of it.
 
-mod error;
 pub mod sample;
 mod video;
 mod words;
 
-pub use error::DemoError;
-
 use crate::capture::CaptureOptions;
-use crate::learn::{Learned, learn};
-use crate::report::{Example, Report, Wanted, stills};
+use crate::learn::{LearnError, Learned, learn};
+use crate::report::{Example, Report, ReportError, Wanted, stills};
 use crate::solve::SolveOptions;
-use crate::video::Summary;
-use iltm_picture::progress::Progress;
+use crate::video::{FrameTotals, VideoError};
+use iltm_picture::{FileError, progress::Progress};
 use iltm_runtime::FrameSize;
 use sample::{make_folder, write_bytes};
 use std::path::{Path, PathBuf};
@@ -29,6 +26,31 @@ const STILL: (u16, u16) = (384, 256);
 
 /// Width and height of the video: 20 x 20 pixels a cell.
 const VIDEO: (u16, u16) = (480, 320);
+
+/// What went wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoError {
+    /// A folder could not be made.
+    #[error("{}: cannot be made: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// A file could not be written.
+    #[error("{}: cannot be written: {}", .0.path.display(), .0.source)]
+    Write(#[from] FileError),
+    /// The sample did not become a table.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A file could not be put in its place, or the video not be compensated.
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    /// There is no report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
 
 /// Where everything is.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -71,7 +93,7 @@ pub struct Outcome {
     /// and compensated, as predicted by the learned transport.
     pub images: Vec<(&'static str, [f64; 3])>,
     /// The video: frames, and how many samples were clipped.
-    pub video: Summary,
+    pub video: FrameTotals,
     /// Bytes of the page.
     pub report_bytes: usize,
     /// Wall-clock seconds by step.

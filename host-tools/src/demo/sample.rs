@@ -1,4 +1,4 @@
-//! The capture that the program carries with it.
+//! Sample capture that the program carries with it.
 
 use super::DemoError;
 use iltm_picture::whole_file;

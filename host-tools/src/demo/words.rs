@@ -1,4 +1,4 @@
-//! What the report says of the sample that photographs cannot.
+//! Words of the demo's report about the sample, which photographs cannot say.
 
 use crate::report::{Command, Words};
 use crate::solved::quoted;

@@ -3,7 +3,7 @@
 
 use ed25519_dalek::SigningKey;
 use iltm::device::emulator::{self, Emulator};
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
 use iltm_runtime::frame_buffers::{Format, psram};
 use iltm_runtime::image::{Table, unseal};
@@ -38,7 +38,7 @@ pub(crate) fn key() -> SigningKey {
 
 pub(crate) struct Board {
     folder: TempDir,
-    memory: Memory,
+    memory: BoardMemory,
     firmware: PathBuf,
     running: Option<Emulator>,
     /// A frame that is shown to it, and its format.
@@ -49,7 +49,7 @@ impl Board {
     /// One fresh from the factory, switched off.
     pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let memory = Memory::kept(&folder.path().join("memory")).expect("a new file");
+        let memory = BoardMemory::kept(&folder.path().join("memory")).expect("a new file");
         let public = key().verifying_key().to_bytes();
         memory.provision(public, DEVICE).expect("it has none");
         let size = FrameSize::of_grid(cells());

@@ -72,7 +72,7 @@ pub fn frames(bytes: &[u8]) {
     let Ok(table) = Table::check(image) else {
         return;
     };
-    if let Ok(compensator) = Compensator::new(&table, iltm::video::Settings::default()) {
+    if let Ok(compensator) = Compensator::new(&table, iltm::video::CompensateOptions::default()) {
         let _ = compensator.stream(bytes, io::sink(), &Silent);
     }
 }

@@ -1,44 +1,9 @@
-//! The host's side of the conversation.
+//! Client of a device: greeting, status, and subscription to its events.
 
-use super::talk::{Talk, name};
+use super::transport::{Incoming, Patience, Transport, name};
 use super::{DeviceError, Line};
-use iltm_runtime::link::{Channel, Event, Hello, PROTOCOL_VERSION, Request, Response, Status};
+use iltm_runtime::link::{Hello, PROTOCOL_VERSION, Request, Response, Status};
 use std::time::Duration;
-
-/// How long a device is waited for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Patience {
-    /// For one answer.
-    pub answer: Duration,
-    /// How often a request is sent before giving up.
-    pub tries: u32,
-}
-
-impl Default for Patience {
-    /// The longest request and answer take .1 s at 115,200 baud.
-    fn default() -> Self {
-        Self {
-            answer: Duration::from_millis(400),
-            tries: 5,
-        }
-    }
-}
-
-/// What a device says by itself.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Incoming {
-    /// An event.
-    Event(Event),
-    /// Whole defmt frames; see [`Logs`](super::logs::Logs).
-    Log(Vec<u8>),
-    /// Frames that the device sent and that did not come.
-    Missed {
-        /// The channel: events or logs.
-        channel: Channel,
-        /// How many.
-        count: u16,
-    },
-}
 
 /// What a subscription was granted.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,7 +20,7 @@ pub struct Subscription {
 /// no harm: the device answers each copy alike, and any of the answers will do.
 #[derive(Debug)]
 pub struct Client<L> {
-    pub(super) talk: Talk<L>,
+    pub(super) transport: Transport<L>,
     device: Hello,
 }
 
@@ -65,14 +30,14 @@ impl<L: Line> Client<L> {
     /// # Errors
     /// [`DeviceError`] if nothing answers, or something of another version.
     pub fn greet(line: L, patience: Patience) -> Result<Self, DeviceError> {
-        let mut talk = Talk::new(line, patience);
+        let mut transport = Transport::new(line, patience);
         let hello = Request::Hello {
             protocol: PROTOCOL_VERSION,
         };
-        match talk.ask(hello)? {
+        match transport.ask(hello)? {
             Response::Hello(device) if device.protocol == PROTOCOL_VERSION => {
-                talk.forget();
-                Ok(Self { talk, device })
+                transport.forget();
+                Ok(Self { transport, device })
             }
             Response::Hello(device) => Err(DeviceError::Protocol {
                 device: device.protocol,
@@ -90,11 +55,11 @@ impl<L: Line> Client<L> {
         let hello = Request::Hello {
             protocol: PROTOCOL_VERSION,
         };
-        let device = match self.talk.ask(hello)? {
+        let device = match self.transport.ask(hello)? {
             Response::Hello(device) => device,
             other => return Err(unexpected(hello, &other)),
         };
-        self.talk.forget();
+        self.transport.forget();
         if device.protocol != PROTOCOL_VERSION {
             return Err(DeviceError::Protocol {
                 device: device.protocol,
@@ -109,13 +74,13 @@ impl<L: Line> Client<L> {
 
     /// The line.
     pub const fn line(&mut self) -> &mut L {
-        self.talk.line()
+        self.transport.line()
     }
 
     /// Ends the conversation.
     #[must_use]
     pub fn into_line(self) -> L {
-        self.talk.into_line()
+        self.transport.into_line()
     }
 
     /// Who the device is.
@@ -129,7 +94,7 @@ impl<L: Line> Client<L> {
     /// # Errors
     /// [`DeviceError`] if it does not answer, or not this.
     pub fn status(&mut self) -> Result<Status, DeviceError> {
-        match self.talk.ask(Request::Status)? {
+        match self.transport.ask(Request::Status)? {
             Response::Status(status) => Ok(status),
             other => Err(unexpected(Request::Status, &other)),
         }
@@ -144,7 +109,7 @@ impl<L: Line> Client<L> {
         let request = Request::Subscribe {
             period_ms: u16::try_from(period.as_millis()).unwrap_or(u16::MAX),
         };
-        match self.talk.ask(request)? {
+        match self.transport.ask(request)? {
             Response::Subscribed {
                 period_ms,
                 lapse_ms,
@@ -161,7 +126,7 @@ impl<L: Line> Client<L> {
     /// # Errors
     /// [`DeviceError::Gone`].
     pub fn next(&mut self, wait: Duration) -> Result<Option<Incoming>, DeviceError> {
-        self.talk.next(wait)
+        self.transport.next(wait)
     }
 }
 

@@ -1,6 +1,6 @@
-//! A reference board in QEMU, its serial line as a port of this machine.
+//! Emulator: a reference board in QEMU, its serial line as a port of this machine.
 
-use super::memory::Memory;
+use super::memory::BoardMemory;
 use iltm_runtime::frame_buffers::psram;
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
@@ -136,7 +136,11 @@ impl Emulator {
     ///
     /// # Errors
     /// [`EmulatorError`].
-    pub fn start(board: Board, firmware: &Path, memory: &Memory) -> Result<Self, EmulatorError> {
+    pub fn start(
+        board: Board,
+        firmware: &Path,
+        memory: &BoardMemory,
+    ) -> Result<Self, EmulatorError> {
         std::fs::metadata(firmware).map_err(|source| EmulatorError::Firmware {
             path: firmware.to_owned(),
             source,
@@ -307,7 +311,7 @@ mod tests {
 
     #[test]
     fn a_firmware_that_is_not_there_is_named() {
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         let error = Emulator::start(Board::An500, Path::new("none.elf"), &memory);
         let error = error.expect_err("there is none").to_string();
         assert!(error.starts_with("none.elf: "), "{error}");

@@ -1,4 +1,4 @@
-//! Why a device could not be spoken to.
+//! Errors of a conversation with a device, and what to do about each.
 
 use iltm_runtime::{
     link::{PROTOCOL_VERSION, Refusal},
@@ -104,7 +104,7 @@ impl DeviceError {
                 "Use the host tools of the firmware's version, or later ones."
             }
             Self::Protocol { .. } => "Bring the device's firmware up to date.",
-            Self::Refused { refusal, .. } => after(refusal),
+            Self::Refused { refusal, .. } => refusal_next_step(refusal),
             Self::Exchanged => "Plug the device back in and start again.",
             Self::Answer { .. } => "Use host tools and firmware of the same version.",
         }
@@ -112,7 +112,7 @@ impl DeviceError {
 }
 
 /// What to do about a refusal.
-const fn after(refusal: &Refusal) -> &'static str {
+const fn refusal_next_step(refusal: &Refusal) -> &'static str {
     match refusal {
         Refusal::HelloFirst => "The device has just restarted: try again.",
         Refusal::Unknown | Refusal::Malformed | Refusal::Chunk => {
@@ -126,7 +126,7 @@ const fn after(refusal: &Refusal) -> &'static str {
         Refusal::Flash { .. } => {
             "Try once more; if it happens again the device's flash is worn out."
         }
-        Refusal::Table(rejected) => cure(rejected),
+        Refusal::Table(rejected) => rejection_next_step(rejected),
         Refusal::NotInUse { .. } => "Run `iltm status` to see which table is in use.",
         Refusal::NoOther => "Flash the table that you want instead.",
         Refusal::HasKey => {
@@ -143,7 +143,7 @@ const fn after(refusal: &Refusal) -> &'static str {
 
 /// What to do about a table that a device does not take.
 #[must_use]
-pub const fn cure(rejected: &Rejected) -> &'static str {
+pub const fn rejection_next_step(rejected: &Rejected) -> &'static str {
     match rejected {
         Rejected::NotATable | Rejected::Truncated | Rejected::Damaged | Rejected::Contents => {
             "Copy the table again, or make it anew with `iltm solve`."

@@ -1,45 +1,49 @@
 //! Devices at the other end of a serial line, real and emulated.
 //!
-//! | step | file |
+//! In: a port's name or an emulated board, requests, table files, frames to play. Out:
+//! answers, events and log messages, and the frames that an emulated board shows.
+//!
+//! | what | file |
 //! |---|---|
 //! | the line: a serial port, or anything else that carries bytes both ways | [`port`] |
-//! | requests, answers, events | [`client`] |
+//! | ports of this machine and of emulated boards, and which of them may be asked | [`port_scan`] |
+//! | ports that a device answers at, and at which speed | [`discovery`] |
+//! | requests and answers as frames on a line | `transport` |
+//! | a conversation: hello, status, subscription to events | [`client`] |
 //! | requests about tables | [`tables`] |
 //! | a table's file on its way, whatever breaks | [`upload`] |
-//! | ports that may be asked | [`candidates`] |
-//! | ports that a device answers at | [`ports`] |
-//! | what was said, in words | [`transcript`] |
+//! | frames on a line in words, for support | [`transcript`] |
 //! | log messages, with the firmware's ELF file | [`logs`] |
 //! | the emulated board, its serial line as a port | [`emulator`] |
 //! | the emulated board's memory, which is a file here | [`memory`] |
-//! | frames for it | [`frames`], [`playback`] |
-//! | lines that fail by order, with the feature `fault-tools` | `fault` |
+//! | frames for it, and those that it shows | [`frame_source`], [`playback`] |
+//! | settings and state of the user | [`user`] |
+//! | errors | [`DeviceError`] |
 //!
 //! What goes over the line is defined in [`iltm_runtime::link`], which the device
 //! uses as well.
 
-pub mod candidates;
 pub mod client;
+pub mod discovery;
 #[cfg(unix)]
 pub mod emulator;
 mod error;
-#[cfg(feature = "fault-tools")]
-pub mod fault;
 #[cfg(unix)]
-pub mod frames;
+pub mod frame_source;
 pub mod logs;
 #[cfg(unix)]
 pub mod memory;
 #[cfg(unix)]
 pub mod playback;
 pub mod port;
-pub mod ports;
+pub mod port_scan;
 pub mod tables;
-mod talk;
 pub mod transcript;
+mod transport;
 pub mod upload;
 pub mod user;
 
-pub use client::{Client, Incoming, Patience};
-pub use error::{DeviceError, cure};
+pub use client::Client;
+pub use error::{DeviceError, rejection_next_step};
 pub use port::{Line, Port};
+pub use transport::{Incoming, Patience};

@@ -36,7 +36,7 @@ pub struct Logs {
 
 /// A log message.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Message {
+pub struct LogMessage {
     /// `error`, `warn`, `info`, `debug` or `trace`; empty for plain print.
     pub level: String,
     /// The device's time, in the format that its firmware chose; empty if it has
@@ -71,14 +71,14 @@ impl Logs {
     /// The messages in the payload of a log frame. Bytes that are none of this
     /// firmware's messages are a message that says so.
     #[must_use]
-    pub fn messages(&self, mut payload: &[u8]) -> Vec<Message> {
+    pub fn messages(&self, mut payload: &[u8]) -> Vec<LogMessage> {
         let mut messages = Vec::new();
         while !payload.is_empty() {
             match self.table.decode(payload) {
                 Ok((frame, length)) => {
                     let level = frame.level().map_or("", |level| level.as_str());
                     let time = frame.display_timestamp();
-                    messages.push(Message {
+                    messages.push(LogMessage {
                         level: level.to_owned(),
                         time: time.map(|time| time.to_string()).unwrap_or_default(),
                         text: frame.display_message().to_string(),
@@ -86,7 +86,7 @@ impl Logs {
                     payload = payload.get(length.max(1)..).unwrap_or_default();
                 }
                 Err(DecodeError::UnexpectedEof | DecodeError::Malformed) => {
-                    messages.push(Message {
+                    messages.push(LogMessage {
                         level: "warn".to_owned(),
                         time: String::new(),
                         text: format!(

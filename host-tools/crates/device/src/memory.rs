@@ -1,4 +1,4 @@
-//! The memory of an emulated board, as a file.
+//! Memory of an emulated board, as a file.
 //!
 //! The emulator maps the file; what either side writes, the other sees. Here it is
 //! read and written through the file rather than mapped, since the system calls
@@ -17,14 +17,14 @@ use tempfile::NamedTempFile;
 
 /// The file behind an emulated board's PSRAM.
 #[derive(Debug)]
-pub struct Memory {
+pub struct BoardMemory {
     file: File,
     path: PathBuf,
     /// Removes the file when the board is gone, where nobody asked to keep it.
     _temporary: Option<NamedTempFile>,
 }
 
-impl Memory {
+impl BoardMemory {
     /// Fresh memory that is gone with the board.
     ///
     /// # Errors
@@ -192,20 +192,20 @@ mod tests {
     fn kept_memory_is_found_again_and_another_file_is_refused() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("memory");
-        let memory = Memory::kept(&path).expect("a new file");
+        let memory = BoardMemory::kept(&path).expect("a new file");
         memory.write(&psram::SLOT_A, b"table").expect("room");
-        let memory = Memory::kept(&path).expect("the same file");
+        let memory = BoardMemory::kept(&path).expect("the same file");
         let mut bytes = [0; 5];
         memory.read(&psram::SLOT_A, &mut bytes).expect("there");
         assert_eq!(&bytes, b"table");
         std::fs::write(&path, b"something else").expect("writable");
-        let error = Memory::kept(&path).expect_err("too short");
+        let error = BoardMemory::kept(&path).expect_err("too short");
         assert_eq!(error.kind(), io::ErrorKind::InvalidData);
     }
 
     #[test]
     fn a_board_has_one_key_and_one_number() {
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         memory.provision([7; 32], 9).expect("it has none");
         memory.put_table(b"table").expect("room");
         memory.provision([7; 32], 9).expect("the same");
@@ -222,14 +222,14 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_its_range_is_not_written() {
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         let error = memory.write(&(4..6), b"abc").expect_err("too long");
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
     }
 
     #[test]
     fn words_lie_in_the_frame_memory_and_nowhere_else() {
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         let words = memory.words().expect("the same file");
         words.store(3, 0x0403_0201);
         words.store(CONTROL_WORDS, u32::MAX);

@@ -1,8 +1,8 @@
-//! The projector cable of an emulated board, both ends: frames in, as a capture
+//! Playback to an emulated board, both ends of its projector cable: frames in, as a capture
 //! port's DMA would bring them, and projector input out, as a display would fetch
 //! it.
 
-use super::memory::{FileWords, Memory};
+use super::memory::{BoardMemory, FileWords};
 use iltm_runtime::frame_buffers::{Display, Format, Layout, RegionError, Shown, Source, psram};
 use std::io;
 use std::ops::Range;
@@ -21,17 +21,17 @@ pub enum PlaybackError {
 /// Plays frames to a board and takes what it shows.
 #[derive(Debug)]
 pub struct Playback<'m> {
-    memory: &'m Memory,
+    memory: &'m BoardMemory,
     layout: Layout,
     source: Source<FileWords>,
     /// Once the board has taken the announcement.
     display: Option<Display<FileWords>>,
-    counts: Counts,
+    counts: PlaybackCounts,
 }
 
 /// What became of the frames, as seen from outside.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Counts {
+pub struct PlaybackCounts {
     /// Given to the board.
     pub given: u64,
     /// That the board had no buffer for.
@@ -47,14 +47,14 @@ impl<'m> Playback<'m> {
     ///
     /// # Errors
     /// [`PlaybackError`].
-    pub fn new(memory: &'m Memory, format: Format) -> Result<Self, PlaybackError> {
+    pub fn new(memory: &'m BoardMemory, format: Format) -> Result<Self, PlaybackError> {
         let region = psram::FRAMES.len();
         Ok(Self {
             memory,
             layout: Layout::new(format, region)?,
             source: Source::announce(memory.words()?, region, format)?,
             display: None,
-            counts: Counts::default(),
+            counts: PlaybackCounts::default(),
         })
     }
 
@@ -109,7 +109,7 @@ impl<'m> Playback<'m> {
 
     /// What became of the frames so far.
     #[must_use]
-    pub const fn counts(&self) -> Counts {
+    pub const fn counts(&self) -> PlaybackCounts {
         self.counts
     }
 }
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn frames_go_through_the_file_to_a_board_and_back() {
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         let size = FrameSize::new(4, 2).expect("small");
         let format = Format::new(size, 1, Encoding::Display, 40_000).expect("a format");
         let mut playback = Playback::new(&memory, format).expect("it fits");

@@ -1,4 +1,4 @@
-//! Lines that carry bytes both ways.
+//! Serial ports, and other lines that carry bytes both ways.
 
 use super::DeviceError;
 use serialport::{ClearBuffer, SerialPort};
@@ -105,7 +105,7 @@ impl Line for Port {
 }
 
 /// Whether this only says that nothing came, or went, in time.
-pub(super) fn is_nothing(error: &io::Error) -> bool {
+fn is_nothing(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock

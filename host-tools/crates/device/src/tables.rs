@@ -1,8 +1,8 @@
-//! What a host asks about tables. Each request may be repeated without harm, and is
+//! Requests about tables. Each may be repeated without harm, and is
 //! until it is answered.
 
-use super::client::{Client, Patience, unexpected};
-use super::{DeviceError, Line};
+use super::client::{Client, unexpected};
+use super::{DeviceError, Line, Patience};
 use iltm_runtime::link::{Digest, InUse, Receiving, Refusal, Request, Response, Sectors, Slots};
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ impl<L: Line> Client<L> {
     /// # Errors
     /// [`DeviceError`] if the device does not answer, or not this.
     pub fn slots(&mut self) -> Result<Slots, DeviceError> {
-        match self.talk.ask(Request::Slots)? {
+        match self.transport.ask(Request::Slots)? {
             Response::Slots(slots) => Ok(slots),
             other => Err(unexpected(Request::Slots, &other)),
         }
@@ -32,7 +32,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`]; [`Refusal::TooLong`] if no such table fits.
     pub fn sectors(&mut self, length: u32, first: u32) -> Result<Sectors, DeviceError> {
         let request = Request::Sectors { length, first };
-        match self.talk.ask(request)? {
+        match self.transport.ask(request)? {
             Response::Sectors(sectors) => Ok(sectors),
             other => Err(unexpected(request, &other)),
         }
@@ -44,7 +44,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`]; [`Refusal::OnTrial`] while another table is on trial.
     pub fn begin(&mut self, length: u32, digest: Digest) -> Result<Receiving, DeviceError> {
         let request = Request::Begin { length, digest };
-        match self.talk.ask(request)? {
+        match self.transport.ask(request)? {
             Response::Receiving(receiving) => Ok(receiving),
             other => Err(unexpected(request, &other)),
         }
@@ -61,7 +61,7 @@ impl<L: Line> Client<L> {
             offset,
             bytes,
         };
-        match self.talk.ask(request)? {
+        match self.transport.ask(request)? {
             Response::Written => Ok(()),
             other => Err(unexpected(request, &other)),
         }
@@ -77,7 +77,7 @@ impl<L: Line> Client<L> {
             transfer,
             trial_s: u16::try_from(trial.as_secs()).unwrap_or(u16::MAX),
         };
-        match self.talk.ask_patiently(request, CHECK)? {
+        match self.transport.ask_patiently(request, CHECK)? {
             Response::InUse(in_use) => Ok(in_use),
             other => Err(unexpected(request, &other)),
         }
@@ -89,7 +89,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`]; [`Refusal::NotInUse`] if another one is in use by now.
     pub fn confirm(&mut self, table: u32) -> Result<InUse, DeviceError> {
         let request = Request::Confirm { table };
-        match self.talk.ask(request)? {
+        match self.transport.ask(request)? {
             Response::InUse(in_use) => Ok(in_use),
             other => Err(unexpected(request, &other)),
         }
@@ -101,7 +101,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`].
     pub fn rollback(&mut self, table: u32) -> Result<InUse, DeviceError> {
         let request = Request::Rollback { table };
-        match self.talk.ask_patiently(request, CHECK)? {
+        match self.transport.ask_patiently(request, CHECK)? {
             Response::InUse(in_use) => Ok(in_use),
             // The answer to an earlier copy of the request was lost: the table has gone.
             Response::Refused(Refusal::NotInUse { table }) => Ok(InUse { table, trial_ms: 0 }),
@@ -115,7 +115,7 @@ impl<L: Line> Client<L> {
     /// [`DeviceError`]; [`Refusal::HasKey`] if it has others.
     pub fn provision(&mut self, key: [u8; 32], device: u64) -> Result<(), DeviceError> {
         let request = Request::Provision { key, device };
-        match self.talk.ask_patiently(request, CHECK)? {
+        match self.transport.ask_patiently(request, CHECK)? {
             Response::Provisioned => Ok(()),
             other => Err(unexpected(request, &other)),
         }

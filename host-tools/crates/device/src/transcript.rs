@@ -1,4 +1,4 @@
-//! What is said on a line, in words, for support.
+//! Transcript of a line, in words, for support.
 
 use super::Line;
 use iltm_runtime::{

@@ -3,7 +3,7 @@
 use super::{Comparison, Projection};
 use iltm_picture::{LightPicture, Picture, ProjectorResponse, Response};
 use iltm_runtime::image::Table;
-use iltm_video::{Compensator, Settings, VideoError};
+use iltm_video::{CompensateOptions, Compensator, VideoError};
 
 /// An image to be projected.
 #[derive(Clone, Debug)]
@@ -104,9 +104,9 @@ impl Example {
             };
             let mut clipped = 0.0;
             if tier.is_some() {
-                let settings = Settings {
+                let settings = CompensateOptions {
                     tier,
-                    ..Settings::default()
+                    ..CompensateOptions::default()
                 };
                 let summary = Compensator::new(table, settings)?.picture(&mut input)?;
                 clipped = summary.clipped as f64 / summary.samples.max(1) as f64;

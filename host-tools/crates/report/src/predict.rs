@@ -196,7 +196,7 @@ mod tests {
     use iltm_picture::{Picture, Response, Samples};
     use iltm_runtime::Grid;
     use iltm_solve::ChannelInverse;
-    use iltm_video::{Compensator, Settings};
+    use iltm_video::{CompensateOptions, Compensator};
 
     /// A textured scene whose cells light each other the more the nearer they are.
     fn scene(channels: usize) -> InverseTransport {
@@ -285,7 +285,8 @@ mod tests {
                     let size = FrameSize::new(width, height).unwrap();
                     let wanted = wanted(size, channels);
                     let mut input = wanted.clone();
-                    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+                    let compensator =
+                        Compensator::new(&table, CompensateOptions::default()).unwrap();
                     let summary = compensator.picture(&mut input).unwrap();
                     assert_eq!(summary.clipped, 0);
                     let projection = Projection::new(&table, &inverse, white, size).unwrap();
@@ -297,9 +298,9 @@ mod tests {
                     let difference = largest_difference(&photograph, &light);
                     assert!(difference < 2e-3, "{channels} {size}: {difference}");
                     // Without the operator the difference is not small.
-                    let settings = Settings {
+                    let settings = CompensateOptions {
                         tier: Some(0),
-                        ..Settings::default()
+                        ..CompensateOptions::default()
                     };
                     let mut input = wanted.clone();
                     Compensator::new(&table, settings)

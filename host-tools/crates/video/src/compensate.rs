@@ -1,4 +1,4 @@
-//! Frames through a table: pictures, and video as a stream.
+//! Compensation of frames with a table: pictures, and video as a stream.
 //!
 //! | frame | table of one channel | table of three |
 //! |---|---|---|
@@ -9,12 +9,10 @@
 //! full resolution; a smaller one is refused. The result has the size and the
 //! kind of the input.
 
-use super::bands::Bands;
-use super::engine::{Engine, Work};
-use super::planar::{Layout, Planar};
-use super::y4m::Reader;
-use super::{VideoError, stream};
-use crate::interleaved::Interleaved;
+use super::bands::{Bands, Interleaved};
+use super::engine::{Engine, FrameJob};
+use super::live::Live;
+use super::{Input, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -25,7 +23,7 @@ use std::sync::Arc;
 
 /// How frames are to be compensated.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Settings {
+pub struct CompensateOptions {
     /// The tier; by default the table's top one.
     pub tier: Option<u8>,
     /// What the codes of the frames mean.
@@ -35,7 +33,7 @@ pub struct Settings {
     pub threads: usize,
 }
 
-impl Default for Settings {
+impl Default for CompensateOptions {
     fn default() -> Self {
         Self {
             tier: None,
@@ -47,7 +45,7 @@ impl Default for Settings {
 
 /// What has been done.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Summary {
+pub struct FrameTotals {
     /// Size of the frames.
     pub size: FrameSize,
     /// How many frames there were.
@@ -62,9 +60,9 @@ pub struct Summary {
 /// Compensates frames with one table.
 #[derive(Debug)]
 pub struct Compensator<'t, 'a> {
-    table: &'t Table<'a>,
+    pub(super) table: &'t Table<'a>,
+    settings: CompensateOptions,
     tier: u8,
-    encoding: Encoding,
     threads: Arc<ThreadPool>,
 }
 
@@ -74,14 +72,26 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// # Errors
     /// [`VideoError::NoSuchTier`], or [`VideoError::Threads`] if the threads cannot
     /// be started.
-    pub fn new(table: &'t Table<'a>, settings: Settings) -> Result<Self, VideoError> {
-        Self::on(table, settings, Arc::new(threads(settings.threads)?))
+    pub fn new(table: &'t Table<'a>, settings: CompensateOptions) -> Result<Self, VideoError> {
+        let threads = ThreadPoolBuilder::new().num_threads(settings.threads);
+        let threads = threads.build().map_err(|error| VideoError::Threads {
+            threads: settings.threads,
+            reason: error.to_string(),
+        })?;
+        Self::on(table, settings, Arc::new(threads))
     }
 
-    /// The same on threads that are there already.
-    pub(super) fn on(
+    /// One for another table, with the same settings, on the same threads.
+    pub(super) fn with_table<'u, 'b>(
+        &self,
+        table: &'u Table<'b>,
+    ) -> Result<Compensator<'u, 'b>, VideoError> {
+        Compensator::on(table, self.settings, Arc::clone(&self.threads))
+    }
+
+    fn on(
         table: &'t Table<'a>,
-        settings: Settings,
+        settings: CompensateOptions,
         threads: Arc<ThreadPool>,
     ) -> Result<Self, VideoError> {
         let top = table.top_tier();
@@ -91,8 +101,8 @@ impl<'t, 'a> Compensator<'t, 'a> {
         }
         Ok(Self {
             table,
+            settings,
             tier,
-            encoding: settings.encoding,
             threads,
         })
     }
@@ -107,7 +117,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         input: &Path,
         output: &Path,
         progress: &dyn Progress,
-    ) -> Result<Summary, VideoError> {
+    ) -> Result<FrameTotals, VideoError> {
         let opened = File::open(input).map_err(|source| VideoError::File {
             path: input.to_owned(),
             source,
@@ -125,18 +135,13 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// [`VideoError::UnknownFormat`].
     pub fn stream<R: Read + Send, W: Write + Send>(
         &self,
-        mut input: R,
+        input: R,
         output: W,
         progress: &dyn Progress,
-    ) -> Result<Summary, VideoError> {
-        let first = first_bytes(&mut input).map_err(|source| VideoError::Read { source })?;
-        let whole = first.as_slice().chain(input);
-        if first.starts_with(&png::SIGNATURE) {
-            self.png(whole, output)
-        } else if first.starts_with(b"YUV4MPEG") {
-            self.y4m(whole, output, progress)
-        } else {
-            Err(VideoError::UnknownFormat)
+    ) -> Result<FrameTotals, VideoError> {
+        match Input::of(input)? {
+            Input::Png(input) => self.png(input, output),
+            Input::Y4m(input) => self.y4m(input, output, progress),
         }
     }
 
@@ -146,7 +151,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// [`VideoError`] if the input is no readable picture, is smaller than the
     /// grid, is grey with a table of three channels, or the output cannot be
     /// written.
-    pub fn png(&self, input: impl Read, output: impl Write) -> Result<Summary, VideoError> {
+    pub fn png(&self, input: impl Read, output: impl Write) -> Result<FrameTotals, VideoError> {
         let mut picture = png::read(input)?;
         let summary = self.picture(&mut picture)?;
         png::write(output, &picture)?;
@@ -158,13 +163,13 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// # Errors
     /// [`VideoError`] if it is smaller than the grid, or grey with a table of three
     /// channels.
-    pub fn picture(&self, picture: &mut Picture) -> Result<Summary, VideoError> {
+    pub fn picture(&self, picture: &mut Picture) -> Result<FrameTotals, VideoError> {
         let (size, channels) = (picture.size(), picture.channels());
-        let work = self.work(size, channels)?;
+        let job = self.job(size, channels)?;
         let width = size.width();
         let clipped = match picture.samples_mut() {
             Samples::Eight(samples) => self.one(
-                work,
+                job,
                 &mut Interleaved {
                     width,
                     channels,
@@ -172,7 +177,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 },
             ),
             Samples::Sixteen(samples) => self.one(
-                work,
+                job,
                 &mut Interleaved {
                     width,
                     channels,
@@ -180,7 +185,12 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 },
             ),
         };
-        Ok(summary(work, 1, clipped?))
+        Ok(FrameTotals {
+            size,
+            frames: 1,
+            samples: job.samples() as u64,
+            clipped: clipped?,
+        })
     }
 
     /// Compensates a Y4M stream, frame by frame: memory does not depend on its
@@ -197,56 +207,19 @@ impl<'t, 'a> Compensator<'t, 'a> {
         input: R,
         output: W,
         progress: &dyn Progress,
-    ) -> Result<Summary, VideoError> {
-        let reader = Reader::new(input)?;
-        let header = reader.header();
-        let work = self.work(header.size(), Layout::new(header).colours())?;
-        progress.begin("compensate", 0);
-        let result = match self.table.channels() {
-            1 => self.frames::<_, _, 1>(work, reader, output, progress),
-            _ => self.frames::<_, _, 3>(work, reader, output, progress),
+    ) -> Result<FrameTotals, VideoError> {
+        let unwatched = Live {
+            budget: None,
+            newer: &mut || None,
+            said: &mut |_| (),
         };
-        progress.end();
-        let (frames, clipped) = result?;
-        Ok(summary(work, frames, clipped))
-    }
-
-    /// Every frame of a stream through a table of `C` channels; how many there
-    /// were and how many samples were clipped.
-    fn frames<R: Read + Send, W: Write + Send, const C: usize>(
-        &self,
-        work: Work,
-        reader: Reader<R>,
-        output: W,
-        progress: &dyn Progress,
-    ) -> Result<(u64, u64), VideoError> {
-        let layout = Layout::new(reader.header());
-        let mut engine = self.engine::<Planar, C>(work)?;
-        let mut clipped = 0;
-        let frames = stream::run(reader, output, |frames| {
-            let mut worked = || {
-                frames.work(|frame| {
-                    let mut planar = Planar {
-                        layout,
-                        frame: std::mem::take(frame),
-                    };
-                    let clipped = engine.compensate(&mut planar)?;
-                    *frame = planar.frame;
-                    Ok(clipped)
-                })
-            };
-            while let Some(more) = worked()? {
-                clipped += more;
-                progress.advance(1);
-            }
-            Ok(())
-        })?;
-        Ok((frames, clipped))
+        let summary = unwatched.run(self, input, output, progress)?;
+        Ok(summary.frames)
     }
 
     /// What is to be done to frames of this size and number of colours, if that is
     /// possible.
-    pub(super) fn work(&self, size: FrameSize, colours: usize) -> Result<Work, VideoError> {
+    pub(super) fn job(&self, size: FrameSize, colours: usize) -> Result<FrameJob, VideoError> {
         if colours < usize::from(self.table.channels()) {
             return Err(VideoError::GreyFrame);
         }
@@ -256,53 +229,26 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 grid: self.table.grid(),
             });
         }
-        Ok(Work {
+        Ok(FrameJob {
             size,
             colours,
             tier: self.tier,
-            encoding: self.encoding,
+            encoding: self.settings.encoding,
         })
     }
 
     /// A single frame in place; how many samples were clipped.
-    fn one<P: Bands>(&self, work: Work, frame: &mut P) -> Result<u64, VideoError> {
+    fn one<P: Bands>(&self, job: FrameJob, frame: &mut P) -> Result<u64, VideoError> {
         match self.table.channels() {
-            1 => self.engine::<P, 1>(work)?.compensate(frame),
-            _ => self.engine::<P, 3>(work)?.compensate(frame),
+            1 => self.engine::<P, 1>(job)?.compensate(frame),
+            _ => self.engine::<P, 3>(job)?.compensate(frame),
         }
     }
 
-    fn engine<P: Bands, const C: usize>(
+    pub(super) fn engine<P: Bands, const C: usize>(
         &self,
-        work: Work,
+        job: FrameJob,
     ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
-        Engine::new(self.table, &self.threads, work).map_err(VideoError::Runtime)
+        Engine::new(self.table, &self.threads, job).map_err(VideoError::Runtime)
     }
-}
-
-/// Threads that work on the rows, 0 for one a core.
-pub(super) fn threads(threads: usize) -> Result<ThreadPool, VideoError> {
-    let builder = ThreadPoolBuilder::new().num_threads(threads);
-    builder.build().map_err(|error| VideoError::Threads {
-        threads,
-        reason: error.to_string(),
-    })
-}
-
-fn summary(work: Work, frames: u64, clipped: u64) -> Summary {
-    Summary {
-        size: work.size,
-        frames,
-        samples: frames * (work.size.pixels() * work.colours) as u64,
-        clipped,
-    }
-}
-
-/// As many bytes as it takes to know what the input is, or all there are.
-pub fn first_bytes(input: &mut impl Read) -> Result<Vec<u8>, std::io::Error> {
-    let mut first = Vec::new();
-    input
-        .take(png::SIGNATURE.len() as u64)
-        .read_to_end(&mut first)?;
-    Ok(first)
 }

@@ -1,4 +1,4 @@
-//! From codes to light and from drives to codes, by tables made once.
+//! Lookup tables from codes to light and from drives to codes.
 //!
 //! Both kinds of table have an element for every value of a `u16`, though not all
 //! can occur: looking up then needs no check. A table of codes by knot of the

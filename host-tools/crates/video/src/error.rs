@@ -1,4 +1,4 @@
-//! Why frames could not be compensated.
+//! Errors of reading, compensating and writing frames, and what to do about each.
 
 use super::y4m::Y4mError;
 use iltm_picture::{FileError, png::PngError};

@@ -1,12 +1,21 @@
 //! Frames from files and pipes, through the runtime's pipelines, and back.
 //!
-//! | step | file |
+//! In: PNG pictures and Y4M streams, and a table. Out: the same frames compensated, in the
+//! kind and size that they came in.
+//!
+//! | what | file |
 //! |---|---|
-//! | video | [`y4m`] |
-//! | YUV to RGB and back | [`yuv`] |
-//! | frames through a table, on all cores | [`compensate`] |
+//! | pictures and streams through a table, the front door | [`compensate`] |
 //! | a table that is replaced while a stream runs, a budget of time | [`live`], [`watch`] |
-//! | a moving picture made by arithmetic, to show and test with | [`test_scene`] |
+//! | inputs told apart, and a few frames of one | [`Input`], [`sampled_frames`] |
+//! | Y4M streams | [`y4m`] |
+//! | YUV to RGB and back | [`yuv`] |
+//! | reading, working and writing at the same time | `stream` |
+//! | bands of rows of planar frames and of pictures | `bands`, `planar` |
+//! | frames of one size through one table, on all cores | `engine` |
+//! | codes to light and drives to codes by lookup | `curves` |
+//! | a moving scene made by arithmetic, to show and test with | [`test_scene`] |
+//! | errors | [`VideoError`] |
 //!
 //! The pixels are worked on by [`iltm_runtime::pipeline`], so that every frame
 //! is what the device would show; here is only what brings them to it fast.
@@ -32,21 +41,19 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
-mod interleaved;
+mod input;
 pub mod live;
-mod operator_memory;
 mod planar;
-mod sampled;
 mod stream;
 pub mod test_scene;
 pub mod watch;
 pub mod y4m;
 pub mod yuv;
 
-pub use compensate::{Compensator, Settings, Summary};
+pub use compensate::{CompensateOptions, Compensator, FrameTotals};
+pub use engine::OperatorMemory;
 pub use error::VideoError;
-pub use operator_memory::OperatorMemory;
-pub use sampled::sampled_frames;
+pub use input::{Input, sampled_frames};
 
 #[cfg(test)]
 mod tests;

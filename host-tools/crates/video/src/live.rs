@@ -1,28 +1,25 @@
-//! A stream whose table may be replaced while it runs, and whose tier follows a budget of
-//! time.
+//! Live streams: the table may be replaced while a stream runs, and the tier follows a
+//! budget of time. A stream without either takes the same way.
 //!
 //! Between two frames, and nowhere else, a newer table takes over and the runtime's
 //! [`Governor`] may choose another tier, as on the device. A newer table that cannot be
 //! used changes nothing.
 
-use super::engine::{Engine, Work};
-use super::planar::{Layout, Planar};
-use super::stream::{self, Frames};
+use super::planar::{Planar, PlaneLayout};
+use super::stream::{self, FrameQueue};
 use super::y4m::Reader;
-use super::{Compensator, Settings, Summary, VideoError};
+use super::{Compensator, FrameTotals, Input, VideoError};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
     governor::{Governor, Reason, TierChange},
-    image::{ImageError, Table, layout::MAX_TIERS, unseal},
+    image::{ImageError, Table, unseal},
 };
-use rayon::ThreadPool;
 use std::io::{Read, Write};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// What happens between two frames.
 #[derive(Debug)]
-pub enum Event {
+pub enum LiveEvent {
     /// The governor chose another tier.
     Tier {
         /// Frames before it.
@@ -42,13 +39,13 @@ pub enum Event {
         /// Frames before that.
         frame: u64,
         /// Why.
-        why: Refusal,
+        why: NewTableError,
     },
 }
 
 /// Why a newer table was not taken.
 #[derive(Debug, thiserror::Error)]
-pub enum Refusal {
+pub enum NewTableError {
     /// Its bytes are no table.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -57,24 +54,22 @@ pub enum Refusal {
     Video(#[from] VideoError),
 }
 
-/// How a stream is compensated live.
+/// What may change while a stream runs.
 pub struct Live<'l> {
-    /// Tier, encoding and threads; with a budget the tier is the governor's.
-    pub settings: Settings,
-    /// What computing a frame may take.
+    /// What computing a frame may take; with a budget the tier is the governor's.
     pub budget: Option<Duration>,
     /// Asked before every frame: the bytes of a table's file that is to be used from now
     /// on.
     pub newer: &'l mut dyn FnMut() -> Option<Vec<u8>>,
     /// Told what happens.
-    pub said: &'l mut dyn FnMut(&Event),
+    pub said: &'l mut dyn FnMut(&LiveEvent),
 }
 
 /// What has been done live.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LiveSummary {
     /// Frames, samples, clipped samples.
-    pub frames: Summary,
+    pub frames: FrameTotals,
     /// Frames at each tier, from 0.
     pub tiers: Vec<u64>,
     /// Frames that took longer than the budget to compute.
@@ -87,94 +82,111 @@ pub struct LiveSummary {
     pub refused: u64,
 }
 
-/// How a table's turn ended.
-enum Turn {
-    /// There are no more frames.
-    End,
-    /// A newer table, checked, takes over.
-    Newer(Vec<u8>),
+impl Compensator<'_, '_> {
+    /// Compensates a Y4M stream as [`y4m`](Self::y4m) does, but begins with this table
+    /// only, and with this tier only without a budget.
+    ///
+    /// # Errors
+    /// Those of [`y4m`](Self::y4m), [`VideoError::UnknownFormat`], and
+    /// [`VideoError::Still`] for a picture.
+    pub fn live<R: Read + Send, W: Write + Send>(
+        &self,
+        live: Live<'_>,
+        input: R,
+        output: W,
+        progress: &dyn Progress,
+    ) -> Result<LiveSummary, VideoError> {
+        match Input::of(input)? {
+            Input::Png(_) => Err(VideoError::Still),
+            Input::Y4m(input) => live.run(self, input, output, progress),
+        }
+    }
 }
 
 impl Live<'_> {
-    /// Compensates a Y4M stream, beginning with the table in the file's bytes `image`.
-    ///
-    /// `progress` advances by one a frame.
-    ///
-    /// # Errors
-    /// Those of [`Compensator::y4m`]; [`VideoError::Table`] if `image` is no table.
-    pub fn y4m<R: Read + Send, W: Write + Send>(
-        mut self,
-        image: &[u8],
+    /// The way of every Y4M stream, whether anything may change or not.
+    pub(super) fn run<R: Read + Send, W: Write + Send>(
+        self,
+        first: &Compensator<'_, '_>,
         input: R,
         output: W,
         progress: &dyn Progress,
     ) -> Result<LiveSummary, VideoError> {
         let reader = Reader::new(input)?;
-        let layout = Layout::new(reader.header());
-        let size = reader.header().size();
-        let threads = Arc::new(super::compensate::threads(self.settings.threads)?);
-        let mut content = unseal(image).map_err(VideoError::Table)?.0.to_vec();
-        let mut done = Done::new(size, layout.colours());
+        let (size, layout) = (reader.header().size(), PlaneLayout::new(reader.header()));
+        first.job(size, layout.colours())?;
+        let mut run = Run {
+            live: self,
+            layout,
+            progress,
+            done: LiveSummary {
+                frames: FrameTotals {
+                    size,
+                    frames: 0,
+                    samples: 0,
+                    clipped: 0,
+                },
+                tiers: Vec::new(),
+                overruns: 0,
+                slowest: Duration::ZERO,
+                tables: 0,
+                refused: 0,
+            },
+        };
         progress.begin("compensate", 0);
-        let frames = stream::run(reader, output, |frames| {
-            loop {
-                let turn = self.table(&content, layout, &threads, frames, &mut done, progress)?;
-                match turn {
-                    Turn::End => return Ok(()),
-                    Turn::Newer(newer) => content = newer,
-                }
+        let result = stream::run(reader, output, |frames| {
+            let mut newer = run.frames(first, frames)?;
+            while let Some(content) = newer {
+                let table = Table::check(&content).map_err(VideoError::Table)?;
+                newer = run.frames(&first.with_table(&table)?, frames)?;
             }
+            Ok(())
         });
         progress.end();
-        done.frames = frames?;
-        Ok(done.summary())
+        result.map(|()| run.done)
     }
+}
 
-    /// Frames with one table, `content`, until it is replaced or there are no more.
-    fn table(
+/// A stream under way.
+struct Run<'r, 'l> {
+    live: Live<'l>,
+    layout: PlaneLayout,
+    progress: &'r dyn Progress,
+    done: LiveSummary,
+}
+
+impl Run<'_, '_> {
+    /// Frames through one table, until there are no more or until a newer table, which is
+    /// returned, takes over.
+    fn frames(
         &mut self,
-        content: &[u8],
-        layout: Layout,
-        threads: &Arc<ThreadPool>,
-        frames: &mut Frames,
-        done: &mut Done,
-        progress: &dyn Progress,
-    ) -> Result<Turn, VideoError> {
-        let table = Table::check(content).map_err(VideoError::Table)?;
-        let compensator = Compensator::on(&table, self.settings, Arc::clone(threads))?;
-        let work = compensator.work(done.size, done.colours)?;
-        match table.channels() {
-            1 => self.turn::<1>(&table, work, layout, threads, frames, done, progress),
-            _ => self.turn::<3>(&table, work, layout, threads, frames, done, progress),
+        compensator: &Compensator<'_, '_>,
+        frames: &mut FrameQueue,
+    ) -> Result<Option<Vec<u8>>, VideoError> {
+        match compensator.table.channels() {
+            1 => self.frames_of::<1>(compensator, frames),
+            _ => self.frames_of::<3>(compensator, frames),
         }
     }
 
     /// The same for a table of `C` channels.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "what a stream has in all and what one table has are different things"
-    )]
-    fn turn<const C: usize>(
+    fn frames_of<const C: usize>(
         &mut self,
-        table: &Table<'_>,
-        work: Work,
-        layout: Layout,
-        threads: &Arc<ThreadPool>,
-        frames: &mut Frames,
-        done: &mut Done,
-        progress: &dyn Progress,
-    ) -> Result<Turn, VideoError> {
-        let engine = Engine::<Planar, C>::new(table, threads, work);
-        let mut engine = engine.map_err(VideoError::Runtime)?;
-        let samples = work.size.pixels() * work.colours;
-        let budget = self.budget.map(microseconds);
-        let mut governor = budget.map(|budget| Governor::for_table(table, samples, budget));
+        compensator: &Compensator<'_, '_>,
+        frames: &mut FrameQueue,
+    ) -> Result<Option<Vec<u8>>, VideoError> {
+        let layout = self.layout;
+        let job = compensator.job(self.done.frames.size, layout.colours())?;
+        let mut engine = compensator.engine::<Planar, C>(job)?;
+        let budget = self.live.budget.map(microseconds);
+        let mut governor =
+            budget.map(|budget| Governor::for_table(compensator.table, job.samples(), budget));
         // Waits for a frame first, so that a table is asked for as late as can be.
         while frames.wait() {
-            if let Some(newer) = self.newer(work, threads, done) {
-                return Ok(Turn::Newer(newer));
+            if let Some(newer) = self.newer(compensator) {
+                return Ok(Some(newer));
             }
-            let tier = governor.as_ref().map_or(work.tier, Governor::tier);
+            let tier = governor.as_ref().map_or(job.tier, Governor::tier);
             let start = Instant::now();
             let worked = frames.work(|frame| {
                 let mut planar = Planar {
@@ -187,35 +199,35 @@ impl Live<'_> {
             });
             let took = start.elapsed();
             let Some(clipped) = worked? else {
-                return Ok(Turn::End);
+                break;
             };
-            done.frame(tier, took, clipped);
-            progress.advance(1);
+            self.done.add(tier, took, job.samples(), clipped);
+            self.progress.advance(1);
             if let Some(governor) = &mut governor {
                 let overruns = governor.overruns();
                 if let Some(change) = governor.frame(microseconds(took)) {
-                    let frame = done.frames;
-                    (self.said)(&Event::Tier { frame, change });
+                    let frame = self.done.frames.frames;
+                    (self.live.said)(&LiveEvent::Tier { frame, change });
                 }
-                done.overruns += u64::from(governor.overruns() - overruns);
+                self.done.overruns += u64::from(governor.overruns() - overruns);
             }
         }
-        Ok(Turn::End)
+        Ok(None)
     }
 
     /// A newer table that can be used.
-    fn newer(&mut self, work: Work, threads: &Arc<ThreadPool>, done: &mut Done) -> Option<Vec<u8>> {
-        let bytes = (self.newer)()?;
-        let frame = done.frames;
-        match self.checked(&bytes, work, threads) {
+    fn newer(&mut self, compensator: &Compensator<'_, '_>) -> Option<Vec<u8>> {
+        let bytes = (self.live.newer)()?;
+        let frame = self.done.frames.frames;
+        match self.checked(&bytes, compensator) {
             Ok((content, id)) => {
-                done.tables += 1;
-                (self.said)(&Event::Table { frame, id });
+                self.done.tables += 1;
+                (self.live.said)(&LiveEvent::Table { frame, id });
                 Some(content)
             }
             Err(why) => {
-                done.refused += 1;
-                (self.said)(&Event::Refused { frame, why });
+                self.done.refused += 1;
+                (self.live.said)(&LiveEvent::Refused { frame, why });
                 None
             }
         }
@@ -224,69 +236,26 @@ impl Live<'_> {
     fn checked(
         &self,
         bytes: &[u8],
-        work: Work,
-        threads: &Arc<ThreadPool>,
-    ) -> Result<(Vec<u8>, u32), Refusal> {
+        compensator: &Compensator<'_, '_>,
+    ) -> Result<(Vec<u8>, u32), NewTableError> {
         let content = unseal(bytes)?.0;
         let table = Table::check(content)?;
-        let compensator = Compensator::on(&table, self.settings, Arc::clone(threads))?;
-        compensator.work(work.size, work.colours)?;
+        let newer = compensator.with_table(&table)?;
+        newer.job(self.done.frames.size, self.layout.colours())?;
         Ok((content.to_vec(), table.id()))
     }
 }
 
-/// What has been done so far.
-struct Done {
-    size: iltm_runtime::FrameSize,
-    colours: usize,
-    frames: u64,
-    clipped: u64,
-    tiers: [u64; MAX_TIERS],
-    overruns: u64,
-    slowest: Duration,
-    tables: u64,
-    refused: u64,
-}
-
-impl Done {
-    const fn new(size: iltm_runtime::FrameSize, colours: usize) -> Self {
-        Self {
-            size,
-            colours,
-            frames: 0,
-            clipped: 0,
-            tiers: [0; MAX_TIERS],
-            overruns: 0,
-            slowest: Duration::ZERO,
-            tables: 0,
-            refused: 0,
-        }
-    }
-
-    fn frame(&mut self, tier: u8, took: Duration, clipped: u64) {
-        self.frames += 1;
-        self.clipped += clipped;
+impl LiveSummary {
+    /// Counts a frame.
+    fn add(&mut self, tier: u8, took: Duration, samples: usize, clipped: u64) {
+        self.frames.frames += 1;
+        self.frames.samples += samples as u64;
+        self.frames.clipped += clipped;
         self.slowest = self.slowest.max(took);
-        if let Some(count) = self.tiers.get_mut(usize::from(tier)) {
-            *count += 1;
-        }
-    }
-
-    fn summary(&self) -> LiveSummary {
-        let used = self.tiers.iter().rposition(|count| *count > 0);
-        LiveSummary {
-            frames: Summary {
-                size: self.size,
-                frames: self.frames,
-                samples: self.frames * (self.size.pixels() * self.colours) as u64,
-                clipped: self.clipped,
-            },
-            tiers: self.tiers[..used.map_or(0, |top| top + 1)].to_vec(),
-            overruns: self.overruns,
-            slowest: self.slowest,
-            tables: self.tables,
-            refused: self.refused,
-        }
+        let tier = usize::from(tier);
+        self.tiers.resize(self.tiers.len().max(tier + 1), 0);
+        self.tiers[tier] += 1;
     }
 }
 

@@ -1,28 +1,27 @@
-//! Y4M frames as rows of colours.
+//! Planar frames of Y4M as rows of colours, and as pictures.
 
 #![allow(
     clippy::inline_always,
     reason = "compiled into `engine::rows`, which chooses the processor's instructions"
 )]
 
-use super::bands::{Band, Bands, STRIP};
-use super::y4m::{Frame, Header, Sampling};
+use super::bands::{Band, Bands, Interleaved, STRIP};
+use super::y4m::{ChromaSampling, Header, YuvFrame};
 use super::yuv::{Conversion, Standard, repeat_pairs, sum_squares};
-use crate::interleaved::Interleaved;
 use iltm_picture::{Picture, Samples};
 
 /// How the planes of every frame of a stream are laid out and converted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(super) struct PlaneLayout {
     width: usize,
     pixels: usize,
     chroma_width: usize,
     chroma_samples: usize,
-    sampling: Sampling,
+    sampling: ChromaSampling,
     conversion: Conversion,
 }
 
-impl Layout {
+impl PlaneLayout {
     pub(super) fn new(header: &Header) -> Self {
         let (chroma_width, chroma_height) = header.chroma();
         Self {
@@ -38,8 +37,8 @@ impl Layout {
     /// Colours of a pixel.
     pub(super) const fn colours(&self) -> usize {
         match self.sampling {
-            Sampling::Mono => 1,
-            Sampling::Chroma420 | Sampling::Chroma444 => 3,
+            ChromaSampling::Mono => 1,
+            ChromaSampling::Chroma420 | ChromaSampling::Chroma444 => 3,
         }
     }
 }
@@ -47,16 +46,16 @@ impl Layout {
 /// One frame of a stream.
 #[derive(Debug)]
 pub(super) struct Planar {
-    pub(super) layout: Layout,
-    pub(super) frame: Frame,
+    pub(super) layout: PlaneLayout,
+    pub(super) frame: YuvFrame,
 }
 
-impl Frame {
+impl YuvFrame {
     /// A picture as a frame of a stream: 8 bits, of the stream's size, with as many
     /// channels as the stream has; `None` for any other.
     #[must_use]
     pub fn from_picture(header: &Header, picture: &Picture) -> Option<Self> {
-        let layout = Layout::new(header);
+        let layout = PlaneLayout::new(header);
         let Samples::Eight(samples) = picture.samples() else {
             return None;
         };
@@ -90,7 +89,7 @@ impl Frame {
     /// than the stream's frames.
     #[must_use]
     pub fn to_picture(&self, header: &Header) -> Option<Picture> {
-        let layout = Layout::new(header);
+        let layout = PlaneLayout::new(header);
         if self.samples.len() != header.frame_bytes() {
             return None;
         }
@@ -135,7 +134,7 @@ where
 /// Adjacent rows of the planes.
 #[derive(Debug)]
 pub(super) struct PlanarBand<'b> {
-    layout: Layout,
+    layout: PlaneLayout,
     luma: &'b mut [u8],
     u: &'b mut [u8],
     v: &'b mut [u8],
@@ -143,7 +142,7 @@ pub(super) struct PlanarBand<'b> {
 
 /// Rows on their way between planes and colours.
 #[derive(Debug, Default)]
-pub(super) struct Rows {
+pub(super) struct ChromaRows {
     /// What each chroma sample adds to each colour.
     terms: [Vec<i16>; 3],
     /// The same for each pixel.
@@ -152,8 +151,8 @@ pub(super) struct Rows {
     sums: [Vec<u16>; 3],
 }
 
-impl Rows {
-    fn fit(&mut self, layout: &Layout) {
+impl ChromaRows {
+    fn fit(&mut self, layout: &PlaneLayout) {
         for terms in &mut self.terms {
             terms.resize(layout.chroma_width, 0);
         }
@@ -172,15 +171,15 @@ impl Bands for Planar {
         = PlanarBand<'b>
     where
         Self: 'b;
-    type Memory = Rows;
+    type Memory = ChromaRows;
 
     fn bands(&mut self, rows: usize) -> Vec<PlanarBand<'_>> {
         let layout = self.layout;
         let (luma, chroma) = self.frame.samples.split_at_mut(layout.pixels);
         let (u, v) = chroma.split_at_mut(layout.chroma_samples);
         let chroma_rows = match layout.sampling {
-            Sampling::Chroma420 => rows / STRIP,
-            Sampling::Mono | Sampling::Chroma444 => rows,
+            ChromaSampling::Chroma420 => rows / STRIP,
+            ChromaSampling::Mono | ChromaSampling::Chroma444 => rows,
         };
         let chroma_band = (chroma_rows * layout.chroma_width).max(1);
         let mut u = u.chunks_mut(chroma_band);
@@ -200,8 +199,8 @@ impl PlanarBand<'_> {
     /// Where the samples of a strip begin in the luma and in each chroma plane.
     fn starts(&self, strip: usize) -> (usize, usize) {
         let chroma_rows = match self.layout.sampling {
-            Sampling::Chroma420 => strip,
-            Sampling::Mono | Sampling::Chroma444 => STRIP * strip,
+            ChromaSampling::Chroma420 => strip,
+            ChromaSampling::Mono | ChromaSampling::Chroma444 => STRIP * strip,
         };
         (
             STRIP * strip * self.layout.width,
@@ -212,15 +211,15 @@ impl PlanarBand<'_> {
 
 impl Band for PlanarBand<'_> {
     type Code = u8;
-    type Memory = Rows;
+    type Memory = ChromaRows;
 
     fn rows(&self) -> usize {
         self.luma.len() / self.layout.width
     }
 
     #[inline(always)]
-    fn unpack(&self, strip: usize, rows: &mut Rows, colours: &mut [u8]) {
-        let Layout {
+    fn unpack(&self, strip: usize, rows: &mut ChromaRows, colours: &mut [u8]) {
+        let PlaneLayout {
             width,
             chroma_width,
             sampling,
@@ -229,7 +228,7 @@ impl Band for PlanarBand<'_> {
         } = self.layout;
         let (luma, chroma) = self.starts(strip);
         let lumas = self.luma[luma..].chunks_exact(width);
-        if sampling == Sampling::Mono {
+        if sampling == ChromaSampling::Mono {
             for (luma, grey) in lumas.zip(colours.chunks_exact_mut(width)) {
                 conversion.grey_row(luma, grey);
             }
@@ -239,19 +238,19 @@ impl Band for PlanarBand<'_> {
         let mut us = self.u[chroma..].chunks_exact(chroma_width);
         let mut vs = self.v[chroma..].chunks_exact(chroma_width);
         for (row, (luma, colours)) in lumas.zip(colours.chunks_exact_mut(3 * width)).enumerate() {
-            if sampling == Sampling::Chroma444 || row == 0 {
+            if sampling == ChromaSampling::Chroma444 || row == 0 {
                 let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
                 let [red, green, blue] = &mut rows.terms;
                 conversion.chroma_terms(u, v, [red, green, blue]);
-                if sampling == Sampling::Chroma420 {
+                if sampling == ChromaSampling::Chroma420 {
                     for (terms, pixels) in rows.terms.iter().zip(&mut rows.spread) {
                         repeat_pairs(terms, pixels);
                     }
                 }
             }
             let terms = match sampling {
-                Sampling::Chroma420 => &rows.spread,
-                Sampling::Mono | Sampling::Chroma444 => &rows.terms,
+                ChromaSampling::Chroma420 => &rows.spread,
+                ChromaSampling::Mono | ChromaSampling::Chroma444 => &rows.terms,
             };
             for (terms, colour) in terms.iter().zip(colours.chunks_exact_mut(width)) {
                 conversion.colour_row(luma, terms, colour);
@@ -260,8 +259,8 @@ impl Band for PlanarBand<'_> {
     }
 
     #[inline(always)]
-    fn pack(&mut self, strip: usize, rows: &mut Rows, colours: &[u8]) {
-        let Layout {
+    fn pack(&mut self, strip: usize, rows: &mut ChromaRows, colours: &[u8]) {
+        let PlaneLayout {
             width,
             chroma_width,
             sampling,
@@ -270,7 +269,7 @@ impl Band for PlanarBand<'_> {
         } = self.layout;
         let (luma, chroma) = self.starts(strip);
         let lumas = self.luma[luma..].chunks_exact_mut(width);
-        if sampling == Sampling::Mono {
+        if sampling == ChromaSampling::Mono {
             for (luma, grey) in lumas.zip(colours.chunks_exact(width)) {
                 conversion.grey_luma_row(grey, luma);
             }
@@ -281,7 +280,7 @@ impl Band for PlanarBand<'_> {
         let mut vs = self.v[chroma..].chunks_exact_mut(chroma_width);
         for (luma, colours) in lumas.zip(colours.chunks_exact(3 * width)) {
             conversion.luma_row(separate(colours, width), luma);
-            if sampling == Sampling::Chroma444 {
+            if sampling == ChromaSampling::Chroma444 {
                 for (sums, colour) in rows.sums.iter_mut().zip(colours.chunks_exact(width)) {
                     for (sum, code) in sums.iter_mut().zip(colour) {
                         *sum = u16::from(*code);
@@ -291,7 +290,7 @@ impl Band for PlanarBand<'_> {
                 conversion.chroma_row(rows.sums.each_ref().map(Vec::as_slice), 0, u, v);
             }
         }
-        if sampling == Sampling::Chroma420 {
+        if sampling == ChromaSampling::Chroma420 {
             let tops = &colours[..3 * width];
             let bottoms = &colours[colours.len() - 3 * width..];
             let pairs = tops.chunks_exact(width).zip(bottoms.chunks_exact(width));

@@ -1,11 +1,11 @@
-//! Reading, working and writing at the same time.
+//! Pipeline of three threads: reading, working and writing at the same time.
 //!
 //! Three threads pass a fixed number of frames round: one reads into them, the
 //! caller's works on them in place, one writes them out. So a pipe that is slow
 //! for a moment stops nobody, and memory does not depend on the stream's length.
 
 use super::VideoError;
-use super::y4m::{Frame, Header, Reader, Writer, Y4mError};
+use super::y4m::{Header, Reader, Writer, Y4mError, YuvFrame};
 use std::io::{Read, Write};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
@@ -14,15 +14,14 @@ use std::thread;
 const FRAMES: usize = 5;
 
 /// The frames of a stream, one after the other.
-pub(super) struct Frames {
-    read: Receiver<Frame>,
-    finished: SyncSender<Frame>,
+pub(super) struct FrameQueue {
+    read: Receiver<YuvFrame>,
+    finished: SyncSender<YuvFrame>,
     /// Read and not yet worked on.
-    next: Option<Frame>,
-    done: u64,
+    next: Option<YuvFrame>,
 }
 
-impl Frames {
+impl FrameQueue {
     /// Waits for the next frame; `false` if there is none any more.
     pub(super) fn wait(&mut self) -> bool {
         if self.next.is_none() {
@@ -38,55 +37,49 @@ impl Frames {
     /// What `work` returns; the frame is not handed on then.
     pub(super) fn work<T>(
         &mut self,
-        work: impl FnOnce(&mut Frame) -> Result<T, VideoError>,
+        work: impl FnOnce(&mut YuvFrame) -> Result<T, VideoError>,
     ) -> Result<Option<T>, VideoError> {
         self.wait();
         let Some(mut frame) = self.next.take() else {
             return Ok(None);
         };
         let worked = work(&mut frame)?;
-        if self.finished.send(frame).is_err() {
-            return Ok(None);
-        }
-        self.done += 1;
-        Ok(Some(worked))
+        Ok(self.finished.send(frame).is_ok().then_some(worked))
     }
 }
 
 /// Sends the frames of `reader` through `work`, which takes them one after the other, to
-/// `output`; returns how many.
+/// `output`.
 ///
 /// # Errors
 /// What reading, `work` or writing returns. What came before it has been written.
 pub(super) fn run<R: Read + Send, W: Write + Send>(
     reader: Reader<R>,
     output: W,
-    work: impl FnOnce(&mut Frames) -> Result<(), VideoError>,
-) -> Result<u64, VideoError> {
+    work: impl FnOnce(&mut FrameQueue) -> Result<(), VideoError>,
+) -> Result<(), VideoError> {
     let header = reader.header().clone();
     let (free, empty) = sync_channel(FRAMES);
     let (filled, read) = sync_channel(FRAMES);
     let (finished, done) = sync_channel(FRAMES);
     for _ in 0..FRAMES {
         // The channel has room for all, and its other end is here.
-        let _ = free.send(Frame::default());
+        let _ = free.send(YuvFrame::default());
     }
     thread::scope(|scope| {
         let reading = scope.spawn(move || read_all(reader, &empty, &filled));
         let writing = scope.spawn(move || write_all(output, &header, &done, &free));
-        let mut frames = Frames {
+        let mut frames = FrameQueue {
             read,
             finished,
             next: None,
-            done: 0,
         };
         let worked = work(&mut frames);
-        let count = frames.done;
         // Both threads end when nobody is at the other end.
         drop(frames);
         finish(writing.join())?;
         finish(reading.join())?;
-        worked.map(|()| count)
+        worked
     })
 }
 
@@ -97,8 +90,8 @@ fn finish(result: thread::Result<Result<(), Y4mError>>) -> Result<(), Y4mError> 
 /// Reads until the end, an error, or nobody takes frames any more.
 fn read_all<R: Read>(
     mut reader: Reader<R>,
-    empty: &Receiver<Frame>,
-    filled: &SyncSender<Frame>,
+    empty: &Receiver<YuvFrame>,
+    filled: &SyncSender<YuvFrame>,
 ) -> Result<(), Y4mError> {
     for mut frame in empty {
         if !reader.read_frame(&mut frame)? || filled.send(frame).is_err() {
@@ -112,8 +105,8 @@ fn read_all<R: Read>(
 fn write_all<W: Write>(
     output: W,
     header: &Header,
-    done: &Receiver<Frame>,
-    free: &SyncSender<Frame>,
+    done: &Receiver<YuvFrame>,
+    free: &SyncSender<YuvFrame>,
 ) -> Result<(), Y4mError> {
     let mut writer = Writer::new(output, header)?;
     for frame in done {

@@ -1,4 +1,4 @@
-//! A file that is read again when it changes.
+//! Watch on a file that is read again when it changes.
 
 use std::fs;
 use std::path::{Path, PathBuf};

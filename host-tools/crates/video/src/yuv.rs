@@ -1,4 +1,4 @@
-//! Between YUV and RGB codes, in integers.
+//! YUV to RGB codes and back, in integers.
 //!
 //! With `K_r`, `K_b` of the standard, `K_g = 1 - K_r - K_b`, black `y_0` and the
 //! widths `Y` of luma and `C` of chroma of the range, in exact numbers
@@ -34,7 +34,7 @@
     reason = "compiled into `engine::rows`, which chooses the processor's instructions"
 )]
 
-use super::y4m::Range;
+use super::y4m::CodeRange;
 use iltm_runtime::FrameSize;
 
 /// What weighs the colours in luma.
@@ -90,12 +90,12 @@ pub struct Conversion {
 impl Conversion {
     /// The coefficients for frames of this standard and range.
     #[must_use]
-    pub fn new(standard: Standard, range: Range) -> Self {
+    pub fn new(standard: Standard, range: CodeRange) -> Self {
         let (red, blue) = standard.red_and_blue();
         let green = 1.0 - red - blue;
         let (black, luma, chroma) = match range {
-            Range::Limited => (16.0, 219.0, 224.0),
-            Range::Full => (0.0, 255.0, 255.0),
+            CodeRange::Limited => (16.0, 219.0, 224.0),
+            CodeRange::Full => (0.0, 255.0, 255.0),
         };
         let scale = 255.0 / luma;
         let term = |coefficient: f64| {
@@ -165,6 +165,14 @@ impl Conversion {
         for (luma, grey) in luma.iter().zip(grey) {
             *grey = (self.luma_term(*luma) >> TERM_BITS).clamp(0, 255) as u8;
         }
+    }
+
+    /// Luma of a pixel.
+    #[must_use]
+    pub fn luma(&self, [red, green, blue]: [u8; 3]) -> u8 {
+        let mut luma = [0];
+        self.luma_row([&[red], &[green], &[blue]], &mut luma);
+        luma[0]
     }
 
     /// Luma of a row of colours.
@@ -248,14 +256,14 @@ mod tests {
     use super::*;
 
     /// The formulas of the module's documentation, in `f64`.
-    fn exact(standard: Standard, range: Range, [y, u, v]: [u8; 3]) -> [f64; 3] {
+    fn exact(standard: Standard, range: CodeRange, [y, u, v]: [u8; 3]) -> [f64; 3] {
         let (red, blue) = match standard {
             Standard::Bt601 => (0.299, 0.114),
             Standard::Bt709 => (0.2126, 0.0722),
         };
         let (black, luma, chroma) = match range {
-            Range::Limited => (16.0, 219.0, 224.0),
-            Range::Full => (0.0, 255.0, 255.0),
+            CodeRange::Limited => (16.0, 219.0, 224.0),
+            CodeRange::Full => (0.0, 255.0, 255.0),
         };
         let y = (f64::from(y) - black) * 255.0 / luma;
         let u = (f64::from(u) - 128.0) * 255.0 / chroma * 2.0 * (1.0 - blue);
@@ -265,10 +273,10 @@ mod tests {
         colours.map(|code| code.clamp(0.0, 255.0))
     }
 
-    fn all() -> impl Iterator<Item = (Standard, Range)> {
+    fn all() -> impl Iterator<Item = (Standard, CodeRange)> {
         [Standard::Bt601, Standard::Bt709]
             .into_iter()
-            .flat_map(|standard| [(standard, Range::Limited), (standard, Range::Full)])
+            .flat_map(|standard| [(standard, CodeRange::Limited), (standard, CodeRange::Full)])
     }
 
     fn rgb(conversion: &Conversion, [y, u, v]: [u8; 3]) -> [u8; 3] {
@@ -336,7 +344,7 @@ mod tests {
                 assert_eq!([u, v], [128, 128]);
                 let mut grey = [0];
                 conversion.grey_row(&[y], &mut grey);
-                assert!(grey[0].abs_diff(code) <= u8::from(range == Range::Limited));
+                assert!(grey[0].abs_diff(code) <= u8::from(range == CodeRange::Limited));
                 assert_eq!(rgb(&conversion, [y, 128, 128]), grey.repeat(3)[..]);
             }
         }
@@ -346,13 +354,13 @@ mod tests {
     fn the_codes_of_black_white_and_the_primaries_are_those_of_the_standards() {
         // BT.709 and BT.601, 8 bit, rounded from the formulas of table 4 of the one
         // and 2.5 of the other.
-        let bt709 = Conversion::new(Standard::Bt709, Range::Limited);
+        let bt709 = Conversion::new(Standard::Bt709, CodeRange::Limited);
         assert_eq!(yuv(&bt709, [0, 0, 0]), [16, 128, 128]);
         assert_eq!(yuv(&bt709, [255, 255, 255]), [235, 128, 128]);
         assert_eq!(yuv(&bt709, [255, 0, 0]), [63, 102, 240]);
         assert_eq!(yuv(&bt709, [0, 255, 0]), [173, 42, 26]);
         assert_eq!(yuv(&bt709, [0, 0, 255]), [32, 240, 118]);
-        let bt601 = Conversion::new(Standard::Bt601, Range::Limited);
+        let bt601 = Conversion::new(Standard::Bt601, CodeRange::Limited);
         assert_eq!(yuv(&bt601, [255, 0, 0]), [81, 90, 240]);
         assert_eq!(yuv(&bt601, [0, 255, 0]), [145, 54, 34]);
         assert_eq!(yuv(&bt601, [0, 0, 255]), [41, 240, 110]);

@@ -17,8 +17,8 @@ use super::output::{Output, read_file};
 use super::slots::letter;
 use super::{interrupt, trial};
 use crate::device::DeviceError;
-use crate::device::upload::{Parcel, Plan, Summary, Upload, UploadError};
-use crate::user::{Folders, transcripts};
+use crate::device::upload::{Parcel, Upload, UploadError, UploadPlan, UploadSummary};
+use crate::user::{Folders, begin_transcript};
 use iltm_runtime::link::{InUse, Refusal};
 use preflight::{Named, Now};
 use serde_json::json;
@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Flash, output: &Output) -> Result<(), Failure> {
         Kind::NoAnswer | Kind::NoDevice | Kind::Port => failure.with(Active::Unknown),
         _ => failure.with(Active::Untouched),
     })?;
-    if let Some(Ok(file)) = Folders::of_user().map(|folders| transcripts::begin(&folders)) {
+    if let Some(Ok(file)) = Folders::of_user().map(|folders| begin_transcript(&folders)) {
         connection.transcribe(file);
     }
     let result = flash(arguments, &bytes, &table, &mut connection, output);
@@ -74,7 +74,7 @@ fn flash(
         arguments,
         table,
         output,
-        summary: Summary::default(),
+        summary: UploadSummary::default(),
         start: Instant::now(),
         dry_run: arguments.dry_run,
     };
@@ -82,7 +82,7 @@ fn flash(
         return ending.end(connection, in_use, "is in use already");
     }
     interrupt::catch();
-    let plan = Plan::make(&mut connection.client, &parcel, interrupt::stopped);
+    let plan = UploadPlan::make(&mut connection.client, &parcel, interrupt::stopped);
     let mut lost = Lost {
         before: super::slots::in_use(&slots),
         asked: Asked::Transfer,
@@ -187,7 +187,7 @@ fn active(slots: &iltm_runtime::link::Slots) -> Active {
 }
 
 /// Says what is about to be done.
-fn announce(table: &Named, plan: &Plan, connection: &Connection, output: &Output) {
+fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &Output) {
     let (differing, sectors) = (plan.differing.len(), plan.sectors);
     let seconds = seconds(plan.bytes(), connection.baud);
     let slot = letter(plan.slots.target);
@@ -250,7 +250,7 @@ struct Ending<'a> {
     arguments: &'a Flash,
     table: &'a Named,
     output: &'a Output,
-    summary: Summary,
+    summary: UploadSummary,
     start: Instant,
     dry_run: bool,
 }

@@ -1,9 +1,9 @@
-//! What the host can tell before anything is sent.
+//! Preflight: checks of a table against a device before anything is sent.
 
 use super::super::failure::{Failure, Kind};
 use super::super::inspect::check_sealed;
 use super::super::slots::{key_id, uses};
-use crate::device::cure;
+use crate::device::rejection_next_step;
 use iltm_runtime::{
     image::{Seal, layout::FORMAT_VERSION},
     link::{Hello, Slots, TableName},
@@ -94,7 +94,7 @@ impl Named {
                 "the table is of format {FORMAT_VERSION}; the device reads format {}",
                 device.table_format
             );
-            return refused(Kind::Table, why, cure(&Rejected::Format));
+            return refused(Kind::Table, why, rejection_next_step(&Rejected::Format));
         }
         match self.rejected(slots) {
             Some(Rejected::Older { version, floor }) => {
@@ -102,9 +102,13 @@ impl Named {
                     "the table has version {version}; the device takes {floor} and later ones"
                 );
                 let rejected = Rejected::Older { version, floor };
-                refused((&rejected).into(), why, cure(&rejected))
+                refused((&rejected).into(), why, rejection_next_step(&rejected))
             }
-            Some(rejected) => refused((&rejected).into(), rejected.to_string(), cure(&rejected)),
+            Some(rejected) => refused(
+                (&rejected).into(),
+                rejected.to_string(),
+                rejection_next_step(&rejected),
+            ),
             None => Ok(Now::Send),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::super::interrupt;
 use super::super::output::Output;
-use crate::device::upload::{Step, Watch};
+use crate::device::upload::{UploadObserver, UploadStep};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -84,30 +84,30 @@ fn bar(skipped: u32, total: u32) -> ProgressBar {
     bar
 }
 
-impl Watch for Show<'_> {
-    fn step(&mut self, step: Step) {
+impl UploadObserver for Show<'_> {
+    fn step(&mut self, step: UploadStep) {
         match step {
-            Step::Progress {
+            UploadStep::Progress {
                 done,
                 skipped,
                 total,
             } => self.progress(done, skipped, total),
-            Step::Quiet { silence } => {
+            UploadStep::Quiet { silence } => {
                 let seconds = silence.as_secs();
                 self.say(
                     &format!("nothing new has arrived for {seconds} s; trying on"),
                     &json!({ "event": "quiet", "seconds": seconds }),
                 );
             }
-            Step::Restarted => self.say(
+            UploadStep::Restarted => self.say(
                 "the device has restarted; going on with what is missing",
                 &json!({ "event": "restarted" }),
             ),
-            Step::Repeated { sector } => self.say(
+            UploadStep::Repeated { sector } => self.say(
                 &format!("sector {sector} did not get into the flash; sending it again"),
                 &json!({ "event": "repeated", "sector": sector }),
             ),
-            Step::Verified => {}
+            UploadStep::Verified => {}
         }
     }
 

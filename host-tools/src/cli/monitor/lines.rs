@@ -1,9 +1,10 @@
-//! A line for everything that happens, on standard output.
+//! Lines on standard output, one for each event, as text or JSON.
 
 use super::super::status;
 use super::Show;
-use super::happening::Happening;
+use super::event::MonitorEvent;
 use super::view::Rates;
+use iltm_runtime::link::Event;
 use std::io::{self, Write};
 
 /// One JSON object a line.
@@ -11,8 +12,8 @@ use std::io::{self, Write};
 pub(super) struct Json;
 
 impl Show for Json {
-    fn show(&mut self, happening: &Happening) -> io::Result<()> {
-        line(&happening.data().to_string())
+    fn show(&mut self, event: &MonitorEvent) -> io::Result<()> {
+        line(&event.data().to_string())
     }
 }
 
@@ -25,9 +26,9 @@ pub(super) struct Plain {
 }
 
 impl Show for Plain {
-    fn show(&mut self, happening: &Happening) -> io::Result<()> {
-        match happening {
-            Happening::Status(status) => {
+    fn show(&mut self, event: &MonitorEvent) -> io::Result<()> {
+        match event {
+            MonitorEvent::Device(Event::Status(status)) => {
                 self.rates.add(status);
                 let time = status.frame_time;
                 line(&format!(
@@ -46,11 +47,11 @@ impl Show for Plain {
                     status.frames.broken,
                 ))
             }
-            Happening::Connected(_) => {
+            MonitorEvent::Connected(_) => {
                 self.rates = Rates::default();
-                line(&happening.words().unwrap_or_default())
+                line(&event.words().unwrap_or_default())
             }
-            Happening::UnreadLog { .. } if std::mem::replace(&mut self.hinted, true) => Ok(()),
+            MonitorEvent::UnreadLog { .. } if std::mem::replace(&mut self.hinted, true) => Ok(()),
             other => line(&other.words().unwrap_or_default()),
         }
     }

@@ -1,7 +1,7 @@
-//! The live view on a terminal.
+//! Live view on a terminal: draws the lines of the view again as they change.
 
 use super::Show;
-use super::happening::Happening;
+use super::event::MonitorEvent;
 use super::view::View;
 use console::Term;
 use std::fmt::Write as _;
@@ -68,8 +68,8 @@ impl Drop for Live {
 }
 
 impl Show for Live {
-    fn show(&mut self, happening: &Happening) -> io::Result<()> {
-        self.view.take(happening);
+    fn show(&mut self, event: &MonitorEvent) -> io::Result<()> {
+        self.view.take(event);
         self.draw()
     }
 

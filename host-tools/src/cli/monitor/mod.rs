@@ -3,12 +3,12 @@
 //! | what | file |
 //! |---|---|
 //! | the conversation, and beginning it anew when it breaks | here |
-//! | what there is to show | [`happening`] |
+//! | events, in words and as data | [`event`] |
 //! | a line of text or JSON for each | [`lines`] |
 //! | the live view: its state as lines | [`view`] |
 //! | the live view: those lines on a terminal | [`live`] |
 
-mod happening;
+mod event;
 mod lines;
 mod live;
 mod view;
@@ -20,7 +20,7 @@ use super::interrupt;
 use super::output::Output;
 use crate::device::logs::Logs;
 use crate::device::{Client, DeviceError, Incoming, Patience, Port};
-use happening::Happening;
+use event::MonitorEvent;
 use iltm_runtime::link::{Channel, Refusal};
 use std::io;
 use std::path::Path;
@@ -36,7 +36,7 @@ const TICK: Duration = Duration::from_millis(100);
 /// Somebody who is shown what happens.
 trait Show {
     /// Shows one thing.
-    fn show(&mut self, happening: &Happening) -> io::Result<()>;
+    fn show(&mut self, event: &MonitorEvent) -> io::Result<()>;
 
     /// Time has passed.
     fn tick(&mut self) -> io::Result<()> {
@@ -50,12 +50,12 @@ pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
     // A first failure ends the command; later ones are the device's business.
     let mut connection = connect(&arguments.line, output)?;
     connection.remember(output);
-    let place = Place {
+    let endpoint = Endpoint {
         port: connection.port,
         baud: connection.baud,
     };
-    let line = &place;
-    let first = Watch::of(connection.client, period, logs.as_ref());
+    let line = &endpoint;
+    let first = MonitoredDevice::of(connection.client, period, logs.as_ref());
     let first = first.map_err(|error| Failure::of_device(&line.port, &error))?;
     interrupt::catch();
     let mut show: Box<dyn Show> = if output.is_json() {
@@ -86,15 +86,15 @@ pub(super) fn words(firmware: &Path) -> Result<Logs, Failure> {
 }
 
 /// Where the device was found.
-struct Place {
+struct Endpoint {
     port: String,
     baud: u32,
 }
 
 /// Shows what happens until somebody stops it.
 fn watch(
-    first: Watch<'_>,
-    line: &Place,
+    first: MonitoredDevice<'_>,
+    line: &Endpoint,
     period: Duration,
     logs: Option<&Logs>,
     show: &mut dyn Show,
@@ -105,7 +105,7 @@ fn watch(
     while !interrupt::stopped() {
         match current {
             Ok(mut watch) => {
-                show.show(&Happening::Connected(watch.client.device().clone()))?;
+                show.show(&MonitorEvent::Connected(watch.client.device().clone()))?;
                 said = false;
                 let error = watch.until_lost(show)?;
                 let Some(error) = error else {
@@ -117,12 +117,12 @@ fn watch(
                 refusal: Refusal::HelloFirst,
                 ..
             }) => {
-                show.show(&Happening::Restarted)?;
-                current = Watch::begin(line, period, logs);
+                show.show(&MonitorEvent::Restarted)?;
+                current = MonitoredDevice::begin(line, period, logs);
             }
             Err(error) => {
                 if !said {
-                    show.show(&Happening::Lost(error.to_string()))?;
+                    show.show(&MonitorEvent::Lost(error.to_string()))?;
                     said = true;
                 }
                 let end = Instant::now() + RETRY;
@@ -130,7 +130,7 @@ fn watch(
                     thread::sleep(TICK);
                     show.tick()?;
                 }
-                current = Watch::begin(line, period, logs);
+                current = MonitoredDevice::begin(line, period, logs);
             }
         }
     }
@@ -138,7 +138,7 @@ fn watch(
 }
 
 /// A conversation with a device that has granted a subscription.
-struct Watch<'l> {
+struct MonitoredDevice<'l> {
     client: Client<Wire>,
     logs: Option<&'l Logs>,
     period: Duration,
@@ -146,8 +146,12 @@ struct Watch<'l> {
     renewal: Duration,
 }
 
-impl<'l> Watch<'l> {
-    fn begin(line: &Place, period: Duration, logs: Option<&'l Logs>) -> Result<Self, DeviceError> {
+impl<'l> MonitoredDevice<'l> {
+    fn begin(
+        line: &Endpoint,
+        period: Duration,
+        logs: Option<&'l Logs>,
+    ) -> Result<Self, DeviceError> {
         let port = Port::open(&line.port, line.baud)?;
         let client = Client::greet(Wire::new(port), Patience::default())?;
         Self::of(client, period, logs)
@@ -192,19 +196,19 @@ impl<'l> Watch<'l> {
 
     fn show(&self, incoming: Incoming, show: &mut dyn Show) -> io::Result<()> {
         match incoming {
-            Incoming::Event(event) => show.show(&event.into()),
+            Incoming::Event(event) => show.show(&MonitorEvent::Device(event)),
             Incoming::Log(payload) => match self.logs {
                 Some(logs) => {
                     for message in logs.messages(&payload) {
-                        show.show(&Happening::Log(message))?;
+                        show.show(&MonitorEvent::Log(message))?;
                     }
                     Ok(())
                 }
-                None => show.show(&Happening::UnreadLog {
+                None => show.show(&MonitorEvent::UnreadLog {
                     bytes: payload.len(),
                 }),
             },
-            Incoming::Missed { channel, count } => show.show(&Happening::Missed {
+            Incoming::Missed { channel, count } => show.show(&MonitorEvent::Missed {
                 what: if channel == Channel::Log {
                     "log"
                 } else {

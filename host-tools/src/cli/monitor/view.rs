@@ -1,9 +1,9 @@
-//! What the live view says, as lines of a given width.
+//! View of a monitored device, as lines of a given width.
 
 use super::super::status;
-use super::happening::Happening;
+use super::event::MonitorEvent;
 use console::{StyledObject, style, truncate_str};
-use iltm_runtime::link::{Hello, Mode, Status};
+use iltm_runtime::link::{Event, Hello, Mode, Status};
 use jiff::Zoned;
 use std::collections::VecDeque;
 
@@ -75,23 +75,23 @@ impl View {
     }
 
     /// Takes in what has happened.
-    pub(super) fn take(&mut self, happening: &Happening) {
-        match happening {
-            Happening::Status(status) => {
+    pub(super) fn take(&mut self, event: &MonitorEvent) {
+        match event {
+            MonitorEvent::Device(Event::Status(status)) => {
                 self.rates.add(status);
                 self.status = Some(status.clone());
             }
-            Happening::Connected(device) => {
+            MonitorEvent::Connected(device) => {
                 self.device = Some(device.clone());
                 self.rates = Rates::default();
                 self.lost = None;
-                self.event(happening);
+                self.event(event);
             }
-            Happening::Lost(why) => {
+            MonitorEvent::Lost(why) => {
                 self.lost = Some(why.clone());
-                self.event(happening);
+                self.event(event);
             }
-            Happening::Log(message) => {
+            MonitorEvent::Log(message) => {
                 let level = match message.level.as_str() {
                     "error" => style("error").red(),
                     "warn" => style("warn ").yellow(),
@@ -103,24 +103,22 @@ impl View {
                 let line = format!("{} {level} {}", message.time, message.text);
                 keep(&mut self.log, line);
             }
-            Happening::UnreadLog { .. } => {
+            MonitorEvent::UnreadLog { .. } => {
                 self.log.clear();
-                self.log.extend(happening.words());
+                self.log.extend(event.words());
             }
-            Happening::TierChanged { .. }
-            | Happening::TableChanged { .. }
-            | Happening::Fault(_)
-            | Happening::Missed { .. }
-            | Happening::Restarted => self.event(happening),
+            MonitorEvent::Device(_) | MonitorEvent::Missed { .. } | MonitorEvent::Restarted => {
+                self.event(event)
+            }
         }
     }
 
-    fn event(&mut self, happening: &Happening) {
+    fn event(&mut self, event: &MonitorEvent) {
         let time = Zoned::now().strftime("%H:%M:%S").to_string();
-        let words = style(happening.words().unwrap_or_default());
-        let words = match happening {
-            Happening::Fault(_) | Happening::Lost(_) => words.red(),
-            Happening::Missed { .. } | Happening::Restarted => words.yellow(),
+        let words = style(event.words().unwrap_or_default());
+        let words = match event {
+            MonitorEvent::Device(Event::Fault(_)) | MonitorEvent::Lost(_) => words.red(),
+            MonitorEvent::Missed { .. } | MonitorEvent::Restarted => words.yellow(),
             _ => words,
         };
         keep(&mut self.events, format!("{time}  {words}"));
@@ -370,28 +368,28 @@ mod tests {
     #[test]
     fn the_view_shows_rates_tier_bars_events_and_log() {
         let mut view = View::new("/dev/ttyACM0");
-        view.take(&Happening::Connected(FakeDevice::default().identity()));
-        view.take(&Happening::Status(status(4_000)));
-        view.take(&Happening::Status(status(5_000)));
-        view.take(&Happening::TierChanged {
+        view.take(&MonitorEvent::Connected(FakeDevice::default().identity()));
+        view.take(&MonitorEvent::Device(Event::Status(status(4_000))));
+        view.take(&MonitorEvent::Device(Event::Status(status(5_000))));
+        view.take(&MonitorEvent::Device(Event::TierChanged {
             from: 4,
             to: 3,
             reason: TierReason::OverBudget,
             frame: 250,
-        });
-        view.take(&Happening::Fault(Fault::Frame {
+        }));
+        view.take(&MonitorEvent::Device(Event::Fault(Fault::Frame {
             sequence: 260,
             cause: FaultyFrame::Torn,
-        }));
-        view.take(&Happening::UnreadLog { bytes: 12 });
+        })));
+        view.take(&MonitorEvent::UnreadLog { bytes: 12 });
         insta::assert_snapshot!(shown(&view, 80, 24));
     }
 
     #[test]
     fn a_small_terminal_cuts_the_view_and_breaks_nothing() {
         let mut view = View::new("/dev/ttyACM0");
-        view.take(&Happening::Connected(FakeDevice::default().identity()));
-        view.take(&Happening::Status(status(4_000)));
+        view.take(&MonitorEvent::Connected(FakeDevice::default().identity()));
+        view.take(&MonitorEvent::Device(Event::Status(status(4_000))));
         for (width, height) in [(0, 0), (1, 1), (10, 3), (30, 12), (79, 15)] {
             shown(&view, width, height);
         }
@@ -400,10 +398,10 @@ mod tests {
     #[test]
     fn a_lost_device_says_so_until_it_is_back() {
         let mut view = View::new("/dev/ttyACM0");
-        let connected = Happening::Connected(FakeDevice::default().identity());
+        let connected = MonitorEvent::Connected(FakeDevice::default().identity());
         view.take(&connected);
-        view.take(&Happening::Status(status(4_000)));
-        view.take(&Happening::Lost("the port has gone".to_owned()));
+        view.take(&MonitorEvent::Device(Event::Status(status(4_000))));
+        view.take(&MonitorEvent::Lost("the port has gone".to_owned()));
         assert!(view.lines(80, 24)[1].contains("lost: the port has gone"));
         view.take(&connected);
         assert!(view.lines(80, 24)[1].contains("compensating"));
@@ -429,7 +427,7 @@ mod tests {
         let mut status = status(1_000);
         status.mode = Mode::PassThrough(PassThrough::NoTable);
         status.table = None;
-        view.take(&Happening::Status(status));
+        view.take(&MonitorEvent::Device(Event::Status(status)));
         assert!(view.lines(80, 24)[1].contains("pass-through: there is no table"));
     }
 }

@@ -1,4 +1,4 @@
-//! What has to be sent.
+//! Plan of an upload: the sectors that have to be sent.
 
 use super::UploadError;
 use crate::{Client, DeviceError, Line};
@@ -53,7 +53,7 @@ impl<'a> Parcel<'a> {
 
 /// Which sectors of a slot do not hold what they should.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Plan {
+pub struct UploadPlan {
     /// The device's slots.
     pub slots: Slots,
     /// Indices of the sectors that differ.
@@ -63,7 +63,7 @@ pub struct Plan {
     length: u32,
 }
 
-impl Plan {
+impl UploadPlan {
     /// Compares the slot that the next table goes to with a file; changes nothing.
     /// Ends early where `stopped` says so.
     ///

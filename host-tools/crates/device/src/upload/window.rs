@@ -1,9 +1,9 @@
-//! Several chunks on their way at once, each until it is in the flash.
+//! Window of an upload: several chunks on their way at once, each until it is in the flash.
 
-use super::plan::{Parcel, Plan};
-use super::{PATIENCE, Step, UploadError, Watch};
+use super::plan::{Parcel, UploadPlan};
+use super::{PATIENCE, UploadError, UploadObserver, UploadStep};
 use crate::client::{Client, unexpected};
-use crate::talk::Posted;
+use crate::transport::Posted;
 use crate::{DeviceError, Line};
 use iltm_runtime::link::{Receiving, Refusal, Request, Response};
 use std::collections::{BTreeMap, VecDeque};
@@ -57,7 +57,7 @@ struct Flight {
 pub(super) struct Window<'a, L> {
     client: &'a mut Client<L>,
     parcel: &'a Parcel<'a>,
-    plan: &'a Plan,
+    plan: &'a UploadPlan,
     chunk: u32,
     size: usize,
     waiting: VecDeque<Chunk>,
@@ -72,7 +72,7 @@ impl<'a, L: Line> Window<'a, L> {
     pub(super) fn new(
         client: &'a mut Client<L>,
         parcel: &'a Parcel<'a>,
-        plan: &'a Plan,
+        plan: &'a UploadPlan,
         receiving: Receiving,
     ) -> Result<Self, DeviceError> {
         if receiving.chunk == 0 {
@@ -116,33 +116,33 @@ impl<'a, L: Line> Window<'a, L> {
         skipped: u32,
         held: u32,
         sent: &mut u64,
-        watch: &mut impl Watch,
+        observer: &mut impl UploadObserver,
     ) -> Result<(), UploadError> {
         let total = self.parcel.length();
-        let mut advanced = self.client.talk.now();
+        let mut advanced = self.client.transport.now();
         let mut told = advanced;
         while !self.waiting.is_empty() || !self.flying.is_empty() {
-            if watch.stopped() {
+            if observer.stopped() {
                 return Err(UploadError::Stopped);
             }
             self.fill()?;
             let wait = self.wait();
-            for (sequence, response) in self.client.talk.responses(wait)? {
+            for (sequence, response) in self.client.transport.responses(wait)? {
                 let Some(flight) = self.landed(sequence) else {
                     continue;
                 };
-                if self.take(flight.chunk, response, watch)? {
-                    advanced = self.client.talk.now();
+                if self.take(flight.chunk, response, observer)? {
+                    advanced = self.client.transport.now();
                 }
                 *sent = u64::from(self.taken.values().sum::<u32>());
-                watch.step(Step::Progress {
+                observer.step(UploadStep::Progress {
                     done: held.saturating_add(*sent as u32),
                     skipped,
                     total,
                 });
             }
             self.repeat()?;
-            let now = self.client.talk.now();
+            let now = self.client.transport.now();
             let silence = now.saturating_duration_since(advanced);
             if silence >= PATIENCE {
                 let done = held.saturating_add(*sent as u32);
@@ -150,7 +150,7 @@ impl<'a, L: Line> Window<'a, L> {
             }
             if silence >= QUIET && now.saturating_duration_since(told) >= QUIET {
                 told = now;
-                watch.step(Step::Quiet { silence });
+                observer.step(UploadStep::Quiet { silence });
             }
         }
         Ok(())
@@ -161,13 +161,13 @@ impl<'a, L: Line> Window<'a, L> {
         while self.flying.len() < self.size
             && let Some(chunk) = self.waiting.pop_front()
         {
-            let posted = self.client.talk.post(self.request(chunk));
-            self.client.talk.send(&posted)?;
+            let posted = self.client.transport.post(self.request(chunk));
+            self.client.transport.send(&posted)?;
             self.turns += 1;
             self.flying.push(Flight {
                 chunk,
                 posted,
-                sent: self.client.talk.now(),
+                sent: self.client.transport.now(),
                 wait: FIRST_WAIT,
                 turn: self.turns,
                 overtaken: 0,
@@ -186,7 +186,7 @@ impl<'a, L: Line> Window<'a, L> {
 
     /// Until the next chunk must be sent again.
     fn wait(&self) -> Duration {
-        let now = self.client.talk.now();
+        let now = self.client.transport.now();
         let left = |flight: &Flight| (flight.sent + flight.wait).saturating_duration_since(now);
         let least = self.flying.iter().map(left).min();
         least
@@ -210,7 +210,7 @@ impl<'a, L: Line> Window<'a, L> {
         &mut self,
         chunk: Chunk,
         response: Option<Response>,
-        watch: &mut impl Watch,
+        observer: &mut impl UploadObserver,
     ) -> Result<bool, UploadError> {
         match response {
             Some(Response::Written) => {
@@ -220,7 +220,7 @@ impl<'a, L: Line> Window<'a, L> {
             Some(Response::Refused(Refusal::Flash { .. })) => {
                 self.again(chunk.sector)?;
                 let sector = chunk.sector;
-                watch.step(Step::Repeated { sector });
+                observer.step(UploadStep::Repeated { sector });
                 Ok(false)
             }
             Some(other) => Err(unexpected(self.request(chunk), &other).into()),
@@ -251,13 +251,13 @@ impl<'a, L: Line> Window<'a, L> {
 
     /// Sends chunks once more that, or whose answers, seem to be lost.
     fn repeat(&mut self) -> Result<(), DeviceError> {
-        let now = self.client.talk.now();
+        let now = self.client.transport.now();
         for flight in &mut self.flying {
             let late = now.saturating_duration_since(flight.sent) >= flight.wait;
             if !late && flight.overtaken < OVERTAKEN {
                 continue;
             }
-            self.client.talk.send(&flight.posted)?;
+            self.client.transport.send(&flight.posted)?;
             if late {
                 flight.wait = (flight.wait * 3 / 2).min(LONGEST_WAIT);
             }

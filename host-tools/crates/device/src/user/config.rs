@@ -31,7 +31,7 @@ pub struct Config {
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Written {
+struct ConfigFile {
     port: Option<String>,
     #[serde(default)]
     include: Vec<String>,
@@ -80,7 +80,7 @@ impl Config {
     pub fn read(folders: &Folders) -> Result<Self, ConfigError> {
         let path = folders.config.join(NAME);
         let text = text(&path)?;
-        let written: Written = toml::from_str(&text).map_err(|error| ConfigError::Toml {
+        let written: ConfigFile = toml::from_str(&text).map_err(|error| ConfigError::Toml {
             path: path.clone(),
             reason: error.to_string().trim_end().to_owned(),
         })?;

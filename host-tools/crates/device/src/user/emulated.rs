@@ -15,19 +15,19 @@ use std::path::PathBuf;
 const FOLDER: &str = "emulated";
 
 #[derive(Serialize, Deserialize)]
-struct Entry {
+struct BoardEntry {
     port: String,
     board: String,
 }
 
 /// A board that others find until this is dropped.
 #[derive(Debug)]
-pub struct Registration {
+pub struct BoardRegistration {
     path: PathBuf,
     _locked: File,
 }
 
-impl Drop for Registration {
+impl Drop for BoardRegistration {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
     }
@@ -37,10 +37,10 @@ impl Drop for Registration {
 ///
 /// # Errors
 /// What the operating system says.
-pub fn register(folders: &Folders, port: &str, board: &str) -> io::Result<Registration> {
+pub fn register(folders: &Folders, port: &str, board: &str) -> io::Result<BoardRegistration> {
     let folder = folders.state.join(FOLDER);
     fs::create_dir_all(&folder)?;
-    let entry = Entry {
+    let entry = BoardEntry {
         port: port.to_owned(),
         board: board.to_owned(),
     };
@@ -52,7 +52,7 @@ pub fn register(folders: &Folders, port: &str, board: &str) -> io::Result<Regist
     whole
         .file()
         .write_all(serde_json::to_string(&entry)?.as_bytes())?;
-    Ok(Registration {
+    Ok(BoardRegistration {
         path,
         _locked: whole.finish()?,
     })
@@ -77,7 +77,7 @@ pub fn registered(folders: &Folders) -> Vec<(String, String)> {
             Err(TryLockError::WouldBlock) => {
                 let mut text = String::new();
                 let read = file.read_to_string(&mut text);
-                let entry = serde_json::from_str::<Entry>(&text);
+                let entry = serde_json::from_str::<BoardEntry>(&text);
                 if let (Ok(_), Ok(entry)) = (read, entry) {
                     found.push((entry.port, entry.board));
                 }

@@ -9,7 +9,7 @@ use iltm_picture::{
     numbers::percent,
 };
 use iltm_runtime::{FrameSize, image::Table};
-use iltm_video::{Compensator, Settings};
+use iltm_video::{CompensateOptions, Compensator};
 use maud::{Markup, html};
 use std::ops::Range;
 
@@ -115,7 +115,7 @@ fn previews<'c>(
 
 /// Share of the samples that the runtime itself cuts; `None` if it cannot show them.
 fn cut_in_full(table: &Table<'_>, frames: &[Picture]) -> Option<f64> {
-    let compensator = Compensator::new(table, Settings::default()).ok()?;
+    let compensator = Compensator::new(table, CompensateOptions::default()).ok()?;
     let (mut clipped, mut samples) = (0, 0);
     for frame in frames {
         let summary = compensator.picture(&mut frame.clone()).ok()?;

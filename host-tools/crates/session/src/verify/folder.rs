@@ -98,7 +98,7 @@ fn slides(
     images: &[TestImage],
 ) -> Result<Vec<Slide>, VerifyError> {
     let curves = ProjectorCurves::new(table);
-    let compensator = Compensator::new(table, iltm_video::Settings::default())?;
+    let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
     let within = Layout::new(table.grid(), layout.inner(), 0)?;
     let code = |(role, pattern): &(Role, Pattern)| -> Result<Slide, VerifyError> {
         let cells = of_pattern(pattern);

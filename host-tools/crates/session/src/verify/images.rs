@@ -10,7 +10,7 @@ use iltm_capture::CellPlanes;
 use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid, image::Table};
 use iltm_solve::content::wanted_images;
-use iltm_video::{Compensator, Settings, VideoError};
+use iltm_video::{CompensateOptions, Compensator, VideoError};
 
 /// Natural images among the test images.
 const NATURAL: usize = 3;
@@ -61,7 +61,7 @@ pub struct TestImage {
 /// [`VideoError`] if the table cannot compensate a picture of its own size.
 pub fn test_images(table: &Table<'_>) -> Result<Vec<TestImage>, VideoError> {
     let drawn = drawn(table.grid(), usize::from(table.channels()));
-    let compensator = Compensator::new(table, Settings::default())?;
+    let compensator = Compensator::new(table, CompensateOptions::default())?;
     // Where white is brighter than the wall can be everywhere, images are darker.
     let most = Expected::new(table).even_grey().min(1.0);
     let mut images = Vec::new();

@@ -167,7 +167,7 @@ fn pictures(
     pairs: &[(u8, [VerifyShot; 2])],
 ) -> Result<Vec<Pictures>, VerifyError> {
     let curves = ProjectorCurves::new(table);
-    let compensator = Compensator::new(table, iltm_video::Settings::default())?;
+    let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
     let of_pair = |(image, [own, compensated]): &(u8, [VerifyShot; 2])| {
         let wanted = read(folder, &wanted_file(*image), table)?;
         let given = [

@@ -1,8 +1,8 @@
-//! Frames of one pixel a cell.
+//! Cell by cell: frames of one pixel a cell.
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;
-use super::{OperatorMemory, Work};
+use super::{FrameJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, GridPipeline},
@@ -18,11 +18,11 @@ pub(super) struct Cells<'t, 'a, S, const C: usize> {
 }
 
 impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
-    pub(super) fn new(table: &'t Table<'a>, work: &Work) -> Result<Self, FrameError> {
+    pub(super) fn new(table: &'t Table<'a>, job: &FrameJob) -> Result<Self, FrameError> {
         let cells = table.grid().cells();
         Ok(Self {
             pipeline: GridPipeline::new(table)?,
-            codes: vec![S::default(); cells * work.colours],
+            codes: vec![S::default(); cells * job.colours],
             wanted: vec![[S::default(); C]; cells],
             input: vec![[S::default(); C]; cells],
         })
@@ -31,13 +31,13 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate<P: Bands<Code = S>>(
         &mut self,
-        work: &Work,
+        job: &FrameJob,
         operator: &mut OperatorMemory,
         frame: &mut P,
     ) -> Result<u64, FrameError> {
-        let (width, colours) = (work.size.width(), work.colours);
+        let (width, colours) = (job.size.width(), job.colours);
         let strip_len = STRIP * width * colours;
-        let rows = work.size.height().next_multiple_of(STRIP);
+        let rows = job.size.height().next_multiple_of(STRIP);
         let mut memory = P::Memory::default();
         let mut bands = frame.bands(rows);
         for band in &bands {
@@ -55,8 +55,8 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
                 *wanted = std::array::from_fn(|channel| self.codes[place(cell, channel)]);
             }
             clipped += u64::from(self.pipeline.compensate(
-                work.tier,
-                work.encoding,
+                job.tier,
+                job.encoding,
                 &self.wanted,
                 &mut self.input,
                 &mut operator.workspace(),

@@ -1,9 +1,48 @@
 //! Memory that is sized once and used for every frame.
 
 use super::super::bands::STRIP;
-use super::Work;
-use iltm_runtime::{pipeline::RowBuffers, units::Drive};
+use super::FrameJob;
+use iltm_runtime::{
+    image::Table,
+    pipeline::{RowBuffers, Workspace},
+    units::{Drive, InputCoefficient},
+};
 use std::sync::{Mutex, PoisonError};
+
+/// What the runtime's [`Workspace`] borrows.
+#[derive(Clone, Debug)]
+pub struct OperatorMemory {
+    buffers: [Vec<i32>; 2],
+    cells: Vec<i32>,
+    inputs: Vec<InputCoefficient>,
+    sums: Vec<i32>,
+}
+
+impl OperatorMemory {
+    /// Enough for `table`.
+    #[must_use]
+    pub fn new(table: &Table<'_>) -> Self {
+        let values = table.grid().cells() * usize::from(table.channels());
+        let buffer = || vec![0; table.basis().scratch_len()];
+        Self {
+            buffers: [buffer(), buffer()],
+            cells: vec![0; table.grid().cells()],
+            inputs: vec![0; values],
+            sums: vec![0; values],
+        }
+    }
+
+    /// The workspace of one frame.
+    pub fn workspace(&mut self) -> Workspace<'_> {
+        let [first, second] = &mut self.buffers;
+        Workspace {
+            buffers: [first, second],
+            cells: &mut self.cells,
+            inputs: &mut self.inputs,
+            sums: &mut self.sums,
+        }
+    }
+}
 
 /// What one thread needs beside the frame.
 pub(super) struct BandMemory<S, M> {
@@ -46,17 +85,17 @@ impl RowMemory {
 pub(super) struct Memories<S, M> {
     free: Mutex<Vec<BandMemory<S, M>>>,
     line: usize,
-    work: Work,
+    job: FrameJob,
     cells: usize,
 }
 
 impl<S: Copy + Default, M: Default> Memories<S, M> {
     /// For rows whose [`RowBuffers::line`] needs `line` elements.
-    pub(super) fn new(line: usize, cells: usize, work: Work) -> Self {
+    pub(super) fn new(line: usize, cells: usize, job: FrameJob) -> Self {
         Self {
             free: Mutex::default(),
             line,
-            work,
+            job,
             cells,
         }
     }
@@ -77,7 +116,7 @@ impl<S: Copy + Default, M: Default> Memories<S, M> {
     }
 
     fn create(&self) -> BandMemory<S, M> {
-        let (width, colours) = (self.work.size.width(), self.work.colours);
+        let (width, colours) = (self.job.size.width(), self.job.colours);
         BandMemory {
             conversion: M::default(),
             codes: vec![S::default(); STRIP * width * colours],

@@ -1,4 +1,4 @@
-//! Frames of one size and layout through one table.
+//! Engine of the compensation: frames of one size and layout through one table.
 //!
 //! A frame larger than the grid passes twice, in bands of rows spread over the
 //! threads ([`rows`]): once to become light and to be averaged over the cells,
@@ -14,8 +14,10 @@ mod cells;
 mod memory;
 mod rows;
 
+use super::VideoError;
 use super::bands::Bands;
-use super::{OperatorMemory, VideoError};
+pub use memory::OperatorMemory;
+
 use cells::Cells;
 use iltm_runtime::{
     FrameSize,
@@ -27,14 +29,14 @@ use rows::FullFrames;
 
 /// Compensates frames of type `P` with a table of `C` channels.
 pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
-    work: Work,
+    job: FrameJob,
     operator: OperatorMemory,
-    path: Path<'t, 'a, P, C>,
+    path: FramePath<'t, 'a, P, C>,
 }
 
 /// What frames there will be and what is to be done to them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Work {
+pub(super) struct FrameJob {
     pub(super) size: FrameSize,
     /// Colours of a pixel: as many as the table has channels, or three for a table
     /// of one, which is then used for each of them.
@@ -43,7 +45,14 @@ pub(super) struct Work {
     pub(super) encoding: Encoding,
 }
 
-enum Path<'t, 'a, P: Bands, const C: usize> {
+impl FrameJob {
+    /// Samples of a frame.
+    pub(super) const fn samples(&self) -> usize {
+        self.size.pixels() * self.colours
+    }
+}
+
+enum FramePath<'t, 'a, P: Bands, const C: usize> {
     /// One pixel a cell.
     Cells(Cells<'t, 'a, P::Code, C>),
     /// More.
@@ -59,15 +68,15 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
     pub(super) fn new(
         table: &'t Table<'a>,
         threads: &'t ThreadPool,
-        work: Work,
+        job: FrameJob,
     ) -> Result<Self, FrameError> {
-        let path = if work.size == FrameSize::of_grid(table.grid()) {
-            Path::Cells(Cells::new(table, &work)?)
+        let path = if job.size == FrameSize::of_grid(table.grid()) {
+            FramePath::Cells(Cells::new(table, &job)?)
         } else {
-            Path::Full(Box::new(FullFrames::new(table, threads, &work)?))
+            FramePath::Full(Box::new(FullFrames::new(table, threads, &job)?))
         };
         Ok(Self {
-            work,
+            job,
             operator: OperatorMemory::new(table),
             path,
         })
@@ -75,15 +84,15 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
 
     /// The same as [`compensate`](Self::compensate) at another tier, from now on.
     pub(super) fn compensate_at(&mut self, tier: u8, frame: &mut P) -> Result<u64, VideoError> {
-        self.work.tier = tier;
+        self.job.tier = tier;
         self.compensate(frame)
     }
 
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate(&mut self, frame: &mut P) -> Result<u64, VideoError> {
         let clipped = match &mut self.path {
-            Path::Cells(cells) => cells.compensate(&self.work, &mut self.operator, frame),
-            Path::Full(full) => full.compensate(&self.work, &mut self.operator, frame),
+            FramePath::Cells(cells) => cells.compensate(&self.job, &mut self.operator, frame),
+            FramePath::Full(full) => full.compensate(&self.job, &mut self.operator, frame),
         };
         clipped.map_err(VideoError::Runtime)
     }

@@ -1,4 +1,4 @@
-//! Frames larger than the grid, in bands of rows.
+//! Row by row: frames larger than the grid, in bands of rows.
 
 #![allow(
     clippy::inline_always,
@@ -8,7 +8,7 @@
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
 use super::memory::{BandMemory, Memories, RowMemory};
-use super::{OperatorMemory, Work};
+use super::{FrameJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, FullPipeline},
@@ -24,7 +24,7 @@ const BAND_ROWS: usize = 16;
 
 /// Compensates frames larger than the grid.
 pub(super) struct FullFrames<'t, 'a, P: Bands, const C: usize> {
-    stages: Stages<'t, 'a, P::Code, C>,
+    stages: RowStages<'t, 'a, P::Code, C>,
     threads: &'t ThreadPool,
     arch: Arch,
     memories: Memories<P::Code, P::Memory>,
@@ -37,7 +37,7 @@ pub(super) struct FullFrames<'t, 'a, P: Bands, const C: usize> {
 }
 
 /// What is done to every row.
-struct Stages<'t, 'a, S: Code, const C: usize> {
+struct RowStages<'t, 'a, S: Code, const C: usize> {
     pipeline: FullPipeline<'t, 'a, C>,
     /// Colours of a pixel.
     colours: usize,
@@ -50,30 +50,30 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     pub(super) fn new(
         table: &'t Table<'a>,
         threads: &'t ThreadPool,
-        work: &Work,
+        job: &FrameJob,
     ) -> Result<Self, FrameError> {
-        let pipeline = FullPipeline::new(table, work.size)?;
-        let (cells, pixels) = (table.grid().cells(), work.size.pixels());
+        let pipeline = FullPipeline::new(table, job.size)?;
+        let (cells, pixels) = (table.grid().cells(), job.size.pixels());
         Ok(Self {
-            stages: Stages {
+            stages: RowStages {
                 pipeline,
-                colours: work.colours,
-                curves: Curves::new(table, work.encoding),
+                colours: job.colours,
+                curves: Curves::new(table, job.encoding),
                 gains: threads.install(|| expand_gains(&pipeline)),
             },
             threads,
             arch: Arch::new(),
-            memories: Memories::new(pipeline.line_len(), cells, *work),
-            light: vec![Light::ZERO; pixels * work.colours],
-            sums: vec![0; cells * work.colours],
-            corrections: vec![0; cells * work.colours],
+            memories: Memories::new(pipeline.line_len(), cells, *job),
+            light: vec![Light::ZERO; pixels * job.colours],
+            sums: vec![0; cells * job.colours],
+            corrections: vec![0; cells * job.colours],
         })
     }
 
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate(
         &mut self,
-        work: &Work,
+        job: &FrameJob,
         operator: &mut OperatorMemory,
         frame: &mut P,
     ) -> Result<u64, FrameError> {
@@ -84,7 +84,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
         for (sums, corrections) in groups.zip(self.corrections.chunks_exact_mut(group)) {
             let mut workspace = operator.workspace();
             let pipeline = &self.stages.pipeline;
-            pipeline.correct(work.tier, sums, corrections, &mut workspace)?;
+            pipeline.correct(job.tier, sums, corrections, &mut workspace)?;
         }
         Ok(self.write(frame))
     }
@@ -142,7 +142,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     }
 }
 
-impl<S: Code, const C: usize> Stages<'_, '_, S, C> {
+impl<S: Code, const C: usize> RowStages<'_, '_, S, C> {
     /// Samples of a row.
     fn row_len(&self) -> usize {
         self.pipeline.frame().width() * self.colours
@@ -160,7 +160,7 @@ impl<S: Code, const C: usize> Stages<'_, '_, S, C> {
 /// be compiled into its caller, which is what makes it use the processor's widest
 /// vectors; so is all that it calls.
 struct ReadBand<'w, 't, 'a, B: Band, const C: usize> {
-    stages: &'w Stages<'t, 'a, B::Code, C>,
+    stages: &'w RowStages<'t, 'a, B::Code, C>,
     first_row: usize,
     band: &'w B,
     light: &'w mut [Light],
@@ -196,7 +196,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
 /// From the light of a band to its samples; returns how many were clipped. A
 /// struct for the same reason as [`ReadBand`].
 struct WriteBand<'w, 't, 'a, B: Band, const C: usize> {
-    stages: &'w Stages<'t, 'a, B::Code, C>,
+    stages: &'w RowStages<'t, 'a, B::Code, C>,
     first_row: usize,
     light: &'w [Light],
     corrections: &'w [i32],

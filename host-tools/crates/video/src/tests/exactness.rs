@@ -1,4 +1,4 @@
-//! What must not change a single bit.
+//! Exactness: tables and frames that must not change a single bit.
 
 use super::*;
 use proptest::prelude::*;
@@ -39,7 +39,7 @@ proptest! {
         let table = SampleTable::random(grid(13, 21), table_channels, 5, seed);
         let picture = random_picture(size(width, height), channels, wide, seed);
         let by = |threads| {
-            let settings = Settings { threads, ..Settings::default() };
+            let settings = CompensateOptions { threads, ..CompensateOptions::default() };
             compensated(&table, settings, &picture).unwrap()
         };
         let one = by(1);
@@ -58,7 +58,7 @@ fn display_codes_come_back_through_a_projector_that_undoes_them() {
         .flat_map(|code: u8| [code, 255 - code, code / 2])
         .collect();
     let picture = Picture::new(size(16, 16), Samples::Eight(ramp)).unwrap();
-    let (result, _) = compensated(&table, Settings::default(), &picture).unwrap();
+    let (result, _) = compensated(&table, CompensateOptions::default(), &picture).unwrap();
     assert_eq!(result, picture);
 }
 
@@ -87,8 +87,8 @@ fn a_frame_of_one_pixel_a_cell_is_what_the_full_resolution_way_makes_of_it() {
             .collect()
     };
     let large = Picture::new(size(20, 12), Samples::Eight(doubled(samples))).unwrap();
-    let (small, _) = compensated(&table, Settings::default(), &small).unwrap();
-    let (large, _) = compensated(&table, Settings::default(), &large).unwrap();
+    let (small, _) = compensated(&table, CompensateOptions::default(), &small).unwrap();
+    let (large, _) = compensated(&table, CompensateOptions::default(), &large).unwrap();
     let Samples::Eight(samples) = small.samples() else {
         panic!("a picture of bytes");
     };

@@ -1,4 +1,4 @@
-//! Which frames go with which tables.
+//! Kinds of frames and of tables, and which go together.
 
 use super::*;
 use iltm_picture::{png, png::PngError, progress::Silent};
@@ -8,7 +8,7 @@ use std::io::Cursor;
 fn a_grey_frame_is_refused_by_a_table_of_three_channels() {
     let table = SampleTable::identity(grid(2, 2), 3);
     let picture = random_picture(size(4, 4), 1, false, 1);
-    let error = compensated(&table, Settings::default(), &picture).unwrap_err();
+    let error = compensated(&table, CompensateOptions::default(), &picture).unwrap_err();
     assert!(matches!(error, VideoError::GreyFrame));
     assert!(error.next_step().contains("colour"));
 }
@@ -25,14 +25,14 @@ fn a_table_of_one_channel_treats_each_colour_like_grey() {
         let plane = |samples: &[u8], channel| -> Vec<u8> {
             samples.iter().copied().skip(channel).step_by(3).collect()
         };
-        let (result, summary) = compensated(&table, Settings::default(), &colour).unwrap();
+        let (result, summary) = compensated(&table, CompensateOptions::default(), &colour).unwrap();
         let Samples::Eight(result) = result.samples() else {
             panic!("a picture of bytes");
         };
         let mut clipped = 0;
         for channel in 0..3 {
             let grey = Picture::new(frame, Samples::Eight(plane(samples, channel))).unwrap();
-            let (grey, of_grey) = compensated(&table, Settings::default(), &grey).unwrap();
+            let (grey, of_grey) = compensated(&table, CompensateOptions::default(), &grey).unwrap();
             assert_eq!(grey.samples(), &Samples::Eight(plane(result, channel)));
             clipped += of_grey.clipped;
         }
@@ -45,7 +45,7 @@ fn a_frame_smaller_than_the_grid_is_refused_with_both_sizes() {
     let table = SampleTable::identity(grid(4, 6), 3);
     for (width, height) in [(5, 4), (6, 3), (5, 40), (60, 3)] {
         let picture = random_picture(size(width, height), 3, false, 1);
-        let error = compensated(&table, Settings::default(), &picture).unwrap_err();
+        let error = compensated(&table, CompensateOptions::default(), &picture).unwrap_err();
         assert!(matches!(error, VideoError::SmallerThanGrid { .. }));
         assert!(error.to_string().contains("6 x 4"));
         assert!(error.to_string().contains(&format!("{width} x {height}")));
@@ -55,9 +55,9 @@ fn a_frame_smaller_than_the_grid_is_refused_with_both_sizes() {
 #[test]
 fn a_tier_that_the_table_has_not_is_refused() {
     let table = SampleTable::random(grid(4, 6), 3, 4, 3);
-    let settings = Settings {
+    let settings = CompensateOptions {
         tier: Some(3),
-        ..Settings::default()
+        ..CompensateOptions::default()
     };
     let picture = random_picture(size(6, 4), 3, false, 1);
     let error = compensated(&table, settings, &picture).unwrap_err();
@@ -99,7 +99,7 @@ fn pictures_keep_their_size_depth_and_colour() {
         assert_eq!(png::read(Cursor::new(&file)).unwrap(), picture);
         let image = SampleTable::identity(grid(2, 3), 1).image();
         let table = Table::check(&image).unwrap();
-        let compensator = Compensator::new(&table, Settings::default()).unwrap();
+        let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
         let mut output = Vec::new();
         let summary = compensator.stream(&file[..], &mut output, &Silent).unwrap();
         assert_eq!((summary.frames, summary.samples), (1, 45 * channels as u64));
@@ -182,7 +182,7 @@ fn damaged_pictures_give_an_error_and_never_a_panic() {
 fn an_input_of_another_kind_is_named() {
     let image = SampleTable::identity(grid(2, 2), 3).image();
     let table = Table::check(&image).unwrap();
-    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
     for input in ["", "x", "RIFF....AVI LIST", "\u{89}PN"] {
         let error = compensator
             .stream(input.as_bytes(), Vec::new(), &Silent)

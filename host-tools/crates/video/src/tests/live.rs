@@ -1,7 +1,7 @@
 //! Tables replaced while a stream runs, and tiers that follow a budget.
 
 use super::*;
-use crate::live::{Event, Live, LiveSummary};
+use crate::live::{Live, LiveEvent, LiveSummary};
 use crate::watch::FileWatch;
 use crate::y4m::Header;
 use iltm_picture::progress::Silent;
@@ -31,7 +31,7 @@ fn frames<'s>(line: &str, stream: &'s [u8]) -> Vec<&'s [u8]> {
 /// A stream through a table at a fixed tier.
 fn fixed(image: &[u8], tier: Option<u8>, input: &[u8]) -> Vec<u8> {
     let table = Table::check(image).unwrap();
-    let settings = Settings {
+    let settings = CompensateOptions {
         tier,
         ..settings(Encoding::Display)
     };
@@ -48,29 +48,30 @@ fn live(
     budget: Option<Duration>,
     newer: &[(usize, &[u8])],
     input: &[u8],
-) -> (Vec<u8>, LiveSummary, Vec<Event>) {
+) -> (Vec<u8>, LiveSummary, Vec<LiveEvent>) {
     let mut waiting: VecDeque<_> = newer.iter().copied().collect();
     let (mut asked, mut events) = (0, Vec::new());
-    let mut events_of = |event: &Event| {
+    let mut events_of = |event: &LiveEvent| {
         // Events carry errors, which cannot be cloned: the fields that tests look at.
         events.push(match event {
-            Event::Tier { frame, change } => Event::Tier {
+            LiveEvent::Tier { frame, change } => LiveEvent::Tier {
                 frame: *frame,
                 change: *change,
             },
-            Event::Table { frame, id } => Event::Table {
+            LiveEvent::Table { frame, id } => LiveEvent::Table {
                 frame: *frame,
                 id: *id,
             },
-            Event::Refused { frame, .. } => Event::Refused {
+            LiveEvent::Refused { frame, .. } => LiveEvent::Refused {
                 frame: *frame,
                 why: VideoError::Still.into(),
             },
         });
     };
     let mut output = Vec::new();
-    let summary = Live {
-        settings: settings(Encoding::Display),
+    let table = Table::check(image).unwrap();
+    let compensator = Compensator::new(&table, settings(Encoding::Display)).unwrap();
+    let live = Live {
         budget,
         newer: &mut || {
             asked += 1;
@@ -78,10 +79,9 @@ fn live(
             due.then(|| waiting.pop_front().unwrap().1.to_vec())
         },
         said: &mut events_of,
-    }
-    .y4m(image, input, &mut output, &Silent)
-    .unwrap();
-    (output, summary, events)
+    };
+    let summary = compensator.live(live, input, &mut output, &Silent);
+    (output, summary.unwrap(), events)
 }
 
 fn tables() -> [Vec<u8>; 2] {
@@ -107,7 +107,7 @@ fn a_new_table_takes_over_between_two_frames_and_no_frame_is_torn() {
             (output.len(), summary.frames.frames, summary.tables),
             (20, 20, 1)
         );
-        assert!(matches!(events[..], [Event::Table { frame, .. }] if frame == at as u64));
+        assert!(matches!(events[..], [LiveEvent::Table { frame, .. }] if frame == at as u64));
     }
 }
 
@@ -143,7 +143,7 @@ fn what_is_no_table_or_does_not_suit_the_stream_keeps_the_old_one() {
     assert!(
         events
             .iter()
-            .all(|event| matches!(event, Event::Refused { .. }))
+            .all(|event| matches!(event, LiveEvent::Refused { .. }))
     );
     // One that is refused is no hindrance for a later one.
     let (output, summary, _) = live(&first, None, &[(1, &damaged), (2, &second)], &input);
@@ -187,7 +187,7 @@ fn a_large_budget_climbs_to_the_top_tier_and_every_frame_is_its_tier_s() {
     let mut tier = 0;
     let mut changes = events.iter().peekable();
     for (number, frame) in frames(LINE, &output).iter().enumerate() {
-        if let Some(Event::Tier { frame, change }) = changes.peek()
+        if let Some(LiveEvent::Tier { frame, change }) = changes.peek()
             && *frame == number as u64
         {
             tier = usize::from(change.to);

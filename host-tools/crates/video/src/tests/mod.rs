@@ -16,7 +16,7 @@ use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid, image::Table, pipeline::Encoding};
 use sample_table::SampleTable;
 
-use super::{Compensator, Settings, Summary};
+use super::{CompensateOptions, Compensator, FrameTotals};
 
 fn grid(rows: u16, cols: u16) -> Grid {
     Grid::new(rows, cols).expect("a small grid")
@@ -26,11 +26,11 @@ fn size(width: u16, height: u16) -> FrameSize {
     FrameSize::new(width, height).expect("not empty")
 }
 
-fn settings(encoding: Encoding) -> Settings {
-    Settings {
+fn settings(encoding: Encoding) -> CompensateOptions {
+    CompensateOptions {
         encoding,
         threads: 2,
-        ..Settings::default()
+        ..CompensateOptions::default()
     }
 }
 
@@ -49,9 +49,9 @@ fn random_picture(size: FrameSize, channels: usize, wide: bool, seed: u64) -> Pi
 /// The picture through a table.
 fn compensated(
     table: &SampleTable,
-    settings: Settings,
+    settings: CompensateOptions,
     picture: &Picture,
-) -> Result<(Picture, Summary), VideoError> {
+) -> Result<(Picture, FrameTotals), VideoError> {
     let image = table.image();
     let table = Table::check(&image).expect("a sample table is whole");
     let mut picture = picture.clone();

@@ -129,7 +129,7 @@ fn reference(table: &SampleTable, channel: usize, frame: FrameSize, light: &[f64
 
 /// Largest difference from the reference over all samples, in steps of 2^-15.
 fn worst(table: &SampleTable, tier: u8, frame: FrameSize, picture: &Picture) -> f64 {
-    let settings = Settings {
+    let settings = CompensateOptions {
         tier: Some(tier),
         ..settings(Encoding::Linear)
     };

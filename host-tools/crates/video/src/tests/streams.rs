@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::test_scene::TestScene;
-use crate::y4m::{Frame, Header, Reader, Y4mError};
+use crate::y4m::{Header, Reader, Y4mError, YuvFrame};
 use iltm_picture::progress::Progress;
 use proptest::prelude::*;
 use std::io::{ErrorKind, Read, Write};
@@ -23,9 +23,9 @@ fn stream(line: &str, frames: usize, codes: std::ops::RangeInclusive<u8>) -> Vec
 /// The stream through a table.
 fn video(
     table: &SampleTable,
-    settings: Settings,
+    settings: CompensateOptions,
     input: &[u8],
-) -> Result<(Vec<u8>, Summary), VideoError> {
+) -> Result<(Vec<u8>, FrameTotals), VideoError> {
     let image = table.image();
     let table = Table::check(&image).expect("a sample table is whole");
     let mut output = Vec::new();
@@ -56,7 +56,7 @@ fn headers_and_frame_parameters_are_kept_byte_for_byte() {
         "YUV4MPEG2 W5 H3 Cmono",
     ] {
         let input = stream(line, 3, 0..=255);
-        let (output, summary) = video(&table, Settings::default(), &input).unwrap();
+        let (output, summary) = video(&table, CompensateOptions::default(), &input).unwrap();
         assert_eq!(output.len(), input.len(), "{line}");
         assert!(
             output.starts_with(format!("{line}\nFRAME Xkept\n").as_bytes()),
@@ -83,11 +83,11 @@ fn mono_video_that_is_not_changed_comes_back_exactly() {
 /// Frames of the test scene.
 fn scene_stream(line: &str, frames: usize) -> Vec<u8> {
     let header = Header::parse(line.as_bytes()).expect("a header");
-    let scene = TestScene::new(header.size(), 25.0, 1);
+    let scene = TestScene::new(header.size(), 25.0);
     let mut stream = format!("{line}\n").into_bytes();
     for number in 0..frames {
         stream.extend(b"FRAME\n");
-        let frame = Frame::from_picture(&header, &scene.frame(number as u64));
+        let frame = YuvFrame::from_picture(&header, &scene.frame(number as u64));
         stream.extend(frame.expect("a frame of the stream's size").samples);
     }
     stream
@@ -161,7 +161,7 @@ proptest! {
         let table = SampleTable::random(grid(13, 21), table_channels, 5, 3);
         let input = stream(&format!("YUV4MPEG2 W{width} H{height} C{colour}"), 3, 0..=255);
         let by = |threads| {
-            let settings = Settings { threads, ..Settings::default() };
+            let settings = CompensateOptions { threads, ..CompensateOptions::default() };
             video(&table, settings, &input).unwrap()
         };
         let one = by(1);
@@ -180,7 +180,7 @@ proptest! {
         let mut input = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
         input[place] = byte;
         input.truncate(input.len() - cut);
-        let _ = video(&table, Settings::default(), &input);
+        let _ = video(&table, CompensateOptions::default(), &input);
     }
 }
 
@@ -189,7 +189,7 @@ fn frames_before_a_fault_have_been_written_and_the_fault_is_named() {
     let table = SampleTable::identity(grid(2, 2), 3);
     let image = table.image();
     let table = Table::check(&image).unwrap();
-    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
     let whole = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
     let mut output = Vec::new();
     let counter = Counter::default();
@@ -200,7 +200,7 @@ fn frames_before_a_fault_have_been_written_and_the_fault_is_named() {
     assert!(error.to_string().contains("frame 3"));
     assert_eq!(counter.0.load(Ordering::Relaxed), 2);
     let mut reader = Reader::new(&output[..]).unwrap();
-    let mut frame = Frame::default();
+    let mut frame = YuvFrame::default();
     assert!(reader.read_frame(&mut frame).unwrap());
     assert!(reader.read_frame(&mut frame).unwrap());
     assert!(!reader.read_frame(&mut frame).unwrap());
@@ -243,7 +243,7 @@ fn a_reader_that_goes_away_ends_an_endless_stream() {
     let table = SampleTable::identity(grid(2, 2), 3);
     let image = table.image();
     let table = Table::check(&image).unwrap();
-    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
     let input = Endless(stream("YUV4MPEG2 W6 H4 C444", 1, 0..=255), 0);
     let error = compensator
         .y4m(input, Limited(1000), &Counter::default())
@@ -254,7 +254,8 @@ fn a_reader_that_goes_away_ends_an_endless_stream() {
 #[test]
 fn a_stream_without_frames_has_none() {
     let table = SampleTable::identity(grid(2, 2), 3);
-    let (output, summary) = video(&table, Settings::default(), b"YUV4MPEG2 W6 H4\n").unwrap();
+    let (output, summary) =
+        video(&table, CompensateOptions::default(), b"YUV4MPEG2 W6 H4\n").unwrap();
     assert_eq!(output, b"YUV4MPEG2 W6 H4\n");
     assert_eq!(
         (summary.frames, summary.samples, summary.clipped),
@@ -266,7 +267,7 @@ fn a_stream_without_frames_has_none() {
 fn mono_video_is_refused_by_a_table_of_three_channels() {
     let table = SampleTable::identity(grid(2, 2), 3);
     let input = stream("YUV4MPEG2 W6 H4 Cmono", 1, 0..=255);
-    let error = video(&table, Settings::default(), &input).unwrap_err();
+    let error = video(&table, CompensateOptions::default(), &input).unwrap_err();
     assert!(matches!(error, VideoError::GreyFrame));
 }
 
@@ -275,7 +276,7 @@ fn files_are_replaced_whole_or_left_alone() {
     let table = SampleTable::identity(grid(2, 2), 3);
     let image = table.image();
     let table = Table::check(&image).unwrap();
-    let compensator = Compensator::new(&table, Settings::default()).unwrap();
+    let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let (input, output) = (folder.path().join("in.y4m"), folder.path().join("out.y4m"));
     let whole = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);

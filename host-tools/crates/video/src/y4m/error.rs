@@ -1,4 +1,4 @@
-//! Everything that can be wrong with a Y4M stream.
+//! Errors of a Y4M stream, and what to do about each.
 
 use iltm_picture::MAX_PIXELS;
 

@@ -1,11 +1,11 @@
-//! The stream header: one line of tags.
+//! Header of a Y4M stream: one line of tags.
 
 use super::Y4mError;
 use iltm_picture::MAX_PIXELS;
 use iltm_runtime::FrameSize;
 
 /// First bytes of every stream.
-pub(super) const MAGIC: &[u8] = b"YUV4MPEG2";
+pub(crate) const MAGIC: &[u8] = b"YUV4MPEG2";
 
 /// Longest stream header in bytes, its newline included. `FFmpeg` reads at most
 /// 128; comments may be longer.
@@ -13,7 +13,7 @@ pub(super) const MAX_HEADER: usize = 4096;
 
 /// How many chroma samples there are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Sampling {
+pub enum ChromaSampling {
     /// None: the luma plane is all there is.
     Mono,
     /// One for every square of 2 x 2 pixels; an odd last row or column has its
@@ -25,7 +25,7 @@ pub enum Sampling {
 
 /// Which codes are black and white.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Range {
+pub enum CodeRange {
     /// Luma 16 to 235, chroma 16 to 240.
     Limited,
     /// 0 to 255.
@@ -37,8 +37,9 @@ pub enum Range {
 pub struct Header {
     line: Vec<u8>,
     size: FrameSize,
-    sampling: Sampling,
-    range: Range,
+    rate: Option<(u32, u32)>,
+    sampling: ChromaSampling,
+    range: CodeRange,
 }
 
 impl Header {
@@ -46,15 +47,20 @@ impl Header {
     ///
     /// `rate` is the frame rate as a fraction.
     #[must_use]
-    pub fn new(size: FrameSize, rate: (u32, u32), sampling: Sampling, range: Range) -> Self {
+    pub fn new(
+        size: FrameSize,
+        rate: (u32, u32),
+        sampling: ChromaSampling,
+        range: CodeRange,
+    ) -> Self {
         let colour = match sampling {
-            Sampling::Mono => "mono",
-            Sampling::Chroma420 => "420jpeg",
-            Sampling::Chroma444 => "444",
+            ChromaSampling::Mono => "mono",
+            ChromaSampling::Chroma420 => "420jpeg",
+            ChromaSampling::Chroma444 => "444",
         };
         let name = match range {
-            Range::Limited => "LIMITED",
-            Range::Full => "FULL",
+            CodeRange::Limited => "LIMITED",
+            CodeRange::Full => "FULL",
         };
         let line = format!(
             "YUV4MPEG2 W{} H{} F{}:{} Ip A1:1 C{colour} XCOLORRANGE={name}",
@@ -66,6 +72,7 @@ impl Header {
         Self {
             line: line.into_bytes(),
             size,
+            rate: Some(rate),
             sampling,
             range,
         }
@@ -92,14 +99,15 @@ impl Header {
         }
         let side = |tag, value: Option<u64>| value.ok_or(Y4mError::NoSize { tag });
         let (width, height) = (side('W', fields.width)?, side('H', fields.height)?);
-        let sampling = fields.sampling.unwrap_or(Sampling::Chroma420);
+        let sampling = fields.sampling.unwrap_or(ChromaSampling::Chroma420);
         let default_range = match sampling {
-            Sampling::Mono => Range::Full,
-            Sampling::Chroma420 | Sampling::Chroma444 => Range::Limited,
+            ChromaSampling::Mono => CodeRange::Full,
+            ChromaSampling::Chroma420 | ChromaSampling::Chroma444 => CodeRange::Limited,
         };
         Ok(Self {
             line: line.to_vec(),
             size: size(width, height)?,
+            rate: fields.rate,
             sampling,
             range: fields.range.unwrap_or(default_range),
         })
@@ -117,15 +125,24 @@ impl Header {
         self.size
     }
 
+    /// Frames a second, if the header says so.
+    #[must_use]
+    pub fn rate(&self) -> Option<f64> {
+        let (number, over) = self
+            .rate
+            .filter(|(number, over)| *number > 0 && *over > 0)?;
+        Some(f64::from(number) / f64::from(over))
+    }
+
     /// How chroma is sampled.
     #[must_use]
-    pub const fn sampling(&self) -> Sampling {
+    pub const fn sampling(&self) -> ChromaSampling {
         self.sampling
     }
 
     /// Which codes are black and white.
     #[must_use]
-    pub const fn range(&self) -> Range {
+    pub const fn range(&self) -> CodeRange {
         self.range
     }
 
@@ -133,12 +150,12 @@ impl Header {
     #[must_use]
     pub const fn chroma(&self) -> (usize, usize) {
         match self.sampling {
-            Sampling::Mono => (0, 0),
-            Sampling::Chroma420 => (
+            ChromaSampling::Mono => (0, 0),
+            ChromaSampling::Chroma420 => (
                 self.size.width().div_ceil(2),
                 self.size.height().div_ceil(2),
             ),
-            Sampling::Chroma444 => (self.size.width(), self.size.height()),
+            ChromaSampling::Chroma444 => (self.size.width(), self.size.height()),
         }
     }
 
@@ -196,8 +213,9 @@ impl Tag<'_> {
 struct Fields {
     width: Option<u64>,
     height: Option<u64>,
-    sampling: Option<Sampling>,
-    range: Option<Range>,
+    rate: Option<(u32, u32)>,
+    sampling: Option<ChromaSampling>,
+    range: Option<CodeRange>,
 }
 
 impl Fields {
@@ -208,6 +226,10 @@ impl Fields {
         match name {
             b'W' => tag.store(&mut self.width, side(tag, value)?),
             b'H' => tag.store(&mut self.height, side(tag, value)?),
+            b'F' => {
+                self.rate = rate(value);
+                Ok(())
+            }
             b'C' => tag.store(&mut self.sampling, sampling(tag, value)?),
             b'I' => match value {
                 b"p" | b"?" => Ok(()),
@@ -218,8 +240,8 @@ impl Fields {
                 _ => Err(tag.error("is not a kind of interlacing")),
             },
             b'X' => match value.strip_prefix(b"COLORRANGE=") {
-                Some(b"LIMITED") => tag.store(&mut self.range, Range::Limited),
-                Some(b"FULL") => tag.store(&mut self.range, Range::Full),
+                Some(b"LIMITED") => tag.store(&mut self.range, CodeRange::Limited),
+                Some(b"FULL") => tag.store(&mut self.range, CodeRange::Full),
                 Some(_) => Err(tag.error("is neither LIMITED nor FULL")),
                 None => Ok(()),
             },
@@ -244,11 +266,17 @@ fn side(tag: Tag<'_>, value: &[u8]) -> Result<u64, Y4mError> {
     Ok(number)
 }
 
-fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<Sampling, Y4mError> {
+/// A fraction such as `30000:1001`.
+fn rate(value: &[u8]) -> Option<(u32, u32)> {
+    let (number, over) = std::str::from_utf8(value).ok()?.split_once(':')?;
+    Some((number.parse().ok()?, over.parse().ok()?))
+}
+
+fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<ChromaSampling, Y4mError> {
     match value {
-        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok(Sampling::Chroma420),
-        b"444" => Ok(Sampling::Chroma444),
-        b"mono" => Ok(Sampling::Mono),
+        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok(ChromaSampling::Chroma420),
+        b"444" => Ok(ChromaSampling::Chroma444),
+        b"mono" => Ok(ChromaSampling::Mono),
         _ => Err(Y4mError::Colour {
             tag: tag.text(),
             offset: tag.offset,

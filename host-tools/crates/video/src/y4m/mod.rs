@@ -10,6 +10,7 @@
 //! | `C` | `420`, `420jpeg`, `420mpeg2`, `420paldv`, `444`, `mono`; `420` if absent |
 //! | `I` | `p`, `?` or absent: rows of one field have nothing between them to average with |
 //! | `XCOLORRANGE` | `LIMITED` or `FULL`; if absent limited, and full for `mono`, as `FFmpeg` has it |
+//! | `F` | frames a second as a fraction; unknown if absent or malformed |
 //! | all else | kept and written out again, byte for byte |
 //!
 //! Reading a frame needs memory for that frame, however long the stream is.
@@ -24,8 +25,9 @@ mod reader;
 mod writer;
 
 pub use error::Y4mError;
-pub use header::{Header, Range, Sampling};
-pub use reader::{Frame, Reader};
+pub(crate) use header::MAGIC;
+pub use header::{ChromaSampling, CodeRange, Header};
+pub use reader::{Reader, YuvFrame};
 pub use writer::Writer;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Reading a stream, one frame at a time.
+//! Reader of a Y4M stream, one frame at a time.
 
 use super::Y4mError;
 use super::header::{Header, MAGIC, MAX_HEADER};
@@ -16,7 +16,7 @@ const BUFFER: usize = 1 << 16;
 
 /// One frame: its planes one after the other, luma first.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Frame {
+pub struct YuvFrame {
     /// What its header says beyond `FRAME`, with the space before it.
     pub parameters: Vec<u8>,
     /// [`Header::frame_bytes`] samples.
@@ -83,7 +83,7 @@ impl<R: Read> Reader<R> {
     ///
     /// # Fuzzing
     /// Total: any bytes give frames and then an end or an error.
-    pub fn read_frame(&mut self, frame: &mut Frame) -> Result<bool, Y4mError> {
+    pub fn read_frame(&mut self, frame: &mut YuvFrame) -> Result<bool, Y4mError> {
         let (number, start) = (self.frames + 1, self.offset);
         frame.parameters.clear();
         let ended = read_line(&mut self.input, MAX_FRAME_HEADER, &mut frame.parameters);

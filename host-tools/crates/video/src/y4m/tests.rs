@@ -2,11 +2,11 @@ use super::*;
 use proptest::prelude::*;
 use std::io::{ErrorKind, Read};
 
-fn read_all(stream: &[u8]) -> Result<Vec<Frame>, Y4mError> {
+fn read_all(stream: &[u8]) -> Result<Vec<YuvFrame>, Y4mError> {
     let mut reader = Reader::new(stream)?;
     let mut frames = Vec::new();
     loop {
-        let mut frame = Frame::default();
+        let mut frame = YuvFrame::default();
         if !reader.read_frame(&mut frame)? {
             return Ok(frames);
         }
@@ -23,41 +23,46 @@ fn tags_say_how_frames_are_laid_out() {
     for (line, sampling, range, bytes) in [
         (
             "YUV4MPEG2 W5 H3",
-            Sampling::Chroma420,
-            Range::Limited,
+            ChromaSampling::Chroma420,
+            CodeRange::Limited,
             15 + 2 * 3 * 2,
         ),
         (
             "YUV4MPEG2 W5 H3 C420mpeg2",
-            Sampling::Chroma420,
-            Range::Limited,
+            ChromaSampling::Chroma420,
+            CodeRange::Limited,
             27,
         ),
         (
             "YUV4MPEG2 W5 H3 C420paldv XCOLORRANGE=LIMITED",
-            Sampling::Chroma420,
-            Range::Limited,
+            ChromaSampling::Chroma420,
+            CodeRange::Limited,
             27,
         ),
         (
             "YUV4MPEG2 H3 W5 Ip C420jpeg XCOLORRANGE=FULL",
-            Sampling::Chroma420,
-            Range::Full,
+            ChromaSampling::Chroma420,
+            CodeRange::Full,
             27,
         ),
         (
             "YUV4MPEG2 W5 H3 I? C444 A1:1 F30000:1001",
-            Sampling::Chroma444,
-            Range::Limited,
+            ChromaSampling::Chroma444,
+            CodeRange::Limited,
             45,
         ),
         (
             "YUV4MPEG2 W5 H3  Cmono Xsomething",
-            Sampling::Mono,
-            Range::Full,
+            ChromaSampling::Mono,
+            CodeRange::Full,
             15,
         ),
-        ("YUV4MPEG2 W1 H1", Sampling::Chroma420, Range::Limited, 3),
+        (
+            "YUV4MPEG2 W1 H1",
+            ChromaSampling::Chroma420,
+            CodeRange::Limited,
+            3,
+        ),
     ] {
         let header = Header::parse(line.as_bytes()).expect(line);
         assert_eq!(
@@ -72,8 +77,12 @@ fn tags_say_how_frames_are_laid_out() {
 #[test]
 fn a_header_of_ours_reads_as_what_it_was_made_for() {
     let size = iltm_runtime::FrameSize::new(640, 361).expect("not empty");
-    for sampling in [Sampling::Mono, Sampling::Chroma420, Sampling::Chroma444] {
-        for range in [Range::Limited, Range::Full] {
+    for sampling in [
+        ChromaSampling::Mono,
+        ChromaSampling::Chroma420,
+        ChromaSampling::Chroma444,
+    ] {
+        for range in [CodeRange::Limited, CodeRange::Full] {
             let header = Header::new(size, (30_000, 1001), sampling, range);
             assert_eq!(Header::parse(header.line()).expect("our own"), header);
         }
@@ -85,7 +94,7 @@ fn frames_come_back_byte_for_byte_with_their_parameters() {
     let stream = b"YUV4MPEG2 W2 H1 F25:1 Ip A1:1 C444 Xa comment\nFRAME\nabcdefFRAME Xb=1\nghijkl";
     let mut reader = Reader::new(&stream[..]).unwrap();
     let mut writer = Writer::new(Vec::new(), reader.header()).unwrap();
-    let mut frame = Frame::default();
+    let mut frame = YuvFrame::default();
     while reader.read_frame(&mut frame).unwrap() {
         writer.write_frame(&frame).unwrap();
     }
@@ -243,7 +252,7 @@ impl Read for Slow<'_> {
 fn a_pipe_that_gives_single_bytes_gives_whole_frames() {
     let stream = b"YUV4MPEG2 W2 H1 C444\nFRAME\nabcdefFRAME\nghijkl";
     let mut reader = Reader::new(Slow(stream, false)).unwrap();
-    let mut frame = Frame::default();
+    let mut frame = YuvFrame::default();
     assert!(reader.read_frame(&mut frame).unwrap());
     assert!(reader.read_frame(&mut frame).unwrap());
     assert_eq!(frame.samples, b"ghijkl");
@@ -275,9 +284,9 @@ fn an_output_that_is_full_says_at_which_frame() {
         Err(Y4mError::Write { frame: 0, .. })
     ));
     let mut writer = Writer::new(Full(40), &header).unwrap();
-    let frame = Frame {
+    let frame = YuvFrame {
         samples: vec![0; 6],
-        ..Frame::default()
+        ..YuvFrame::default()
     };
     writer.write_frame(&frame).unwrap();
     assert!(matches!(

@@ -1,7 +1,7 @@
-//! Writing a stream, one frame at a time.
+//! Writer of a Y4M stream, one frame at a time.
 
 use super::reader::FRAME;
-use super::{Frame, Header, Y4mError};
+use super::{Header, Y4mError, YuvFrame};
 use std::io::Write;
 
 /// Writes a stream.
@@ -34,7 +34,7 @@ impl<W: Write> Writer<W> {
     ///
     /// # Errors
     /// [`Y4mError::Write`].
-    pub fn write_frame(&mut self, frame: &Frame) -> Result<(), Y4mError> {
+    pub fn write_frame(&mut self, frame: &YuvFrame) -> Result<(), Y4mError> {
         self.frames += 1;
         self.line.clear();
         self.line.extend_from_slice(FRAME);

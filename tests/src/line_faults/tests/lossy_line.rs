@@ -1,7 +1,7 @@
 use super::*;
-use crate::Line;
-use crate::fault::{Faults, Harm, LossyLine, PacedLine, Tally};
+use crate::line_faults::{FaultCounts, FaultRates, Faults, LossyLine, PacedLine};
 use fastrand::Rng;
+use iltm::device::Line;
 use std::io::ErrorKind;
 
 /// Fast enough that frames take next to no time.
@@ -54,7 +54,7 @@ fn pieces(bytes: &[u8]) -> Vec<&[u8]> {
 }
 
 #[test]
-fn a_line_without_harm_passes_every_byte_in_its_order() {
+fn a_line_without_faults_passes_every_byte_in_its_order() {
     let mut random = Rng::with_seed(1);
     // Noise, with many delimiters in a row, with thousands of bytes between two, and
     // without one at the end.
@@ -67,7 +67,7 @@ fn a_line_without_harm_passes_every_byte_in_its_order() {
     line.line_mut().far_end_mut().says.clone_from(&noise);
     assert_eq!(hear(&mut line), noise);
     assert_eq!(line.line().far_end().heard, noise);
-    assert_eq!((line.to_device().harmed(), line.to_host().harmed()), (0, 0));
+    assert_eq!((line.to_device().faulty(), line.to_host().faulty()), (0, 0));
 }
 
 #[test]
@@ -89,10 +89,10 @@ fn is_rate(count: u64, rate: u16, draws: u16) -> bool {
 
 const COUNT: u16 = 20_000;
 
-/// What became of frames by a tally, and what the device heard of them.
-fn harmed(harm: Harm) -> (Tally, Vec<u8>) {
+/// What became of frames by a counts, and what the device heard of them.
+fn damaged(rates: FaultRates) -> (FaultCounts, Vec<u8>) {
     let mut line = fast(Faults {
-        to_device: harm,
+        to_device: rates,
         seed: 7,
         ..Faults::default()
     });
@@ -101,8 +101,8 @@ fn harmed(harm: Harm) -> (Tally, Vec<u8>) {
 }
 
 #[test]
-fn every_kind_of_harm_comes_as_often_as_its_rate() {
-    let harm = Harm {
+fn every_kind_of_fault_comes_as_often_as_its_rate() {
+    let rates = FaultRates {
         drop: 100,
         duplicate: 150,
         corrupt: 50,
@@ -111,118 +111,118 @@ fn every_kind_of_harm_comes_as_often_as_its_rate() {
         cut: 120,
         delay_by: SECOND / 2,
     };
-    let (tally, _) = harmed(harm);
+    let (counts, _) = damaged(rates);
     for (count, rate) in [
-        (tally.dropped, 100),
-        (tally.duplicated, 150),
-        (tally.corrupted, 50),
-        (tally.reordered, 200),
-        (tally.delayed, 80),
-        (tally.cut, 120),
-        (tally.harmed(), 700),
+        (counts.dropped, 100),
+        (counts.duplicated, 150),
+        (counts.corrupted, 50),
+        (counts.reordered, 200),
+        (counts.delayed, 80),
+        (counts.cut, 120),
+        (counts.faulty(), 700),
     ] {
         assert!(is_rate(count, rate, COUNT), "{count} for {rate} of 1,000");
     }
-    assert_eq!(tally.frames, u64::from(COUNT));
+    assert_eq!(counts.frames, u64::from(COUNT));
 }
 
 #[test]
 fn dropped_frames_are_missing_and_no_others() {
-    let (tally, heard) = harmed(Harm {
+    let (counts, heard) = damaged(FaultRates {
         drop: 100,
-        ..Harm::default()
+        ..FaultRates::default()
     });
-    assert!(is_rate(tally.dropped, 100, COUNT) && tally.harmed() == tally.dropped);
+    assert!(is_rate(counts.dropped, 100, COUNT) && counts.faulty() == counts.dropped);
     assert_eq!(
         pieces(&heard).len() as u64,
-        u64::from(COUNT) - tally.dropped
+        u64::from(COUNT) - counts.dropped
     );
     assert!(pieces(&heard).is_sorted_by_key(number), "in their order");
 }
 
 #[test]
 fn duplicated_frames_come_twice_and_no_others() {
-    let (tally, heard) = harmed(Harm {
+    let (counts, heard) = damaged(FaultRates {
         duplicate: 150,
-        ..Harm::default()
+        ..FaultRates::default()
     });
-    assert!(is_rate(tally.duplicated, 150, COUNT) && tally.harmed() == tally.duplicated);
+    assert!(is_rate(counts.duplicated, 150, COUNT) && counts.faulty() == counts.duplicated);
     let mut came = pieces(&heard);
-    assert_eq!(came.len() as u64, u64::from(COUNT) + tally.duplicated);
+    assert_eq!(came.len() as u64, u64::from(COUNT) + counts.duplicated);
     came.dedup();
     assert!(came.concat() == frames(COUNT));
 }
 
 #[test]
 fn reordered_and_delayed_frames_all_arrive() {
-    let delayed = Harm {
+    let delayed = FaultRates {
         delay: 80,
         delay_by: SECOND / 2,
-        ..Harm::default()
+        ..FaultRates::default()
     };
-    for harm in [
+    for rates in [
         delayed,
-        Harm {
+        FaultRates {
             reorder: 200,
-            ..Harm::default()
+            ..FaultRates::default()
         },
     ] {
-        let (tally, heard) = harmed(harm);
+        let (counts, heard) = damaged(rates);
         assert!(is_rate(
-            tally.delayed + tally.reordered,
-            harm.delay + harm.reorder,
+            counts.delayed + counts.reordered,
+            rates.delay + rates.reorder,
             COUNT
         ));
         let mut came = pieces(&heard);
-        assert!(!came.is_sorted_by_key(number), "{tally:?}");
+        assert!(!came.is_sorted_by_key(number), "{counts:?}");
         came.sort_unstable_by_key(number);
-        assert!(came.concat() == frames(COUNT), "{tally:?}");
+        assert!(came.concat() == frames(COUNT), "{counts:?}");
     }
 }
 
 #[test]
 fn cut_frames_run_into_the_next() {
-    let (tally, heard) = harmed(Harm {
+    let (counts, heard) = damaged(FaultRates {
         cut: 120,
-        ..Harm::default()
+        ..FaultRates::default()
     });
-    assert!(is_rate(tally.cut, 120, COUNT) && tally.harmed() == tally.cut);
+    assert!(is_rate(counts.cut, 120, COUNT) && counts.faulty() == counts.cut);
     let whole = pieces(&heard)
         .iter()
         .filter(|piece| piece.ends_with(&[0]))
         .count();
-    assert_eq!(whole as u64, u64::from(COUNT) - tally.cut);
+    assert_eq!(whole as u64, u64::from(COUNT) - counts.cut);
     // Of six bytes, from none to five stay, each alike often.
-    let left = heard.len() as f64 - 6.0 * (f64::from(COUNT) - tally.cut as f64);
+    let left = heard.len() as f64 - 6.0 * (f64::from(COUNT) - counts.cut as f64);
     assert!(
-        (left / tally.cut as f64 - 2.5).abs() < 0.2,
-        "{left} of {tally:?}"
+        (left / counts.cut as f64 - 2.5).abs() < 0.2,
+        "{left} of {counts:?}"
     );
 }
 
 #[test]
 fn corrupted_frames_have_other_bytes_and_as_many() {
-    let (tally, heard) = harmed(Harm {
+    let (counts, heard) = damaged(FaultRates {
         corrupt: 50,
-        ..Harm::default()
+        ..FaultRates::default()
     });
-    assert!(is_rate(tally.corrupted, 50, COUNT) && tally.harmed() == tally.corrupted);
+    assert!(is_rate(counts.corrupted, 50, COUNT) && counts.faulty() == counts.corrupted);
     let sent = frames(COUNT);
     assert_eq!(heard.len(), sent.len());
     let pairs = heard.chunks(6).zip(sent.chunks(6));
     assert_eq!(
         pairs.filter(|(heard, sent)| heard != sent).count() as u64,
-        tally.corrupted
+        counts.corrupted
     );
 }
 
 #[test]
 fn frames_that_are_all_reordered_arrive_all_the_same() {
-    let harm = Harm {
+    let rates = FaultRates {
         reorder: 1_000,
-        ..Harm::default()
+        ..FaultRates::default()
     };
-    let mut line = fast(Faults::both_ways(harm, 1));
+    let mut line = fast(Faults::both_ways(rates, 1));
     assert_eq!(sent(&mut line, 50), frames(50));
     // One alone waits for a companion, and not for ever.
     let before = line.now();
@@ -239,11 +239,11 @@ fn frames_that_are_all_reordered_arrive_all_the_same() {
 
 #[test]
 fn a_reordered_frame_changes_places_with_the_next() {
-    let harm = Harm {
+    let rates = FaultRates {
         reorder: 300,
-        ..Harm::default()
+        ..FaultRates::default()
     };
-    let mut line = fast(Faults::both_ways(harm, 3));
+    let mut line = fast(Faults::both_ways(rates, 3));
     let heard = sent(&mut line, 1_000);
     let all = frames(1_000);
     let places: Vec<usize> = pieces(&heard)
@@ -255,12 +255,12 @@ fn a_reordered_frame_changes_places_with_the_next() {
                 .expect("whole")
         })
         .collect();
-    let tally = line.to_device();
+    let counts = line.to_device();
     // Where two frames in a row wait, the third passes both.
     let passed = places.windows(2).filter(|pair| pair[0] > pair[1]).count() as u64;
     assert!(
-        passed > 150 && passed <= tally.reordered,
-        "{passed} of {tally:?}"
+        passed > 150 && passed <= counts.reordered,
+        "{passed} of {counts:?}"
     );
     let far = places
         .iter()
@@ -272,12 +272,12 @@ fn a_reordered_frame_changes_places_with_the_next() {
 #[test]
 fn a_delayed_frame_comes_when_its_time_has_come() {
     let delay_by = Duration::from_millis(70);
-    let harm = Harm {
+    let rates = FaultRates {
         delay: 1_000,
         delay_by,
-        ..Harm::default()
+        ..FaultRates::default()
     };
-    let mut line = fast(Faults::both_ways(harm, 1));
+    let mut line = fast(Faults::both_ways(rates, 1));
     line.write(&frame(1)).expect("plugged in");
     hear(&mut line);
     // On the next turn, a tenth of a millisecond later at most.
@@ -327,9 +327,9 @@ fn frames_to_the_host_before_it_is_unplugged_can_still_be_read() {
 }
 
 #[test]
-fn the_same_seed_harms_the_same_frames() {
+fn the_same_seed_damages_the_same_frames() {
     let run = |seed| {
-        let mut line = fast(Faults::both_ways(Harm::evenly(400), seed));
+        let mut line = fast(Faults::both_ways(FaultRates::evenly(400), seed));
         let heard = sent(&mut line, 500);
         (heard, line.to_device())
     };
@@ -340,14 +340,14 @@ fn the_same_seed_harms_the_same_frames() {
 #[test]
 fn rates_that_are_shared_evenly_add_up() {
     for parts in [0, 4, 200, 201, 1_000] {
-        let harm = Harm::evenly(parts);
-        let sum = harm.drop + harm.duplicate + harm.corrupt + harm.reorder + harm.cut;
+        let rates = FaultRates::evenly(parts);
+        let sum = rates.drop + rates.duplicate + rates.corrupt + rates.reorder + rates.cut;
         assert_eq!(sum, parts);
     }
-    let all = Harm {
+    let all = FaultRates {
         drop: u16::MAX,
         cut: u16::MAX,
-        ..Harm::default()
+        ..FaultRates::default()
     };
     let mut line = fast(Faults::both_ways(all, 1));
     assert!(sent(&mut line, 100).is_empty());

@@ -1,7 +1,7 @@
 //! Devices that the simulated lines are tested with.
 
-mod lossy;
-mod paced;
+mod lossy_line;
+mod paced_line;
 
 use super::FarEnd;
 use std::time::Duration;

@@ -1,26 +1,20 @@
-//! Wanted frames for a board: the test scene, a picture, or a video over and over.
+//! Sources of frames for a board: the test scene, a picture, or a video over and over.
 
 use iltm_picture::{Picture, Samples, png};
 use iltm_runtime::FrameSize;
 use iltm_video::{
-    VideoError,
+    Input, VideoError,
     test_scene::TestScene,
-    y4m::{Frame, Reader, Y4mError},
+    y4m::{CodeRange, Reader, Y4mError, YuvFrame},
+    yuv::{Conversion, Standard},
 };
 use std::fs::File;
-use std::io::{Read, Seek};
+use std::io::{Chain, Cursor};
 use std::path::{Path, PathBuf};
-
-/// Frames of the test scene that are drawn; then it begins again. Drawing takes
-/// longer than many a board has for a frame, so they are kept.
-const DRAWN: u64 = 100;
-
-/// What the test scene's motion and colours follow from.
-const SEED: u64 = 1;
 
 /// Frames without an end.
 #[derive(Debug)]
-pub struct Frames {
+pub struct FrameSource {
     kind: Kind,
     size: FrameSize,
     channels: u8,
@@ -30,30 +24,25 @@ pub struct Frames {
 #[derive(Debug)]
 enum Kind {
     Scene {
-        scene: Box<TestScene>,
+        scene: TestScene,
         next: u64,
-        drawn: Vec<Vec<u8>>,
     },
     Still(Picture),
     Video {
         path: PathBuf,
-        reader: Box<Reader<File>>,
-        frame: Frame,
+        reader: Reader<Chain<Cursor<Vec<u8>>, File>>,
+        frame: YuvFrame,
     },
 }
 
-impl Frames {
+impl FrameSource {
     /// The moving test scene, `rate` frames a second, each of `channels` (1 or 3)
     /// samples a pixel.
     #[must_use]
     pub fn scene(size: FrameSize, channels: u8, rate: f64) -> Self {
-        let scene = Box::new(TestScene::new(size, rate as f32, SEED));
+        let scene = TestScene::new(size, rate as f32);
         Self {
-            kind: Kind::Scene {
-                scene,
-                next: 0,
-                drawn: Vec::new(),
-            },
+            kind: Kind::Scene { scene, next: 0 },
             size,
             channels,
             rate,
@@ -67,36 +56,28 @@ impl Frames {
     /// # Errors
     /// [`VideoError`] if the file cannot be read.
     pub fn file(path: &Path, channels: Option<u8>, rate: Option<f64>) -> Result<Self, VideoError> {
-        let mut file = open(path)?;
-        let mut first = [0; png::SIGNATURE.len()];
-        let read = file.read(&mut first).and_then(|count| {
-            file.rewind()?;
-            Ok(count)
-        });
-        let count = read.map_err(|source| VideoError::Read { source })?;
-        if first == png::SIGNATURE {
-            let picture = png::read(file)?;
-            return Ok(Self {
-                size: picture.size(),
-                channels: channels.unwrap_or(picture.channels() as u8),
-                rate: rate.unwrap_or(25.0),
-                kind: Kind::Still(picture),
-            });
-        }
-        if !first[..count].starts_with(b"YUV4MPEG") {
-            return Err(VideoError::UnknownFormat);
-        }
-        let reader = Box::new(Reader::new(file)?);
+        let reader = match Input::open(path)? {
+            Input::Png(file) => {
+                let picture = png::read(file)?;
+                return Ok(Self {
+                    size: picture.size(),
+                    channels: channels.unwrap_or(picture.channels() as u8),
+                    rate: rate.unwrap_or(25.0),
+                    kind: Kind::Still(picture),
+                });
+            }
+            Input::Y4m(file) => Reader::new(file)?,
+        };
         let header = reader.header();
         let colours = if header.chroma() == (0, 0) { 1 } else { 3 };
         Ok(Self {
             size: header.size(),
             channels: channels.unwrap_or(colours),
-            rate: rate.or_else(|| own_rate(header.line())).unwrap_or(25.0),
+            rate: rate.or(header.rate()).unwrap_or(25.0),
             kind: Kind::Video {
                 path: path.to_owned(),
                 reader,
-                frame: Frame::default(),
+                frame: YuvFrame::default(),
             },
         })
     }
@@ -123,18 +104,11 @@ impl Frames {
     ///
     /// # Errors
     /// [`VideoError`] if the file does not go on.
-    ///
-    /// # Panics
-    /// Never: the reader gives frames of the stream's size only.
     pub fn next_frame(&mut self) -> Result<Vec<u8>, VideoError> {
         let picture = match &mut self.kind {
-            Kind::Scene { scene, next, drawn } => {
-                let number = *next as usize;
-                *next = (*next + 1) % DRAWN;
-                if number == drawn.len() {
-                    drawn.push(samples(&scene.frame(number as u64), self.channels));
-                }
-                return Ok(drawn[number].clone());
+            Kind::Scene { scene, next } => {
+                *next += 1;
+                scene.frame(*next - 1)
             }
             Kind::Still(picture) => picture.clone(),
             Kind::Video {
@@ -142,43 +116,30 @@ impl Frames {
                 reader,
                 frame,
             } => {
-                if !reader.read_frame(frame)? {
-                    **reader = Reader::new(open(path)?)?;
-                    if !reader.read_frame(frame)? {
-                        return Err(VideoError::Y4m(Y4mError::Truncated {
-                            place: "the first frame".to_owned(),
-                            offset: reader.header().line().len() as u64 + 1,
-                            needed: reader.header().frame_bytes() as u64,
-                            given: 0,
-                        }));
-                    }
+                let mut is_read = reader.read_frame(frame)?;
+                if !is_read {
+                    let Input::Y4m(file) = Input::open(path)? else {
+                        return Err(VideoError::Still);
+                    };
+                    *reader = Reader::new(file)?;
+                    is_read = reader.read_frame(frame)?;
                 }
-                let picture = frame.to_picture(reader.header());
-                picture.expect("a frame of the stream")
+                let header = reader.header();
+                let picture = frame.to_picture(header).filter(|_| is_read);
+                picture.ok_or_else(|| Y4mError::Truncated {
+                    place: "the first frame".to_owned(),
+                    offset: header.line().len() as u64 + 1,
+                    needed: header.frame_bytes() as u64,
+                    given: 0,
+                })?
             }
         };
         Ok(samples(&picture, self.channels))
     }
 }
 
-fn open(path: &Path) -> Result<File, VideoError> {
-    File::open(path).map_err(|source| VideoError::File {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-/// The rate in a stream header, such as `F25:1`.
-fn own_rate(line: &[u8]) -> Option<f64> {
-    let line = std::str::from_utf8(line).ok()?;
-    let rate = line.split(' ').find_map(|word| word.strip_prefix('F'))?;
-    let (number, over) = rate.split_once(':')?;
-    let rate = number.parse::<f64>().ok()? / over.parse::<f64>().ok()?;
-    (rate.is_finite() && rate > 0.0).then_some(rate)
-}
-
 /// The samples of a picture in 8 bits and this many channels. Grey of a colour is
-/// its luma by BT.601, in 256ths.
+/// its luma by BT.601.
 fn samples(picture: &Picture, channels: u8) -> Vec<u8> {
     let eight = match picture.samples() {
         Samples::Eight(samples) => samples.clone(),
@@ -188,11 +149,8 @@ fn samples(picture: &Picture, channels: u8) -> Vec<u8> {
         (1, 3) => eight.iter().flat_map(|grey| [*grey; 3]).collect(),
         (3, 1) => {
             let (pixels, _) = eight.as_chunks::<3>();
-            let luma = |[red, green, blue]: &[u8; 3]| {
-                let sum = 77 * u16::from(*red) + 150 * u16::from(*green) + 29 * u16::from(*blue);
-                (sum >> 8) as u8
-            };
-            pixels.iter().map(luma).collect()
+            let conversion = Conversion::new(Standard::Bt601, CodeRange::Full);
+            pixels.iter().map(|pixel| conversion.luma(*pixel)).collect()
         }
         _ => eight,
     }
@@ -217,7 +175,7 @@ mod tests {
             stream.extend([code; 2]);
         }
         let (_folder, path) = in_file("v.y4m", &stream);
-        let mut frames = Frames::file(&path, None, None).expect("a good video");
+        let mut frames = FrameSource::file(&path, None, None).expect("a good video");
         assert_eq!((frames.size().width(), frames.channels()), (2, 1));
         assert!((frames.rate() - 29.97).abs() < 0.001);
         let got: Vec<_> = (0..5)
@@ -229,7 +187,7 @@ mod tests {
     #[test]
     fn a_video_without_frames_is_an_error_and_no_endless_loop() {
         let (_folder, path) = in_file("v.y4m", b"YUV4MPEG2 W2 H1 F25:1 Cmono\n");
-        let mut frames = Frames::file(&path, None, None).expect("a header");
+        let mut frames = FrameSource::file(&path, None, None).expect("a header");
         assert!(frames.next_frame().is_err());
     }
 
@@ -248,15 +206,10 @@ mod tests {
     #[test]
     fn the_scene_moves() {
         let size = FrameSize::new(16, 12).expect("small");
-        let mut frames = Frames::scene(size, 3, 25.0);
+        let mut frames = FrameSource::scene(size, 3, 25.0);
         let first = frames.next_frame().expect("a frame");
         assert_eq!(first.len(), 16 * 12 * 3);
-        let mut later = (1..DRAWN).map(|_| frames.next_frame().expect("a frame"));
+        let mut later = (1..100).map(|_| frames.next_frame().expect("a frame"));
         assert!(later.all(|frame| frame != first));
-        assert_eq!(
-            frames.next_frame().expect("a frame"),
-            first,
-            "from the start"
-        );
     }
 }

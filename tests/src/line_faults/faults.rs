@@ -1,13 +1,13 @@
-//! What is done to frames, how often, and how often it was.
+//! Rates and kinds of line faults, and counts of those that happened.
 
 use std::time::Duration;
 
-/// How often frames of one way come to harm, in parts of 1,000.
+/// How often frames of one direction are damaged, in parts of 1,000.
 ///
-/// A frame comes to one kind of harm at most, so the rates add up to the share that
-/// is harmed. Where they add up to more than 1,000, the first named come first.
+/// A frame has one fault at most, so the rates add up to the share of faulty frames.
+/// Where they add up to more than 1,000, the first named come first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Harm {
+pub struct FaultRates {
     /// It never arrives.
     pub drop: u16,
     /// It arrives twice.
@@ -24,20 +24,19 @@ pub struct Harm {
     pub delay_by: Duration,
 }
 
-/// What happens to a frame.
+/// A fault of one frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Fate {
+pub(super) enum FaultKind {
     Drop,
     Duplicate,
     Corrupt,
     Reorder,
     Delay,
     Cut,
-    Pass,
 }
 
-impl Harm {
-    /// So many parts of 1,000 come to harm, dropped, duplicated, corrupted, reordered
+impl FaultRates {
+    /// So many parts of 1,000 are faulty: dropped, duplicated, corrupted, reordered
     /// and cut alike often.
     #[must_use]
     pub const fn evenly(parts: u16) -> Self {
@@ -63,45 +62,46 @@ impl Harm {
         }
     }
 
-    pub(super) fn fate(&self, random: &mut fastrand::Rng) -> Fate {
+    /// The fault of the next frame, if it has one.
+    pub(super) fn draw(&self, random: &mut fastrand::Rng) -> Option<FaultKind> {
         let mut draw = random.u32(..1_000);
-        for (rate, fate) in [
-            (self.drop, Fate::Drop),
-            (self.duplicate, Fate::Duplicate),
-            (self.corrupt, Fate::Corrupt),
-            (self.reorder, Fate::Reorder),
-            (self.delay, Fate::Delay),
-            (self.cut, Fate::Cut),
+        for (rate, kind) in [
+            (self.drop, FaultKind::Drop),
+            (self.duplicate, FaultKind::Duplicate),
+            (self.corrupt, FaultKind::Corrupt),
+            (self.reorder, FaultKind::Reorder),
+            (self.delay, FaultKind::Delay),
+            (self.cut, FaultKind::Cut),
         ] {
             match draw.checked_sub(rate.into()) {
                 Some(rest) => draw = rest,
-                None => return fate,
+                None => return Some(kind),
             }
         }
-        Fate::Pass
+        None
     }
 }
 
 /// All that goes wrong on a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Faults {
-    /// To frames from host to device.
-    pub to_device: Harm,
-    /// To frames from device to host.
-    pub to_host: Harm,
-    /// The line is unplugged after so many frames, both ways together.
+    /// Of frames from host to device.
+    pub to_device: FaultRates,
+    /// Of frames from device to host.
+    pub to_host: FaultRates,
+    /// The line is unplugged after so many frames of both directions together.
     pub unplug_after: Option<u64>,
     /// What is random follows from this.
     pub seed: u64,
 }
 
 impl Faults {
-    /// The same harm both ways.
+    /// The same rates in both directions.
     #[must_use]
-    pub const fn both_ways(harm: Harm, seed: u64) -> Self {
+    pub const fn both_ways(rates: FaultRates, seed: u64) -> Self {
         Self {
-            to_device: harm,
-            to_host: harm,
+            to_device: rates,
+            to_host: rates,
             unplug_after: None,
             seed,
         }
@@ -115,9 +115,9 @@ impl Faults {
     }
 }
 
-/// How many frames of one way met which fate.
+/// Frames of one direction, and how many of them had which fault.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Tally {
+pub struct FaultCounts {
     /// Came from the sender.
     pub frames: u64,
     /// Of these: never arrived.
@@ -134,23 +134,23 @@ pub struct Tally {
     pub cut: u64,
 }
 
-impl Tally {
-    /// Frames that came to harm.
+impl FaultCounts {
+    /// Frames that had a fault.
     #[must_use]
-    pub const fn harmed(&self) -> u64 {
+    pub const fn faulty(&self) -> u64 {
         self.dropped + self.duplicated + self.corrupted + self.reordered + self.delayed + self.cut
     }
 
-    pub(super) const fn count(&mut self, fate: Fate) {
+    pub(super) const fn count(&mut self, fault: Option<FaultKind>) {
         self.frames += 1;
-        match fate {
-            Fate::Drop => self.dropped += 1,
-            Fate::Duplicate => self.duplicated += 1,
-            Fate::Corrupt => self.corrupted += 1,
-            Fate::Reorder => self.reordered += 1,
-            Fate::Delay => self.delayed += 1,
-            Fate::Cut => self.cut += 1,
-            Fate::Pass => {}
+        match fault {
+            Some(FaultKind::Drop) => self.dropped += 1,
+            Some(FaultKind::Duplicate) => self.duplicated += 1,
+            Some(FaultKind::Corrupt) => self.corrupted += 1,
+            Some(FaultKind::Reorder) => self.reordered += 1,
+            Some(FaultKind::Delay) => self.delayed += 1,
+            Some(FaultKind::Cut) => self.cut += 1,
+            None => {}
         }
     }
 }

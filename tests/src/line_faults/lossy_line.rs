@@ -1,13 +1,13 @@
-//! A line that harms frames.
+//! A line that damages frames on their way.
 
-use super::harm::{Faults, Tally};
-use super::way::Way;
-use crate::Line;
+use super::direction::Direction;
+use super::faults::{FaultCounts, Faults};
+use iltm::device::Line;
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
 /// A line around another one, that drops, duplicates, corrupts, reorders, delays and
-/// cuts frames both ways, as [`Faults`] say.
+/// cuts frames in both directions, as [`Faults`] say.
 ///
 /// At rates of 0 all bytes pass in their order; those behind the last delimiter .02 s
 /// late, when it is clear that no delimiter follows.
@@ -17,32 +17,32 @@ use std::time::{Duration, Instant};
 #[derive(Debug)]
 pub struct LossyLine<L> {
     line: L,
-    to_device: Way,
-    to_host: Way,
+    to_device: Direction,
+    to_host: Direction,
     /// Frames until the line is unplugged.
     left: u64,
 }
 
 impl<L: Line> LossyLine<L> {
-    /// Does so much harm between a host and this line.
+    /// Puts these faults between a host and this line.
     #[must_use]
     pub fn new(line: L, faults: Faults) -> Self {
         let mut seeds = fastrand::Rng::with_seed(faults.seed);
         Self {
             line,
-            to_device: Way::new(faults.to_device, seeds.u64(..)),
-            to_host: Way::new(faults.to_host, seeds.u64(..)),
+            to_device: Direction::new(faults.to_device, seeds.u64(..)),
+            to_host: Direction::new(faults.to_host, seeds.u64(..)),
             left: faults.unplug_after.unwrap_or(u64::MAX),
         }
     }
 
-    /// The line that is harmed.
+    /// The line within.
     #[must_use]
     pub const fn line(&self) -> &L {
         &self.line
     }
 
-    /// The line that is harmed, to do other things to it.
+    /// The line within, to do other things to it.
     #[must_use]
     pub const fn line_mut(&mut self) -> &mut L {
         &mut self.line
@@ -50,14 +50,14 @@ impl<L: Line> LossyLine<L> {
 
     /// What became of frames from host to device.
     #[must_use]
-    pub const fn to_device(&self) -> Tally {
-        self.to_device.tally
+    pub const fn to_device(&self) -> FaultCounts {
+        self.to_device.counts
     }
 
     /// What became of frames from device to host.
     #[must_use]
-    pub const fn to_host(&self) -> Tally {
-        self.to_host.tally
+    pub const fn to_host(&self) -> FaultCounts {
+        self.to_host.counts
     }
 
     /// Unplugs the line after so many more frames, both ways together; at once with 0.

@@ -1,6 +1,6 @@
-//! One way of a line that harms frames: bytes in, bytes out.
+//! One direction of a line that damages frames: bytes in, bytes out.
 
-use super::harm::{Fate, Harm, Tally};
+use super::faults::{FaultCounts, FaultKind, FaultRates};
 use fastrand::Rng;
 use iltm_runtime::link::DELIMITER;
 use std::collections::VecDeque;
@@ -18,8 +18,8 @@ const LONGEST: usize = 4_096;
 const MOST_HELD: usize = 1 << 20;
 
 #[derive(Debug)]
-pub(super) struct Way {
-    harm: Harm,
+pub(super) struct Direction {
+    rates: FaultRates,
     random: Rng,
     /// A frame whose end has not come, and when its last byte came.
     frame: Vec<u8>,
@@ -27,7 +27,7 @@ pub(super) struct Way {
     held: Vec<Held>,
     /// Bytes that are through.
     pub(super) ready: VecDeque<u8>,
-    pub(super) tally: Tally,
+    pub(super) counts: FaultCounts,
 }
 
 /// A frame that waits.
@@ -39,16 +39,16 @@ struct Held {
     changes_places: bool,
 }
 
-impl Way {
-    pub(super) fn new(harm: Harm, seed: u64) -> Self {
+impl Direction {
+    pub(super) fn new(rates: FaultRates, seed: u64) -> Self {
         Self {
-            harm,
+            rates,
             random: Rng::with_seed(seed),
             frame: Vec::new(),
             heard: None,
             held: Vec::new(),
             ready: VecDeque::new(),
-            tally: Tally::default(),
+            counts: FaultCounts::default(),
         }
     }
 
@@ -89,7 +89,7 @@ impl Way {
         self.ready.clear();
     }
 
-    /// The frame is whole: its fate is drawn.
+    /// The frame is whole: its fault is drawn.
     fn end(&mut self, now: Instant, left: &mut u64) {
         let mut frame = std::mem::take(&mut self.frame);
         self.heard = None;
@@ -101,16 +101,16 @@ impl Way {
             return;
         }
         *left -= 1;
-        let fate = self.harm.fate(&mut self.random);
-        self.tally.count(fate);
-        match fate {
-            Fate::Drop => return,
-            Fate::Duplicate => self.ready.extend(&frame),
-            Fate::Corrupt => self.corrupt(&mut frame),
-            Fate::Cut => frame.truncate(self.random.usize(..frame.len())),
-            Fate::Reorder => return self.hold(frame, now, PAUSE, true),
-            Fate::Delay => return self.hold(frame, now, self.harm.delay_by, false),
-            Fate::Pass => {}
+        let fault = self.rates.draw(&mut self.random);
+        self.counts.count(fault);
+        match fault {
+            Some(FaultKind::Drop) => return,
+            Some(FaultKind::Duplicate) => self.ready.extend(&frame),
+            Some(FaultKind::Corrupt) => self.corrupt(&mut frame),
+            Some(FaultKind::Cut) => frame.truncate(self.random.usize(..frame.len())),
+            Some(FaultKind::Reorder) => return self.hold(frame, now, PAUSE, true),
+            Some(FaultKind::Delay) => return self.hold(frame, now, self.rates.delay_by, false),
+            None => {}
         }
         self.ready.extend(frame);
         self.release(|held| held.changes_places);

@@ -1,7 +1,7 @@
 //! A serial line of a given speed, on a clock of its own.
 
 use super::wire::Wire;
-use crate::Line;
+use iltm::device::Line;
 use std::io;
 use std::time::{Duration, Instant};
 
@@ -28,8 +28,8 @@ pub trait FarEnd {
 /// each time, and timeouts take no time:
 ///
 /// ```
-/// use iltm_device::Line;
-/// use iltm_device::fault::{FarEnd, PacedLine};
+/// use iltm::device::Line;
+/// use iltm_tests::line_faults::{FarEnd, PacedLine};
 /// use std::time::Duration;
 ///
 /// /// Sends back what it hears.

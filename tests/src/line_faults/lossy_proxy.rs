@@ -1,18 +1,17 @@
-//! A port that harms frames, before a real one.
+//! A port that damages frames, before a real one.
 
-use super::harm::{Faults, Tally};
-use super::lossy::LossyLine;
-use crate::port::is_nothing;
-use crate::{DeviceError, Line, Port};
+use super::faults::{FaultCounts, Faults};
+use super::lossy_line::LossyLine;
+use iltm::device::{DeviceError, Line, Port};
 use serialport::{SerialPort, TTYPort};
-use std::io::{self, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Longest that one way waits for the other: what the proxy adds to the time of a
-/// frame, once each way.
+/// Longest that one direction waits for the other: what the proxy adds to the time of a
+/// frame, once in each direction.
 const ROUND: Duration = Duration::from_millis(1);
 
 /// Bytes that wait for a client that does not read. More are lost, as on a line
@@ -23,13 +22,13 @@ const MOST_WAITING: usize = 1 << 16;
 /// [`Faults`] say, for any client program:
 ///
 /// ```no_run
-/// use iltm_device::fault::{Faults, Harm, LossyProxy};
+/// use iltm_tests::line_faults::{FaultRates, Faults, LossyProxy};
 ///
-/// let faults = Faults::both_ways(Harm::evenly(100), 1);
+/// let faults = Faults::both_ways(FaultRates::evenly(100), 1);
 /// let proxy = LossyProxy::start("/dev/ttyUSB0", 115_200, faults)?;
 /// println!("iltm status --port {}", proxy.path());
 /// # std::thread::park();
-/// # Ok::<(), iltm_device::DeviceError>(())
+/// # Ok::<(), iltm::device::DeviceError>(())
 /// ```
 ///
 /// When the line is unplugged by order, when the real port goes, or when this is
@@ -45,7 +44,7 @@ pub struct LossyProxy {
 #[derive(Debug, Default)]
 struct Shared {
     is_over: AtomicBool,
-    tallies: Mutex<(Tally, Tally)>,
+    counts: Mutex<(FaultCounts, FaultCounts)>,
 }
 
 impl LossyProxy {
@@ -102,19 +101,19 @@ impl LossyProxy {
 
     /// What became of frames from host to device.
     #[must_use]
-    pub fn to_device(&self) -> Tally {
-        self.tallies().0
+    pub fn to_device(&self) -> FaultCounts {
+        self.counts().0
     }
 
     /// What became of frames from device to host.
     #[must_use]
-    pub fn to_host(&self) -> Tally {
-        self.tallies().1
+    pub fn to_host(&self) -> FaultCounts {
+        self.counts().1
     }
 
-    fn tallies(&self) -> (Tally, Tally) {
-        let tallies = self.shared.tallies.lock();
-        *tallies.unwrap_or_else(PoisonError::into_inner)
+    fn counts(&self) -> (FaultCounts, FaultCounts) {
+        let counts = self.shared.counts.lock();
+        *counts.unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -127,7 +126,7 @@ impl Drop for LossyProxy {
     }
 }
 
-/// Carries bytes both ways until one end has gone.
+/// Carries bytes in both directions until one end has gone.
 fn carry(mut client: TTYPort, mut line: LossyLine<impl Line>, shared: &Shared) -> io::Result<()> {
     let mut bytes = [0; 4_096];
     let mut waiting = Vec::new();
@@ -144,11 +143,8 @@ fn carry(mut client: TTYPort, mut line: LossyLine<impl Line>, shared: &Shared) -
             let count = some(client.write(&waiting))?;
             waiting.drain(..count);
         }
-        let mut tallies = shared
-            .tallies
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        *tallies = (line.to_device(), line.to_host());
+        let mut counts = shared.counts.lock().unwrap_or_else(PoisonError::into_inner);
+        *counts = (line.to_device(), line.to_host());
     }
     Ok(())
 }
@@ -159,4 +155,11 @@ fn some(count: io::Result<usize>) -> io::Result<usize> {
         Err(error) if is_nothing(&error) => Ok(0),
         other => other,
     }
+}
+
+fn is_nothing(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock
+    )
 }

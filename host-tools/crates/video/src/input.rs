@@ -1,35 +1,74 @@
-//! A few frames of a picture or a video, evenly spread over its length.
+//! Inputs, told apart by their first bytes: PNG pictures and Y4M streams.
 
-use super::y4m::{Frame, Reader};
-use super::{VideoError, compensate::first_bytes};
+use super::VideoError;
+use super::y4m::{MAGIC, Reader, YuvFrame};
 use iltm_picture::{Picture, png};
 use std::fs::File;
-use std::io::Read;
+use std::io::{Chain, Cursor, Read};
 use std::path::Path;
 
+/// An input, from its beginning.
+#[derive(Debug)]
+pub enum Input<R> {
+    /// It begins like a PNG picture.
+    Png(Whole<R>),
+    /// It begins like a Y4M stream.
+    Y4m(Whole<R>),
+}
+
+/// The bytes that were looked at, then the rest.
+type Whole<R> = Chain<Cursor<Vec<u8>>, R>;
+
+impl Input<File> {
+    /// A file.
+    ///
+    /// # Errors
+    /// [`VideoError::File`] if it cannot be opened, and those of [`of`](Self::of).
+    pub fn open(path: &Path) -> Result<Self, VideoError> {
+        let file = File::open(path).map_err(|source| VideoError::File {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::of(file)
+    }
+}
+
+impl<R: Read> Input<R> {
+    /// What `input` begins like.
+    ///
+    /// # Errors
+    /// [`VideoError::UnknownFormat`], or [`VideoError::Read`].
+    pub fn of(mut input: R) -> Result<Self, VideoError> {
+        let mut first = Vec::new();
+        let mut head = input.by_ref().take(png::SIGNATURE.len() as u64);
+        let read = head.read_to_end(&mut first);
+        read.map_err(|source| VideoError::Read { source })?;
+        let is_png = first.starts_with(&png::SIGNATURE);
+        let is_y4m = first.starts_with(&MAGIC[..png::SIGNATURE.len()]);
+        let whole = Cursor::new(first).chain(input);
+        match (is_png, is_y4m) {
+            (true, _) => Ok(Self::Png(whole)),
+            (_, true) => Ok(Self::Y4m(whole)),
+            _ => Err(VideoError::UnknownFormat),
+        }
+    }
+}
+
 /// The picture of a PNG file, or at least `most / 2` and at most `most` frames of a Y4M
-/// file (all, if it has no more), by the file's first bytes. The file is read once from
-/// beginning to end, and no more than `most` frames are held.
+/// file (all, if it has no more), spread evenly over its length. The file is read once
+/// from beginning to end, and no more than `most` frames are held.
 ///
 /// # Errors
 /// [`VideoError`] if the file cannot be read.
 pub fn sampled_frames(path: &Path, most: usize) -> Result<Vec<Picture>, VideoError> {
-    let mut file = File::open(path).map_err(|source| VideoError::File {
-        path: path.to_owned(),
-        source,
-    })?;
-    let first = first_bytes(&mut file).map_err(|source| VideoError::Read { source })?;
-    let whole = first.as_slice().chain(file);
-    if first.starts_with(&png::SIGNATURE) {
-        return Ok(vec![png::read(whole)?]);
-    }
-    if !first.starts_with(b"YUV4MPEG") {
-        return Err(VideoError::UnknownFormat);
-    }
+    let whole = match Input::open(path)? {
+        Input::Png(file) => return Ok(vec![png::read(file)?]),
+        Input::Y4m(file) => file,
+    };
     let most = most.max(2);
     let mut reader = Reader::new(whole)?;
     let header = reader.header().clone();
-    let (mut frame, mut frames) = (Frame::default(), Vec::new());
+    let (mut frame, mut frames) = (YuvFrame::default(), Vec::new());
     let (mut number, mut step) = (0_usize, 1_usize);
     while reader.read_frame(&mut frame)? {
         if number.is_multiple_of(step) {

@@ -1,4 +1,4 @@
-//! One way of a serial line of a given speed, by a clock in nanoseconds.
+//! One direction of a serial line of a given speed, by a clock in nanoseconds.
 
 use std::collections::VecDeque;
 

@@ -1,8 +1,8 @@
-//! Which ports a device answers at, and at which speed.
+//! Discovery of devices: every port is asked, at one speed after the other.
 
-use super::candidates::Candidate;
-use super::client::{Client, Patience};
 use super::port::{BAUD, Port};
+use super::port_scan::ListedPort;
+use super::{Client, Patience};
 use super::{DeviceError, Line};
 use iltm_runtime::link::{Hello, Status};
 use std::thread;
@@ -19,9 +19,9 @@ pub const SHORT: Patience = Patience {
 
 /// A device that answers.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Found {
+pub struct FoundDevice {
     /// Where.
-    pub candidate: Candidate,
+    pub port: ListedPort,
     /// At which speed.
     pub baud: u32,
     /// Who it is.
@@ -34,32 +34,32 @@ pub struct Found {
 /// have none.
 #[must_use]
 pub fn ask(
-    candidates: &[Candidate],
+    ports: &[ListedPort],
     baud: Option<u32>,
-) -> (Vec<Found>, Vec<(Candidate, DeviceError)>) {
+) -> (Vec<FoundDevice>, Vec<(ListedPort, DeviceError)>) {
     let answers = thread::scope(|scope| {
-        let asked: Vec<_> = candidates
+        let asked: Vec<_> = ports
             .iter()
-            .map(|candidate| scope.spawn(move || ask_one(candidate, baud)))
+            .map(|port| scope.spawn(move || ask_one(port, baud)))
             .collect();
         let answers = asked.into_iter().map(thread::ScopedJoinHandle::join);
         answers.filter_map(Result::ok).collect::<Vec<_>>()
     });
     let mut found = Vec::new();
     let mut silent = Vec::new();
-    for (candidate, answer) in candidates.iter().zip(answers) {
+    for (port, answer) in ports.iter().zip(answers) {
         match answer {
             Ok(device) => found.push(device),
-            Err(error) => silent.push((candidate.clone(), error)),
+            Err(error) => silent.push((port.clone(), error)),
         }
     }
     (found, silent)
 }
 
-fn ask_one(candidate: &Candidate, baud: Option<u32>) -> Result<Found, DeviceError> {
-    let (mut client, baud) = greet(&candidate.path, baud, SHORT, |port| port)?;
-    Ok(Found {
-        candidate: candidate.clone(),
+fn ask_one(port: &ListedPort, baud: Option<u32>) -> Result<FoundDevice, DeviceError> {
+    let (mut client, baud) = greet(&port.path, baud, SHORT, |port| port)?;
+    Ok(FoundDevice {
+        port: port.clone(),
         baud,
         device: client.device().clone(),
         status: client.status().ok(),

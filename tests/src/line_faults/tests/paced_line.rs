@@ -1,6 +1,6 @@
 use super::*;
-use crate::Line;
-use crate::fault::PacedLine;
+use crate::line_faults::PacedLine;
+use iltm::device::Line;
 
 const BAUD: u32 = 921_600;
 const NANOSECOND: Duration = Duration::from_nanos(1);

@@ -1,4 +1,5 @@
-//! Which ports there are, and which of them may be asked.
+//! Scan for serial ports: those of this machine and of emulated boards, and which of them
+//! may be asked.
 //!
 //! Whoever asks a port writes to it, and what is behind it may be no device of ours: a
 //! console, a modem, a relay. So only ports that were plugged in are asked (USB,
@@ -11,7 +12,7 @@ use std::path::Path;
 
 /// A port.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub struct Candidate {
+pub struct ListedPort {
     /// Its name.
     pub path: String,
     /// What the system says about it; may be empty.
@@ -20,14 +21,14 @@ pub struct Candidate {
 
 /// Ports of this machine and of emulated boards, without those that the user excluded.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Candidates {
+pub struct PortScan {
     /// A device may be there, and they may be asked.
-    pub asked: Vec<Candidate>,
+    pub asked: Vec<ListedPort>,
     /// Nobody said that they may be written to.
-    pub unasked: Vec<Candidate>,
+    pub unasked: Vec<ListedPort>,
 }
 
-impl Candidates {
+impl PortScan {
     /// Those of now.
     #[must_use]
     pub fn find(folders: &Folders, config: &Config) -> Self {
@@ -51,9 +52,9 @@ impl Candidates {
                 &mut found.unasked
             };
             let about = about(port.port_type);
-            list.push(Candidate { path, about });
+            list.push(ListedPort { path, about });
         }
-        let boards = boards.into_iter().map(|(path, board)| Candidate {
+        let boards = boards.into_iter().map(|(path, board)| ListedPort {
             path,
             about: format!("emulated {board}"),
         });
@@ -61,7 +62,7 @@ impl Candidates {
         // The system does not list every port that it has.
         let known = |path: &str| found.asked.iter().any(|port| port.path == path);
         let named = config.included().filter(|path| !known(path) && there(path));
-        let named = named.map(|path| Candidate {
+        let named = named.map(|path| ListedPort {
             path: path.to_owned(),
             about: String::new(),
         });
@@ -166,8 +167,8 @@ mod tests {
     fn sorted(text: &str) -> [Vec<String>; 2] {
         let boards = vec![("/dev/pts/3".to_owned(), "mps2-an500".to_owned())];
         let there = |path: &str| path == "/dev/ttyAMA0";
-        let found = Candidates::sort(machine(), boards, &config(text), there);
-        let names = |list: Vec<Candidate>| list.into_iter().map(|port| port.path).collect();
+        let found = PortScan::sort(machine(), boards, &config(text), there);
+        let names = |list: Vec<ListedPort>| list.into_iter().map(|port| port.path).collect();
         [names(found.asked), names(found.unasked)]
     }
 
@@ -206,7 +207,7 @@ mod tests {
 
     #[test]
     fn what_the_system_says_about_a_port_is_kept() {
-        let found = Candidates::sort(machine(), Vec::new(), &config(""), |_| false);
+        let found = PortScan::sort(machine(), Vec::new(), &config(""), |_| false);
         let about = |path: &str| {
             let mut ports = found.asked.iter();
             let port = ports.find(|port| port.path == path);
@@ -219,7 +220,7 @@ mod tests {
     #[test]
     fn a_remembered_pseudo_terminal_is_asked_only_while_a_board_has_it() {
         let boards = vec![("/dev/pts/3".to_owned(), "mps2-an500".to_owned())];
-        let found = Candidates::sort(machine(), boards, &config(""), |_| false);
+        let found = PortScan::sort(machine(), boards, &config(""), |_| false);
         assert!(found.may_ask_again("/dev/pts/3"));
         for other in ["/dev/pts/4", "/dev/ttys004"] {
             assert!(!found.may_ask_again(other), "{other}");

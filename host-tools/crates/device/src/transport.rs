@@ -1,14 +1,49 @@
-//! Frames out, frames in: what every request has in common.
+//! Transport below the client: requests and answers as frames on a line, sent again until
+//! they are answered.
 
-use super::client::{Incoming, Patience};
 use super::error::Heard;
 use super::{DeviceError, Line};
 use iltm_runtime::link::{
-    Channel, DELIMITER, Decoder, LinkFrame, MAX_ENCODED, MAX_PAYLOAD, Request, Response,
+    Channel, DELIMITER, Decoder, Event, LinkFrame, MAX_ENCODED, MAX_PAYLOAD, Request, Response,
 };
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
+
+/// How long a device is waited for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Patience {
+    /// For one answer.
+    pub answer: Duration,
+    /// How often a request is sent before giving up.
+    pub tries: u32,
+}
+
+impl Default for Patience {
+    /// The longest request and answer take .1 s at 115,200 baud.
+    fn default() -> Self {
+        Self {
+            answer: Duration::from_millis(400),
+            tries: 5,
+        }
+    }
+}
+
+/// What a device says by itself.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Incoming {
+    /// An event.
+    Event(Event),
+    /// Whole defmt frames; see [`Logs`](super::logs::Logs).
+    Log(Vec<u8>),
+    /// Frames that the device sent and that did not come.
+    Missed {
+        /// The channel: events or logs.
+        channel: Channel,
+        /// How many.
+        count: u16,
+    },
+}
 
 /// A request as it goes on the line.
 #[derive(Debug)]
@@ -19,7 +54,7 @@ pub(super) struct Posted {
 
 /// A line with frames on it.
 #[derive(Debug)]
-pub(super) struct Talk<L> {
+pub(super) struct Transport<L> {
     line: L,
     decoder: Decoder,
     patience: Patience,
@@ -31,7 +66,7 @@ pub(super) struct Talk<L> {
     heard: Heard,
 }
 
-impl<L: Line> Talk<L> {
+impl<L: Line> Transport<L> {
     pub(super) fn new(line: L, patience: Patience) -> Self {
         Self {
             line,
