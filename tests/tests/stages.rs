@@ -5,7 +5,7 @@
 //! says what is left when their code is not there at all.
 
 use iltm::device::emulator::{Board, Emulator};
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
 use iltm::device::port::BAUD;
 use iltm::device::upload::{NoObserver, Parcel, Upload, UploadError};
@@ -196,8 +196,8 @@ fn firmware_with_no_stage_and_with_all_has_the_size_that_the_documentation_says(
 }
 
 /// A board whose firmware has gain and clip alone, with this in slot A.
-fn lean(slot: &[u8]) -> (Memory, Emulator, Client<Port>) {
-    let memory = Memory::temporary().expect("a temporary file");
+fn lean(slot: &[u8]) -> (BoardMemory, Emulator, Client<Port>) {
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.write(&psram::SLOT_A, slot).expect("room");
     let firmware = elf_of(Board::An500, LEAN, "firmware");
     let emulator = Emulator::start(Board::An500, &firmware, &memory).expect("QEMU runs");

@@ -66,8 +66,8 @@ pub(crate) struct Follower {
     clone: PathBuf,
     /// Long blocks are run as well.
     full: bool,
-    /// All pages have one place in the full run.
-    _alone: Option<MutexGuard<'static, ()>>,
+    /// All pages have one place.
+    _alone: MutexGuard<'static, ()>,
     running: Vec<Child>,
 }
 
@@ -85,12 +85,11 @@ impl Drop for Follower {
 impl Follower {
     /// Somebody with a fresh clone. It is always at the same place: cargo builds there what
     /// it did not build before, and tests that it builds look for their files at that place.
-    pub(crate) fn new(page: &str, full: bool) -> Self {
-        static FULL: Mutex<()> = Mutex::new(());
-        let alone = full.then(|| FULL.lock().unwrap_or_else(PoisonError::into_inner));
+    pub(crate) fn new(full: bool) -> Self {
+        static ALONE: Mutex<()> = Mutex::new(());
+        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let pages = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pages");
-        let name = page.trim_end_matches(".md").replace('/', "-");
-        let place = pages.join(if full { "full" } else { &name });
+        let place = pages.join("reader");
         let _ = fs::remove_dir_all(&place);
         let (clone, programs) = (place.join("clone"), place.join("programs"));
         fresh_clone(&clone);

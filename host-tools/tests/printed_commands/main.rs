@@ -47,7 +47,7 @@ fn root() -> PathBuf {
 /// Follows a page; returns the clone in which this was done.
 fn follow(page: &str) -> PathBuf {
     let full = env::var("ILTM_PAGES").is_ok_and(|pages| pages == "full");
-    let mut follower = Follower::new(page, full);
+    let mut follower = Follower::new(full);
     let (mut run, mut left) = (0, 0);
     for block in Page::read(page).commands() {
         if follower.follow(block) {
