@@ -4,7 +4,7 @@
 use ed25519_dalek::SigningKey;
 use iltm::compile::sign::{SealTerms, sign};
 use iltm::device::emulator::Board;
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::upload::{NoObserver, Parcel, Upload, UploadError};
 use iltm::device::{Client, DeviceError, Patience};
 use iltm_runtime::frame_buffers::{Format, Layout, psram};
@@ -58,7 +58,7 @@ fn format(hertz: u32) -> Format {
 /// A board that counts instructions and plays frames to itself, at the end of a line.
 struct Running {
     qemu: Child,
-    memory: Memory,
+    memory: BoardMemory,
     client: Client<Socket>,
     _folder: tempfile::TempDir,
 }
@@ -71,7 +71,7 @@ impl Drop for Running {
 }
 
 /// Starts a board whose frames all look like this.
-fn run(memory: Memory, format: Format, frame: &[u8]) -> Running {
+fn run(memory: BoardMemory, format: Format, frame: &[u8]) -> Running {
     order(&memory, word::FRAMES, u32::MAX);
     let size = format.size();
     let sides = size.width() as u32 | (size.height() as u32) << 16;
@@ -108,7 +108,7 @@ fn run(memory: Memory, format: Format, frame: &[u8]) -> Running {
 #[test]
 fn an_update_misses_no_frame_and_the_new_table_comes_between_two() {
     let (old, new) = (signed(&table(1), 1), signed(&table(2), 2));
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.put_table(&old).expect("room");
     let format = format(1_000);
     let frame = random_frame(format, 3);
@@ -178,7 +178,7 @@ fn an_update_misses_no_frame_and_the_new_table_comes_between_two() {
 #[test]
 fn a_trial_that_nobody_confirms_ends_with_the_old_table() {
     let (old, new) = (table(1), table(2));
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.put_table(&old).expect("room");
     let format = format(60);
     let mut running = run(memory, format, &random_frame(format, 3));
@@ -206,7 +206,7 @@ fn a_trial_that_nobody_confirms_ends_with_the_old_table() {
 #[test]
 fn the_firmware_refuses_each_bad_table_for_its_own_reason_and_keeps_the_old_one() {
     let good = signed(&table(1), 5);
-    let memory = Memory::temporary().expect("a temporary file");
+    let memory = BoardMemory::temporary().expect("a temporary file");
     memory.put_table(&good).expect("room");
     let format = format(60);
     let mut running = run(memory, format, &random_frame(format, 3));

@@ -4,7 +4,7 @@
 //! `docs/hard-cases.md`.
 
 use iltm::device::emulator::{Board, Emulator};
-use iltm::device::memory::Memory;
+use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
 use iltm_runtime::FrameSize;
 use iltm_runtime::frame_buffers::{Format, psram};
@@ -114,7 +114,7 @@ fn the_firmware_makes_of_hard_frames_what_the_host_makes_of_them() {
     for made in tables {
         let image = made.image();
         let table = Table::check(&image).expect("made to be taken");
-        let memory = Memory::temporary().expect("a temporary file");
+        let memory = BoardMemory::temporary().expect("a temporary file");
         memory.write(&psram::SLOT_A, &image).expect("room");
         let tier = table.top_tier();
         order(&memory, word::TIER, u32::from(tier) + 1);

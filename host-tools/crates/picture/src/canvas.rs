@@ -28,6 +28,7 @@ pub struct Type {
 
 impl Type {
     /// Width of a text in pixels: all letters are equally wide.
+    #[must_use]
     pub fn width(self, text: &str) -> usize {
         text.chars().count() * get_raster_width(self.weight, self.height)
     }
@@ -51,6 +52,7 @@ impl Canvas {
     }
 
     /// Begins from a picture; `None` if it is not 8-bit RGB.
+    #[must_use]
     pub fn over(picture: &Picture) -> Option<Self> {
         match (picture.channels(), picture.samples()) {
             (3, Samples::Eight(samples)) => Some(Self {
@@ -76,6 +78,7 @@ impl Canvas {
     }
 
     /// The colour at a place; black outside.
+    #[must_use]
     pub fn get(&self, x: usize, y: usize) -> Colour {
         let (pixels, _) = self.samples.as_chunks::<3>();
         let inside = x < self.size.width() && y < self.size.height();

@@ -107,6 +107,7 @@ impl Scale {
 
 impl Chart<'_> {
     /// The chart as an `svg` element.
+    #[must_use]
     pub fn render(&self) -> Markup {
         let points = self.points.iter();
         let xs = points.clone().map(|point| point.x);

@@ -7,6 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// A page that is complete in itself: `style` adds to the style that all pages share.
+#[must_use]
 pub fn document(title: &str, style: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -33,6 +34,7 @@ pub struct PictureFile {
 }
 
 /// A picture as a file.
+#[must_use]
 pub fn picture_file(name: &str, picture: &Picture) -> PictureFile {
     PictureFile {
         name: name.to_owned(),
@@ -41,11 +43,13 @@ pub fn picture_file(name: &str, picture: &Picture) -> PictureFile {
 }
 
 /// A picture inside of a page.
+#[must_use]
 pub fn embedded(file: &PictureFile, alt: &str) -> Markup {
     html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt); }
 }
 
 /// The colours of a scale with its ticks; `open` where greater numbers have its last colour.
+#[must_use]
 pub fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
     const STOPS: usize = 16;
     let stops: Vec<String> = (0..=STOPS)

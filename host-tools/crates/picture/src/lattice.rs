@@ -24,6 +24,7 @@ pub struct Lattice {
 
 impl Lattice {
     /// `None` if some cell would cover no pixel.
+    #[must_use]
     pub fn new(grid: Grid, frame: FrameSize) -> Option<Self> {
         Some(Self {
             grid,
@@ -40,11 +41,13 @@ impl Lattice {
     }
 
     /// Cells of the grid.
+    #[must_use]
     pub const fn cells(&self) -> usize {
         self.grid.cells()
     }
 
     /// `A`: means over the cells.
+    #[must_use]
     pub fn average(&self, pixels: &[f32]) -> Vec<f64> {
         let (width, cols) = (self.frame.width(), self.grid.cols());
         let mut cells = vec![0.0; self.grid.cells()];
@@ -66,6 +69,7 @@ impl Lattice {
     }
 
     /// `U`: linear interpolation between the cells' centres.
+    #[must_use]
     pub fn expand(&self, cells: &[f64]) -> Vec<f32> {
         let cols = self.grid.cols();
         let mut pixels = Vec::with_capacity(self.frame.pixels());

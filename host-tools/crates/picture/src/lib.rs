@@ -8,6 +8,7 @@
 //! | response curves, declared and measured | [`Response`], [`Curve`] |
 //! | between pixels and cells | [`Lattice`] |
 //! | numbers as colours, lines and words | [`ColourScale`], [`chart`], [`canvas`], [`numbers`] |
+//! | medians and quantiles | [`statistics`] |
 //! | HTML pages | [`html`] |
 //! | files and folders that are there whole or not at all | [`WholeFile`], [`WholeFolder`] |
 //! | how far long work is | [`progress`] |
@@ -24,6 +25,7 @@ mod picture;
 pub mod png;
 pub mod progress;
 mod response;
+pub mod statistics;
 pub mod whole_file;
 mod whole_folder;
 

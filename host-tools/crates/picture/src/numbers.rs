@@ -1,6 +1,7 @@
 //! Numbers as people read them, and round numbers for the ticks of an axis.
 
 /// Multiples of 1, 2 or 5 times a power of ten in a range, at most `most + 1`.
+#[must_use]
 pub fn steps(low: f64, high: f64, most: usize) -> Vec<f64> {
     let width = (high - low) / most.max(1) as f64;
     if !(width.is_finite() && width > 0.0) {
@@ -17,6 +18,7 @@ pub fn steps(low: f64, high: f64, most: usize) -> Vec<f64> {
 }
 
 /// Powers of ten in a range.
+#[must_use]
 pub fn decades(low: f64, high: f64) -> Vec<f64> {
     let first = (low.log10() - 1e-9).ceil() as i32;
     let last = (high.log10() + 1e-9).floor() as i32;
@@ -24,6 +26,7 @@ pub fn decades(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// A number of about three digits, without zeros at its end.
+#[must_use]
 pub fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -43,6 +46,7 @@ pub fn number(value: f64) -> String {
 
 /// A share as a percentage: tenths from 10 up, hundredths from 1 up, two digits
 /// below.
+#[must_use]
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     let places = match percent {
@@ -55,6 +59,7 @@ pub fn percent(share: f64) -> String {
 }
 
 /// A whole number with its thousands apart.
+#[must_use]
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
     let first = digits.len() % 3;

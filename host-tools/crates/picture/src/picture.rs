@@ -65,6 +65,23 @@ impl Picture {
         }
     }
 
+    /// A picture of `N` channels with 8-bit samples, each pixel's from its column and
+    /// row.
+    #[must_use]
+    pub fn from_fn<const N: usize>(
+        size: FrameSize,
+        pixel: impl Fn(usize, usize) -> [u8; N],
+    ) -> Self {
+        const { assert!(N == 1 || N == 3, "a picture has one channel or three") };
+        let (width, height) = (size.width(), size.height());
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Self {
+            size,
+            channels: N,
+            samples: Samples::Eight(pixels.flat_map(|(x, y)| pixel(x, y)).collect()),
+        }
+    }
+
     /// Its size.
     #[must_use]
     pub const fn size(&self) -> FrameSize {

@@ -108,7 +108,7 @@ impl View {
                 self.log.extend(event.words());
             }
             MonitorEvent::Device(_) | MonitorEvent::Missed { .. } | MonitorEvent::Restarted => {
-                self.event(event)
+                self.event(event);
             }
         }
     }
