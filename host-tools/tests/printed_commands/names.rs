@@ -4,7 +4,7 @@
 //! every `cargo` command in comments and messages of the sources.
 
 use super::follower::files;
-use super::page::{Page, is_assignment, pages_in};
+use super::page::{Page, has_extension, is_assignment, pages_in};
 use super::root;
 use clap::ArgAction;
 use serde_json::Value;
@@ -199,7 +199,7 @@ pub(crate) fn look_up(line: &str) -> Result<(), Unknown> {
                 }
             }
             Some((&"iltm" | &"target/release/iltm", words)) => iltm(words)?,
-            Some((script, _)) if script.ends_with(".sh") => {
+            Some((script, _)) if has_extension(script, "sh") => {
                 let found = files().iter().any(|path| path.ends_with(script));
                 found.then_some(()).ok_or(format!("there is no {script}"))?;
             }

@@ -125,6 +125,13 @@ impl Page {
     }
 }
 
+/// Whether a path's last component ends with `.` and `extension`.
+pub(crate) fn has_extension(path: &str, extension: &str) -> bool {
+    Path::new(path)
+        .extension()
+        .is_some_and(|its| its == extension)
+}
+
 /// Whether a line is meant to be typed into a shell.
 fn is_typed(line: &str) -> bool {
     let words = line.split_whitespace();
@@ -132,7 +139,7 @@ fn is_typed(line: &str) -> bool {
     // A name alone is one in a drawing.
     words.first().is_some_and(|first| {
         PROGRAMS.contains(first) && words.len() > 1
-            || first.ends_with(".sh")
+            || has_extension(first, "sh")
             || first.starts_with("./")
     })
 }
@@ -155,7 +162,7 @@ pub(crate) fn pages_in(root: &Path) -> Vec<String> {
             let path = format!("{folder}/{}", entry.file_name().to_string_lossy());
             if entry.path().is_dir() {
                 folders.push(path);
-            } else if path.ends_with(".md") {
+            } else if has_extension(&path, "md") {
                 pages.push(path);
             }
         }

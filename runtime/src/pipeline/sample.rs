@@ -31,7 +31,7 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
     /// Light of a code.
     fn light(self, curves: Self::Curves<'_>) -> Light;
 
-    /// Code of a drive in units of [`Drive`] that may lie outside 0 to 1; says
+    /// Code of a drive in units of [`Drive`](crate::units::Drive) that may lie outside 0 to 1; says
     /// whether it did.
     fn code(wanted: i32, curves: Self::Curves<'_>) -> (Self, bool);
 

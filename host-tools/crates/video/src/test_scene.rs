@@ -6,7 +6,7 @@
 //! for natural images*, 2001).
 //!
 //! It is a function of size and time alone, in operations that IEEE 754 defines to the
-//! last bit, so it is the same on every machine. It repeats every [`LOOP`] seconds,
+//! last bit, so it is the same on every machine. It repeats every 60 seconds,
 //! without a jump.
 //!
 //! Places are in units of the picture's height: `u` to the right from the middle, `v` up
