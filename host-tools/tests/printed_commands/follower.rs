@@ -3,9 +3,9 @@
 
 use super::names::look_up;
 use super::page::{ALL_TESTS, Block};
-use super::root;
 use iltm::device::emulator::Board;
 use iltm_tests::firmware::{elf, without_cargos_variables};
+use iltm_tests::reference_pages::root;
 use serde_json::Value;
 use std::env;
 use std::ffi::OsStr;

@@ -11,7 +11,6 @@ mod transport;
 use super::case::Case;
 
 /// Every case with the heading it belongs under.
-#[must_use]
 pub fn all() -> Vec<(&'static str, Vec<Case>)> {
     vec![
         ("Strong and singular transport", transport::CASES.to_vec()),
