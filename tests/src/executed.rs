@@ -1,4 +1,4 @@
-//! Which code of a firmware a run comes to, by the emulator's own record.
+//! Code coverage of a firmware: which code a run comes to, by the emulator's own record.
 //!
 //! With `-d in_asm` QEMU writes down every block of instructions when it translates it,
 //! which it does when the program first gets there and never before. The ELF file says

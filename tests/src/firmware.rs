@@ -1,4 +1,4 @@
-//! The firmware in the emulator (QEMU): building it, boards that run it, their lines, and
+//! Firmware in the emulator (QEMU): building it, boards that run it, their lines, and
 //! tables and frames for them.
 
 use crate::wedge;

@@ -1,5 +1,5 @@
-//! Gates before a solve, and which of them notices a fault of which size: photographs of a described scene are taken
-//! with the fault on purpose, and every gate is asked.
+//! Gates before a solve, and which of them notices a fault of which size: photographs of a
+//! described scene are taken with the fault on purpose, and every gate is asked.
 
 use crate::simulated::simulation;
 use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, shown};

@@ -1,5 +1,5 @@
-//! Made-up tables: any gains, ambient light, response and operator, without a
-//! scene behind them.
+//! Made-up tables: any gains, ambient light, response and operator, without a scene behind
+//! them.
 
 use fastrand::Rng;
 use fixed::types::{U0F32, U1F15, U8F24};

@@ -1,6 +1,6 @@
-//! The site's pages: those made from the source are up to date, links lead somewhere, every
-//! page is in the table of contents, the table format says what the reader does, and the
-//! architecture what the manifests say.
+//! Pages of the site: those made from the source are up to date, links lead somewhere,
+//! every page is in the table of contents, the table format says what the reader does, and
+//! the architecture what the manifests say.
 
 use iltm::capture::{CalibrationRole, Role, SETTINGS_FILE, Settings};
 use iltm_runtime::image::layout::{SectionKind, header, meta, tier};

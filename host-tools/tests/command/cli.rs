@@ -1,6 +1,6 @@
-//! Solving, compensating, signing and separating bounces: the wrong ways in particular.
-//! Every one has a message with its place and the next step, an exit code of its kind, and
-//! leaves no half-written output.
+//! `iltm solve`, `compensate`, `sign` and `bounces`, the wrong ways in particular. Every one
+//! has a message with its place and the next step, an exit code of its kind, and leaves no
+//! half-written output.
 
 use super::user::{Ended, User, contains, table};
 use ed25519_dalek::{Signature, VerifyingKey};

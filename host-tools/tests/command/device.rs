@@ -1,4 +1,4 @@
-//! `status` and `monitor` as a user meets them, with a device at the end of a
+//! `iltm status` and `iltm monitor` as a user meets them, with a device at the end of a
 //! pseudo-terminal.
 
 use super::user::{User, contains, interrupt};

@@ -1,5 +1,5 @@
-//! Tables on their way to devices as a user meets them: `ports`, `flash`, `confirm`,
-//! `rollback`, `key`, `report`, with devices at the end of pseudo-terminals.
+//! `iltm flash` as a user meets it, and `ports`, `confirm`, `rollback`, `key` and
+//! `report`, with devices at the end of pseudo-terminals.
 
 use super::user::{Ended, User, contains, interrupt};
 use ed25519_dalek::SigningKey;

@@ -1,6 +1,6 @@
-//! The command line as a user meets it: `iltm` is run, and what it says, its exit code and
-//! the files that it leaves behind are looked at. One module for a command or a task:
-//! `cargo test -p iltm --test command simulate` runs the tests of one.
+//! Command line as a user meets it: `iltm` is run, and what it says, its exit code and the
+//! files that it leaves behind are looked at. One module for a command or a task: `cargo
+//! test -p iltm --test command simulate` runs the tests of one.
 
 mod check;
 mod cli;

@@ -1,4 +1,5 @@
-//! A user: a folder in which `iltm` is run, and what a command says and leaves behind.
+//! User of the command line: a folder in which `iltm` is run, and what a command says and
+//! leaves behind.
 
 use serde_json::Value;
 use std::fs;

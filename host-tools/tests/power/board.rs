@@ -1,5 +1,5 @@
-//! An emulated board with the product's firmware, whose memory outlives it, and
-//! `iltm` commands to it.
+//! Emulated board with the product's firmware, whose memory outlives it, and `iltm`
+//! commands to it.
 
 use ed25519_dalek::SigningKey;
 use iltm::device::emulator::{self, Emulator};

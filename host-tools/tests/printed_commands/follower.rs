@@ -1,5 +1,5 @@
-//! Somebody who follows a page: a fresh clone, stand-ins for hardware and for programs of
-//! others, and commands run by bash.
+//! Follower of a page: a fresh clone, stand-ins for hardware and for programs of others,
+//! and commands run by bash.
 
 use super::names::look_up;
 use super::page::{ALL_TESTS, Block};

@@ -1,4 +1,5 @@
-//! Names in commands: programs, packages, targets, features, profiles and options exist.
+//! Names in printed commands: programs, packages, targets, features, profiles and options
+//! exist.
 //!
 //! Looked up are commands that are too long to be run, those in the prose of the pages, and
 //! every `cargo` command in comments and messages of the sources.

@@ -1,4 +1,4 @@
-//! Pages in Markdown: their blocks of commands, and commands that stand elsewhere.
+//! Markdown pages: their blocks of commands, and commands that stand elsewhere.
 
 use iltm_tests::reference_pages::{files_below, root};
 use std::fs;

@@ -1,5 +1,5 @@
-//! Counts instructions on the reference board, and bytes of firmware, and prints the lists
-//! that `docs` holds:
+//! Instruction counts on the reference board, and bytes of firmware: prints the lists that
+//! `docs` holds:
 //!
 //!     cargo run --release -p iltm-tests --bin counts -- instructions > docs/instructions.csv
 //!     cargo run --release -p iltm-tests --bin counts -- costs > docs/costs.csv

@@ -1,5 +1,5 @@
-//! Takes simulated photographs with every fault at several sizes and prints which gates
-//! notice: `cargo run --release -p iltm-tests --bin gates`.
+//! Gates before a solve: takes simulated photographs with every fault at several sizes and
+//! prints which gates notice: `cargo run --release -p iltm-tests --bin gates`.
 //!
 //! Words choose the faults whose names contain one of them.
 

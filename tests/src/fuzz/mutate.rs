@@ -1,5 +1,5 @@
-//! Inputs made from good ones, each by its number: nothing else is needed to make it
-//! again.
+//! Mutation: inputs made from good ones, each by its number: nothing else is needed to
+//! make it again.
 
 use fastrand::Rng;
 

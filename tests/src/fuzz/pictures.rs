@@ -1,4 +1,4 @@
-//! A small photograph in every format that is read.
+//! Picture formats: a small photograph in every format that is read.
 
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use std::fmt::Write;

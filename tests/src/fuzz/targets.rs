@@ -1,4 +1,4 @@
-//! All fuzz targets by name, with good inputs to start from.
+//! Table of the fuzz targets: all of them by name, with good inputs to start from.
 
 use super::{files, session};
 use crate::simulated::host_tools;

@@ -1,4 +1,4 @@
-//! A hard case: what is hard about it, what must hold, and whether it does.
+//! Hard case: what is hard about it, what must hold, and whether it does.
 
 use super::closed_loop::{LoopErrors, errors};
 use super::theory;

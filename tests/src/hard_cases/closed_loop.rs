@@ -1,4 +1,4 @@
-//! How far the picture on the wall is from the wanted one.
+//! Closed loop: how far the picture on the wall is from the wanted one.
 
 use iltm::compile::white::reference_white;
 use iltm::content::wanted_images;

@@ -1,4 +1,4 @@
-//! The page of all cases.
+//! Page of hard cases: lists all of them.
 
 use super::case::{Case, Outcome};
 use crate::hard_frames::page::Row;

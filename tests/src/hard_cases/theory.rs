@@ -1,4 +1,4 @@
-//! The errors that theory allows.
+//! Error bounds: the errors that theory allows.
 //!
 //! For a closed loop with a learned inverse the bound is
 //!

@@ -1,5 +1,5 @@
-//! Tables at the edge of what the proof of the bounds takes, and the frames that it has
-//! in mind.
+//! Overflow limits: tables at the edge of what the proof of the bounds takes, and the
+//! frames that it has in mind.
 
 use super::{Frame, UNIT};
 use crate::grid;

@@ -1,4 +1,4 @@
-//! The lines of the page of hard cases that are about frames.
+//! Page of hard frames: the lines of the page of hard cases that are about frames.
 
 use super::limits::{at_the_accumulators_limit, at_the_corrections_limit, corrections, verdict};
 use super::{Frame, GRIDS, Worst, all_frames, drifted, random};

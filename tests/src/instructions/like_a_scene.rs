@@ -1,4 +1,4 @@
-//! Operators for grids whose real scenes take minutes to compile.
+//! Made-up operators for grids whose real scenes take minutes to compile.
 //!
 //! The operator's rows are copies of those of a real table, as to how many pairs and
 //! entries they have; where they lie and what their values are is made up. What a

@@ -1,4 +1,4 @@
-//! Rates and kinds of line faults, and counts of those that happened.
+//! Line faults: rates and kinds of line faults, and counts of those that happened.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! A line that damages frames on their way.
+//! Lossy line: damages frames on their way.
 
 use super::direction::Direction;
 use super::faults::{FaultCounts, Faults};

@@ -1,4 +1,4 @@
-//! A port that damages frames, before a real one.
+//! Lossy proxy: a port that damages frames, before a real one.
 
 use super::faults::{FaultCounts, Faults};
 use super::lossy_line::LossyLine;

@@ -1,4 +1,4 @@
-//! Serial lines that fail by order, to test clients and devices against.
+//! Line faults: serial lines that fail by order, to test clients and devices against.
 //!
 //! | simulator | file | what for |
 //! |---|---|---|

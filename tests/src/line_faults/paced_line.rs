@@ -1,4 +1,4 @@
-//! A serial line of a given speed, on a clock of its own.
+//! Paced line: a serial line of a given speed, on a clock of its own.
 
 use super::wire::Wire;
 use iltm::device::Line;

@@ -1,4 +1,4 @@
-//! Reads error types from the source: their words are where they are made, and nowhere else.
+//! Error types, read from the source: their words are where they are made, and nowhere else.
 
 use std::collections::HashMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! The firmware on both reference boards, in the emulator.
+//! Firmware on both reference boards, in the emulator.
 
 use iltm::device::emulator::{Board, Emulator};
 use iltm::device::logs::Logs;

@@ -1,5 +1,5 @@
-//! Tables on their way into the firmware, in the emulator: what the device does with
-//! frames meanwhile, and which tables it takes.
+//! Firmware update: tables on their way into the firmware, in the emulator: what the
+//! device does with frames meanwhile, and which tables it takes.
 
 use ed25519_dalek::SigningKey;
 use iltm::device::memory::BoardMemory;

@@ -1,4 +1,5 @@
-//! What the session fuzzer found (`docs/fuzzing.md`), each as it happens to a device.
+//! Regressions: what the session fuzzer found (`docs/fuzzing.md`), each as it happens to a
+//! device.
 
 use ed25519_dalek::SigningKey;
 use iltm::picture::Response as Projector;

@@ -1,6 +1,6 @@
 //! Device identity: its key and number, from a factory or a host, in a flash that is cut,
-//! misread or rots: whoever was told that a device
-//! has a key need not fear that it takes tables without.
+//! misread or rots: whoever was told that a device has a key need not fear that it takes
+//! tables without.
 
 use embedded_storage::nor_flash::NorFlash;
 use iltm::picture::Response as Projector;

@@ -1,4 +1,4 @@
-//! Host and device at the two ends of one line, good and bad.
+//! Serial link: host and device at the two ends of one line, good and bad.
 
 use iltm::device::port::BAUD;
 use iltm::device::{Client, DeviceError, Incoming, Patience, Port};

@@ -1,4 +1,5 @@
-//! That `docs/protocol.md` says what host and device say: its byte examples and limits.
+//! Protocol: that `docs/protocol.md` says what host and device say: its byte examples and
+//! limits.
 
 use iltm_runtime::link::{
     Channel, Device as _, Digest, Event, Fault, FaultyFrame, InUse, LinkFrame, MAX_ENCODED,

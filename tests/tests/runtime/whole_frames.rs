@@ -1,4 +1,5 @@
-//! A device's way through a frame larger than the grid against the host's.
+//! Frames larger than the grid: a device's way through a frame larger than the grid
+//! against the host's.
 
 use iltm::video::OperatorMemory;
 use iltm_runtime::frame_buffers::Format;

@@ -1,5 +1,5 @@
-//! From simulated photographs to a projection that is photographed again: the error on
-//! the wall, cells that the surface covers only in part among them.
+//! Closed loop: from simulated photographs to a projection that is photographed again: the
+//! error on the wall, cells that the surface covers only in part among them.
 
 use iltm::compile::white::reference_white;
 use iltm::content::natural_images;

@@ -1,4 +1,4 @@
-//! The demo from its photographs to its page.
+//! Demo: from its photographs to its page.
 
 use iltm::demo::{self, DemoError};
 use iltm::picture::png;

@@ -1,6 +1,7 @@
-//! The whole way at an installation as a technician finds it: a projector of gamma 2.2 that
-//! drifts, perspective, a lens that distorts, 8-bit sRGB photographs. What goes wrong there
-//! is named before a solve, and what goes well is as good as with a laboratory's camera.
+//! Installation: the whole way as a technician finds it: a projector of gamma 2.2 that
+//! drifts, perspective, a lens that distorts, 8-bit sRGB photographs. What goes wrong
+//! there is named before a solve, and what goes well is as good as with a laboratory's
+//! camera.
 
 use iltm::capture::{self, CameraSettings, CaptureOptions, GateName, Settings};
 use iltm::learn::Learned;

@@ -1,5 +1,5 @@
-//! The paper's claims in few draws; the whole study is `iltm compare --paper`, whose
-//! page is `docs/results`.
+//! Claims of the paper in few draws; the whole study is `iltm compare --paper`, whose page
+//! is `docs/results`.
 
 use iltm::compare::paper::Condition;
 use iltm::compare::paper::seeds::{Sample, run};

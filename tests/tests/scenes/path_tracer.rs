@@ -1,6 +1,6 @@
-//! The simulator beside photographs that an independent path tracer made of the same
-//! scenes: Mitsuba 3, the sample captures. Nothing is fitted but the unit of light and
-//! the ambient light.
+//! Path tracer: the simulator beside photographs that an independent path tracer made of
+//! the same scenes: Mitsuba 3, the sample captures. Nothing is fitted but the unit of
+//! light and the ambient light.
 
 use iltm::capture::{Manifest, Role};
 use iltm::scene::Forced;

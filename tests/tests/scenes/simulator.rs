@@ -1,5 +1,5 @@
-//! The simulator as its users meet it: effects that it leaves out do not show, flat
-//! scenes cost nothing, and what it photographs can be solved.
+//! Simulator as its users meet it: effects that it leaves out do not show, flat scenes
+//! cost nothing, and what it photographs can be solved.
 
 use iltm::capture::shown;
 use iltm::progress::Silent;

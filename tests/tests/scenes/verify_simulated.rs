@@ -1,6 +1,6 @@
-//! Verdicts of `iltm verify` against the truth: the same pictures projected onto the
-//! simulated scene and measured without a camera's noise, in the cells that the table was
-//! learned in.
+//! Verification: verdicts of `iltm verify` against the truth: the same pictures projected
+//! onto the simulated scene and measured without a camera's noise, in the cells that the
+//! table was learned in.
 
 use iltm::capture::Settings;
 use iltm::learn::Learned;

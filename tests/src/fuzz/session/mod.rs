@@ -1,4 +1,4 @@
-//! The device session against a model of it.
+//! Session fuzzer: the device session against a model of it.
 //!
 //! ```text
 //! bytes -> Op, Op, ... -> frames -> Session -> Updater -> NOR simulator

@@ -1,4 +1,4 @@
-//! All hard cases, by what is hard.
+//! Table of the hard cases: all of them, by what is hard.
 
 mod coverage;
 mod grids;
