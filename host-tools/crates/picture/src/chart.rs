@@ -1,6 +1,7 @@
 //! Line charts as inline SVG, coloured by the page's style sheet.
 
-use crate::numbers::{decades, number, steps};
+use crate::html::number;
+use crate::numbers::{decades, steps};
 use maud::{Markup, html};
 
 /// Size of a chart in its own units; the page scales it.

@@ -1,7 +1,7 @@
 //! HTML pages that are complete in themselves: the frame that every page stands in, and
-//! pictures and colour bars inside of one.
+//! pictures, colour bars and [number words](crate::numbers) inside of one.
 
-use crate::{ColourScale, Picture, png};
+use crate::{ColourScale, Picture, numbers, png};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -72,4 +72,28 @@ pub fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
             }
         }
     }
+}
+
+/// [`numbers::number`] as pages have it.
+#[must_use]
+pub fn number(value: f64) -> String {
+    typeset(&numbers::number(value))
+}
+
+/// [`numbers::percent`] as pages have it.
+#[must_use]
+pub fn percent(share: f64) -> String {
+    typeset(&numbers::percent(share))
+}
+
+/// [`numbers::grouped`] as pages have it.
+#[must_use]
+pub fn grouped(value: u64) -> String {
+    typeset(&numbers::grouped(value))
+}
+
+/// Minus signs, and narrow spaces at which no line breaks.
+fn typeset(number: &str) -> String {
+    let spaced = number.replace([' ', ','], "\u{202f}");
+    spaced.replace('-', "\u{2212}")
 }

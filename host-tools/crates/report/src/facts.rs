@@ -2,7 +2,7 @@
 
 use iltm_capture::{Measurements, NoiseSource, RegistrationMethod};
 use iltm_compile::learn::Learned;
-use iltm_picture::numbers::{grouped, number, percent};
+use iltm_picture::html::{grouped, number, percent};
 
 /// One line: its name and what there is to say.
 pub(super) type Fact = (&'static str, String);

@@ -4,7 +4,11 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use iltm_capture::{Evidence, Gate, Verdict};
-use iltm_picture::{ColourScale, Palette, html::document, numbers::number, png};
+use iltm_picture::{
+    ColourScale, Palette,
+    html::{document, number},
+    png,
+};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
 use std::ops::RangeInclusive;

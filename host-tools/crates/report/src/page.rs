@@ -4,8 +4,7 @@ use super::facts::facts;
 use super::{Example, Report, Rung, Shown, Treatment};
 use iltm_picture::{
     chart::{Axis, Chart, Point},
-    html::{colour_bar, document, embedded},
-    numbers::{grouped, number, percent},
+    html::{colour_bar, document, embedded, grouped, number, percent},
 };
 use iltm_solve::{Compensation, Prediction};
 use maud::{Markup, html};

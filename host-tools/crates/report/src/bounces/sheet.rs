@@ -7,6 +7,7 @@ use super::separate::LayerKind;
 use iltm_picture::{
     LightPicture, Picture,
     canvas::{BACKGROUND, Canvas, INK, QUIET, Type},
+    numbers::{number, percent},
 };
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 
@@ -123,7 +124,7 @@ fn columns(bounces: &Bounces) -> Option<Vec<Column>> {
                     percent(layer.light_share),
                     percent(layer.energy_share)
                 ),
-                format!("rms {} x noise", times(layer.rms / bounces.noise.cell)),
+                format!("rms {} x noise", number(layer.rms / bounces.noise.cell)),
             ],
             factor: round_factor(bright / brightness(&light).max(1e-9)),
             light,
@@ -157,30 +158,6 @@ fn notes(bounces: &Bounces) -> Vec<String> {
             percent(bounces.ambient_share),
         ),
     ]
-}
-
-/// A share in words, three digits that count.
-#[must_use]
-pub fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    match percent.abs() {
-        p if p >= 9.995 || p == 0.0 => format!("{percent:.1} %"),
-        p if p >= 0.1 => format!("{percent:.2} %"),
-        p if p >= 0.001 => format!("{percent:.4} %"),
-        _ => format!("{percent:.1e} %"),
-    }
-}
-
-/// How many times as large, two digits that count.
-#[must_use]
-pub fn times(ratio: f64) -> String {
-    match ratio {
-        r if !r.is_finite() => "-".to_owned(),
-        r if r >= 99_999.5 => format!("{r:.0e}"),
-        r if r >= 9.95 => format!("{r:.0}"),
-        r if r >= 0.995 => format!("{r:.1}"),
-        r => format!("{r:.2}"),
-    }
 }
 
 /// The picture at a size that suits the sheet.
@@ -239,14 +216,5 @@ mod tests {
             assert!((round_factor(asked) - given).abs() < 1e-9, "{asked}");
         }
         assert!((round_factor(f64::INFINITY) - 1000.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn shares_keep_their_digits() {
-        assert_eq!(percent(0.8766), "87.7 %");
-        assert_eq!(percent(0.0123), "1.23 %");
-        assert_eq!(percent(0.000_051), "0.0051 %");
-        assert_eq!(percent(0.0), "0.0 %");
-        assert_eq!(percent(-0.000_002), "-2.0e-4 %");
     }
 }

@@ -5,8 +5,7 @@ use iltm_capture::FineFlood;
 use iltm_compile::{content_white::Headroom, gain::fine_gains, learn::Learned, wish::headroom};
 use iltm_picture::{
     LightPicture, Picture, Samples,
-    html::{PictureFile, embedded, picture_file},
-    numbers::percent,
+    html::{PictureFile, embedded, percent, picture_file},
 };
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::{CompensateOptions, Compensator};

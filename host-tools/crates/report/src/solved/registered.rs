@@ -4,8 +4,7 @@ use iltm_capture::NO_CELL;
 use iltm_compile::learn::Learned;
 use iltm_picture::{
     canvas::Canvas,
-    html::{PictureFile, embedded, picture_file},
-    numbers::percent,
+    html::{PictureFile, embedded, percent, picture_file},
 };
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};

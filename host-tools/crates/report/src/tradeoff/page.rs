@@ -1,13 +1,10 @@
 //! The page: one HTML file with everything inside, that a browser shows without network.
 
-use super::advice::{fraction, share};
+use super::advice::fraction;
 use super::picture::{colour, title};
 use super::{Point, Sweep, Tradeoff};
 use iltm_compile::cost::{CLOCK, RATE};
-use iltm_picture::{
-    html::document,
-    numbers::{grouped, percent},
-};
+use iltm_picture::html::{document, grouped, percent};
 use maud::{Markup, PreEscaped, html};
 
 impl Tradeoff {
@@ -109,7 +106,7 @@ impl Tradeoff {
                         td { (point.tier) }
                         td { (percent(point.predicted)) @if point.predicted < 0.1 { " (" (fraction(point.predicted)) ")" } }
                         @if truth { td { @if let Some(error) = point.truth { (percent(error)) } } }
-                        td { (percent(point.left_out)) } td { (grouped(point.instructions)) } td { (share(point.share())) }
+                        td { (percent(point.left_out)) } td { (grouped(point.instructions)) } td { (percent(point.share())) }
                         td { (micros(point).unwrap_or_default()) } td { (grouped(point.bytes)) }
                     } } }
                 } }

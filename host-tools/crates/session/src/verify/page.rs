@@ -4,10 +4,7 @@ use super::maps::{drift_scale, error_scale};
 use super::{ImageVerdict, TestImage, Verdict};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use iltm_picture::{
-    html::{PictureFile, colour_bar, document},
-    numbers::percent,
-};
+use iltm_picture::html::{PictureFile, colour_bar, document, percent};
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
 
