@@ -16,7 +16,7 @@ pub fn document(title: &str, style: &str, body: &Markup) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) }
-                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(style)) }
+                style { (PreEscaped(concat!(include_str!("style.css"), include_str!("chart.css")))) (PreEscaped(style)) }
             }
             body { (body) }
         }
@@ -42,10 +42,25 @@ pub fn picture_file(name: &str, picture: &Picture) -> PictureFile {
     }
 }
 
-/// A picture inside of a page.
+/// A PNG file inside of a page.
 #[must_use]
-pub fn embedded(file: &PictureFile, alt: &str) -> Markup {
-    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt); }
+pub fn img(png: &[u8], alt: &str) -> Markup {
+    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(png))) alt=(alt); }
+}
+
+/// The picture of this name inside of a page; nothing if there is none.
+#[must_use]
+pub fn img_named(files: &[PictureFile], name: &str, alt: &str) -> Markup {
+    let file = files.iter().find(|file| file.name == name);
+    html! { @if let Some(file) = file { (img(&file.png, alt)) } }
+}
+
+/// A text with a capital letter in front.
+#[must_use]
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
 }
 
 /// The colours of a scale with its ticks; `open` where greater numbers have its last colour.
