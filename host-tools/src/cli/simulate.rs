@@ -10,9 +10,9 @@ use crate::scene::description::{Scene, SceneError};
 use crate::scene::folder::{self, CaptureFolderError, Written};
 use crate::scene::retake::{RetakeError, Session};
 use crate::scene::{
-    Decision, Effect, Forced, Shooting, Simulation, SimulationError, SimulationOptions, percent,
+    Decision, Effect, Forced, Shooting, Simulation, SimulationError, SimulationOptions,
 };
-use iltm_picture::{FolderError, progress::Progress};
+use iltm_picture::{FolderError, numbers::percent, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
