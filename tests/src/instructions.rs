@@ -7,12 +7,12 @@
 mod like_a_scene;
 
 use crate::firmware::{counted, elf, order};
-use iltm::compile::content::natural_images;
+use iltm::build_table::build_table;
 use iltm::compile::{CompileOptions, compile};
 use iltm::device::emulator::Board;
 use iltm::device::memory::BoardMemory;
-use iltm::learn::learn;
 use iltm::progress::Silent;
+use iltm::solve::natural_images;
 use iltm::solve::{ChannelInverse, SolveOptions};
 use iltm::{capture::CaptureOptions, picture::Response};
 use iltm_runtime::frame_buffers::psram;
@@ -61,7 +61,7 @@ pub fn cases() -> Vec<Case> {
     let sample = |name: &str| {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/samples");
         let options = (CaptureOptions::default(), SolveOptions::default());
-        let learned = learn(&path.join(name), &options.0, &options.1, None, &Silent);
+        let learned = build_table(&path.join(name), &options.0, &options.1, None, &Silent);
         learned.expect("the sample is good")
     };
     let compiled = |inverse: &_, targets: &[f64]| {

@@ -1,14 +1,14 @@
 //! From simulated photographs to a projection that is photographed again: the error on
 //! the wall, cells that the surface covers only in part among them.
 
+use iltm::build_table::build_table;
 use iltm::capture::{CaptureOptions, NO_CELL, shown};
-use iltm::compile::white::reference_white;
-use iltm::content::natural_images;
-use iltm::learn::learn;
+use iltm::compile::reference_white::uniform_white;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
 use iltm::solve::SolveOptions;
+use iltm::solve::natural_images;
 
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -38,7 +38,7 @@ fn errors(scene: &Scene) -> (usize, f64, f64) {
     let shooting = Shooting::new(scene, &simulation, 3).unwrap();
     folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
-    let learned = learn(&capture, &photographs, &solve, None, &Silent).unwrap();
+    let learned = build_table(&capture, &photographs, &solve, None, &Silent).unwrap();
     let inverse = &learned.inverse;
     let live = &inverse.live;
     let dense = inverse.channel(0).dense();
@@ -47,7 +47,7 @@ fn errors(scene: &Scene) -> (usize, f64, f64) {
         .column(0)
         .into_owned();
     // Walls that light each other cannot be much darker than their neighbours.
-    let white = reference_white(inverse).unwrap().light;
+    let white = uniform_white(inverse).unwrap();
     let wanted = natural_images(simulation.grid()).map(|light| white * (0.2 + 0.8 * light));
     let keep = |value: f64, cell: usize| {
         if live[cell] {

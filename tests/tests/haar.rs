@@ -1,6 +1,6 @@
 //! The solver's floating-point Haar basis is the runtime's integer one.
 
-use iltm::solve::{Basis, Haar};
+use iltm::solve::Haar;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::{self, Function};
 use nalgebra::DVector;
@@ -9,7 +9,7 @@ use nalgebra::DVector;
 fn both_bases_have_the_same_functions_in_the_same_order() {
     for (rows, cols) in [(1, 1), (1, 7), (6, 1), (5, 8), (13, 21), (16, 24)] {
         let grid = Grid::new(rows, cols).expect("a small grid");
-        let float = Haar::new(grid, Basis::QuadTree);
+        let float = Haar::new(grid);
         let integer = haar::Basis::new(grid);
         for (index, function) in integer.functions().enumerate() {
             let mut unit = DVector::zeros(grid.cells());

@@ -2,8 +2,8 @@
 //! drifts, perspective, a lens that distorts, 8-bit sRGB photographs. What goes wrong there
 //! is named before a solve, and what goes well is as good as with a laboratory's camera.
 
+use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::{self, CameraSettings, CaptureOptions, GateName, Settings};
-use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::retake;
@@ -120,11 +120,11 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
 
 /// Error on the wall of a table that was learned from photographs of `scene`: its
 /// verification, photographed by a camera without noise.
-fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (Learned, [f64; 2]) {
+fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 2]) {
     let folder = place.join("capture");
     photographed(&simulated(scene, Forced::default()), scene, &[], &folder);
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
-    let learned = learn(&folder, &photographs, &solve, None, &Silent).unwrap();
+    let learned = build_table(&folder, &photographs, &solve, None, &Silent).unwrap();
     let image = learned.compiled.image.clone();
     let table = Table::check(&image).unwrap();
     let size = FrameSize::new(PROJECTOR.0, PROJECTOR.1).unwrap();

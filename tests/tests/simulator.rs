@@ -1,8 +1,8 @@
 //! The simulator as its users meet it: effects that it leaves out do not show, flat
 //! scenes cost nothing, and what it photographs can be solved.
 
+use iltm::build_table::build_table;
 use iltm::capture::{CaptureOptions, shown};
-use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
 use iltm::scene::description::Scene;
@@ -158,7 +158,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let shooting = Shooting::new(&scene, &simulation, 1).unwrap();
     let written = folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());
-    let learned = learn(
+    let learned = build_table(
         &capture,
         &CaptureOptions::default(),
         &SolveOptions::default(),

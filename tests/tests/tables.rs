@@ -1,8 +1,8 @@
 //! What a table computes against the inverse that it was made from, in `f64`.
 
-use iltm::compile::content::natural_images;
 use iltm::compile::ladder::relative_error;
-use iltm::compile::white::reference_white;
+use iltm::compile::reference_white::uniform_white;
+use iltm::solve::natural_images;
 use iltm::video::OperatorMemory;
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
@@ -45,9 +45,7 @@ fn every_tier_keeps_its_promise<const C: usize>(rows: u16, cols: u16) {
     let grid = Grid::new(rows, cols).expect("a small grid");
     let (inverse, image) = (wedge(grid, C), wedge_table(rows, cols, C));
     let table = Table::check(&image).expect("compile checked it");
-    let white = reference_white(&inverse)
-        .expect("the wedge can be lit")
-        .light;
+    let white = uniform_white(&inverse).expect("the wedge can be lit");
     // Bright enough everywhere that no cell is asked for less than it gets from
     // the others, which no projector input could reach.
     let wanted = natural_images(grid) * 0.5 + DMatrix::repeat(grid.cells(), 16, 0.45);

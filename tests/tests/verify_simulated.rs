@@ -2,8 +2,8 @@
 //! simulated scene and measured without a camera's noise, in the cells that the table was
 //! learned in.
 
+use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::{CaptureOptions, NO_CELL, Registration, Settings, shown};
-use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::retake;
@@ -33,18 +33,18 @@ fn white_of(verdict: &Verdict) -> &WhiteChange {
 }
 
 /// A table learned from simulated photographs, and what was learned.
-fn learned(scene: &Scene, place: &Path) -> Learned {
+fn learned(scene: &Scene, place: &Path) -> BuiltTable {
     let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
     let capture = place.join("capture");
     let shooting = Shooting::new(scene, &simulation, 3).unwrap();
     let patterns = shown(simulation.grid(), 100, 3);
     folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
-    learn(&capture, &photographs, &solve, None, &Silent).unwrap()
+    build_table(&capture, &photographs, &solve, None, &Silent).unwrap()
 }
 
 /// A folder to verify `learned` with, photographed in `scene`.
-fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
+fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     let table = Table::check(&learned.compiled.image).unwrap();
     let projector = FrameSize::new(320, 200).unwrap();
     let layout = Layout::new(table.grid(), projector, 4).unwrap();
@@ -59,14 +59,14 @@ fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
     session.take_missing(&shooting, &Silent).unwrap();
 }
 
-fn verdict(learned: &Learned, folder: &Path) -> Result<Verdict, VerifyError> {
+fn verdict(learned: &BuiltTable, folder: &Path) -> Result<Verdict, VerifyError> {
     let table = Table::check(&learned.compiled.image).unwrap();
     let session = Session::read(folder, &table, &Silent)?;
     judge(folder, &table, &session, None)
 }
 
 /// Mean errors of plain and compensated pictures on the wall, without noise.
-fn truth(learned: &Learned, scene: &Scene, folder: &Path) -> [f64; 2] {
+fn truth(learned: &BuiltTable, scene: &Scene, folder: &Path) -> [f64; 2] {
     let table = Table::check(&learned.compiled.image).unwrap();
     let session = Session::read(folder, &table, &Silent).unwrap();
     let quiet = SimulationOptions {

@@ -68,7 +68,8 @@ pub(super) enum Command {
     /// Make, show and install keys that tables are signed with
     Key(Key),
     /// Write a zip file for support: versions, status, logs, transcripts; never keys
-    Report(Report),
+    #[command(alias = "report")]
+    SupportBundle(SupportBundle),
     /// Write manual pages
     Man(Man),
     /// Print completions for a shell
@@ -411,7 +412,7 @@ pub(super) struct Install {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Report {
+pub(super) struct SupportBundle {
     /// Zip file to write
     #[arg(short, long, value_name = "FILE.zip")]
     pub(super) output: PathBuf,

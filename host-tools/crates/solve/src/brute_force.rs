@@ -54,7 +54,7 @@ fn demultiplexer(patterns: &DMatrix<f64>) -> Result<DMatrix<f64>, SolveError> {
     let cells = patterns.nrows();
     if rank < cells {
         return Err(SolveError::Dependent {
-            method: Method::BruteForce.name(),
+            method: Method::BruteForce,
             rank,
             cells,
         });

@@ -8,8 +8,7 @@
 use super::column_block::ColumnBlock;
 use super::convergence::Residuals;
 use super::data_term::{DataTerm, Factor, Shrink, Slack};
-use super::haar::Haar;
-use super::lane::{LANES, Pack, transpose};
+use super::haar::{Haar, LANES, Pack, transpose};
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 
 #[derive(Debug)]

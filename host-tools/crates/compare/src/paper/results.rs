@@ -217,7 +217,7 @@ fn of_methods(
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points.dedup_by(|a, b| a.0.total_cmp(&b.0).is_eq());
         Series {
-            name: method.name().to_owned(),
+            name: method.to_string(),
             points,
             joined: true,
         }

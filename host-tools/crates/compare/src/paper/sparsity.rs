@@ -4,7 +4,7 @@ use super::scenes::Condition;
 use crate::sheet::{Tile, sheet};
 use iltm_picture::{ColourScale, Palette, Picture};
 use iltm_runtime::FrameSize;
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::DMatrix;
 
 /// Parts of the energy that are counted for.
@@ -37,7 +37,7 @@ struct Matrices {
 
 fn matrices(condition: Condition) -> Option<Matrices> {
     let (truth, _) = condition.world(1)?;
-    let haar = Haar::new(truth.grid, Basis::QuadTree);
+    let haar = Haar::new(truth.grid);
     let mut operator = truth.inverse.clone();
     operator.fill_diagonal(0.0);
     Some(Matrices {
