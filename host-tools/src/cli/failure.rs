@@ -26,13 +26,11 @@ use serde_json::{Value, json};
 use std::fmt::{self, Write};
 use std::io;
 use std::path::Path;
-use strum::{EnumMessage, IntoEnumIterator};
+use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
 /// Causes of failure, each with an exit code of its own, its name in kebab case, and what
 /// it means. The codes are a contract; `docs/errors.md` and `--help` are made from them.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Debug, strum::EnumIter, strum::EnumMessage, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, EnumIter, EnumMessage, IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub(super) enum Kind {

@@ -1,4 +1,4 @@
-//! Which operator entries a tier needs.
+//! Accuracy ladder: which operator entries a tier needs.
 //!
 //! Entry `(i, j)` of `K^ = W^T K W` changes the light of a frame by about
 //! `|K^_ij| sigma_j`, with `sigma_j` the root mean square of input coefficient

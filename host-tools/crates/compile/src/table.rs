@@ -1,4 +1,4 @@
-//! The whole way from an inverse to a checked image.
+//! Compiling: from an inverse to a checked image.
 
 use super::gain::FineGains;
 use super::image::{ImageWriter, halfwords, operator_sections};
@@ -208,10 +208,8 @@ pub fn compile(
         bytes.extend(halfwords(values));
         image.section(SectionKind::FineGain, 0, bytes);
     }
-    if !operator.sections.is_empty() {
-        for (selector, bytes) in operator.sections {
-            image.section(SectionKind::Operator, selector, bytes);
-        }
+    for (selector, bytes) in operator.sections {
+        image.section(SectionKind::Operator, selector, bytes);
     }
     let provenance = options.provenance.clone().into_bytes();
     image.section(SectionKind::Provenance, 0, provenance);

@@ -8,6 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
+use strum::{Display, EnumString, IntoStaticStr};
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
@@ -16,17 +17,7 @@ const PROGRAM: &str = "qemu-system-arm";
 const START: Duration = Duration::from_secs(20);
 
 /// A board that can be emulated.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Debug,
-    Default,
-    strum::Display,
-    strum::EnumString,
-    strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Display, EnumString, IntoStaticStr)]
 #[strum(parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Board {
     /// Arm MPS2 with the AN500 image: Cortex-M7 with FPU.

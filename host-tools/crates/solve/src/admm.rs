@@ -107,7 +107,7 @@ impl<'h> Consensus<'h> {
         self.lambda = lambda;
         self.rows
             .par_iter_mut()
-            .for_each(|block| block.load_slack(data.slack.as_ref()));
+            .for_each(|block| block.load_residual(data.weighted.as_ref()));
         self.take(&factor);
         let norm = self.floor_norm + GAIN_PART * GAIN_PART * data.squared_gains();
         let mut end = Convergence::none();

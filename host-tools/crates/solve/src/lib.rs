@@ -1,4 +1,4 @@
-//! From [`Measurements`] to [`InverseTransport`].
+//! Inverse light transport: from [`Measurements`] to [`InverseTransport`].
 //!
 //! The inverse of a scene's light transport is `T^-1 = diag(g) - K`: texture is
 //! in the gains `g` alone, and `K` is geometry, one bounce, smooth and
@@ -14,8 +14,7 @@
 //! haar                  the sparse basis, sixteen images at a time
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
-//! direct                the paper's method, over basis_pursuit
-//! two_stage, brute_force    forward transport first, then its inverse
+//! by_rows               the paper's method and others, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
 //! clipped_projection    what clipping makes of natural images
 //! flux                  what of a gain is the projector's, where reciprocity tells
@@ -33,13 +32,12 @@
 mod admm;
 mod basis_pursuit;
 mod blur;
-mod brute_force;
+mod by_rows;
 mod clipped_projection;
 mod column_block;
 mod convergence;
 mod data_term;
 mod deblur;
-mod direct;
 mod error;
 mod flux;
 mod forward;
@@ -65,9 +63,9 @@ mod test_reference;
 mod test_scene;
 #[cfg(test)]
 mod tests;
-mod two_stage;
 
 pub use blur::blur;
+pub use by_rows::inverted;
 pub use convergence::Convergence;
 pub use error::SolveError;
 pub use flux::Flux;
@@ -83,14 +81,14 @@ pub use report::{
 };
 pub use restricted_isometry::Recovery;
 pub use solution::{ChannelInverse, InverseTransport};
-pub use two_stage::inverted;
 
 use clipped_projection::ClippedProjection;
 use convergence::Stop;
-use deblur::deblur;
+use deblur::{Deblurred, deblur};
 use held_out::{Judged, Split, predict};
 use iltm_capture::{Measurements, Role};
 use iltm_picture::progress::Progress;
+use iltm_runtime::Grid;
 use joint::Solver;
 use prepare::Prepared;
 use solution::{Candidate, Solution, drop_dead};
@@ -169,26 +167,7 @@ pub fn solve_observed(
     let condition = candidates.iter().map(condition).fold(1.0, f64::max);
     let prediction = predict(&prepared, &outcome.judged);
     check_prediction(&prediction)?;
-    let blur = prepared.blur.clone().map(|mut blur| {
-        drop_dead(&mut blur, &prepared.live);
-        blur
-    });
-    let content = ClippedProjection::new(observed.grid, &prepared, &candidates, blur.as_ref());
-    let deblurred = blur
-        .as_ref()
-        .and_then(|blur| deblur(blur, &prepared.live, &candidates, &content));
-    let with_operator = deblurred.as_ref().map_or_else(
-        || {
-            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
-            content.operator(&inverses).0
-        },
-        |deblurred| deblurred.error,
-    );
-    let clipped = Clipped {
-        uncompensated: content.nothing(),
-        gain_only: content.gain_only(&prediction),
-        compensated: with_operator,
-    };
+    let (clipped, deblurred) = clip(observed.grid, &prepared, &candidates, &prediction);
     seconds.finish = clock.lap();
     let recovery = recovery(&prepared, &haar, &candidates);
     seconds.recovery = clock.lap();
@@ -218,7 +197,38 @@ pub fn solve_observed(
     ))
 }
 
-/// What both methods need.
+/// What clipping makes of natural images, and the inverse that undoes the projector's blur
+/// as well where there is one.
+fn clip(
+    grid: Grid,
+    prepared: &Prepared,
+    candidates: &[Candidate],
+    prediction: &Prediction,
+) -> (Clipped, Option<Deblurred>) {
+    let blur = prepared.blur.clone().map(|mut blur| {
+        drop_dead(&mut blur, &prepared.live);
+        blur
+    });
+    let content = ClippedProjection::new(grid, prepared, candidates, blur.as_ref());
+    let deblurred = blur
+        .as_ref()
+        .and_then(|blur| deblur(blur, &prepared.live, candidates, &content));
+    let with_operator = deblurred.as_ref().map_or_else(
+        || {
+            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
+            content.operator(&inverses).0
+        },
+        |deblurred| deblurred.error,
+    );
+    let clipped = Clipped {
+        uncompensated: content.nothing(),
+        gain_only: content.gain_only(prediction),
+        compensated: with_operator,
+    };
+    (clipped, deblurred)
+}
+
+/// What all methods need.
 struct Task<'t> {
     prepared: &'t Prepared,
     haar: &'t Haar,
@@ -308,10 +318,10 @@ impl<'t> Task<'t> {
             self.progress.begin(what, 0);
             let (prepared, haar, stop) = (self.prepared, self.haar, self.stop);
             let found = match method {
-                Method::TwoStage => two_stage::solve(prepared, haar, chosen, stop, self.progress),
-                Method::BruteForce => brute_force::solve(prepared, chosen),
+                Method::TwoStage => by_rows::two_stage(prepared, haar, chosen, stop, self.progress),
+                Method::BruteForce => by_rows::brute_force(prepared, chosen),
                 Method::Direct | Method::Joint => {
-                    Ok(direct::solve(prepared, haar, chosen, stop, self.progress))
+                    Ok(by_rows::direct(prepared, haar, chosen, stop, self.progress))
                 }
             };
             self.progress.end();

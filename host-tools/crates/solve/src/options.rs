@@ -1,21 +1,10 @@
 //! Options of a solve: the method, and the settings that it has.
 
 use super::error::SolveError;
+use strum::{Display, EnumString, VariantArray};
 
 /// How the inverse is found; the name on the command line and in reports is in kebab case.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Debug,
-    Default,
-    Hash,
-    strum::Display,
-    strum::EnumString,
-    strum::IntoStaticStr,
-    strum::VariantArray,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash, Display, EnumString, VariantArray)]
 #[strum(serialize_all = "kebab-case", parse_err_ty = UnknownMethod, parse_err_fn = unknown)]
 pub enum Method {
     /// Gains and one operator for all channels together, from every photograph:

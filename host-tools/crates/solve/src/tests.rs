@@ -6,7 +6,6 @@
 use super::test_scene::{Corner, add_noise, patterns};
 use super::*;
 use iltm_picture::progress::Silent;
-use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use strum::VariantArray;
 

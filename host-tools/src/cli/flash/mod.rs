@@ -100,9 +100,27 @@ fn flash(
         );
         return Ok(());
     }
-    let mut show = Show::new(output);
-    let in_use = loop {
-        let mut upload = Upload::new(&mut connection.client, &parcel);
+    let in_use = bring(connection, &parcel, &plan, &mut ending, &mut lost)?;
+    lost.asked = Asked::Confirmation;
+    let ended = ending.end(connection, in_use, "is in use");
+    ended.map_err(|failure| match failure.active {
+        Some(Active::Unknown) => failure.with(Active::Lost(lost)),
+        _ => failure,
+    })
+}
+
+/// Sends what differs and starts the trial, at lower speeds where the line falls silent.
+fn bring(
+    connection: &mut Connection,
+    parcel: &Parcel<'_>,
+    plan: &UploadPlan,
+    ending: &mut Ending<'_>,
+    lost: &mut Lost,
+) -> Result<InUse, Failure> {
+    let mut show = Show::new(ending.output);
+    let trial = Duration::from_secs(ending.arguments.trial.into());
+    loop {
+        let mut upload = Upload::new(&mut connection.client, parcel);
         let result = upload.run(&mut show).and_then(|summary| {
             ending.summary = summary;
             let text = format!("slot {} holds the table", letter(plan.slots.target));
@@ -116,10 +134,13 @@ fn flash(
                 }),
             );
             lost.asked = Asked::Trial;
-            upload.activate(Duration::from_secs(arguments.trial.into()), &mut show)
+            upload.activate(trial, &mut show)
         });
         match result {
-            Ok(in_use) => break in_use,
+            Ok(in_use) => {
+                show.end();
+                return Ok(in_use);
+            }
             Err(error) if is_silence(&error) && connection.slow_down() => {
                 let baud = connection.baud;
                 let data = json!({ "event": "slower", "baud": baud });
@@ -130,17 +151,10 @@ fn flash(
             }
             Err(error) => {
                 show.stop();
-                return Err(failed(connection, &error, lost));
+                return Err(failed(connection, &error, *lost));
             }
         }
-    };
-    show.end();
-    lost.asked = Asked::Confirmation;
-    let ended = ending.end(connection, in_use, "is in use");
-    ended.map_err(|failure| match failure.active {
-        Some(Active::Unknown) => failure.with(Active::Lost(lost)),
-        _ => failure,
-    })
+    }
 }
 
 /// Asks a device with a table on trial for the trial of this file, which changes

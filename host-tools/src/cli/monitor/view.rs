@@ -187,14 +187,6 @@ impl View {
         let share = |us: u32| f64::from(us) / f64::from(time.budget_us.max(1));
         let clipped = words::clipped_share(status);
         let stack = f64::from(status.stack.used) / f64::from(status.stack.size.max(1));
-        let count = |count: u32, what: &str| {
-            let text = format!("{count} {what}");
-            if count == 0 {
-                style(text).dim()
-            } else {
-                style(text).yellow()
-            }
-        };
         let line = |name: &str, value: String| format!("{name:<11}{value}");
         vec![
             line(
@@ -202,9 +194,9 @@ impl View {
                 format!(
                     "{}   {}   {}   {}",
                     self.rates.words(),
-                    count(frames.late, "late"),
-                    count(frames.dropped, "dropped"),
-                    count(frames.broken, "broken")
+                    fault_count(frames.late, "late"),
+                    fault_count(frames.dropped, "dropped"),
+                    fault_count(frames.broken, "broken")
                 ),
             ),
             line(
@@ -262,6 +254,16 @@ impl View {
                 ),
             ),
         ]
+    }
+}
+
+/// Dim while there are none.
+fn fault_count(count: u32, what: &str) -> StyledObject<String> {
+    let text = style(format!("{count} {what}"));
+    if count == 0 {
+        text.dim()
+    } else {
+        text.yellow()
     }
 }
 

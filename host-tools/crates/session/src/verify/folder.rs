@@ -1,12 +1,11 @@
-//! Writes the folder of pictures that a table is verified with.
+//! Verification folder: writes the pictures that a table is verified with.
 
 use super::images::test_images;
+use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
-use super::role::{VerifyManifest, VerifyRole};
 use super::{TestImage, VerifyError};
 use crate::{Layout, slide_name};
-use iltm_capture::VERIFY_FILE;
-use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, numbered, shown};
+use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, shown};
 use iltm_picture::{Picture, Samples, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::Compensator;
@@ -109,17 +108,10 @@ fn slides(
         })
     };
     let coded = shown(table.grid(), BERNOULLI, SEED);
-    let ends = || {
-        coded
-            .iter()
-            .take(2)
-            .map(code)
-            .collect::<Result<Vec<_>, VerifyError>>()
-    };
-    let mut slides = coded
-        .iter()
-        .map(code)
-        .collect::<Result<Vec<_>, VerifyError>>()?;
+    let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
+    // White and black.
+    let ends = || all(&coded[..2]);
+    let mut slides = all(&coded)?;
     slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);
@@ -146,7 +138,6 @@ fn slides(
 /// A wanted picture as a projector is sent it that is not compensated: the same light,
 /// relative to the projector's own white.
 pub(super) fn plain(wanted: &Picture, curves: &ProjectorCurves) -> Picture {
-    let channels = wanted.channels();
     let light = iltm_picture::LightPicture::decode(wanted, iltm_picture::Response::Srgb);
     let pixels = 0..wanted.size().pixels();
     let samples = pixels.flat_map(|pixel| {
@@ -154,14 +145,7 @@ pub(super) fn plain(wanted: &Picture, curves: &ProjectorCurves) -> Picture {
         planes.map(move |(channel, plane)| (channel, f64::from(plane[pixel])))
     });
     let samples = samples.map(|(channel, light)| curves.code(channel, light));
-    eight(
-        wanted.size(),
-        samples.take(pixels_of(wanted) * channels).collect(),
-    )
-}
-
-fn pixels_of(picture: &Picture) -> usize {
-    picture.size().pixels()
+    eight(wanted.size(), samples.collect())
 }
 
 /// A pattern as a grey picture of one pixel a cell.

@@ -1,4 +1,4 @@
-//! The test images: wanted light, one value a cell and channel.
+//! Test images: wanted light, one value a cell and channel.
 //!
 //! Natural ones, an even grey, a checkerboard and, where a table has colours, bars. None
 //! wants black beside white, which walls that light each other cannot show; where a table

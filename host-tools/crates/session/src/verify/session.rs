@@ -1,8 +1,8 @@
 //! A verification folder with its photographs, read back and checked.
 
 use super::folder::{plain, wanted_file};
+use super::manifest::{VerifyManifest, VerifyRole, VerifyShot};
 use super::response::ProjectorCurves;
-use super::role::{VerifyManifest, VerifyRole, VerifyShot};
 use super::{Expected, VerifyError};
 use iltm_capture::VERIFY_FILE;
 use iltm_capture::{CaptureError, CellPlanes, Revisited, Settings, Shot, find_photo, revisit};
