@@ -5,7 +5,7 @@
 //! |---|---|
 //! | settings: the port, and ports never to open | [`config`] |
 //! | ports of emulated boards that run now | [`emulated`] |
-//! | folders, and transcripts of the last transfers for `iltm report` | here |
+//! | folders, and transcripts of the last transfers for `iltm support-bundle` | here |
 
 pub mod config;
 pub mod emulated;
