@@ -4,11 +4,12 @@ use super::args::Bounces;
 use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::progress::progress;
-use crate::bounces::{
-    self, BouncesError, BouncesOptions, Layer, LayerKind, Written, percent, times,
-};
+use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, Written};
 use crate::capture::CaptureOptions;
-use iltm_picture::check_free;
+use iltm_picture::{
+    check_free,
+    numbers::{number, percent},
+};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::time::Instant;
@@ -144,7 +145,7 @@ fn text(found: &bounces::Bounces) -> String {
             percent(layer.light_share),
             percent(layer.energy_share),
             layer.brightest,
-            times(layer.rms / found.noise.cell),
+            number(layer.rms / found.noise.cell),
             meaning(layer.kind),
         );
     }

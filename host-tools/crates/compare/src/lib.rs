@@ -11,7 +11,7 @@
 //! meter         memory that a method held
 //! light         the light that a capture or a described scene gives to compare on
 //! paper         the paper's experiments
-//! table, page   rows for people and programs                        chart, sheet
+//! table, page   rows for people and programs                        chart
 //! ```
 //!
 //! Light is cell by cell, in camera units, ambient light removed: `c = T p`. Every
@@ -27,7 +27,6 @@ mod meter;
 pub mod page;
 pub mod paper;
 mod rig;
-mod sheet;
 mod source;
 pub mod table;
 mod truth;

@@ -2,11 +2,12 @@
 
 use super::contest::{Done, Row};
 use super::light::Light;
-use super::sheet::{Tile, encoded, sheet};
 use super::table::{COLUMNS, cells};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use iltm_picture::{ColourScale, Palette, html::document};
+use iltm_picture::{
+    ColourScale, ContactSheet, Palette, Tile,
+    html::{document, img},
+    png,
+};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
 
@@ -62,7 +63,7 @@ impl Contest<'_> {
                 p { (words) " Errors are relative: of the inverse (Frobenius), of the second bounce\u{2019}s picture under white, and of what compensated images look like, clipping included." }
                 @if let Some(picture) = self.pictures(rows) {
                     figure {
-                        img src=(picture) alt=(format!("{title}: where a compensated image errs"));
+                        (img(&picture, &format!("{title}: where a compensated image errs")))
                         figcaption { "One natural image on the wall, and where it errs by each method." }
                     }
                 }
@@ -101,18 +102,13 @@ impl Contest<'_> {
         }
     }
 
-    /// Where one image errs, by method, as a data URL.
-    fn pictures(&self, rows: &[Row]) -> Option<String> {
+    /// Where one image errs, by method, as a PNG file.
+    fn pictures(&self, rows: &[Row]) -> Option<Vec<u8>> {
         let truth = &self.light.truth;
         let scale = ColourScale::logarithmic(Palette::Magma, WORST.0, WORST.1);
         let size = FrameSize::of_grid(truth.grid);
         let wanted = truth.images.column(0).into_owned();
-        let wanted_tile = Tile::light(
-            ("wanted", ""),
-            truth.grid,
-            wanted.iter().copied(),
-            truth.white,
-        );
+        let wanted_tile = Tile::light(("wanted", ""), size, wanted.iter().copied(), truth.white);
         let mut tiles = vec![wanted_tile];
         for row in rows {
             let Ok(done) = &row.result else { continue };
@@ -125,11 +121,11 @@ impl Contest<'_> {
             let values = off.iter().map(|value| value.abs());
             tiles.push(Tile::scaled((&row.name, &caption), size, values, &scale));
         }
-        let rows: Vec<Vec<Tile>> = tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect();
-        let picture = sheet(&rows, Some((&scale, "error, relative to reference white")))?;
-        Some(format!(
-            "data:image/png;base64,{}",
-            STANDARD.encode(encoded(&picture))
-        ))
+        let sheet = ContactSheet {
+            rows: tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect(),
+            bar: Some((&scale, "error, relative to reference white")),
+            ..ContactSheet::default()
+        };
+        Some(png::encode_small(&sheet.compose()?))
     }
 }

@@ -1,6 +1,7 @@
 //! Rows of a contest as CSV, Markdown and text.
 
 use super::contest::{Done, Row};
+use iltm_picture::numbers::grouped;
 use std::fmt::Write;
 
 /// Rows as comma-separated values with a heading; a method that gives no answer has
@@ -86,7 +87,8 @@ pub(super) fn cells(row: &Row) -> [String; 8] {
         photographs,
         seconds(done.seconds),
         done.memory.map_or_else(String::new, bytes),
-        done.multiplications.map_or_else(String::new, thousands),
+        done.multiplications
+            .map_or_else(String::new, |count| grouped(count.round() as u64)),
         done.errors.inverse.map_or_else(String::new, error),
         done.errors.second_bounce.map_or_else(String::new, error),
         error(done.errors.compensation),
@@ -173,19 +175,6 @@ fn bytes(bytes: usize) -> String {
     }
 }
 
-/// A count with commas.
-fn thousands(count: f64) -> String {
-    let digits = format!("{count:.0}");
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,11 +198,5 @@ mod tests {
                 "0", ".0001", ".0123", ".250", "1.0", "1.2", "120", "diverges"
             ]
         );
-    }
-
-    #[test]
-    fn large_counts_have_commas() {
-        assert_eq!(thousands(1_234_567.0), "1,234,567");
-        assert_eq!(thousands(12.0), "12");
     }
 }

@@ -134,8 +134,7 @@ impl Example {
     /// number.
     #[must_use]
     pub fn brightening(&self) -> f64 {
-        let planes = self.bounced.planes().iter().flatten();
-        let brightest = super::quantile(planes.map(|light| f64::from(*light)).collect(), 0.995);
+        let brightest = self.bounced.quantile(0.995);
         if brightest > 0.0 {
             (1.0 / brightest).floor().clamp(1.0, 100.0)
         } else {

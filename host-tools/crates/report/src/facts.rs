@@ -2,7 +2,10 @@
 
 use iltm_capture::{Measurements, NoiseSource, RegistrationMethod};
 use iltm_compile::build_table::BuiltTable;
-use iltm_picture::numbers::{grouped, number, percent};
+use iltm_picture::{
+    html::{grouped, number, percent},
+    statistics::median,
+};
 
 /// One line: its name and what there is to say.
 pub(super) type Fact = (&'static str, String);
@@ -126,7 +129,7 @@ fn noise(learned: &BuiltTable) -> f64 {
         let lit = cells.filter(|(_, light)| **light > 0.0);
         lit.map(|(noise, light)| noise / light).collect::<Vec<_>>()
     });
-    super::quantile(ratios.collect(), 0.5)
+    median(ratios.collect()).unwrap_or(0.0)
 }
 
 fn noise_source(source: NoiseSource) -> String {

@@ -41,6 +41,7 @@ pub use timing::{microseconds, microseconds_at};
 use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
     ColourScale, LightPicture, Palette, Picture, html::PictureFile, progress::Progress,
+    statistics::quantile,
 };
 use iltm_runtime::{
     FrameSize,
@@ -153,11 +154,10 @@ impl<'a> Report<'a> {
 fn flood(learned: &BuiltTable) -> Option<Picture> {
     let (width, height) = learned.measurements.registration.camera;
     let size = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
-    let planes = learned.measurements.flood.clone();
-    let all = planes.iter().flatten().map(|light| f64::from(*light));
-    let white = quantile(all.collect(), 1.0 - GLINTS);
+    let flood = LightPicture::new(size, learned.measurements.flood.clone())?;
+    let white = flood.quantile(1.0 - GLINTS);
     let scale = if white > 0.0 { 1.0 / white } else { 0.0 };
-    Some(LightPicture::new(size, planes)?.scaled(scale).for_display())
+    Some(flood.scaled(scale).for_display())
 }
 
 /// A round number that nearly all errors stay below once each pixel has its gain.
@@ -166,20 +166,14 @@ fn flood(learned: &BuiltTable) -> Option<Picture> {
 fn largest_error(examples: &[Example]) -> f64 {
     let shown = examples.iter().flat_map(|example| &example.shown);
     let shown = shown.filter(|shown| shown.treatment == Treatment::GainOnly);
-    let errors = shown.flat_map(|shown| shown.comparison.map.iter().map(|error| f64::from(*error)));
-    let high = quantile(errors.collect(), 1.0 - BEYOND_SCALE).max(1e-3);
+    let mut errors: Vec<f32> = shown
+        .flat_map(|shown| &shown.comparison.map)
+        .copied()
+        .collect();
+    let high = quantile(&mut errors, 1.0 - BEYOND_SCALE).map_or(0.0, f64::from);
+    let high = high.max(1e-3);
     let power = 10_f64.powf(high.log10().floor());
     // Ends that a tick falls on.
     let ends = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0].map(|digit| digit * power);
     ends.into_iter().find(|end| *end >= high).unwrap_or(high)
-}
-
-/// The value that a share of all values stays below; 0 of none.
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    values
-        .get((share * last as f64) as usize)
-        .copied()
-        .unwrap_or(0.0)
 }

@@ -3,9 +3,8 @@
 use super::facts::facts;
 use super::{Example, Report, Rung, Shown, Treatment};
 use iltm_picture::{
-    chart::{Axis, Chart, Point},
-    html::{colour_bar, document, embedded},
-    numbers::{grouped, number, percent},
+    chart::{Axis, Chart, Series},
+    html::{colour_bar, document, grouped, img_named, number, percent},
 };
 use iltm_solve::{Compensation, Prediction};
 use maud::{Markup, html};
@@ -262,32 +261,36 @@ impl Report<'_> {
 
     /// A picture inside of the page, by the name of its file.
     fn image(&self, name: &str, alt: &str) -> Markup {
-        let file = self.files.iter().find(|file| file.name == name);
-        html! {
-            @if let Some(file) = file { (embedded(file, alt)) }
-        }
+        img_named(&self.files, name, alt)
     }
 
     fn accuracy(&self) -> Markup {
         let own = self.learned.report.predicted_error();
-        let point = |(tier, rung): (usize, &Rung)| Point {
-            x: rung.microseconds,
-            y: rung.step.left_out,
-            label: format!("tier {tier}"),
+        let tiers = self.ladder.iter();
+        let series = Series {
+            points: tiers
+                .map(|rung| (rung.microseconds, rung.step.left_out))
+                .collect(),
+            labels: (0..self.ladder.len())
+                .map(|tier| format!("tier {tier}"))
+                .collect(),
+            line: 1.8,
+            ..Series::default()
         };
         let chart = Chart {
             title: "What each tier leaves out against the time it takes",
             x: Axis {
                 label: "microseconds a frame, one core of this machine",
-                logarithmic: false,
+                ..Axis::default()
             },
             y: Axis {
                 label: "left out (relative error)",
                 logarithmic: true,
+                range: None,
             },
-            points: self.ladder.iter().enumerate().map(point).collect(),
-            marked: None,
-            level: Some((own, "error of the inverse itself")),
+            limit: Some((own, "error of the inverse itself")),
+            series: vec![series],
+            ..Chart::default()
         };
         html! {
             section {
@@ -323,28 +326,31 @@ impl Report<'_> {
 
     fn solve(&self, words: &Words) -> Markup {
         let report = &self.learned.report;
-        let misfit = |trial: &iltm_solve::LambdaTrial| Point {
-            x: trial.lambda,
-            y: 100.0 * trial.misfit,
-            label: String::new(),
+        let path = report.lambda_path.iter();
+        let is_best =
+            |trial: &iltm_solve::LambdaTrial| trial.lambda.total_cmp(&report.lambda).is_eq();
+        let series = Series {
+            points: path
+                .clone()
+                .map(|trial| (trial.lambda, 100.0 * trial.misfit))
+                .collect(),
+            marked: path.clone().position(is_best),
+            line: 1.8,
+            ..Series::default()
         };
-        let best = report
-            .lambda_path
-            .iter()
-            .position(|trial| trial.lambda.total_cmp(&report.lambda).is_eq());
         let chart = Chart {
             title: "Misfit of held-out photographs by the weight of sparsity",
             x: Axis {
                 label: "weight of sparsity \u{3bb}",
                 logarithmic: true,
+                range: None,
             },
             y: Axis {
                 label: "misfit of held-out photographs, %",
-                logarithmic: false,
+                ..Axis::default()
             },
-            points: report.lambda_path.iter().map(misfit).collect(),
-            marked: best,
-            level: None,
+            series: vec![series],
+            ..Chart::default()
         };
         html! {
             section {

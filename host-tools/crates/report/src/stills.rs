@@ -6,10 +6,9 @@
 use crate::Wanted;
 use iltm_picture::{
     LightPicture, Picture,
-    canvas::{Canvas, Type},
+    canvas::{Canvas, FontWeight, RasterHeight, Type},
 };
 use iltm_runtime::FrameSize;
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 use std::f64::consts::TAU;
 
 /// Samples along each side of a pixel.

@@ -5,7 +5,10 @@ use super::effects::{Decisions, Effect};
 use super::estimate::{self, Estimate};
 use super::facets::Facets;
 use super::sensor::Sensor;
-use iltm_picture::Response;
+use iltm_picture::{
+    Response,
+    numbers::{number, percent},
+};
 
 /// Effects that change a photograph by less than this share of white are left out,
 /// where the camera has no noise that would hide more.
@@ -293,29 +296,5 @@ pub(super) fn between_surfaces(
             "back sides",
             "no back side gets light and is seen",
         ),
-    }
-}
-
-/// A share for people.
-#[must_use]
-pub fn percent(share: f64) -> String {
-    format!("{} %", number(100.0 * share))
-}
-
-/// Two significant digits, plain where that is short.
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if size >= 10.0 {
-        format!("{value:.0}")
-    } else if size >= 1.0 {
-        format!("{value:.1}")
-    } else if size >= 1e-4 {
-        let digits = 1 - size.log10().floor() as i32;
-        let text = format!("{value:.*}", digits.max(0) as usize);
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        format!("{value:.1e}")
     }
 }

@@ -51,7 +51,6 @@ mod sparse;
 mod specular;
 mod view;
 
-pub use decide::percent;
 pub use effects::{Decision, Decisions, Effect, Forced, UnknownEffect};
 pub use exposure::Exposed;
 pub use facets::Facets;

@@ -2,7 +2,7 @@
 //! depend on the pattern computed once.
 
 use super::between;
-use super::decide::{self, percent};
+use super::decide;
 use super::description::Scene;
 use super::effects::{Decision, Decisions, Effect, Forced};
 use super::exchange::{Exchange, ExchangeError, RadiosityError};
@@ -14,7 +14,7 @@ use super::sensor::{Readout, Sensor};
 use super::sight::{Looks, Sight};
 use super::sparse::Rows;
 use super::specular::{Specular, Surfaces, TooGlossy};
-use iltm_picture::progress::Progress;
+use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use std::time::Instant;

@@ -29,10 +29,9 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
             let _ = writeln!(
                 text,
                 "- {}, {photographs} photographs: **{}**. Direct is better in {wins} of {all} \
-                 draws; two-stage errs {} as much on average.",
+                 draws; two-stage errs {ratio:.2} times as much on average.",
                 condition.name(),
                 verdict(wins, all),
-                times(ratio),
             );
         }
     }
@@ -99,10 +98,6 @@ fn verdict(wins: usize, all: usize) -> &'static str {
     } else {
         "a tie"
     }
-}
-
-fn times(ratio: f64) -> String {
-    format!("{ratio:.2} times")
 }
 
 #[cfg(test)]

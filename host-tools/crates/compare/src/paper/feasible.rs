@@ -5,7 +5,7 @@
 //! only be further from the region, not nearer.
 
 use super::scenes::{Condition, surface};
-use crate::chart::{ChartError, Series, Words, region};
+use crate::chart::curves;
 use iltm_capture::{Role, columns, shown};
 use iltm_solve::{
     Haar,
@@ -68,10 +68,9 @@ pub(super) fn places() -> Vec<Place> {
 }
 
 /// The region with the scene's places in it.
-pub(super) fn chart(places: &[Place]) -> Result<String, ChartError> {
+pub(super) fn chart(places: &[Place]) -> String {
     let finite = |place: &&Place| place.gamma.is_finite();
     let most = |of: fn(&Place) -> f64| places.iter().filter(finite).map(of).fold(2.0, f64::max);
-    let (x, y) = (1.0..most(|p| p.kappa) * 1.3, 1.0..most(|p| p.gamma) * 1.6);
     let border: Vec<(f64, f64)> = (0..=60)
         .map(|step| 1.0 + f64::from(step) / 60.0 * (LIMIT.sqrt() - 1.0))
         .map(|kappa| (kappa, LIMIT / (kappa * kappa)))
@@ -84,21 +83,22 @@ pub(super) fn chart(places: &[Place]) -> Result<String, ChartError> {
                     && place.gamma.is_finite()
             });
             let scene = surface(textured);
-            series.push(Series {
-                name: format!("{scene}, {photographs} photographs"),
-                points: own.map(|place| (place.kappa, place.gamma)).collect(),
-                joined: true,
-            });
+            series.push((
+                format!("{scene}, {photographs} photographs"),
+                own.map(|place| (place.kappa, place.gamma)).collect(),
+            ));
         }
     }
-    region(
-        Words {
-            title: "Where Theorem 3.1 promises recovery (shaded), and where the scene is: k = 1, 2, 4, 8, 16",
-            x: "kappa of T for 2k coefficients, at least",
-            y: "gamma of the patterns for 2k coefficients, at least",
-        },
-        (x, y),
-        &border,
-        &series,
-    )
+    let mut chart = curves(
+        "Where Theorem 3.1 promises recovery (shaded), and where the scene is: k = 1, 2, 4, 8, 16",
+        (
+            "kappa of T for 2k coefficients, at least",
+            "gamma of the patterns for 2k coefficients, at least",
+        ),
+        series,
+    );
+    chart.x.range = Some((1.0, 1.3 * most(|p| p.kappa)));
+    chart.y.range = Some((1.0, 1.6 * most(|p| p.gamma)));
+    chart.shaded = border;
+    chart.file()
 }

@@ -7,10 +7,9 @@ use super::scenes::{Condition, surface};
 use super::seeds::{self, Mean, SEEDS, Sample};
 use super::sparsity::{self, Counted};
 use super::{File, claims, second_bounce, sections};
-use crate::chart::{self, ChartError, Interval, Series, Words};
+use crate::chart::{Curve, Interval, curves, intervals};
 use crate::contest::Row;
-use crate::sheet::encoded;
-use iltm_picture::{Picture, progress::Progress};
+use iltm_picture::{Picture, chart::PALETTE, png, progress::Progress};
 use iltm_solve::Method;
 use std::fmt::Write;
 use std::path::Path;
@@ -30,14 +29,6 @@ pub enum PaperError {
     #[error("the photographs that the program carries cannot be used: {why}")]
     Sample {
         /// What went wrong.
-        why: String,
-    },
-    /// A chart cannot be drawn.
-    #[error("the chart of {what} cannot be drawn: {why}")]
-    Chart {
-        /// Which.
-        what: &'static str,
-        /// What the library says.
         why: String,
     },
 }
@@ -60,7 +51,7 @@ pub fn files(
     let (lit, bounces) = second_bounce::panels().ok_or(PaperError::Picture { what: "Fig. 3" })?;
     let places = feasible::places();
     let mut files = vec![
-        chart("fig2.svg", "Fig. 2", feasible::chart(&places))?,
+        file("fig2.svg", feasible::chart(&places)),
         file("fig2.csv", places_csv(&places)),
         picture("fig1.png", "Fig. 1", sparsity::picture())?,
         picture("fig3.png", "Fig. 3", Some(lit))?,
@@ -74,13 +65,9 @@ pub fn files(
             "Fig. 4",
             second_bounce::compared(Condition::ALL[2]),
         )?,
-        chart("fig4-seeds.svg", "the seeds", seeds_chart(&samples))?,
-        chart("complexity-cells.svg", "the complexity", by_cells(&timed))?,
-        chart(
-            "complexity-photographs.svg",
-            "the complexity",
-            by_photographs(&timed),
-        )?,
+        file("fig4-seeds.svg", seeds_chart(&samples)),
+        file("complexity-cells.svg", by_cells(&timed)),
+        file("complexity-photographs.svg", by_photographs(&timed)),
         file("fig1.csv", sparsity_csv(&sparsity::counts())),
         file("fig3.csv", bounces_csv(&bounces)),
         file("fig4.csv", seeds_csv(&samples)),
@@ -113,38 +100,19 @@ fn picture(name: &str, what: &'static str, picture: Option<Picture>) -> Result<F
     let picture = picture.ok_or(PaperError::Picture { what })?;
     Ok(File {
         name: name.to_owned(),
-        bytes: encoded(&picture),
+        bytes: png::encode_small(&picture),
     })
 }
 
-fn chart(
-    name: &str,
-    what: &'static str,
-    svg: Result<String, ChartError>,
-) -> Result<File, PaperError> {
-    let svg = svg.map_err(|why| PaperError::Chart {
-        what,
-        why: why.to_string(),
-    })?;
-    Ok(file(name, svg))
-}
-
-fn seeds_chart(samples: &[Sample]) -> Result<String, ChartError> {
+fn seeds_chart(samples: &[Sample]) -> String {
     let of = |condition: Condition| {
         let own = samples.iter().filter(move |s| s.condition == condition);
         let rows = own.filter(|s| !s.errors.is_empty()).map(interval);
         (condition.name(), rows.collect::<Vec<Interval>>())
     };
-    let groups = Condition::ALL.map(of);
     let title = format!("{SEEDS} draws, their mean and its 95 % interval");
-    chart::intervals(
-        Words {
-            title: &title,
-            x: "error of the second bounce under white",
-            y: "",
-        },
-        &groups,
-    )
+    let x = "error of the second bounce under white";
+    intervals(&title, x, Condition::ALL.map(of)).file()
 }
 
 fn interval(sample: &Sample) -> Interval {
@@ -153,9 +121,9 @@ fn interval(sample: &Sample) -> Interval {
     Interval {
         label: sections::words(sample.method, sample.photographs),
         colour: match sample.method {
-            Method::TwoStage => 1,
-            Method::Direct => 0,
-            _ => 2,
+            Method::TwoStage => PALETTE[1],
+            Method::Direct => PALETTE[0],
+            _ => PALETTE[2],
         },
         low: (mean.mean - mean.half).max(mean.mean / 10.0),
         middle: mean.mean,
@@ -164,31 +132,24 @@ fn interval(sample: &Sample) -> Interval {
     }
 }
 
-fn by_cells(timed: &[Timed]) -> Result<String, ChartError> {
-    let mut series = of_methods(
+fn by_cells(timed: &[Timed]) -> String {
+    let mut all = of_methods(
         timed,
         |t| t.photographs == complexity::PHOTOGRAPHS,
         |t| (t.cells as f64, t.seconds),
     );
     let own = timed.iter().filter(|t| t.method == Method::Direct);
     let own = own.filter(|t| t.photographs == complexity::PHOTOGRAPHS);
-    series.push(Series {
-        name: "exact inversion alone".to_owned(),
-        points: own.map(|t| (t.cells as f64, t.inversion)).collect(),
-        joined: true,
-    });
-    chart::logarithmic(
-        Words {
-            title: "Time of a solve against cells, 150 photographs",
-            x: "cells N",
-            y: "seconds",
-        },
-        &series,
-    )
+    all.push((
+        "exact inversion alone".to_owned(),
+        own.map(|t| (t.cells as f64, t.inversion)).collect(),
+    ));
+    let title = "Time of a solve against cells, 150 photographs";
+    curves(title, ("cells N", "seconds"), all).file()
 }
 
-fn by_photographs(timed: &[Timed]) -> Result<String, ChartError> {
-    let series = of_methods(
+fn by_photographs(timed: &[Timed]) -> String {
+    let all = of_methods(
         timed,
         |t| t.cells == 13 * 21,
         |t| {
@@ -196,31 +157,22 @@ fn by_photographs(timed: &[Timed]) -> Result<String, ChartError> {
             (t.photographs as f64, 1e3 * each)
         },
     );
-    chart::logarithmic(
-        Words {
-            title: "Time of an iteration against photographs, 13 x 21 cells",
-            x: "photographs m",
-            y: "milliseconds an iteration",
-        },
-        &series,
-    )
+    let title = "Time of an iteration against photographs, 13 x 21 cells";
+    let axes = ("photographs m", "milliseconds an iteration");
+    curves(title, axes, all).file()
 }
 
 fn of_methods(
     timed: &[Timed],
     chosen: impl Fn(&Timed) -> bool,
     point: impl Fn(&Timed) -> (f64, f64),
-) -> Vec<Series> {
+) -> Vec<Curve> {
     let of = |method: Method| {
         let own = timed.iter().filter(|t| t.method == method && chosen(t));
         let mut points: Vec<(f64, f64)> = own.map(&point).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points.dedup_by(|a, b| a.0.total_cmp(&b.0).is_eq());
-        Series {
-            name: method.to_string(),
-            points,
-            joined: true,
-        }
+        (method.to_string(), points)
     };
     complexity::METHODS.map(of).to_vec()
 }

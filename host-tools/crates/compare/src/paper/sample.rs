@@ -2,8 +2,7 @@
 
 use super::File;
 use super::results::PaperError;
-use crate::sheet::encoded;
-use iltm_picture::progress::Progress;
+use iltm_picture::{png::encode_small, progress::Progress};
 use iltm_report::{
     bounces::{self, BouncesOptions},
     tradeoff::Tradeoff,
@@ -47,7 +46,7 @@ pub(super) fn pictures(folder: &Path, progress: &dyn Progress) -> Result<Sample,
             file("tradeoff.svg", picture.into_bytes()),
             file("tradeoff.csv", found.csv()),
             file("tradeoff.html", found.html().into_bytes()),
-            file("bounces.png", encoded(&sheet)),
+            file("bounces.png", encode_small(&sheet)),
         ],
         advice: found.advice(),
         shares: (share(0), share(1)),

@@ -2,9 +2,8 @@
 
 use super::scenes::Condition;
 use crate::acquisition::{Acquisition, Sparse};
-use crate::sheet::{Tile, sheet};
 use crate::{Found, Rig, Truth};
-use iltm_picture::{ColourScale, Palette, Picture, progress::Silent};
+use iltm_picture::{ColourScale, ContactSheet, Palette, Picture, Tile, progress::Silent};
 use iltm_runtime::FrameSize;
 use iltm_solve::{Method, inverted};
 use nalgebra::{DMatrix, DVector};
@@ -33,6 +32,7 @@ pub(super) struct Lit {
 #[must_use]
 pub(super) fn panels() -> Option<(Picture, Vec<Lit>)> {
     let (truth, rig) = Condition::ALL[0].world(1)?;
+    let size = FrameSize::of_grid(truth.grid);
     let found = found(Method::Direct, PHOTOGRAPHS, &rig, &truth)?;
     let mut lights = vec![(
         "flood".to_owned(),
@@ -57,11 +57,11 @@ pub(super) fn panels() -> Option<(Picture, Vec<Lit>)> {
         let error = (&seen - &wanted).norm() / wanted.norm();
         let bright = wanted.max();
         let tile = |words: (&str, &str), values: &DVector<f64>| {
-            Tile::light(words, truth.grid, values.iter().copied(), bright)
+            Tile::light(words, size, values.iter().copied(), bright)
         };
         let photograph = Tile::light(
             (&name, "photograph"),
-            truth.grid,
+            size,
             light.iter().copied(),
             light.max(),
         );
@@ -73,7 +73,11 @@ pub(super) fn panels() -> Option<(Picture, Vec<Lit>)> {
         rows[2].push(tile(("second bounce", "true"), &wanted));
         errors.push(Lit { name, error });
     }
-    Some((sheet(&rows, None)?, errors))
+    let sheet = ContactSheet {
+        rows,
+        ..ContactSheet::default()
+    };
+    Some((sheet.compose()?, errors))
 }
 
 /// Fig. 4: the second bounce under white by both methods, and where it errs.
@@ -86,13 +90,13 @@ pub(super) fn compared(condition: Condition) -> Option<Picture> {
     let size = FrameSize::of_grid(truth.grid);
     let mut first = vec![Tile::light(
         ("true", "second bounce"),
-        truth.grid,
+        size,
         wanted.iter().copied(),
         bright,
     )];
     let mut second = vec![Tile::light(
         ("flood", "photograph"),
-        truth.grid,
+        size,
         truth.flood().iter().copied(),
         truth.flood().max(),
     )];
@@ -109,7 +113,7 @@ pub(super) fn compared(condition: Condition) -> Option<Picture> {
         let title = format!("{name}, {photographs}");
         let caption = format!("error {error:.4}");
         let values = seen.iter().copied();
-        first.push(Tile::light((&title, &caption), truth.grid, values, bright));
+        first.push(Tile::light((&title, &caption), size, values, bright));
         let off = (&seen - wanted).map(|value| value.abs() / bright);
         let values = off.iter().copied();
         second.push(Tile::scaled(
@@ -119,13 +123,15 @@ pub(super) fn compared(condition: Condition) -> Option<Picture> {
             &scale,
         ));
     }
-    sheet(
-        &[first, second],
-        Some((
+    let sheet = ContactSheet {
+        rows: vec![first, second],
+        bar: Some((
             &scale,
             "error of the second bounce, relative to its brightest cell",
         )),
-    )
+        ..ContactSheet::default()
+    };
+    sheet.compose()
 }
 
 fn found(method: Method, photographs: usize, rig: &Rig, truth: &Truth) -> Option<DMatrix<f64>> {

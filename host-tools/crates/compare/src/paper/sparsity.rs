@@ -1,8 +1,7 @@
 //! Fig. 1: how few coefficients hold the energy of `T` and of `T^-1`.
 
 use super::scenes::Condition;
-use crate::sheet::{Tile, sheet};
-use iltm_picture::{ColourScale, Palette, Picture};
+use iltm_picture::{ColourScale, ContactSheet, Palette, Picture, Tile};
 use iltm_runtime::FrameSize;
 use iltm_solve::Haar;
 use nalgebra::DMatrix;
@@ -111,14 +110,15 @@ pub(super) fn picture() -> Option<Picture> {
         };
         Some(named.into_iter().map(tile).collect())
     };
-    let rows = [row(Condition::ALL[0])?, row(Condition::ALL[2])?];
-    sheet(
-        &rows,
-        Some((
+    let sheet = ContactSheet {
+        rows: vec![row(Condition::ALL[0])?, row(Condition::ALL[2])?],
+        bar: Some((
             &scale,
             "magnitude, relative to the matrix's largest; uniform panels above, textured below",
         )),
-    )
+        ..ContactSheet::default()
+    };
+    sheet.compose()
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ mod wall;
 pub use folder::{FileOf, Written, write};
 pub use noise::Noise;
 pub use separate::{Layer, LayerKind, MOST_BOUNCES, Separated};
-pub use sheet::{percent, sheet, times};
+pub use sheet::sheet;
 pub use wall::Wall;
 
 use iltm_capture::{CaptureError, CaptureOptions, Measurements, Shot, ShotLight};

@@ -4,11 +4,11 @@ use super::Content;
 use iltm_capture::FineFlood;
 use iltm_compile::{build_table::BuiltTable, clip_thresholds::ClipThresholds, gain::fine_gains};
 use iltm_picture::{
-    LightPicture, Picture, Samples,
-    html::{PictureFile, embedded, picture_file},
-    numbers::percent,
+    LightPicture, Picture,
+    canvas::Canvas,
+    html::{PictureFile, img, percent, picture_file},
 };
-use iltm_runtime::{FrameSize, image::Table};
+use iltm_runtime::image::Table;
 use iltm_video::{CompensateOptions, Compensator};
 use maud::{Markup, html};
 use std::ops::Range;
@@ -56,11 +56,11 @@ pub(super) fn section(
                 }
                 div .half {
                     figure {
-                        (embedded(&preview.still, "A frame with what is cut painted over"))
+                        (img(&preview.still.png, "A frame with what is cut painted over"))
                         figcaption { "A frame; red: brighter than the projector can, blue: darker than the light from elsewhere." }
                     }
                     figure {
-                        (embedded(&preview.map, "Share of frames that are cut"))
+                        (img(&preview.map.png, "Share of frames that are cut"))
                         figcaption { "All frames: the redder or bluer, the more of them are cut there." }
                     }
                 }
@@ -134,17 +134,13 @@ fn painted(
     under: &LightPicture,
 ) -> Picture {
     let [bright, dark] = thresholds.maps(white, frames);
-    let (size, shown) = (thresholds.size(), under.for_display());
-    let (width, height) = (shown.size().width(), shown.size().height());
-    let Samples::Eight(samples) = shown.samples() else {
-        unreachable!("screens get 8 bits");
-    };
-    let channels = shown.channels();
-    let pixel = |at: usize| {
-        let (x, y) = (at % width, at / width);
+    let size = thresholds.size();
+    let mut shown = Canvas::new(under.size(), [0; 3]);
+    shown.place(0, 0, &under.for_display());
+    let (width, height) = (under.size().width(), under.size().height());
+    Picture::from_fn(under.size(), |x, y| {
         let place = y * size.height() / height * size.width() + x * size.width() / width;
-        let own = &samples[at * channels..][..channels];
-        let own: [u8; 3] = std::array::from_fn(|colour| own[colour.min(channels - 1)]);
+        let own = shown.get(x, y);
         let (share, over) = if bright[place] > 0.0 {
             (bright[place], BRIGHT)
         } else {
@@ -160,11 +156,5 @@ fn painted(
             let (below, above) = (f64::from(own[colour]), f64::from(over[colour]));
             (below + cover * (above - below)).round() as u8
         })
-    };
-    let all: Vec<u8> = (0..shown.size().pixels()).flat_map(pixel).collect();
-    let size: FrameSize = shown.size();
-    match Picture::new(size, Samples::Eight(all)) {
-        Some(picture) => picture,
-        None => unreachable!("three samples for each pixel"),
-    }
+    })
 }

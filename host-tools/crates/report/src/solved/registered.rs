@@ -4,8 +4,7 @@ use iltm_capture::NO_CELL;
 use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
     canvas::Canvas,
-    html::{PictureFile, embedded, picture_file},
-    numbers::percent,
+    html::{PictureFile, img, percent, picture_file},
 };
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
@@ -54,7 +53,7 @@ pub(super) fn section(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Mar
             }
         }
         @if let Some(file) = &file {
-            figure { (embedded(file, "Cells as the camera sees them")) figcaption { "The camera's picture, coloured by cell." } }
+            figure { (img(&file.png, "Cells as the camera sees them")) figcaption { "The camera's picture, coloured by cell." } }
         }
     } };
     files.extend(file);

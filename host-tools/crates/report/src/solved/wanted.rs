@@ -62,30 +62,22 @@ fn natural(grid: Grid, channels: usize) -> Wanted {
     let side = |cells: usize| (cells * factor) as u16;
     let fine = Grid::new(side(grid.rows()), side(grid.cols())).unwrap_or(grid);
     let images = natural_images(fine);
-    let plane = |channel: usize| {
-        let cells = images.column(0).into_iter().zip(images.column(1 + channel));
-        let light = cells.map(|(common, own)| {
-            let light = if channels == 1 {
-                *common
-            } else {
-                0.6 * common + 0.4 * own
-            };
-            (DARKEST_SHOWN + (1.0 - DARKEST_SHOWN) * light) as f32
-        });
-        light.collect()
-    };
-    let planes = (0..channels).map(plane).collect();
-    let picture = LightPicture::new(FrameSize::of_grid(fine), planes);
+    let picture = LightPicture::from_fn(FrameSize::of_grid(fine), channels, |channel, cell| {
+        let common = images[(cell, 0)];
+        let light = if channels == 1 {
+            common
+        } else {
+            0.6 * common + 0.4 * images[(cell, 1 + channel)]
+        };
+        (DARKEST_SHOWN + (1.0 - DARKEST_SHOWN) * light) as f32
+    });
     Wanted {
         name: "natural",
         title: "Like a photograph".to_owned(),
         remark:
             "Surfaces of all sizes before each other, which have the statistics of natural images."
                 .to_owned(),
-        picture: match picture {
-            Some(picture) => picture.for_display(),
-            None => unreachable!("one or three planes of the grid's cells"),
-        },
+        picture: picture.for_display(),
     }
 }
 
@@ -108,14 +100,9 @@ fn of_channels(picture: Picture, channels: usize) -> Picture {
         return picture;
     }
     let light = LightPicture::decode(&picture, iltm_picture::Response::Srgb);
-    let pixels = 0..light.size().pixels();
     let mean = |pixel: usize| {
         let colours = light.planes().iter().map(|plane| plane[pixel]);
         colours.sum::<f32>() / light.planes().len() as f32
     };
-    let grey = LightPicture::new(light.size(), vec![pixels.map(mean).collect()]);
-    match grey {
-        Some(grey) => grey.for_display(),
-        None => unreachable!("a value for each pixel"),
-    }
+    LightPicture::from_fn(light.size(), 1, |_, pixel| mean(pixel)).for_display()
 }

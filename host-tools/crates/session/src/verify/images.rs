@@ -7,7 +7,7 @@
 
 use super::Expected;
 use iltm_capture::CellPlanes;
-use iltm_picture::{Picture, Samples};
+use iltm_picture::Picture;
 use iltm_runtime::{FrameSize, Grid, image::Table};
 use iltm_solve::wanted_images;
 use iltm_video::{CompensateOptions, Compensator, VideoError};
@@ -140,10 +140,7 @@ fn codes(grid: Grid, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Picture 
         let light = dark + (bright - dark) * shape;
         (iltm_picture::Response::Srgb.value(light) * 255.0).round() as u8
     };
-    let cells = 0..grid.cells();
-    let samples = cells.flat_map(|cell| shape.iter().map(move |plane| code(plane[cell])));
-    match Picture::new(FrameSize::of_grid(grid), Samples::Eight(samples.collect())) {
-        Some(picture) => picture,
-        None => unreachable!("a sample for each cell and channel"),
-    }
+    Picture::of_codes(FrameSize::of_grid(grid), shape.len(), |cell, channel| {
+        code(shape[channel][cell])
+    })
 }

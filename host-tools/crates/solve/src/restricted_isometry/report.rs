@@ -4,6 +4,7 @@ use super::super::forward::Inverse;
 use super::super::haar::Haar;
 use super::sensing::Transported;
 use super::{LIMIT, RecoveryBounds, Sampling, Sensing, signed};
+use iltm_picture::numbers::number;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -122,14 +123,6 @@ impl Recovery {
         lines.extend(why.lines().map(str::to_owned));
         lines.push(so);
         lines
-    }
-}
-
-fn number(value: f64) -> String {
-    match value {
-        v if v < 100.0 => format!("{v:.1}"),
-        v if v < 1e4 => format!("{v:.0}"),
-        v => format!("{v:.0e}"),
     }
 }
 
