@@ -67,7 +67,7 @@ fn versions() -> Value {
         "system": std::env::consts::OS,
         "machine": std::env::consts::ARCH,
         "release": fs::read_to_string("/etc/os-release").ok(),
-        "time": jiff::Zoned::now().to_string(),
+        "time": chrono::Local::now().to_rfc3339(),
     })
 }
 

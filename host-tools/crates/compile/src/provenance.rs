@@ -96,7 +96,7 @@ impl Provenance {
             name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
         };
         let scene = measurements.settings.scene.name.clone();
-        let date = jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC");
+        let date = chrono::Utc::now().format("%Y-%m-%d %H:%M:%S UTC");
         let failed = measurements.diagnostics.gates.iter();
         let failed = failed.filter(|gate| gate.fails());
         let mixing = measurements.devices.mixing().map(|mixing| mixing.matrix);

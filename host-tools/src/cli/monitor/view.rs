@@ -2,9 +2,9 @@
 
 use super::super::words;
 use super::event::MonitorEvent;
+use chrono::Local;
 use console::{StyledObject, style, truncate_str};
 use iltm_runtime::link::{Event, Hello, Mode, Status};
-use jiff::Zoned;
 use std::collections::VecDeque;
 
 /// Events and log lines that are kept: more than any terminal has rows.
@@ -114,7 +114,7 @@ impl View {
     }
 
     fn event(&mut self, event: &MonitorEvent) {
-        let time = Zoned::now().strftime("%H:%M:%S").to_string();
+        let time = Local::now().format("%H:%M:%S").to_string();
         let words = style(event.words().unwrap_or_default());
         let words = match event {
             MonitorEvent::Device(Event::Fault(_)) | MonitorEvent::Lost(_) => words.red(),
