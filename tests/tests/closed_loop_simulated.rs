@@ -7,7 +7,7 @@ use iltm::content::natural_images;
 use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
+use iltm::scene::{Effect, Forced, Simulation, SimulationOptions, VirtualCamera, folder};
 use iltm::solve::SolveOptions;
 
 use nalgebra::DMatrix;
@@ -35,8 +35,8 @@ fn errors(scene: &Scene) -> (usize, f64, f64) {
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
     let patterns = shown(simulation.grid(), 150, 3);
-    let shooting = Shooting::new(scene, &simulation, 3).unwrap();
-    folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    let camera = VirtualCamera::new(scene, &simulation, 3).unwrap();
+    folder::write(&camera, &patterns, &capture, &Silent).unwrap();
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
     let learned = learn(&capture, &photographs, &solve, None, &Silent).unwrap();
     let inverse = &learned.inverse;

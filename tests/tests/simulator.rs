@@ -6,10 +6,11 @@ use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
+use iltm::scene::{Effect, Forced, Simulation, SimulationOptions, VirtualCamera, folder};
 use iltm::solve::SolveOptions;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use strum::IntoEnumIterator;
 
 fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/scenes")
@@ -135,7 +136,7 @@ fn a_flat_scene_costs_as_little_as_a_diagonal() {
     assert_eq!(simulation.patches(), simulation.grid().cells());
     assert_eq!(simulation.work().lit, simulation.grid().cells());
     assert_eq!(simulation.work().exchanged, 0);
-    for effect in Effect::ALL {
+    for effect in Effect::iter() {
         let on = simulation
             .decisions()
             .iter()
@@ -155,8 +156,8 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
     let patterns = shown(simulation.grid(), 60, 1);
-    let shooting = Shooting::new(&scene, &simulation, 1).unwrap();
-    let written = folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
+    let written = folder::write(&camera, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());
     let learned = learn(
         &capture,
@@ -181,7 +182,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     );
     // The same seed gives the same bytes.
     let again = place.path().join("again");
-    folder::write(&shooting, &patterns, &again, &Silent).unwrap();
+    folder::write(&camera, &patterns, &again, &Silent).unwrap();
     for name in ["photos/000.png", "photos/050.png", "capture.csv"] {
         let read = |folder: &Path| std::fs::read(folder.join(name)).unwrap();
         assert_eq!(read(&capture), read(&again), "{name}");

@@ -6,8 +6,8 @@ use iltm::capture::{CaptureOptions, NO_CELL, Registration, Settings, shown};
 use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::retake;
-use iltm::scene::{Effect, Forced, Shooting, Simulation, SimulationOptions, folder};
+use iltm::scene::fill_capture;
+use iltm::scene::{Effect, Forced, Simulation, SimulationOptions, VirtualCamera, folder};
 use iltm::session::Layout;
 use iltm::solve::SolveOptions;
 use iltm::verify::{Session, Verdict, VerifyError, WhiteChange, judge, write};
@@ -36,9 +36,9 @@ fn white_of(verdict: &Verdict) -> &WhiteChange {
 fn learned(scene: &Scene, place: &Path) -> Learned {
     let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
     let capture = place.join("capture");
-    let shooting = Shooting::new(scene, &simulation, 3).unwrap();
+    let camera = VirtualCamera::new(scene, &simulation, 3).unwrap();
     let patterns = shown(simulation.grid(), 100, 3);
-    folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    folder::write(&camera, &patterns, &capture, &Silent).unwrap();
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
     learn(&capture, &photographs, &solve, None, &Silent).unwrap()
 }
@@ -54,9 +54,9 @@ fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
     };
     write(&table, &layout, &settings, folder, &Silent).unwrap();
     let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
-    let shooting = Shooting::new(scene, &simulation, 11).unwrap();
-    let session = retake::Session::read(folder, simulation.grid()).unwrap();
-    session.take_missing(&shooting, &Silent).unwrap();
+    let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
+    let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();
+    session.take_missing(&camera, &Silent).unwrap();
 }
 
 fn verdict(learned: &Learned, folder: &Path) -> Result<Verdict, VerifyError> {

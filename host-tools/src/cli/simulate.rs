@@ -6,11 +6,11 @@ use super::output::{Output, cannot_write};
 use super::progress::progress;
 use crate::capture::shown;
 use crate::scene::ablation::{Ablated, ablate};
-use crate::scene::description::{Scene, SceneError};
-use crate::scene::folder::{self, CaptureFolderError, Written};
-use crate::scene::retake::{RetakeError, Session};
+use crate::scene::description::{Scene, SceneError, SceneProblem};
+use crate::scene::fill_capture::{FillCaptureError, UnfilledCapture};
+use crate::scene::folder::{self, CaptureFolderError, SimulatedCapture};
 use crate::scene::{
-    Decision, Effect, Forced, Shooting, Simulation, SimulationError, SimulationOptions,
+    Decision, Effect, Forced, Simulation, SimulationError, SimulationOptions, VirtualCamera,
 };
 use iltm_picture::{FolderError, numbers::percent, progress::Progress};
 use serde_json::{Value, json};
@@ -51,15 +51,15 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     let mut written = None;
     let mut taken = None;
     if arguments.output.is_some() || arguments.photograph.is_some() {
-        let shooting = Shooting::new(&scene, &simulation, arguments.seed);
-        let shooting = shooting.map_err(|error| unsimulated(&error))?;
-        let shooting = shooting.with_faults(&arguments.fault);
+        let camera = VirtualCamera::new(&scene, &simulation, arguments.seed);
+        let camera = camera.map_err(|error| unsimulated(&error))?;
+        let camera = camera.with_faults(&arguments.fault);
         if let Some(folder) = &arguments.photograph {
-            let count = photograph(arguments, folder, &shooting, bars.as_ref());
+            let count = photograph(arguments, folder, &camera, bars.as_ref());
             taken = Some(count.map_err(|error| not_taken(&error))?);
         } else if let Some(out) = &arguments.output {
             let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
-            let done = folder::write(&shooting, &patterns, out, bars.as_ref());
+            let done = folder::write(&camera, &patterns, out, bars.as_ref());
             written = Some(done.map_err(untaken)?);
         }
     }
@@ -124,30 +124,30 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
 fn photograph(
     arguments: &Simulate,
     folder: &Path,
-    shooting: &Shooting<'_>,
+    camera: &VirtualCamera<'_>,
     progress: &dyn Progress,
-) -> Result<usize, RetakeError> {
-    let session = Session::read(folder, shooting.grid())?;
+) -> Result<usize, FillCaptureError> {
+    let session = UnfilledCapture::read(folder, camera.grid())?;
     match (arguments.shot, &arguments.output) {
-        (Some(index), Some(file)) => session.take_one(shooting, index, file).map(|()| 1),
-        _ => session.take_missing(shooting, progress),
+        (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),
+        _ => session.take_missing(camera, progress),
     }
 }
 
-fn not_taken(error: &RetakeError) -> Failure {
+fn not_taken(error: &FillCaptureError) -> Failure {
     let kind = match error {
-        RetakeError::Capture(error) => {
+        FillCaptureError::Capture(error) => {
             return Failure::new(kind_of(error), error, error.next_step());
         }
-        RetakeError::Simulation(error) => return unsimulated(error),
-        RetakeError::Pattern { .. } => Kind::Capture,
-        RetakeError::NoIndex { .. } | RetakeError::Missed { .. } => Kind::Usage,
-        RetakeError::Io { .. } => Kind::Write,
+        FillCaptureError::Simulation(error) => return unsimulated(error),
+        FillCaptureError::Pattern { .. } => Kind::Capture,
+        FillCaptureError::NoIndex { .. } | FillCaptureError::Missed { .. } => Kind::Usage,
+        FillCaptureError::Io { .. } => Kind::Write,
     };
     Failure::new(kind, error, error.next_step())
 }
 
-fn bounces(written: Written) -> String {
+fn bounces(written: SimulatedCapture) -> String {
     match written.bounces {
         0 => "no bounces,".to_owned(),
         1 => "1 bounce,".to_owned(),
@@ -157,7 +157,7 @@ fn bounces(written: Written) -> String {
 
 fn effect(decision: &Decision) -> Value {
     json!({
-        "effect": decision.effect.name(),
+        "effect": decision.effect.to_string(),
         "on": decision.on,
         "forced": decision.forced,
         "reason": decision.reason,
@@ -204,7 +204,7 @@ fn explain(simulation: &Simulation<'_>, decisions: &[Decision], text: &mut Strin
 
 fn difference(ablated: &Ablated) -> Value {
     json!({
-        "effect": ablated.effect.name(),
+        "effect": ablated.effect.to_string(),
         "on": ablated.on,
         "error": ablated.error,
         "largest": ablated.largest,
@@ -234,8 +234,8 @@ fn differences(ablated: &[Ablated], text: &mut String) {
 }
 
 pub(super) fn unreadable(error: &SceneError) -> Failure {
-    let kind = match error {
-        SceneError::Io { .. } => Kind::Read,
+    let kind = match error.problem {
+        SceneProblem::Io(_) => Kind::Read,
         _ => Kind::Scene,
     };
     Failure::new(kind, error, error.next_step())

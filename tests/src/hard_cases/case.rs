@@ -3,7 +3,7 @@
 use super::closed_loop::{LoopErrors, errors};
 use super::theory;
 use crate::hard_cases::observations::Capture;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::{Compensation, SolveError, gain_only};
 
 /// One hard case.
@@ -88,7 +88,7 @@ pub struct Demand {
 /// What is chosen may never be worse than gain alone or nothing.
 #[must_use]
 pub fn closed_loop(
-    scene: &Scene,
+    scene: &CoaxialScene,
     seeds: u64,
     demand: Demand,
     make: impl Fn(u64) -> Capture,
@@ -147,7 +147,7 @@ pub fn closed_loop(
 /// Error of what `iltm solve` would write, all errors, what it is and the cells
 /// that took part.
 fn loop_of(
-    scene: &Scene,
+    scene: &CoaxialScene,
     capture: &Capture,
 ) -> Result<(f64, LoopErrors, Compensation, Vec<bool>), SolveError> {
     let (inverse, report) = capture.solve()?;

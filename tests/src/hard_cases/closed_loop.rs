@@ -2,7 +2,7 @@
 
 use iltm::compile::white::reference_white;
 use iltm::content::wanted_images;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
 
@@ -30,7 +30,7 @@ pub struct LoopErrors {
 /// cannot show their edges at all; there the wanted images are those that it
 /// makes of natural ones.
 #[must_use]
-pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
+pub fn errors(scene: &CoaxialScene, found: &InverseTransport) -> LoopErrors {
     let transport = scene.transport();
     let judged: Vec<bool> = (0..scene.grid.cells())
         .map(|cell| found.live[cell] && scene.coverage[cell] > 1e-9)
