@@ -6,7 +6,7 @@ use iltm::capture::{CaptureOptions, NO_CELL, Registration, shown};
 
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Forced, Shooting, Simulation, SimulationOptions, folder};
+use iltm::scene::{Forced, Simulation, SimulationOptions, VirtualCamera, folder};
 use iltm::solve::SolveOptions;
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ pub fn simulation(scene: &Scene, forced: Forced) -> Simulation<'_> {
 pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
     let simulation = simulation(scene, Forced::default());
     let patterns = shown(simulation.grid(), bernoulli, seed);
-    let shooting = Shooting::new(scene, &simulation, seed).expect("light");
+    let shooting = VirtualCamera::new(scene, &simulation, seed).expect("light");
     folder::write(&shooting, &patterns, capture, &Silent).expect("written");
 }
 

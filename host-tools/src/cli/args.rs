@@ -5,7 +5,7 @@ use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
-use crate::scene::{Effect, Fault};
+use crate::scene::{Effect, InjectedFault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
@@ -115,7 +115,7 @@ pub(super) struct Simulate {
     /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
     /// larger than usual; may be repeated
     #[arg(long, value_name = "FAULT")]
-    pub(super) fault: Vec<Fault>,
+    pub(super) fault: Vec<InjectedFault>,
     /// Say which effects are simulated and why
     #[arg(long)]
     pub(super) explain: bool,

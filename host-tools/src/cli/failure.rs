@@ -11,7 +11,7 @@ use crate::device::DeviceError;
 use crate::device::logs::LogsError;
 use crate::device::upload::UploadError;
 use crate::scene::SimulationError;
-use crate::scene::description::SceneError;
+use crate::scene::description::{SceneError, SceneProblem};
 use crate::scene::folder::CaptureFolderError;
 use crate::session::{PatternsError, SessionError};
 use crate::solve::SolveError;
@@ -406,8 +406,8 @@ impl From<VideoError> for Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
-        let kind = match error {
-            SceneError::Io { .. } => Kind::Read,
+        let kind = match error.problem {
+            SceneProblem::Io(_) => Kind::Read,
             _ => Kind::Scene,
         };
         Self::new(kind, &error, error.next_step())

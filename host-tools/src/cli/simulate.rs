@@ -7,9 +7,9 @@ use super::progress::progress;
 use crate::capture::shown;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::Scene;
-use crate::scene::folder::{self, Written};
-use crate::scene::retake::{RetakeError, Session};
-use crate::scene::{Decision, Forced, Shooting, Simulation, SimulationOptions};
+use crate::scene::fill_capture::{FillCaptureError, UnfilledCapture};
+use crate::scene::folder::{self, SimulatedCapture};
+use crate::scene::{Decision, Forced, Simulation, SimulationOptions, VirtualCamera};
 use iltm_picture::{numbers::percent, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -100,7 +100,7 @@ fn forced(arguments: &Simulate) -> Forced {
 enum Shot<'a> {
     Nothing,
     /// A capture folder, made anew.
-    Capture(&'a Path, Written),
+    Capture(&'a Path, SimulatedCapture),
     /// So many photographs of those that a folder calls for.
     Missing(&'a Path, usize),
 }
@@ -111,7 +111,7 @@ fn shoot<'a>(
     simulation: &Simulation<'_>,
     progress: &dyn Progress,
 ) -> Result<Shot<'a>, Failure> {
-    let shooting = || Shooting::new(scene, simulation, arguments.seed);
+    let shooting = || VirtualCamera::new(scene, simulation, arguments.seed);
     let shooting = || shooting().map(|shooting| shooting.with_faults(&arguments.fault));
     if let Some(folder) = &arguments.photograph {
         let taken = photograph(arguments, folder, &shooting()?, progress).map_err(not_taken)?;
@@ -129,28 +129,28 @@ fn shoot<'a>(
 fn photograph(
     arguments: &Simulate,
     folder: &Path,
-    shooting: &Shooting<'_>,
+    camera: &VirtualCamera<'_>,
     progress: &dyn Progress,
-) -> Result<usize, RetakeError> {
-    let session = Session::read(folder, shooting.grid())?;
+) -> Result<usize, FillCaptureError> {
+    let session = UnfilledCapture::read(folder, camera.grid())?;
     match (arguments.shot, &arguments.output) {
-        (Some(index), Some(file)) => session.take_one(shooting, index, file).map(|()| 1),
-        _ => session.take_missing(shooting, progress),
+        (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),
+        _ => session.take_missing(camera, progress),
     }
 }
 
-fn not_taken(error: RetakeError) -> Failure {
+fn not_taken(error: FillCaptureError) -> Failure {
     let kind = match error {
-        RetakeError::Capture(error) => return error.into(),
-        RetakeError::Simulation(error) => return error.into(),
-        RetakeError::Pattern { .. } => Kind::Capture,
-        RetakeError::NoIndex { .. } | RetakeError::Missed { .. } => Kind::Usage,
-        RetakeError::Io { .. } => Kind::Write,
+        FillCaptureError::Capture(error) => return error.into(),
+        FillCaptureError::Simulation(error) => return error.into(),
+        FillCaptureError::Pattern { .. } => Kind::Capture,
+        FillCaptureError::NoIndex { .. } | FillCaptureError::Missed { .. } => Kind::Usage,
+        FillCaptureError::Io { .. } => Kind::Write,
     };
     Failure::new(kind, &error, error.next_step())
 }
 
-fn bounces(written: Written) -> String {
+fn bounces(written: SimulatedCapture) -> String {
     match written.bounces {
         0 => "no bounces,".to_owned(),
         1 => "1 bounce,".to_owned(),
@@ -160,7 +160,7 @@ fn bounces(written: Written) -> String {
 
 fn effect(decision: &Decision) -> Value {
     json!({
-        "effect": decision.effect.name(),
+        "effect": decision.effect.to_string(),
         "on": decision.on,
         "forced": decision.forced,
         "reason": decision.reason,
@@ -207,7 +207,7 @@ fn explain(simulation: &Simulation<'_>, decisions: &[Decision], text: &mut Strin
 
 fn difference(ablated: &Ablated) -> Value {
     json!({
-        "effect": ablated.effect.name(),
+        "effect": ablated.effect.to_string(),
         "on": ablated.on,
         "error": ablated.error,
         "largest": ablated.largest,

@@ -23,12 +23,12 @@ fn main() {
     };
     say(&rig.session(None));
     let mut all = Vec::new();
-    for (mishap, what, sizes) in tried() {
-        if !words.is_empty() && !words.iter().any(|word| mishap.name().contains(word)) {
+    for (kind, what, sizes) in tried() {
+        if !words.is_empty() && !words.iter().any(|word| kind.to_string().contains(word)) {
             continue;
         }
         let sessions = sizes.into_iter().map(|size| {
-            let session = rig.session(Some(iltm::scene::Fault { mishap, size }));
+            let session = rig.session(Some(iltm::scene::InjectedFault { kind, size }));
             say(&session);
             session
         });

@@ -3,7 +3,7 @@
 use super::closed_loop::{LoopErrors, errors};
 use super::theory;
 use crate::hard_cases::observations::Capture;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::{Compensation, SolveError, gain_only};
 
 /// One hard case.
@@ -84,7 +84,7 @@ pub struct Demand {
 /// alone or refusal as predicted, and holds the closed loop against its bound.
 /// What is chosen may never be worse than gain alone or nothing.
 pub fn closed_loop(
-    scene: &Scene,
+    scene: &CoaxialScene,
     seeds: u64,
     demand: Demand,
     make: impl Fn(u64) -> Capture,
@@ -143,7 +143,7 @@ pub fn closed_loop(
 /// Error of what `iltm solve` would write, all errors, what it is and the cells
 /// that took part.
 fn loop_of(
-    scene: &Scene,
+    scene: &CoaxialScene,
     capture: &Capture,
 ) -> Result<(f64, LoopErrors, Compensation, Vec<bool>), SolveError> {
     let (inverse, report) = capture.solve()?;

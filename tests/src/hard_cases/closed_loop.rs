@@ -1,7 +1,7 @@
 //! Closed loop: how far the picture on the wall is from the wanted one.
 
 use iltm::compile::reference_white::uniform_white;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::InverseTransport;
 use iltm::solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
@@ -29,7 +29,7 @@ pub struct LoopErrors {
 /// white: walls that light each other cannot be darker. A projector out of focus
 /// cannot show their edges at all; there the wanted images are those that it
 /// makes of natural ones.
-pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
+pub fn errors(scene: &CoaxialScene, found: &InverseTransport) -> LoopErrors {
     let transport = scene.transport();
     let judged: Vec<bool> = (0..scene.grid.cells())
         .map(|cell| found.live[cell] && scene.coverage[cell] > 1e-9)

@@ -1,9 +1,9 @@
-//! Observations of a [`Scene`] for a solver: patterns as a real capture has them, and
+//! Observations of a [`CoaxialScene`] for a solver: patterns as a real capture has them, and
 //! what a noisy camera makes of them.
 
 use iltm::capture::{Pattern, Role};
 use iltm::progress::Silent;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::{
     CellNoise, InverseTransport, Observed, ObservedChannel, SolveError, SolveOptions, SolveReport,
     blur, solve_observed,
@@ -35,7 +35,7 @@ pub struct Capture {
 impl Capture {
     /// White, Gray code with its inverses, and `bernoulli` random patterns,
     /// without noise.
-    pub fn new(scene: &Scene, bernoulli: usize, seed: u64) -> Self {
+    pub fn new(scene: &CoaxialScene, bernoulli: usize, seed: u64) -> Self {
         let (patterns, roles) = sequence(scene.grid, bernoulli, seed);
         let light = vec![scene.transport() * &patterns];
         Self {
@@ -154,7 +154,7 @@ pub fn sequence(grid: Grid, bernoulli: usize, seed: u64) -> (DMatrix<f64>, Vec<R
 
 /// A scene whose projector is out of focus: a Gaussian of `deviation` cells, integrated
 /// over each cell; what falls beside the frame is lost.
-pub fn out_of_focus(scene: Scene, deviation: f64) -> Scene {
+pub fn out_of_focus(scene: CoaxialScene, deviation: f64) -> CoaxialScene {
     let blur = blur(scene.grid, deviation);
     scene.blurred(blur)
 }

@@ -18,7 +18,7 @@
 //! inverse to the wall. `tolerance` is the relative residual at which the solver
 //! stops.
 
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::natural_images;
 use iltm::solve::{Haar, SolveOptions};
 use nalgebra::DMatrix;
@@ -31,7 +31,13 @@ pub fn condition(transport: &DMatrix<f64>, live: &[bool]) -> f64 {
 
 /// Bound on the closed loop's error; `photographs` are all that the solver uses,
 /// `noise` is relative to the light's root mean square.
-pub fn bound(scene: &Scene, live: &[bool], photographs: usize, noise: f64, perfect: f64) -> f64 {
+pub fn bound(
+    scene: &CoaxialScene,
+    live: &[bool],
+    photographs: usize,
+    noise: f64,
+    perfect: f64,
+) -> f64 {
     let transport = scene.transport();
     let cells = live.iter().filter(|live| **live).count() as f64;
     let m = photographs as f64;
@@ -60,7 +66,7 @@ struct Tails<'t> {
 }
 
 impl<'t> Tails<'t> {
-    fn new(scene: &Scene, transport: &DMatrix<f64>, live: &'t [bool]) -> Self {
+    fn new(scene: &CoaxialScene, transport: &DMatrix<f64>, live: &'t [bool]) -> Self {
         let chosen = chosen(live);
         let haar = Haar::new(scene.grid);
         let coefficients = part(transport, live).try_inverse().map(|inverse| {

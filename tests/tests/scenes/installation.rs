@@ -7,7 +7,9 @@ use iltm::build_table::BuiltTable;
 use iltm::capture::{self, CameraSettings, CaptureOptions, GateName, Settings};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Fault, Forced, Mishap, Shooting, Simulation, retake};
+use iltm::scene::{
+    CaptureFault, Effect, Forced, InjectedFault, Simulation, VirtualCamera, fill_capture,
+};
 use iltm::session::{self, Layout, OrderOptions, order};
 use iltm::verify;
 use iltm_runtime::FrameSize;
@@ -15,6 +17,7 @@ use iltm_runtime::image::Table;
 use iltm_tests::gates::Session;
 use iltm_tests::simulated::{self, simulation};
 use std::path::Path;
+use strum::IntoEnumIterator;
 
 const PROJECTOR: (u16, u16) = (320, 240);
 
@@ -31,7 +34,12 @@ fn camera(scene: &Scene) -> CameraSettings {
 }
 
 /// Makes the slides of a session, as `iltm patterns` does, and photographs them.
-fn photographed(simulation: &Simulation<'_>, scene: &Scene, faults: &[Fault], folder: &Path) {
+fn photographed(
+    simulation: &Simulation<'_>,
+    scene: &Scene,
+    faults: &[InjectedFault],
+    folder: &Path,
+) {
     let grid = simulation.grid();
     let options = OrderOptions {
         bernoulli: 60,
@@ -42,26 +50,26 @@ fn photographed(simulation: &Simulation<'_>, scene: &Scene, faults: &[Fault], fo
     let layout = Layout::new(grid, size, 0).unwrap();
     let slides = order(grid, &options);
     session::write(&slides, &layout, &camera(scene), folder, &Silent).unwrap();
-    let shooting = Shooting::new(scene, simulation, 5).unwrap();
-    let shooting = shooting.with_faults(faults);
-    let session = retake::Session::read(folder, grid).unwrap();
-    session.take_missing(&shooting, &Silent).unwrap();
+    let camera = VirtualCamera::new(scene, simulation, 5).unwrap();
+    let camera = camera.with_faults(faults);
+    let session = fill_capture::UnfilledCapture::read(folder, grid).unwrap();
+    session.take_missing(&camera, &Silent).unwrap();
 }
 
-/// Gates of which one must refuse a session with a mishap, and a word that its sentence or
+/// Gates of which one must refuse a session with a kind, and a word that its sentence or
 /// its next step must have.
-fn named_by(mishap: Mishap) -> (&'static [GateName], &'static [&'static str]) {
+fn named_by(kind: CaptureFault) -> (&'static [GateName], &'static [&'static str]) {
     use GateName as G;
-    match mishap {
-        Mishap::Gamma => (&[G::Superposition, G::Response], &["gamma"]),
-        Mishap::AutoExposure => (&[G::Superposition], &["automatic exposure"]),
-        Mishap::Tripod => (&[G::Movement], &["moved"]),
-        Mishap::Swapped => (&[G::Order], &["exchanged"]),
-        Mishap::Dropped => (&[G::Complete], &["missing"]),
-        Mishap::Skipped => (&[G::Order], &["missing", "never taken", "late"]),
-        Mishap::Clipped => (&[G::Saturation], &["clipped"]),
-        Mishap::Vivid => (&[G::Superposition, G::Response], &["vivid"]),
-        Mishap::Flicker => (&[G::Flicker], &["flicker", "bands"]),
+    match kind {
+        CaptureFault::Gamma => (&[G::Superposition, G::Response], &["gamma"]),
+        CaptureFault::AutoExposure => (&[G::Superposition], &["automatic exposure"]),
+        CaptureFault::Tripod => (&[G::Movement], &["moved"]),
+        CaptureFault::Swapped => (&[G::Order], &["exchanged"]),
+        CaptureFault::Dropped => (&[G::Complete], &["missing"]),
+        CaptureFault::Skipped => (&[G::Order], &["missing", "never taken", "late"]),
+        CaptureFault::Clipped => (&[G::Saturation], &["clipped"]),
+        CaptureFault::Vivid => (&[G::Superposition, G::Response], &["vivid"]),
+        CaptureFault::Flicker => (&[G::Flicker], &["flicker", "bands"]),
     }
 }
 
@@ -70,9 +78,9 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
     let scene = scene(&[]);
     let simulation = simulation(&scene, Forced::default());
     let place = tempfile::tempdir().unwrap();
-    let examined = |fault: Option<Fault>, name: &str| {
+    let examined = |fault: Option<InjectedFault>, name: &str| {
         let folder = place.path().join(name);
-        let faults: Vec<Fault> = fault.into_iter().collect();
+        let faults: Vec<InjectedFault> = fault.into_iter().collect();
         photographed(&simulation, &scene, &faults, &folder);
         let examined = capture::examine(&folder, &CaptureOptions::default(), &Silent);
         let gates = examined.unwrap().gates;
@@ -82,23 +90,23 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
     let failed: Vec<_> = good.gates.iter().filter(|gate| gate.fails()).collect();
     assert!(failed.is_empty(), "{failed:#?}");
     let mut silent = Vec::new();
-    for mishap in Mishap::ALL {
+    for kind in CaptureFault::iter() {
         // The usual fault, a gamma of 2.2, is what sRGB nearly is.
-        let fault = match mishap {
-            Mishap::Gamma => Fault { mishap, size: 1.4 },
-            mishap => mishap.into(),
+        let fault = match kind {
+            CaptureFault::Gamma => InjectedFault { kind, size: 1.4 },
+            kind => kind.into(),
         };
-        let session = examined(Some(fault), mishap.name());
-        let (gates, words) = named_by(mishap);
+        let session = examined(Some(fault), &kind.to_string());
+        let (gates, words) = named_by(kind);
         let named = session.gates.iter().any(|gate| {
             let said = format!("{} {}", gate.what, gate.next_step).to_lowercase();
             gate.fails() && gates.contains(&gate.name) && words.iter().any(|w| said.contains(w))
         });
         for gate in session.gates.iter().filter(|gate| gate.fails()) {
-            println!("{mishap}: {} {}: {}", gate.name, gate.number, gate.what);
+            println!("{kind}: {} {}: {}", gate.name, gate.number, gate.what);
         }
         if !named {
-            silent.push(mishap);
+            silent.push(kind);
         }
     }
     assert!(silent.is_empty(), "not named: {silent:?}");
@@ -122,8 +130,8 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
     verify::write(&table, &layout, &settings, &folder, &Silent).unwrap();
     let quiet = Forced::default().with(Effect::Noise, false);
     let simulation = simulation(laboratory, quiet);
-    let shooting = Shooting::new(laboratory, &simulation, 11).unwrap();
-    let session = retake::Session::read(&folder, table.grid()).unwrap();
+    let shooting = VirtualCamera::new(laboratory, &simulation, 11).unwrap();
+    let session = fill_capture::UnfilledCapture::read(&folder, table.grid()).unwrap();
     session.take_missing(&shooting, &Silent).unwrap();
     let session = verify::Session::read(&folder, &table, &Silent).unwrap();
     let verdict = verify::judge(&folder, &table, &session, None).unwrap();

@@ -2,7 +2,7 @@
 //! is `docs/results`.
 
 use iltm::compare::paper::Condition;
-use iltm::compare::paper::seeds::{Sample, run};
+use iltm::compare::paper::seeds::{DrawErrors, run};
 use iltm::compare::{acquisition, inversion};
 use iltm::progress::Silent;
 use iltm::solve::Method;
@@ -15,7 +15,7 @@ const DIRECT: (Method, usize) = (Method::Direct, 120);
 const DIRECT_MORE: (Method, usize) = (Method::Direct, 150);
 const OURS: (Method, usize) = (Method::Joint, 50);
 
-fn of(samples: &[Sample], condition: Condition, entry: (Method, usize)) -> &Sample {
+fn of(samples: &[DrawErrors], condition: Condition, entry: (Method, usize)) -> &DrawErrors {
     let found = samples
         .iter()
         .find(|s| s.condition == condition && (s.method, s.photographs) == entry);
@@ -48,9 +48,11 @@ fn the_page_of_results_names_every_method_with_its_source() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results/README.md");
     let page = std::fs::read_to_string(path).expect("it is part of the repository");
     let photographed = acquisition::all(150, 1);
-    let photographed = photographed.iter().map(|m| (m.name(), m.source()));
+    let photographed = photographed
+        .iter()
+        .map(|m| (m.name(), m.description().source));
     let inverted = inversion::all();
-    let inverted = inverted.iter().map(|m| (m.name(), m.source()));
+    let inverted = inverted.iter().map(|m| (m.name(), m.description().source));
     for (name, source) in photographed.chain(inverted) {
         let (name, source) = (format!("**{name}**"), format!(": {source}."));
         let told = page

@@ -5,10 +5,11 @@ use iltm::capture::shown;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, Shooting, SimulationOptions, folder};
+use iltm::scene::{Effect, Forced, SimulationOptions, VirtualCamera, folder};
 use iltm_tests::simulated::{learned, scene, simulation};
 use std::fmt::Write;
 use std::path::Path;
+use strum::IntoEnumIterator;
 
 /// Panels in random places whose light, blur, colour and so on are drawn over several
 /// powers of ten, so that many are too weak to be simulated.
@@ -122,7 +123,7 @@ fn a_flat_scene_costs_as_little_as_a_diagonal() {
     assert_eq!(simulation.patches(), simulation.grid().cells());
     assert_eq!(simulation.work().lit, simulation.grid().cells());
     assert_eq!(simulation.work().exchanged, 0);
-    for effect in Effect::ALL {
+    for effect in Effect::iter() {
         let on = simulation
             .decisions()
             .iter()
@@ -142,8 +143,8 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
     let patterns = shown(simulation.grid(), 60, 1);
-    let shooting = Shooting::new(&scene, &simulation, 1).unwrap();
-    let written = folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
+    let written = folder::write(&camera, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());
     let learned = learned(&capture);
     let prediction = learned.report.prediction;
@@ -161,7 +162,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     );
     // The same seed gives the same bytes.
     let again = place.path().join("again");
-    folder::write(&shooting, &patterns, &again, &Silent).unwrap();
+    folder::write(&camera, &patterns, &again, &Silent).unwrap();
     for name in ["photos/000.png", "photos/050.png", "capture.csv"] {
         let read = |folder: &Path| std::fs::read(folder.join(name)).unwrap();
         assert_eq!(read(&capture), read(&again), "{name}");

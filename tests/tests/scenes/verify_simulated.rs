@@ -6,7 +6,7 @@ use iltm::build_table::BuiltTable;
 use iltm::capture::Settings;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, Shooting, retake};
+use iltm::scene::{Effect, Forced, VirtualCamera, fill_capture};
 use iltm::session::Layout;
 use iltm::verify::{Session, Verdict, VerifyError, WhiteChange, judge, write};
 use iltm_runtime::FrameSize;
@@ -43,8 +43,8 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     };
     write(&table, &layout, &settings, folder, &Silent).unwrap();
     let simulation = simulation(scene, Forced::default());
-    let shooting = Shooting::new(scene, &simulation, 11).unwrap();
-    let session = retake::Session::read(folder, simulation.grid()).unwrap();
+    let shooting = VirtualCamera::new(scene, &simulation, 11).unwrap();
+    let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();
     session.take_missing(&shooting, &Silent).unwrap();
 }
 

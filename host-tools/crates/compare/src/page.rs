@@ -1,7 +1,7 @@
 //! The page of a contest: pictures first, numbers beside them.
 
-use super::contest::{Done, Row};
-use super::light::Light;
+use super::benchmark::{BenchmarkRow, MethodResult};
+use super::benchmark_scene::BenchmarkScene;
 use super::table::{COLUMNS, cells};
 use iltm_picture::{
     ColourScale, ContactSheet, Palette, Tile,
@@ -20,18 +20,18 @@ const WORST: (f64, i32) = (0.3, 3);
 
 /// Two groups of rows and the light they were made with.
 #[derive(Debug)]
-pub struct Contest<'c> {
+pub struct BenchmarkPage<'c> {
     /// What was compared on, for the heading.
     pub name: &'c str,
     /// The light.
-    pub light: &'c Light,
+    pub light: &'c BenchmarkScene,
     /// Ways to photograph.
-    pub photographed: &'c [Row],
+    pub photographed: &'c [BenchmarkRow],
     /// Ways to invert, given the transport itself.
-    pub inverted: &'c [Row],
+    pub inverted: &'c [BenchmarkRow],
 }
 
-impl Contest<'_> {
+impl BenchmarkPage<'_> {
     /// The page as HTML, complete in itself.
     #[must_use]
     pub fn html(&self) -> String {
@@ -56,7 +56,7 @@ impl Contest<'_> {
         document(&format!("Methods compared: {}", self.name), "", &body)
     }
 
-    fn group(&self, title: &str, words: &str, rows: &[Row]) -> Markup {
+    fn group(&self, title: &str, words: &str, rows: &[BenchmarkRow]) -> Markup {
         html! {
             section {
                 h2 { (title) }
@@ -75,7 +75,7 @@ impl Contest<'_> {
                                 Ok(_) => @for (at, cell) in cells(row).into_iter().enumerate() {
                                     td .(if at == 0 { "" } else { "formula" }) { (cell) }
                                 },
-                                Err(why) => { td { (row.name) } td colspan="7" { "no answer: " (why) } },
+                                Err(why) => { td { (row.method.name) } td colspan="7" { "no answer: " (why) } },
                             }
                         }
                     }
@@ -91,10 +91,10 @@ impl Contest<'_> {
                 h2 { "What they are, and where they come from" }
                 dl .facts {
                     @for row in rows {
-                        dt { strong { (row.name) } }
+                        dt { strong { (row.method.name) } }
                         dd {
-                            (row.how) " " em { (row.source) "." }
-                            @if let Ok(Done { remark, .. }) = &row.result { @if !remark.is_empty() { " Here: " (remark) "." } }
+                            (row.method.how) " " em { (row.method.source) "." }
+                            @if let Ok(MethodResult { remark, .. }) = &row.result { @if !remark.is_empty() { " Here: " (remark) "." } }
                         }
                     }
                 }
@@ -103,7 +103,7 @@ impl Contest<'_> {
     }
 
     /// Where one image errs, by method, as a PNG file.
-    fn pictures(&self, rows: &[Row]) -> Option<Vec<u8>> {
+    fn pictures(&self, rows: &[BenchmarkRow]) -> Option<Vec<u8>> {
         let truth = &self.light.truth;
         let scale = ColourScale::logarithmic(Palette::Magma, WORST.0, WORST.1);
         let size = FrameSize::of_grid(truth.grid);
@@ -119,7 +119,12 @@ impl Contest<'_> {
                 super::table::error(done.errors.compensation)
             );
             let values = off.iter().map(|value| value.abs());
-            tiles.push(Tile::scaled((&row.name, &caption), size, values, &scale));
+            tiles.push(Tile::scaled(
+                (&row.method.name, &caption),
+                size,
+                values,
+                &scale,
+            ));
         }
         let sheet = ContactSheet {
             rows: tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect(),

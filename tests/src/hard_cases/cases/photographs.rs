@@ -8,7 +8,7 @@ use super::super::photographs::Camera;
 use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::CaptureOptions;
 use iltm::progress::Silent;
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use iltm::solve::{InverseTransport, SolveOptions};
 
 pub(super) const CASES: [Case; 8] = [
@@ -105,9 +105,9 @@ pub(super) const CASES: [Case; 8] = [
     },
 ];
 
-fn scene() -> Scene {
+fn scene() -> CoaxialScene {
     let grid = grid((9, 14));
-    Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.3, 0.9, 1)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.3, 0.9, 1)
 }
 
 fn flat() -> Outcome {
@@ -131,7 +131,7 @@ fn flat() -> Outcome {
     }
 }
 
-fn table(scene: &Scene, camera: Camera, settings: &str) -> Result<BuiltTable, String> {
+fn table(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<BuiltTable, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     camera
         .write(scene, folder.path(), settings)
@@ -148,7 +148,7 @@ fn table(scene: &Scene, camera: Camera, settings: &str) -> Result<BuiltTable, St
 }
 
 /// Error of the closed loop of what was learned, or why nothing was.
-fn learned(scene: &Scene, camera: Camera, settings: &str) -> Result<(f64, f64), String> {
+fn learned(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<(f64, f64), String> {
     let learned = table(scene, camera, settings)?;
     let flood = scene.transport().column_sum().max();
     let errors = errors(
@@ -175,7 +175,7 @@ fn exact(camera: Camera, settings: &str, bound: f64) -> Outcome {
     of_scene(&scene(), camera, settings, bound)
 }
 
-fn of_scene(scene: &Scene, camera: Camera, settings: &str, bound: f64) -> Outcome {
+fn of_scene(scene: &CoaxialScene, camera: Camera, settings: &str, bound: f64) -> Outcome {
     match learned(scene, camera, settings) {
         Ok((error, gain_only)) => Outcome::new(
             error <= bound.min(gain_only),

@@ -1,14 +1,14 @@
-//! The paper's claims, and this project's, judged draw by draw.
+//! Claims of the paper, and this project's, judged draw by draw.
 
 use super::scenes::Condition;
 use super::sections::find;
-use super::seeds::{Mean, SEEDS, Sample};
+use super::seeds::{DrawErrors, Mean, SEEDS};
 use crate::table;
 use iltm_solve::Method;
 use std::fmt::Write;
 
 /// The paper's claims, and whether they hold.
-pub(super) fn claims(text: &mut String, samples: &[Sample]) {
+pub(super) fn claims(text: &mut String, samples: &[DrawErrors]) {
     let _ = writeln!(text, "\n## The paper's claim\n");
     let _ = writeln!(
         text,
@@ -46,7 +46,7 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
             continue;
         };
         let (wins, all) = own.wins(direct);
-        let means = |sample: &Sample| {
+        let means = |sample: &DrawErrors| {
             let compensation = Mean::of(&sample.compensation());
             let second = Mean::of(&sample.second_bounce());
             (table::error(second.mean), table::error(compensation.mean))
@@ -69,7 +69,7 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
 }
 
 /// With how many photographs this project's second bounce is better than another's.
-fn fewest(samples: &[Sample], condition: Condition, other: &Sample) -> String {
+fn fewest(samples: &[DrawErrors], condition: Condition, other: &DrawErrors) -> String {
     let own = samples
         .iter()
         .filter(|s| s.condition == condition && s.method == Method::Joint);

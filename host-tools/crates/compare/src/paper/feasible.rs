@@ -20,7 +20,7 @@ const PHOTOGRAPHS: [usize; 3] = [120, 270, 1_500];
 
 /// A scene's place at one sparsity and number of photographs.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Place {
+pub(super) struct TheoremBounds {
     /// Whether cells differ in albedo.
     pub(super) textured: bool,
     /// Photographs.
@@ -36,7 +36,7 @@ pub(super) struct Place {
 }
 
 /// Bounds for the uniform and the textured scene.
-pub(super) fn places() -> Vec<Place> {
+pub(super) fn places() -> Vec<TheoremBounds> {
     let mut places = Vec::new();
     for condition in [Condition::ALL[0], Condition::ALL[2]] {
         let Some((truth, _)) = condition.world(1) else {
@@ -53,7 +53,7 @@ pub(super) fn places() -> Vec<Place> {
             let sensing = Sensing::new(&truth.transport, &haar, &patterns);
             for k in SPARSITIES {
                 let bounds = sensing.bounds(k, Sampling::default());
-                places.push(Place {
+                places.push(TheoremBounds {
                     textured: condition.textured,
                     photographs,
                     k,
@@ -68,9 +68,10 @@ pub(super) fn places() -> Vec<Place> {
 }
 
 /// The region with the scene's places in it.
-pub(super) fn chart(places: &[Place]) -> String {
-    let finite = |place: &&Place| place.gamma.is_finite();
-    let most = |of: fn(&Place) -> f64| places.iter().filter(finite).map(of).fold(2.0, f64::max);
+pub(super) fn chart(places: &[TheoremBounds]) -> String {
+    let finite = |place: &&TheoremBounds| place.gamma.is_finite();
+    let most =
+        |of: fn(&TheoremBounds) -> f64| places.iter().filter(finite).map(of).fold(2.0, f64::max);
     let border: Vec<(f64, f64)> = (0..=60)
         .map(|step| 1.0 + f64::from(step) / 60.0 * (LIMIT.sqrt() - 1.0))
         .map(|kappa| (kappa, LIMIT / (kappa * kappa)))

@@ -1,13 +1,13 @@
-//! The words and tables of the page, each from its numbers.
+//! Sections of the experiments page: words and tables, each from its numbers.
 
 use super::complexity::{self, Timed};
-use super::feasible::Place;
-use super::sample::Sample as Pictures;
+use super::feasible::TheoremBounds;
+use super::results::CapturePictures;
 use super::scenes::{Condition, surface};
 use super::second_bounce::Lit;
-use super::seeds::{ENTRIES, Mean, SEEDS, Sample};
+use super::seeds::{DrawErrors, ENTRIES, Mean, SEEDS};
 use super::sparsity::{Counted, INVERSE_IN_HAAR, PARTS};
-use crate::contest::Row;
+use crate::benchmark::BenchmarkRow;
 use crate::table;
 use iltm_solve::{Method, restricted_isometry::LIMIT};
 use std::fmt::Write;
@@ -25,17 +25,17 @@ pub(super) fn words(method: Method, photographs: usize) -> String {
 
 /// The sample of a condition and method.
 pub(super) fn find(
-    samples: &[Sample],
+    samples: &[DrawErrors],
     condition: Condition,
     entry: (Method, usize),
-) -> Option<&Sample> {
+) -> Option<&DrawErrors> {
     samples.iter().find(|sample| {
         sample.condition == condition && (sample.method, sample.photographs) == entry
     })
 }
 
 /// Fig. 4.
-pub(super) fn fourth(text: &mut String, samples: &[Sample]) {
+pub(super) fn fourth(text: &mut String, samples: &[DrawErrors]) {
     let _ = writeln!(
         text,
         "\n## Fig. 4: the second bounce, by method\n\n\
@@ -48,13 +48,13 @@ pub(super) fn fourth(text: &mut String, samples: &[Sample]) {
     let names: Vec<&str> = Condition::ALL.iter().map(|c| c.name()).collect();
     let _ = writeln!(text, "| second bounce | {} |", names.join(" | "));
     let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
-    rows(text, samples, Sample::second_bounce);
+    rows(text, samples, DrawErrors::second_bounce);
     let _ = writeln!(text, "\n| compensation | {} |", names.join(" | "));
     let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
-    rows(text, samples, Sample::compensation);
+    rows(text, samples, DrawErrors::compensation);
 }
 
-fn rows(text: &mut String, samples: &[Sample], of: fn(&Sample) -> Vec<f64>) {
+fn rows(text: &mut String, samples: &[DrawErrors], of: fn(&DrawErrors) -> Vec<f64>) {
     for (method, photographs) in ENTRIES {
         let cell = |condition: &Condition| {
             let Some(sample) = find(samples, *condition, (method, photographs)) else {
@@ -109,7 +109,7 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
 }
 
 /// Fig. 2.
-pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
+pub(super) fn second(text: &mut String, places: &[TheoremBounds], counts: &[Counted]) {
     let _ = writeln!(
         text,
         "\n## Fig. 2: what the theorem promises\n\n\
@@ -223,7 +223,7 @@ pub(super) fn cost(text: &mut String, timed: &[Timed]) {
 }
 
 /// What accuracy costs in time, and bounces, on photographs.
-pub(super) fn time(text: &mut String, pictures: &Pictures) {
+pub(super) fn time(text: &mut String, pictures: &CapturePictures) {
     let (direct, second) = pictures.shares;
     let _ = writeln!(
         text,
@@ -244,7 +244,7 @@ pub(super) fn time(text: &mut String, pictures: &Pictures) {
 }
 
 /// Every method on the same light.
-pub(super) fn every(text: &mut String, contests: &[(&str, Vec<Row>, Vec<Row>)]) {
+pub(super) fn every(text: &mut String, contests: &[(&str, Vec<BenchmarkRow>, Vec<BenchmarkRow>)]) {
     let _ = writeln!(text, "\n## Every method on the same light\n");
     for (scene, photographed, inverted) in contests {
         let _ = writeln!(
@@ -266,12 +266,14 @@ pub(super) fn every(text: &mut String, contests: &[(&str, Vec<Row>, Vec<Row>)]) 
 }
 
 /// Where methods come from; rows that differ in a parameter only stand together.
-fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r Row>) {
-    let rows: Vec<&Row> = rows.collect();
-    for alike in rows.chunk_by(|a, b| (a.source, a.how) == (b.source, b.how)) {
+fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r BenchmarkRow>) {
+    let rows: Vec<&BenchmarkRow> = rows.collect();
+    for alike in
+        rows.chunk_by(|a, b| (a.method.source, a.method.how) == (b.method.source, b.method.how))
+    {
         let names: Vec<String> = alike
             .iter()
-            .map(|row| format!("**{}**", row.name))
+            .map(|row| format!("**{}**", row.method.name))
             .collect();
         let remarks: Vec<&str> = alike
             .iter()
@@ -279,7 +281,7 @@ fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r Row>) {
             .map(|done| done.remark.as_str())
             .filter(|remark| !remark.is_empty())
             .collect();
-        let (source, how) = (alike[0].source, alike[0].how);
+        let (source, how) = (alike[0].method.source, alike[0].method.how);
         let _ = write!(text, "- {}: {source}. {how}", names.join("; "));
         if !remarks.is_empty() {
             let _ = write!(text, " Here: {}.", remarks.join("; "));

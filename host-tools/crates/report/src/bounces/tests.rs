@@ -6,9 +6,9 @@ use iltm_capture::{Registration, Role, shown};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use iltm_scene::{
-    Effect, Forced, Shooting, Simulation, SimulationOptions,
-    coaxial::{Panels, Scene},
-    description::Scene as Described,
+    Effect, Forced, Simulation, SimulationOptions, VirtualCamera,
+    coaxial::{CoaxialScene, Panels},
+    description::Scene,
     folder as simulated,
 };
 use iltm_solve::ChannelInverse;
@@ -53,7 +53,7 @@ pub(super) fn normal(random: &mut fastrand::Rng) -> f64 {
 }
 
 /// `T^-1 = E^-1 (R^-1 - F)`, exactly.
-fn inverse(scene: &Scene) -> InverseTransport {
+fn inverse(scene: &CoaxialScene) -> InverseTransport {
     let cells = scene.grid.cells();
     let gain = |cell: usize| (scene.albedo[cell] * scene.irradiance[cell]).recip();
     let operator = DMatrix::from_fn(cells, cells, |i, j| {
@@ -73,7 +73,7 @@ fn inverse(scene: &Scene) -> InverseTransport {
 }
 
 /// `(R F)^(k-1) R E p` for `k` from 1.
-fn bounces_of(scene: &Scene, pattern: &DVector<f64>, count: usize) -> Vec<DVector<f64>> {
+fn bounces_of(scene: &CoaxialScene, pattern: &DVector<f64>, count: usize) -> Vec<DVector<f64>> {
     let lit = scene.irradiance.component_mul(pattern);
     let first = scene.albedo.component_mul(&lit);
     let next = |light: &DVector<f64>| {
@@ -89,9 +89,9 @@ fn plane(light: &DVector<f64>) -> Vec<f32> {
     light.iter().map(|light| *light as f32).collect()
 }
 
-fn textured_valleys() -> Scene {
+fn textured_valleys() -> CoaxialScene {
     let grid = Grid::new(9, 14).unwrap();
-    Scene::new(grid, &Panels::m_shape(grid, 60.0), 0.8)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 60.0), 0.8)
         .textured(0.3, 0.9, 5)
         .vignetted(0.6)
 }
@@ -227,7 +227,7 @@ fn light_that_does_not_fade_is_refused() {
 
 /// The M-shaped panels as they come with the tools, and what a camera without noise
 /// sees straight from the projector under a pattern, of full scale.
-fn direct_light(scene: &Described, pattern: usize, patterns: &DMatrix<f64>) -> Vec<f32> {
+fn direct_light(scene: &Scene, pattern: usize, patterns: &DMatrix<f64>) -> Vec<f32> {
     let quiet = Forced::default()
         .with(Effect::Noise, false)
         .with(Effect::Ambient, false);
@@ -252,13 +252,13 @@ fn direct_light(scene: &Described, pattern: usize, patterns: &DMatrix<f64>) -> V
 #[test]
 fn direct_light_is_what_the_camera_sees_without_interreflection() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/m-panels.toml");
-    let scene = Described::read(Path::new(path)).unwrap();
+    let scene = Scene::read(Path::new(path)).unwrap();
     let simulation = Simulation::new(&scene, &SimulationOptions::default(), &Silent).unwrap();
     let patterns = shown(simulation.grid(), 60, 3);
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
-    let shooting = Shooting::new(&scene, &simulation, 3).unwrap();
-    simulated::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    let camera = VirtualCamera::new(&scene, &simulation, 3).unwrap();
+    simulated::write(&camera, &patterns, &capture, &Silent).unwrap();
     let light = DMatrix::from_fn(simulation.grid().cells(), patterns.len(), |cell, k| {
         f64::from(u8::from(patterns[k].1.lit[cell]))
     });
