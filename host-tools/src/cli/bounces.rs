@@ -5,7 +5,7 @@ use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::progress::progress;
 use super::simulate::unwritten;
-use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, Written};
+use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, WrittenBounces};
 use crate::capture::CaptureOptions;
 use crate::learn::LearnError;
 use iltm_picture::{
@@ -70,7 +70,7 @@ fn failed(error: BouncesError) -> Failure {
     }
 }
 
-fn data(found: &bounces::Bounces, written: &Written) -> Value {
+fn data(found: &bounces::Bounces, written: &WrittenBounces) -> Value {
     let separated = &found.separated;
     let layer = |layer: &Layer| {
         json!({

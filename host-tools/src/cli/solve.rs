@@ -11,7 +11,7 @@ use crate::compile::sign::read_key;
 use crate::compile::wish::WhiteWish;
 use crate::learn::{Learned, learn};
 use crate::solve::{Compensation, Method, SolveOptions, WhyLeftOut};
-use crate::solved::{self, Content};
+use crate::solve_page::{self, Content};
 use crate::video::sampled_frames;
 use iltm_picture::{LightPicture, progress::Progress};
 use serde_json::{Value, json};
@@ -128,7 +128,7 @@ fn report(
     folder: &Path,
     bars: &dyn Progress,
 ) -> Result<PathBuf, Failure> {
-    let report = solved::report(
+    let report = solve_page::report(
         learned,
         &arguments.capture,
         &arguments.output,

@@ -1,4 +1,4 @@
-//! The page of a contest: pictures first, numbers beside them.
+//! HTML page of a contest: pictures first, numbers beside them.
 
 use super::contest::{Done, Row};
 use super::light::Light;

@@ -1,4 +1,4 @@
-//! The page: one HTML file with everything inside, that a browser shows without network.
+//! HTML page of the trade-off: one file that a browser shows without network.
 
 use super::advice::fraction;
 use super::picture::{colour, title};
@@ -57,7 +57,7 @@ impl Tradeoff {
                         @if self.has_truth() { option value="true_error" { "true, by the reference" } }
                     } }
                     fieldset {
-                        legend { "Shown" }
+                        legend { "TreatedImage" }
                         @for sweep in sweeps {
                             label .toggle {
                                 input type="checkbox" name="sweep" value=(sweep.name()) checked;
