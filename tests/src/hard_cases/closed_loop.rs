@@ -1,4 +1,4 @@
-//! How far the picture on the wall is from the wanted one.
+//! Closed loop: how far the picture on the wall is from the wanted one.
 
 use iltm::compile::white::reference_white;
 use iltm::content::wanted_images;
@@ -29,7 +29,6 @@ pub struct LoopErrors {
 /// white: walls that light each other cannot be darker. A projector out of focus
 /// cannot show their edges at all; there the wanted images are those that it
 /// makes of natural ones.
-#[must_use]
 pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
     let transport = scene.transport();
     let judged: Vec<bool> = (0..scene.grid.cells())
@@ -76,7 +75,6 @@ pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
 }
 
 /// `diag(g) - K` of the first channel.
-#[must_use]
 pub fn dense(found: &InverseTransport) -> DMatrix<f64> {
     let channel = found.channel(0);
     DMatrix::from_diagonal(&channel.gain) - channel.operator

@@ -1,4 +1,4 @@
-//! The errors that theory allows.
+//! Error bounds: the errors that theory allows.
 //!
 //! For a closed loop with a learned inverse the bound is
 //!
@@ -24,7 +24,6 @@ use iltm::solve::{Basis, Haar, SolveOptions};
 use nalgebra::DMatrix;
 
 /// Largest over smallest singular value of `T` between the chosen cells.
-#[must_use]
 pub fn condition(transport: &DMatrix<f64>, live: &[bool]) -> f64 {
     let values = part(transport, live).singular_values();
     values.max() / values.min()
@@ -32,7 +31,6 @@ pub fn condition(transport: &DMatrix<f64>, live: &[bool]) -> f64 {
 
 /// Bound on the closed loop's error; `photographs` are all that the solver uses,
 /// `noise` is relative to the light's root mean square.
-#[must_use]
 pub fn bound(scene: &Scene, live: &[bool], photographs: usize, noise: f64, perfect: f64) -> f64 {
     let transport = scene.transport();
     let cells = live.iter().filter(|live| **live).count() as f64;

@@ -1,4 +1,4 @@
-//! Whole captures, as files: what the camera does to the light.
+//! Capture files: what the camera does to the light of whole captures.
 
 use super::super::case::{Case, Outcome};
 use super::super::closed_loop::errors;

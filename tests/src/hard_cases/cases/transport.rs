@@ -1,4 +1,4 @@
-//! Transport that is strong, ill-conditioned or singular.
+//! Light transport that is strong, ill-conditioned or singular.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::observations::Capture;
