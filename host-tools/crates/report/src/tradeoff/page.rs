@@ -57,7 +57,7 @@ impl Tradeoff {
                         @if self.has_truth() { option value="true_error" { "true, by the reference" } }
                     } }
                     fieldset {
-                        legend { "TreatedImage" }
+                        legend { "Shown" }
                         @for sweep in sweeps {
                             label .toggle {
                                 input type="checkbox" name="sweep" value=(sweep.name()) checked;
