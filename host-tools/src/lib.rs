@@ -20,7 +20,7 @@ pub use iltm_device::user;
 pub use iltm_picture as picture;
 pub use iltm_picture::progress;
 pub use iltm_report as report;
-pub use iltm_report::{bounces, solved, tradeoff};
+pub use iltm_report::{bounces, solve_page, tradeoff};
 pub use iltm_scene as scene;
 pub use iltm_session as session;
 pub use iltm_session::verify;

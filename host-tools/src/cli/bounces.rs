@@ -4,7 +4,7 @@ use super::args::Bounces;
 use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::progress::progress;
-use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, Written};
+use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, WrittenBounces};
 use crate::capture::CaptureOptions;
 use iltm_picture::{
     check_free,
@@ -68,7 +68,7 @@ fn failed(error: BouncesError) -> Failure {
     }
 }
 
-fn data(found: &bounces::Bounces, written: &Written) -> Value {
+fn data(found: &bounces::Bounces, written: &WrittenBounces) -> Value {
     let separated = &found.separated;
     let layer = |layer: &Layer| {
         json!({

@@ -9,7 +9,7 @@ use crate::compile::Provenance;
 use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
 use crate::device::rejection_next_step;
-use crate::report::steps;
+use crate::report::tier_costs;
 use ed25519_dalek::VerifyingKey;
 use iltm_runtime::{
     image::{Seal, Table},
@@ -126,7 +126,7 @@ fn inverse_error(table: &Table<'_>) -> Option<f64> {
 }
 
 fn data(table: &Table<'_>) -> Value {
-    let tiers = steps(table).into_iter().map(|step| {
+    let tiers = tier_costs(table).into_iter().map(|step| {
         json!({
             "error": step.left_out,
             "total_error": step.total,
@@ -224,7 +224,7 @@ fn tiers(table: &Table<'_>, text: &mut String) {
         text,
         "\ntier   left out   error in all   entries   multiplications   instructions   of a frame     bytes"
     );
-    for step in steps(table) {
+    for step in tier_costs(table) {
         let _ = writeln!(
             text,
             "{:>4}   {:>8.5}   {:>12.5}   {:>7}   {:>15}   {:>12}   {:>8.2} %   {:>7}",

@@ -11,7 +11,7 @@ use crate::capture::CaptureOptions;
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
 use crate::solve::SolveOptions;
-use crate::solved::{self, Content};
+use crate::solve_page::{self, Content};
 use crate::video::sampled_frames;
 use iltm_picture::{LightPicture, progress::Progress};
 use serde_json::json;
@@ -116,7 +116,7 @@ fn report(
     folder: &Path,
     bars: &dyn Progress,
 ) -> Result<PathBuf, Failure> {
-    let report = solved::report(built, &arguments.capture, &arguments.output, content, bars);
+    let report = solve_page::report(built, &arguments.capture, &arguments.output, content, bars);
     let report = report.map_err(|error| {
         Failure::new(
             Kind::Frames,

@@ -1,4 +1,4 @@
-//! The page of a contest: pictures first, numbers beside them.
+//! HTML page of a contest: pictures first, numbers beside them.
 
 use super::benchmark::{BenchmarkRow, MethodResult};
 use super::benchmark_scene::BenchmarkScene;

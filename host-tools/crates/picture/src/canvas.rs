@@ -51,18 +51,6 @@ impl Canvas {
         }
     }
 
-    /// Begins from a picture; `None` if it is not 8-bit RGB.
-    #[must_use]
-    pub fn over(picture: &Picture) -> Option<Self> {
-        match (picture.channels(), picture.samples()) {
-            (3, Samples::Eight(samples)) => Some(Self {
-                size: picture.size(),
-                samples: samples.clone(),
-            }),
-            _ => None,
-        }
-    }
-
     /// What was drawn.
     #[must_use]
     pub fn finish(self) -> Picture {

@@ -265,7 +265,7 @@ impl Chart<'_> {
                 text .(if row.heading { "heading" } else { "axis" }) x=(if row.heading { 14 } else { 26 }) y=(at(y.place(row.y) + 4.0)) { (row.text) }
             }
             text .axis x=(at(middle.0)) y=(height - 10.0) text-anchor="middle" { (self.x.label) }
-            text .axis transform=(format!("translate(15 {}) rotate(-90)", at(middle.1))) text-anchor="middle" { (self.y.label) }
+            text .axis transform=(format!("translate(18 {}) rotate(-90)", at(middle.1))) text-anchor="middle" { (self.y.label) }
             @if let (Some(first), Some(last)) = (self.shaded.first(), self.shaded.last()) {
                 polygon .shaded points=(format!("{} {},{bottom} {},{bottom}", line(&self.shaded, &x, &y), at(x.place(last.0)), at(x.place(first.0)))) {}
             }
@@ -287,15 +287,19 @@ impl Chart<'_> {
 
     /// Where the names of the series begin, row by row above the axes; and where those may.
     fn legend(&self, (left, right): (f64, f64), top: f64) -> (Vec<(&Series, f64, f64)>, f64) {
-        let (mut x, mut y) = (left + 10.0, top + 8.0);
+        let named = || self.series.iter().filter(|series| !series.name.is_empty());
+        let width = |series: &Series| 34.0 + LETTER * series.name.chars().count() as f64;
+        let one_row = named().map(width).sum::<f64>() < right - left;
+        let widest = named().map(width).fold(1.0, f64::max);
+        let columns = ((right - left) / widest).floor().max(1.0) as usize;
         let mut places = Vec::new();
-        for series in self.series.iter().filter(|s| !s.name.is_empty()) {
-            let wide = 34.0 + LETTER * series.name.chars().count() as f64;
-            if x > left + 10.0 && x + wide > right {
+        let (mut x, mut y) = (left + 10.0, top + 8.0);
+        for (index, series) in named().enumerate() {
+            if !one_row && index > 0 && index.is_multiple_of(columns) {
                 (x, y) = (left + 10.0, y + LINE);
             }
             places.push((series, x, y));
-            x += wide;
+            x += if one_row { width(series) } else { widest };
         }
         let below = if places.is_empty() { top } else { y + LINE };
         (places, below)
@@ -327,9 +331,10 @@ impl Chart<'_> {
 }
 
 fn circle(series: &Series, (x, y): (f64, f64), radius: f64) -> Markup {
-    let (fill, stroke) = match series.hollow {
-        true => ("none", Some(series.colour)),
-        false => (series.colour, None),
+    let (fill, stroke) = if series.hollow {
+        ("none", Some(series.colour))
+    } else {
+        (series.colour, None)
     };
     let opacity = (series.opacity < 1.0).then_some(series.opacity);
     html! { circle cx=(at(x)) cy=(at(y)) r=(radius) fill=(fill) stroke=[stroke] opacity=[opacity] {} }

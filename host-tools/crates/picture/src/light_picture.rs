@@ -72,17 +72,6 @@ impl LightPicture {
         }
     }
 
-    /// Red, green and blue light of every pixel, row by row.
-    pub fn of_pixels(size: FrameSize, light: impl FnMut(usize) -> [f32; 3]) -> Self {
-        let mut planes = vec![Vec::new(); 3];
-        for pixel in (0..size.pixels()).map(light) {
-            for (plane, light) in planes.iter_mut().zip(pixel) {
-                plane.push(light);
-            }
-        }
-        Self { size, planes }
-    }
-
     /// The picture with other planes, each made from its channel's number and its light.
     ///
     /// # Panics

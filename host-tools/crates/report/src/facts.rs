@@ -1,4 +1,4 @@
-//! What a capture and its solve say about themselves, line by line.
+//! Table of facts: what a capture and its solve say about themselves, line by line.
 
 use iltm_capture::{Measurements, NoiseSource, RegistrationMethod};
 use iltm_compile::build_table::BuiltTable;

@@ -1,4 +1,4 @@
-//! The report's pictures as PNG files.
+//! PNG files of a report's pictures.
 
 use super::{CoefficientMap, Example, summary};
 use color_quant::NeuQuant;

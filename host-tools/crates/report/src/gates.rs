@@ -1,4 +1,4 @@
-//! What the gates say of a capture, as a page: a card for each, what explains others
+//! Gates page: what the gates say of a capture, a card for each, what explains others
 //! first, with what its number was taken from.
 
 use iltm_capture::{Evidence, Gate, Verdict};
@@ -6,7 +6,7 @@ use iltm_picture::{
     ColourScale, Palette,
     canvas::{Canvas, QUIET},
     chart::{Axis, Chart, PALETTE, Series},
-    html::{capitalised, document, img, number},
+    html::{capitalised, colour_bar, document, img},
     png,
 };
 use iltm_runtime::FrameSize;
@@ -151,20 +151,10 @@ fn map(what: &str, rows: usize, cols: usize, values: &[f64]) -> Markup {
     for (at, value) in sizes().enumerate().filter(|(_, value)| value.is_finite()) {
         canvas.set(at % cols, at / cols, scale.colour(value));
     }
-    let stops: Vec<String> = (0..=8)
-        .map(|k| {
-            let [red, green, blue] = scale.colour_at(f64::from(k) / 8.0);
-            format!("rgb({red},{green},{blue})")
-        })
-        .collect();
     html! {
         figure.map {
             (img(&png::encode(&canvas.finish()), what))
-            div.scale {
-                span { "0" }
-                div style=(format!("background: linear-gradient(to right, {})", stops.join(", "))) {}
-                span { (number(high)) }
-            }
+            (colour_bar(&scale, false))
             figcaption { (capitalised(what)) ", a square for each cell" }
         }
     }
@@ -211,6 +201,6 @@ mod tests {
         };
         let page = page("c", &[gate(Verdict::Pass, evidence)]);
         assert!(page.contains("data:image/png;base64,"));
-        assert!(page.contains("<span>4</span>"), "{page}");
+        assert!(page.contains(">4</span>"), "{page}");
     }
 }

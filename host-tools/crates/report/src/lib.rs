@@ -1,4 +1,5 @@
-//! What was learned of a scene, as a page that a browser shows without network.
+//! Report pages: what was learned of a scene, in files that a browser shows without
+//! network.
 //!
 //! | what | file |
 //! |---|---|
@@ -6,12 +7,15 @@
 //! | how far it is from what was wanted | `comparison.rs` |
 //! | a wanted image with and without compensation | `example.rs` |
 //! | the operator in the Haar domain | `coefficient_map.rs` |
-//! | what each tier costs | `ladder.rs`, `timing.rs` |
+//! | what each tier costs | `ladder.rs` |
 //! | one picture of it all | `summary.rs` |
 //! | pictures as PNG files, one of a few colours | `files.rs` |
 //! | what the solve says about itself | `facts.rs` |
 //! | what the gates say, a page of its own | `gates.rs`, `gates.css` |
 //! | the page | `page.rs` |
+//! | pages of a solve and of its trade-off, with more | [`solve_page`], [`tradeoff`] |
+//! | a photograph bounce by bounce | [`bounces`] |
+//! | test images | [`stills`] |
 
 pub mod bounces;
 mod coefficient_map;
@@ -23,20 +27,20 @@ pub mod gates;
 mod ladder;
 pub(crate) mod page;
 mod predict;
-pub mod solved;
+pub mod solve_page;
 pub mod stills;
 mod summary;
-mod timing;
+#[cfg(test)]
+mod test_scene;
 pub mod tradeoff;
 
 pub use coefficient_map::{CoefficientMap, Level};
 pub use comparison::Comparison;
-pub use example::{Example, Shown, Treatment, Wanted};
-pub use ladder::{Rung, Step, ladder, steps};
+pub use example::{Example, TreatedImage, Treatment, Wanted};
+pub use ladder::{TierCost, TimedTier, ladder, microseconds, microseconds_at, tier_costs};
 pub use page::{Command, Words};
 pub use predict::Projection;
 pub use summary::summary;
-pub use timing::{microseconds, microseconds_at};
 
 use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
@@ -98,7 +102,7 @@ pub struct Report<'a> {
     /// The operator.
     pub coefficients: CoefficientMap,
     /// The tiers, gain only first.
-    pub ladder: Vec<Rung>,
+    pub ladder: Vec<TimedTier>,
     /// All pictures: those of the page, and the summary.
     pub files: Vec<PictureFile>,
 }
@@ -153,7 +157,7 @@ impl<'a> Report<'a> {
 /// `None` of a camera whose sides a frame's do not reach.
 fn flood(learned: &BuiltTable) -> Option<Picture> {
     let (width, height) = learned.measurements.registration.camera;
-    let size = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
+    let size = frame_size(width, height)?;
     let flood = LightPicture::new(size, learned.measurements.flood.clone())?;
     let white = flood.quantile(1.0 - GLINTS);
     let scale = if white > 0.0 { 1.0 / white } else { 0.0 };
@@ -176,4 +180,9 @@ fn largest_error(examples: &[Example]) -> f64 {
     // Ends that a tick falls on.
     let ends = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0].map(|digit| digit * power);
     ends.into_iter().find(|end| *end >= high).unwrap_or(high)
+}
+
+/// `None` of more than 65,535 pixels a side.
+fn frame_size(width: usize, height: usize) -> Option<FrameSize> {
+    FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)
 }

@@ -1,7 +1,7 @@
-//! The page: one HTML file with everything inside.
+//! HTML page of a report: one file with everything inside.
 
 use super::facts::facts;
-use super::{Example, Report, Rung, Shown, Treatment};
+use super::{Example, Report, TimedTier, TreatedImage, Treatment};
 use iltm_picture::{
     chart::{Axis, Chart, Series},
     html::{colour_bar, document, grouped, img_named, number, percent},
@@ -31,6 +31,17 @@ pub struct Command {
     pub what: String,
     /// The line.
     pub line: String,
+}
+
+impl Command {
+    /// A line and what it does.
+    #[must_use]
+    pub fn new(what: &str, line: String) -> Self {
+        Self {
+            what: what.to_owned(),
+            line,
+        }
+    }
 }
 
 impl Report<'_> {
@@ -204,7 +215,8 @@ impl Report<'_> {
     fn operator(&self) -> Markup {
         let map = &self.coefficients;
         let all = map.coefficients as u64;
-        let entries = |rung: Option<&Rung>| u64::from(rung.map_or(0, |rung| rung.step.entries));
+        let entries =
+            |rung: Option<&TimedTier>| u64::from(rung.map_or(0, |rung| rung.cost.entries));
         let (first, last) = (entries(self.ladder.get(1)), entries(self.ladder.last()));
         html! {
             section .half {
@@ -269,7 +281,7 @@ impl Report<'_> {
         let tiers = self.ladder.iter();
         let series = Series {
             points: tiers
-                .map(|rung| (rung.microseconds, rung.step.left_out))
+                .map(|rung| (rung.microseconds, rung.cost.left_out))
                 .collect(),
             labels: (0..self.ladder.len())
                 .map(|tier| format!("tier {tier}"))
@@ -306,9 +318,9 @@ impl Report<'_> {
                             th { "tier" } th { "left out" } th { "error in all" } th { "entries" } th { "multipli\u{ad}cations" } th { "bytes" } th { "\u{b5}s" }
                         } }
                         tbody { @for (tier, rung) in self.ladder.iter().enumerate() { tr {
-                            td { (tier) } td { (percent(rung.step.left_out)) } td { (percent(rung.step.total)) }
-                            td { (grouped(rung.step.entries.into())) } td { (grouped(rung.step.multiplications.into())) }
-                            td { (grouped(rung.step.bytes)) } td { (format!("{:.0}", rung.microseconds)) }
+                            td { (tier) } td { (percent(rung.cost.left_out)) } td { (percent(rung.cost.total)) }
+                            td { (grouped(rung.cost.entries.into())) } td { (grouped(rung.cost.multiplications.into())) }
+                            td { (grouped(rung.cost.bytes)) } td { (format!("{:.0}", rung.microseconds)) }
                         } } }
                     } }
                     (chart.render())
@@ -401,11 +413,11 @@ fn headline(error: f64, what: &str, class: &str) -> Markup {
 }
 
 /// The treatment's name, for screens too narrow for four columns.
-fn phone(shown: &Shown) -> Markup {
+fn phone(shown: &TreatedImage) -> Markup {
     html! { span .phone { (shown.treatment.title()) } }
 }
 
-fn clipping(shown: &Shown) -> String {
+fn clipping(shown: &TreatedImage) -> String {
     match shown.treatment {
         Treatment::None => "The wanted image".to_owned(),
         _ if shown.clipped == 0.0 => "Nothing clipped".to_owned(),

@@ -60,7 +60,7 @@ pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> String {
 /// A word for the shell.
 #[cfg(unix)]
 fn quoted(word: &str) -> String {
-    iltm_report::solved::quoted(Path::new(word))
+    iltm_report::solve_page::quoted(Path::new(word))
 }
 
 /// A word for the shell. Captures' names have no quotes and no percent signs.

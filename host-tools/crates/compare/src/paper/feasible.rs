@@ -91,7 +91,7 @@ pub(super) fn chart(places: &[TheoremBounds]) -> String {
         }
     }
     let mut chart = curves(
-        "Where Theorem 3.1 promises recovery (shaded), and where the scene is: k = 1, 2, 4, 8, 16",
+        "Where Theorem 3.1 promises recovery (shaded), and where the scene is",
         (
             "kappa of T for 2k coefficients, at least",
             "gamma of the patterns for 2k coefficients, at least",
@@ -100,6 +100,7 @@ pub(super) fn chart(places: &[TheoremBounds]) -> String {
     );
     chart.x.range = Some((1.0, 1.3 * most(|p| p.kappa)));
     chart.y.range = Some((1.0, 1.6 * most(|p| p.gamma)));
+    chart.notes = vec!["Points of a line: k = 1, 2, 4, 8, 16 coefficients a row".to_owned()];
     chart.shaded = border;
     chart.file()
 }

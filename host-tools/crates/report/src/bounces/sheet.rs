@@ -2,8 +2,8 @@
 //! brightened.
 
 use super::Bounces;
-use super::folder::frame_size;
 use super::separate::LayerKind;
+use crate::frame_size;
 use iltm_picture::{
     ContactSheet, LightPicture, Picture, Tile,
     numbers::{number, percent},

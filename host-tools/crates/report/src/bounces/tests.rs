@@ -2,6 +2,7 @@
 //! at the camera's resolution against the same scene without interreflection.
 
 use super::*;
+use crate::test_scene;
 use iltm_capture::{Registration, Role, shown};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
@@ -11,7 +12,6 @@ use iltm_scene::{
     description::Scene,
     folder as simulated,
 };
-use iltm_solve::ChannelInverse;
 use nalgebra::DVector;
 
 /// A camera with a pixel a cell.
@@ -29,21 +29,10 @@ fn registration(grid: Grid) -> Registration {
 }
 
 /// A wall of which every pixel is a cell of its own, without interreflection.
-pub(super) fn known_wall(rows: u16, cols: u16) -> Wall {
+pub(super) fn known_wall(rows: u16, cols: u16) -> BounceOperator {
     let grid = Grid::new(rows, cols).unwrap();
-    let cells = grid.cells();
-    let dark = InverseTransport {
-        grid,
-        live: vec![true; cells],
-        shared: DMatrix::zeros(cells, cells),
-        channels: vec![ChannelInverse {
-            gain: vec![1.0; cells],
-            scale: 1.0,
-            deviation: None,
-            ambient: vec![0.0; cells],
-        }],
-    };
-    Wall::new(&registration(grid), &[vec![1.0; cells]], &dark)
+    let dark = test_scene::inverse(grid, 1, |_, _| 1.0, |_, _| 0.0);
+    BounceOperator::new(&registration(grid), &[vec![1.0; grid.cells()]], &dark)
 }
 
 /// Standard normal (Box, Muller 1958).
@@ -54,22 +43,9 @@ pub(super) fn normal(random: &mut fastrand::Rng) -> f64 {
 
 /// `T^-1 = E^-1 (R^-1 - F)`, exactly.
 fn inverse(scene: &CoaxialScene) -> InverseTransport {
-    let cells = scene.grid.cells();
-    let gain = |cell: usize| (scene.albedo[cell] * scene.irradiance[cell]).recip();
-    let operator = DMatrix::from_fn(cells, cells, |i, j| {
-        scene.form_factors[(i, j)] / scene.irradiance[i]
-    });
-    InverseTransport {
-        grid: scene.grid,
-        live: vec![true; cells],
-        shared: operator,
-        channels: vec![ChannelInverse {
-            gain: (0..cells).map(gain).collect(),
-            scale: 1.0,
-            deviation: None,
-            ambient: vec![0.0; cells],
-        }],
-    }
+    let gain = |cell: usize, _| (scene.albedo[cell] * scene.irradiance[cell]).recip();
+    let operator = |i, j| scene.form_factors[(i, j)] / scene.irradiance[i];
+    test_scene::inverse(scene.grid, 1, gain, operator)
 }
 
 /// `(R F)^(k-1) R E p` for `k` from 1.
@@ -103,7 +79,7 @@ fn every_bounce_of_a_known_scene_is_found_with_its_exact_inverse() {
     let pattern = DVector::from_fn(cells, |cell, _| f64::from(cell % 5 == 0));
     let transport = scene.transport();
     let flood = plane(&(&transport * DVector::from_element(cells, 1.0)));
-    let wall = Wall::new(&registration(scene.grid), &[flood], &inverse(&scene));
+    let wall = BounceOperator::new(&registration(scene.grid), &[flood], &inverse(&scene));
     let photograph = plane(&(&transport * &pattern));
     let separated = Separated::new(&wall, &[photograph], 1e-5).unwrap();
     let (unseparated, layers) = separated.layers.split_last().unwrap();
@@ -158,7 +134,7 @@ fn bounces_of_a_known_scene_are_found_from_its_photographs() {
     let (inverse, _) = solved.unwrap();
     let white = DVector::from_element(cells, 1.0);
     let checkered = DVector::from_fn(cells, |cell, _| f64::from(cell / 14 % 3 == cell % 2));
-    let wall = Wall::new(
+    let wall = BounceOperator::new(
         &registration(scene.grid),
         &[plane(&(&transport * &white))],
         &inverse,
@@ -190,7 +166,7 @@ fn layers_add_up_to_the_photograph_even_with_a_wrong_inverse() {
     inverse.shared *= 0.5;
     inverse.live[17] = false;
     inverse.channels[0].gain.rotate_left(3);
-    let wall = Wall::new(
+    let wall = BounceOperator::new(
         &registration(scene.grid),
         std::slice::from_ref(&flood),
         &inverse,
@@ -216,7 +192,7 @@ fn light_that_does_not_fade_is_refused() {
     let flood = plane(&(scene.transport() * DVector::from_element(cells, 1.0)));
     let mut inverse = inverse(&scene);
     inverse.shared *= 10.0;
-    let wall = Wall::new(
+    let wall = BounceOperator::new(
         &registration(scene.grid),
         std::slice::from_ref(&flood),
         &inverse,

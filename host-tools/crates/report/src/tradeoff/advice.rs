@@ -1,4 +1,4 @@
-//! One line of advice.
+//! Advice in one line: the cheapest tier that is good enough.
 
 use super::{Point, Sweep};
 use iltm_compile::cost::{CLOCK, RATE};

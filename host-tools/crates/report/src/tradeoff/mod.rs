@@ -1,11 +1,11 @@
-//! What accuracy costs in time: many ways to compensate a scene, each with its error
-//! and its cost.
+//! Accuracy against time: many ways to compensate a scene, each with its error and its
+//! cost.
 //!
 //! | what | file |
 //! |---|---|
 //! | the ways, and what is asked of each | `sweep.rs`, of a table alone `of_table.rs` |
 //! | a table's tiers and bits as points | `points.rs` |
-//! | a table's numbers, read back | `operator.rs` |
+//! | a table in floating point | `float_table.rs` |
 //! | errors of natural images, predicted and true | `judge.rs` |
 //! | fewer bits, a coarser grid | `bits.rs`, `coarse.rs` |
 //! | points that no other beats | `front.rs` |
@@ -22,11 +22,11 @@
 mod advice;
 mod bits;
 mod coarse;
+mod float_table;
 mod front;
 mod judge;
 mod list;
 mod of_table;
-mod operator;
 mod page;
 mod picture;
 mod points;

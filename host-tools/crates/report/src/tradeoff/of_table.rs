@@ -1,4 +1,4 @@
-//! The sweeps that a table alone allows.
+//! Sweeps that a table alone allows.
 
 use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Sweep, Tradeoff, TradeoffError};

@@ -1,4 +1,4 @@
-//! The page: one HTML file with everything inside, that a browser shows without network.
+//! HTML page of the trade-off: one file that a browser shows without network.
 
 use super::advice::fraction;
 use super::picture::{colour, title};

@@ -1,11 +1,11 @@
-//! The sweeps over a capture: the ways, and what is asked of each.
+//! Sweeps over a capture: the ways, and what is asked of each.
 
 use super::coarse::{averaged, coarser};
-use super::judge::{Truth, of_other_grid};
-use super::operator::Numbers;
+use super::float_table::FloatTable;
+use super::judge::{ReferenceTransport, of_other_grid};
 use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Point, Sweep, Tradeoff, TradeoffError};
-use crate::{microseconds_at, steps};
+use crate::{microseconds_at, tier_costs};
 use iltm_capture::{CaptureOptions, FineFlood, Measurements, read_reference};
 use iltm_compile::{
     CompileOptions, Provenance,
@@ -49,7 +49,7 @@ struct Base<'b> {
     folder: &'b Path,
     learned: &'b BuiltTable,
     common: Common,
-    truth: Option<Truth>,
+    truth: Option<ReferenceTransport>,
     progress: &'b dyn Progress,
 }
 
@@ -63,7 +63,7 @@ pub(super) fn of_capture(
     let reference = read_reference(folder, measurements.grid, channels)?;
     let options = SolveOptions::default();
     let learned = build_table_from(measurements, folder, &options, None, progress)?;
-    let truth = reference.map(|transports| Truth {
+    let truth = reference.map(|transports| ReferenceTransport {
         transports,
         white: learned.compiled.white,
         live: learned.inverse.live.clone(),
@@ -244,7 +244,7 @@ impl Base<'_> {
         self.progress.end();
         let compiled = compiled?;
         let coarse = Table::check(&compiled.image).map_err(TradeoffError::Table)?;
-        let Some(numbers) = Numbers::finer(&coarse, inverse.grid) else {
+        let Some(numbers) = FloatTable::finer(&coarse, inverse.grid) else {
             return Ok(Vec::new());
         };
         let timed = microseconds_at(&coarse, inverse.grid).map_err(TradeoffError::Timing)?;
@@ -253,31 +253,21 @@ impl Base<'_> {
         let common = self
             .common
             .again(Sweep::Grid, format!("operator of {grid} cells"));
-        let point = |(step, microseconds): (crate::Step, f64)| {
-            let entries = numbers.entries(&numbers.segments(step.tier));
+        let point = |(cost, microseconds): (crate::TierCost, f64)| {
+            let entries = numbers.entries(&numbers.segments(cost.tier));
             let left_out = of_other_grid(&numbers, &entries, inverse, white);
             let truth = self.truth.as_ref();
             Point {
-                sweep: common.sweep,
-                setting: common.setting.clone(),
-                tier: step.tier,
-                method: common.method.clone(),
-                photographs: common.photographs,
-                bits: 16,
-                grid,
                 left_out,
                 inverse: own,
                 predicted: left_out.hypot(own),
                 truth: truth.map(|truth| truth.error(&numbers, &entries, white)),
-                instructions: cost::stages(&coarse, step.tier, size).total(),
-                microseconds: Some(microseconds),
-                bytes: step.table_bytes - fine_bytes(&coarse) + fine_bytes(table),
-                seconds: common.seconds,
-                hypothetical: false,
-                front: false,
+                instructions: cost::stages(&coarse, cost.tier, size).total(),
+                bytes: cost.table_bytes - fine_bytes(&coarse) + fine_bytes(table),
+                ..common.point(&coarse, cost, microseconds)
             }
         };
-        let points = steps(&coarse).into_iter().zip(timed).map(point);
+        let points = tier_costs(&coarse).into_iter().zip(timed).map(point);
         // Gain only is the same on every grid.
         Ok(points.filter(|point| point.tier > 0).collect())
     }

@@ -1,4 +1,4 @@
-//! Images that show what a table does to a scene nobody knows beforehand.
+//! Wanted images that show what a table does to a scene nobody knows beforehand.
 
 use super::Content;
 use crate::Wanted;

@@ -1,18 +1,23 @@
-//! The report of a solve: what was learned of a scene, and what it means for the user's
-//! own content, as a page that a browser shows without network.
+//! Page of a solve: what was learned of a scene, and what it means for the user's own
+//! content, in a file that a browser shows without network.
 //!
-//! [`Report`] draws what every report has; here are the images for a scene nobody knows
-//! (`wanted`), where the cells are (`registered`) and how bright white may be
-//! (`headroom`).
+//! [`Report`] draws what every report has; here are where the cells are, the images for a
+//! scene nobody knows (`wanted`) and how bright white may be (`headroom`).
 
 mod headroom;
-mod registered;
 mod wanted;
 
-use crate::{Command, Report, ReportError, Words};
+use crate::{Command, Report, ReportError, Words, frame_size};
+use iltm_capture::NO_CELL;
 use iltm_compile::build_table::BuiltTable;
-use iltm_picture::{LightPicture, Picture, html::PictureFile, progress::Progress};
+use iltm_picture::{
+    LightPicture, Picture,
+    canvas::Canvas,
+    html::{PictureFile, img, percent, picture_file},
+    progress::Progress,
+};
 use iltm_runtime::image::Table;
+use maud::{Markup, html};
 use std::path::Path;
 
 /// Pictures or videos that the user is going to show.
@@ -35,7 +40,7 @@ impl Content {
 
 /// A page and the pictures on it.
 #[derive(Clone, Debug)]
-pub struct SolvedReport {
+pub struct SolvePage {
     /// The page, complete in itself.
     pub page: String,
     /// All pictures, to be kept beside it.
@@ -52,19 +57,68 @@ pub fn report(
     table: &Path,
     content: &[Content],
     progress: &dyn Progress,
-) -> Result<SolvedReport, ReportError> {
+) -> Result<SolvePage, ReportError> {
     let checked = Table::check(&learned.compiled.image).map_err(ReportError::Table)?;
     let wanted = wanted::wanted(&checked, content);
     let report = Report::new(learned, wanted, progress)?;
     let mut files = report.files.clone();
-    let mut sections = vec![registered::section(learned, &mut files)];
+    let mut sections = vec![cell_map(learned, &mut files)];
     sections.push(headroom::section(learned, &checked, content, &mut files));
     let words = Words {
         sections,
         ..words(learned, capture, table)
     };
     let page = report.html(&words);
-    Ok(SolvedReport { page, files })
+    Ok(SolvePage { page, files })
+}
+
+/// Two colours for cells beside each other, and of pixels that are lit and not used.
+const COLOURS: [[u8; 3]; 2] = [[245, 180, 90], [70, 130, 200]];
+const UNUSED: [u8; 3] = [60, 62, 68];
+
+/// The section with the map of the cells in the photographs.
+fn cell_map(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Markup {
+    let measurements = &learned.measurements;
+    let registration = &measurements.registration;
+    let (width, height) = registration.camera;
+    let file = frame_size(width, height).map(|size| {
+        let mut canvas = Canvas::new(size, [0; 3]);
+        let cols = measurements.grid.cols();
+        let cells = registration
+            .cell_of_pixel
+            .iter()
+            .zip(&registration.seen_cell);
+        for (pixel, (used, seen)) in cells.enumerate() {
+            let colour = match (*used, *seen) {
+                (NO_CELL, NO_CELL) => continue,
+                (NO_CELL, _) => UNUSED,
+                (cell, _) => {
+                    let cell = cell as usize;
+                    COLOURS[(cell / cols + cell % cols) % 2]
+                }
+            };
+            canvas.set(pixel % width, pixel / width, colour);
+        }
+        picture_file("registration", &canvas.finish())
+    });
+    let live = measurements.live.iter().filter(|live| **live).count();
+    let markup = html! { section .split {
+        div {
+            h2 { "Where the cells are" }
+            p {
+                (live) " of " (measurements.live.len()) " cells were found. Each square of the map is one cell of the projector as "
+                "the camera sees it; pixels between the squares see two cells at once and are not used."
+            }
+            p .quiet {
+                "White reaches " (percent(measurements.diagnostics.exposure)) " of the camera's full scale."
+            }
+        }
+        @if let Some(file) = &file {
+            figure { (img(&file.png, "Cells as the camera sees them")) figcaption { "The camera's picture, coloured by cell." } }
+        }
+    } };
+    files.extend(file);
+    markup
 }
 
 fn words(learned: &BuiltTable, capture: &Path, table: &Path) -> Words {
@@ -74,25 +128,21 @@ fn words(learned: &BuiltTable, capture: &Path, table: &Path) -> Words {
         name.to_string_lossy().into_owned()
     });
     let (capture, table) = (quoted(capture), quoted(table));
-    let command = |what: &str, line: String| Command {
-        what: what.to_owned(),
-        line,
-    };
     Words {
         title,
         scene: "What the photographs of this scene say, what the table makes of it, and what it \
                 will look like on the wall."
             .to_owned(),
         commands: vec![
-            command(
+            Command::new(
                 "This table again, without new photographs:",
                 format!("iltm solve {capture} -o {table}"),
             ),
-            command(
+            Command::new(
                 "Proof on the wall: pictures to project and to photograph, then a verdict:",
                 format!("iltm verify {table} -o verification\niltm verify {table} verification"),
             ),
-            command(
+            Command::new(
                 "Live:",
                 format!(
                     "ffmpeg -i VIDEO -pix_fmt yuv420p -f yuv4mpegpipe - | iltm compensate {table} - -o - | mpv -"

@@ -1,5 +1,5 @@
-//! What a table does to a frame, in floating point: its gains and the entries of its
-//! operator, read back from the image.
+//! Table in floating point: its gains and the entries of its operator, read back from the
+//! image, and what they do to a frame.
 //!
 //! Light is relative to reference white, drives to the projector's white. Ambient light
 //! is left out: what is wanted is wanted above it.
@@ -23,17 +23,17 @@ const SETTLED: f64 = 1e-7;
 
 /// One entry of `K^` in the orthonormal Haar domain.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Entry {
+pub(super) struct HaarEntry {
     pub(super) row: usize,
     pub(super) col: usize,
     pub(super) value: f64,
 }
 
 /// The entries of one channel.
-pub(super) type Entries = Vec<Entry>;
+pub(super) type HaarEntries = Vec<HaarEntry>;
 
 /// A table's numbers.
-pub(super) struct Numbers<'t> {
+pub(super) struct FloatTable<'t> {
     table: &'t Table<'t>,
     functions: Vec<Function>,
     haar: Haar,
@@ -45,7 +45,7 @@ pub(super) struct Numbers<'t> {
     gains: DMatrix<f64>,
 }
 
-impl<'t> Numbers<'t> {
+impl<'t> FloatTable<'t> {
     /// For frames of one pixel a cell.
     pub(super) fn new(table: &'t Table<'t>) -> Self {
         let (grid, channels) = (table.grid(), usize::from(table.channels()));
@@ -110,7 +110,7 @@ impl<'t> Numbers<'t> {
     }
 
     /// The entries of segments by channel, scales of the channels included.
-    pub(super) fn entries(&self, segments: &[Segment<'_>]) -> Vec<Entries> {
+    pub(super) fn entries(&self, segments: &[Segment<'_>]) -> Vec<HaarEntries> {
         let scales = self.table.operator().map(Operator::channel_scales);
         let of_channel = |channel: usize| {
             let scale = scales.map_or(1.0, |scales| scales[channel].to_num::<f64>());
@@ -125,13 +125,13 @@ impl<'t> Numbers<'t> {
     }
 
     /// The inverse of what [`quantise`](iltm_compile::quantise) does.
-    fn row(&self, row: Row<'_>, scale: f64) -> Entries {
+    fn row(&self, row: Row<'_>, scale: f64) -> HaarEntries {
         let norm = |index: usize| (self.functions[index].squared_norm() as f64).sqrt();
         let index = usize::from(row.index);
         let entry = |(col, value): (usize, i16)| {
             let shift = self.functions[col].input_shift() + CORRECTION_GUARD_BITS;
             let unit = (-f64::from(shift + u32::from(row.shift))).exp2();
-            Entry {
+            HaarEntry {
                 row: index,
                 col,
                 value: scale * f64::from(value) * unit * norm(index) * norm(col),
@@ -141,7 +141,7 @@ impl<'t> Numbers<'t> {
     }
 
     /// `K d` of every column of `wanted`, one a pixel.
-    pub(super) fn bounced(&self, entries: &[Entry], wanted: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(super) fn bounced(&self, entries: &[HaarEntry], wanted: &DMatrix<f64>) -> DMatrix<f64> {
         let cells = match &self.lattice {
             Some(lattice) => by_column(wanted, |column| {
                 let light: Vec<f32> = column.iter().map(|light| *light as f32).collect();
@@ -170,7 +170,7 @@ impl<'t> Numbers<'t> {
     pub(super) fn drives(
         &self,
         channel: usize,
-        entries: &[Entry],
+        entries: &[HaarEntry],
         wanted: &DMatrix<f64>,
     ) -> DMatrix<f64> {
         let mut drives = wanted.clone();
@@ -187,7 +187,7 @@ impl<'t> Numbers<'t> {
     pub(super) fn light(
         &self,
         channel: usize,
-        entries: &[Entry],
+        entries: &[HaarEntry],
         drives: &DMatrix<f64>,
     ) -> Option<DMatrix<f64>> {
         let fade = self
@@ -234,16 +234,14 @@ fn by_column(matrix: &DMatrix<f64>, of: impl Fn(&[f64]) -> Vec<f64>) -> DMatrix<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_scene;
     use iltm_compile::{CompileOptions, compile};
     use iltm_solve::{InverseTransport, natural_images};
 
-    fn inverse(channels: usize) -> InverseTransport {
-        iltm_tests_wedge(channels)
-    }
-
     /// Two facing rows of cells that light each other, with a deviation in blue.
-    fn iltm_tests_wedge(channels: usize) -> InverseTransport {
+    fn inverse(channels: usize) -> InverseTransport {
         let grid = Grid::new(5, 6).unwrap();
+        let gain = |cell: usize, _| 2.0 + 0.1 * (cell % 4) as f64;
         let near = |i: usize, j: usize| {
             let (a, b) = ((i % 6) as f64, (j % 6) as f64);
             let apart = (i / 6).abs_diff(j / 6) as f64;
@@ -253,25 +251,16 @@ mod tests {
                 0.02 / (1.0 + apart + (a - b).abs())
             }
         };
-        let cells = grid.cells();
-        let channel = |index: usize| iltm_solve::ChannelInverse {
-            gain: (0..cells)
-                .map(|cell| 2.0 + 0.1 * (cell % 4) as f64)
-                .collect(),
-            scale: [1.0, 0.8, 0.5][index],
-            deviation: (index == 2).then(|| {
-                DMatrix::from_fn(cells, cells, |i, j| {
-                    if (i + 2 * j) % 11 == 1 { 0.003 } else { 0.0 }
-                })
-            }),
-            ambient: vec![0.0; cells],
-        };
-        InverseTransport {
-            grid,
-            live: vec![true; cells],
-            shared: DMatrix::from_fn(cells, cells, near),
-            channels: (0..channels).map(channel).collect(),
+        let mut inverse = test_scene::inverse(grid, channels, gain, near);
+        for (channel, scale) in inverse.channels.iter_mut().zip([1.0, 0.8, 0.5]) {
+            channel.scale = scale;
         }
+        if let Some(blue) = inverse.channels.get_mut(2) {
+            blue.deviation = Some(DMatrix::from_fn(grid.cells(), grid.cells(), |i, j| {
+                if (i + 2 * j) % 11 == 1 { 0.003 } else { 0.0 }
+            }));
+        }
+        inverse
     }
 
     #[test]
@@ -284,7 +273,7 @@ mod tests {
             };
             let compiled = compile(&inverse, None, &options).unwrap();
             let table = Table::check(&compiled.image).unwrap();
-            let numbers = Numbers::new(&table);
+            let numbers = FloatTable::new(&table);
             let wanted = natural_images(inverse.grid);
             let entries = numbers.entries(&numbers.segments(1));
             for (channel, entries) in entries.iter().enumerate().take(channels) {

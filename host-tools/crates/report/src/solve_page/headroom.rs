@@ -1,4 +1,4 @@
-//! How bright white is, why, and what of the content is cut at that.
+//! Headroom: how bright white is, why, and what of the content is cut at that.
 
 use super::Content;
 use iltm_capture::FineFlood;

@@ -1,5 +1,5 @@
-//! What the wall does to light once it has landed: `F1 K`, the next bounce of any
-//! light, at the camera's full resolution.
+//! One-bounce operator `F1 K`: the next bounce of any light that has landed on the wall,
+//! at the camera's full resolution.
 
 use iltm_capture::{NO_CELL, Registration};
 use iltm_solve::InverseTransport;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// A camera pixel on the wall.
 #[derive(Clone, Debug)]
-struct Place {
+struct WallPixel {
     pixel: u32,
     /// Cells around it and their weights: `U`.
     weights: [(u32, f32); 4],
@@ -27,24 +27,24 @@ struct Place {
 /// the cells is the flood photograph's own, as in a table's
 /// [fine gains](iltm_compile::gain::fine_gains).
 #[derive(Clone, Debug)]
-pub struct Wall {
+pub struct BounceOperator {
     size: (usize, usize),
-    places: Vec<Place>,
+    places: Vec<WallPixel>,
     /// Cell whose mean a pixel is part of, by place; `None` where it sees two.
     members: Vec<Option<u32>>,
     /// Pixels of each cell's mean, length `N`.
     counts: Vec<u32>,
-    channels: Vec<WallChannel>,
+    channels: Vec<OperatorChannel>,
 }
 
 #[derive(Clone, Debug)]
-struct WallChannel {
+struct OperatorChannel {
     operator: DMatrix<f64>,
     /// `1 / g(x)` by place: light that is seen for light that lands.
     fade: Vec<f32>,
 }
 
-impl Wall {
+impl BounceOperator {
     /// The pixels whose cells took part in the solve; `flood` is the photograph of
     /// white with black subtracted, one plane a channel.
     ///
@@ -61,12 +61,12 @@ impl Wall {
         let mut places = Vec::new();
         for pixel in 0..registration.seen_cell.len() {
             let weights = registration.weights(grid, &inverse.live, pixel);
-            places.extend(weights.map(|weights| Place {
+            places.extend(weights.map(|weights| WallPixel {
                 pixel: pixel as u32,
                 weights: weights.map(|(cell, weight)| (cell as u32, weight as f32)),
             }));
         }
-        let cell = |place: &Place| {
+        let cell = |place: &WallPixel| {
             let cell = registration.cell_of_pixel[place.pixel as usize];
             (cell != NO_CELL).then_some(cell)
         };
@@ -94,12 +94,12 @@ impl Wall {
                         if landed > 0.0 { flood / landed } else { 0.0 }
                     },
                 );
-            WallChannel {
+            OperatorChannel {
                 fade: fade.collect(),
                 operator: found.operator,
             }
         });
-        let channels: Vec<WallChannel> = channels.collect();
+        let channels: Vec<OperatorChannel> = channels.collect();
         wall.channels = channels;
         wall
     }
@@ -184,7 +184,7 @@ impl Wall {
 
     /// `U`: values of cells, linear between their centres.
     fn interpolated(&self, cells: &DVector<f64>) -> Vec<f32> {
-        let at = |place: &Place| {
+        let at = |place: &WallPixel| {
             let corner = |(cell, weight): (u32, f32)| f64::from(weight) * cells[cell as usize];
             place.weights.map(corner).iter().sum::<f64>() as f32
         };
