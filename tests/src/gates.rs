@@ -1,12 +1,11 @@
-//! Which gates notice a fault of which size: photographs of a described scene are taken
-//! with the fault on purpose, and every gate is asked.
+//! Gates before a solve, and which of them notices a fault of which size: photographs of a
+//! described scene are taken with the fault on purpose, and every gate is asked.
 
+use crate::simulated::simulation;
 use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, shown};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{
-    CaptureFault, InjectedFault, Simulation, SimulationOptions, VirtualCamera, folder,
-};
+use iltm::scene::{CaptureFault, Forced, InjectedFault, Simulation, VirtualCamera, folder};
 use std::fmt::Write;
 
 /// Seed of patterns and noise.
@@ -26,14 +25,12 @@ pub struct Session {
 
 impl Session {
     /// The gates with this verdict.
-    #[must_use]
     pub fn that(&self, verdict: Verdict) -> Vec<GateName> {
         let that = self.gates.iter().filter(|gate| gate.verdict == verdict);
         that.map(|gate| gate.name).collect()
     }
 
     /// What the first gate that is not content says.
-    #[must_use]
     pub fn first_words(&self) -> &str {
         let worst = self.gates.iter().find(|gate| gate.fails());
         let remark = || self.gates.iter().find(|g| g.verdict == Verdict::Warn);
@@ -49,21 +46,12 @@ pub struct Rig<'s> {
 
 impl<'s> Rig<'s> {
     /// Computes the light of a scene.
-    ///
-    /// # Panics
-    /// If it cannot be simulated: the scenes are part of the project.
-    #[must_use]
     pub fn new(scene: &'s Scene) -> Self {
-        let options = SimulationOptions::default();
-        let simulation = Simulation::new(scene, &options, &Silent).expect("can be simulated");
+        let simulation = simulation(scene, Forced::default());
         Self { scene, simulation }
     }
 
     /// Takes photographs with a fault, or none, and asks the gates.
-    ///
-    /// # Panics
-    /// If the photographs cannot be written or are no capture.
-    #[must_use]
     pub fn session(&self, fault: Option<InjectedFault>) -> Session {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("capture");
@@ -81,7 +69,6 @@ impl<'s> Rig<'s> {
 }
 
 /// Faults and the sizes that are tried, the smallest first.
-#[must_use]
 pub fn tried() -> Vec<(CaptureFault, &'static str, Vec<f64>)> {
     vec![
         (
@@ -133,7 +120,6 @@ pub fn tried() -> Vec<(CaptureFault, &'static str, Vec<f64>)> {
 }
 
 /// A table of what was noticed, a line for each fault.
-#[must_use]
 pub fn table(sessions: &[(&'static str, Vec<Session>)]) -> String {
     let mut text = String::from(
         "| fault | passes in silence | remark from | refused from | by |\n|---|---|---|---|---|\n",

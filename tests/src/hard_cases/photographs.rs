@@ -1,4 +1,4 @@
-//! Whole captures of a [`CoaxialScene`], written as files: each cell is a square of
+//! Camera: whole captures of a [`CoaxialScene`], written as files: each cell is a square of
 //! camera pixels.
 
 use crate::hard_cases::observations::{normal, sequence};

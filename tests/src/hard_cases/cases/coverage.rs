@@ -1,4 +1,4 @@
-//! Cells that no light reaches, that reflect none, that the camera does not see,
+//! Coverage: cells that no light reaches, that reflect none, that the camera does not see,
 //! or that the surface covers in part.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};

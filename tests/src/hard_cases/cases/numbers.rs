@@ -1,4 +1,4 @@
-//! Not a number, infinity and denormals wherever a number may come in.
+//! NaN: not a number, infinity and denormals wherever a number may come in.
 
 use super::super::case::{Case, Outcome};
 use super::super::grid;

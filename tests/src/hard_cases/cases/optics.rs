@@ -1,4 +1,4 @@
-//! What projector, camera and surface do to light besides Lambert's law.
+//! Optics: what projector, camera and surface do to light besides Lambert's law.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::observations::{Capture, out_of_focus};

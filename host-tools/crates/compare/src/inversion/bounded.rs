@@ -3,7 +3,7 @@
 use super::live::LiveTransport;
 use super::{Inversion, Inverted, KnownTransport};
 use crate::{Answer, Citation, Description, Unfit};
-use iltm_solve::content::wanted_images;
+use iltm_solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of one frame at most.

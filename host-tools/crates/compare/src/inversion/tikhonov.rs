@@ -6,7 +6,7 @@ use super::pseudo_inverse::regularised;
 use super::{Inversion, Inverted, KnownTransport};
 use crate::{Citation, Description, Rig, Unfit};
 use iltm_capture::NoiseModel;
-use iltm_solve::content::wanted_images;
+use iltm_solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Weights that are tried, each twice the one before.

@@ -8,7 +8,7 @@ use super::live::{LiveTransport, finite};
 use super::{Inversion, Inverted, KnownTransport};
 use crate::rig::clear_dead;
 use crate::{Citation, Description, Unfit};
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::{DMatrix, DVector};
 
 /// The sparse matrix `M` in Haar that brings `T^ M` nearest to the identity, column by
@@ -40,7 +40,7 @@ impl Inversion for WaveletInverse {
 
     fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let haar = Haar::new(known.grid, Basis::QuadTree);
+        let haar = Haar::new(known.grid);
         let transformed = haar.analyse_operator(&filled(&known, &live));
         let patterns = patterns(&transformed, self.entries);
         let stored: usize = patterns.iter().map(Vec::len).sum();
