@@ -39,8 +39,8 @@ pub fn simulation(scene: &Scene, forced: Forced) -> Simulation<'_> {
 pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
     let simulation = simulation(scene, Forced::default());
     let patterns = shown(simulation.grid(), bernoulli, seed);
-    let shooting = VirtualCamera::new(scene, &simulation, seed).expect("light");
-    folder::write(&shooting, &patterns, capture, &Silent).expect("written");
+    let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
+    folder::write(&camera, &patterns, capture, &Silent).expect("written");
 }
 
 /// What is learned from a capture with the usual options.

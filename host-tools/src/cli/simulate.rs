@@ -111,17 +111,17 @@ fn shoot<'a>(
     simulation: &Simulation<'_>,
     progress: &dyn Progress,
 ) -> Result<Shot<'a>, Failure> {
-    let shooting = || VirtualCamera::new(scene, simulation, arguments.seed);
-    let shooting = || shooting().map(|shooting| shooting.with_faults(&arguments.fault));
+    let camera = || VirtualCamera::new(scene, simulation, arguments.seed);
+    let camera = || camera().map(|camera| camera.with_faults(&arguments.fault));
     if let Some(folder) = &arguments.photograph {
-        let taken = photograph(arguments, folder, &shooting()?, progress).map_err(not_taken)?;
+        let taken = photograph(arguments, folder, &camera()?, progress).map_err(not_taken)?;
         return Ok(Shot::Missing(folder, taken));
     }
     let Some(out) = &arguments.output else {
         return Ok(Shot::Nothing);
     };
     let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
-    let written = folder::write(&shooting()?, &patterns, out, progress)?;
+    let written = folder::write(&camera()?, &patterns, out, progress)?;
     Ok(Shot::Capture(out, written))
 }
 

@@ -130,9 +130,9 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
     verify::write(&table, &layout, &settings, &folder, &Silent).unwrap();
     let quiet = Forced::default().with(Effect::Noise, false);
     let simulation = simulation(laboratory, quiet);
-    let shooting = VirtualCamera::new(laboratory, &simulation, 11).unwrap();
+    let camera = VirtualCamera::new(laboratory, &simulation, 11).unwrap();
     let session = fill_capture::UnfilledCapture::read(&folder, table.grid()).unwrap();
-    session.take_missing(&shooting, &Silent).unwrap();
+    session.take_missing(&camera, &Silent).unwrap();
     let session = verify::Session::read(&folder, &table, &Silent).unwrap();
     let verdict = verify::judge(&folder, &table, &session, None).unwrap();
     (learned, verdict.error)

@@ -43,9 +43,9 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     };
     write(&table, &layout, &settings, folder, &Silent).unwrap();
     let simulation = simulation(scene, Forced::default());
-    let shooting = VirtualCamera::new(scene, &simulation, 11).unwrap();
+    let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
     let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();
-    session.take_missing(&shooting, &Silent).unwrap();
+    session.take_missing(&camera, &Silent).unwrap();
 }
 
 fn verdict(learned: &BuiltTable, folder: &Path) -> Result<Verdict, VerifyError> {

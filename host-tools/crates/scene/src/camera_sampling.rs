@@ -256,10 +256,8 @@ impl<'e> PixelSampler<'e> {
         albedo: [f64; 3],
         pixel: &mut PixelSamples,
     ) {
-        let gloss = point
-            .panel
-            .gloss
-            .filter(|_| self.options.gloss && !point.back);
+        let seen = self.options.gloss && !point.back;
+        let gloss = point.panel.gloss.filter(|_| seen);
         if self.near.is_none() && gloss.is_none() {
             return;
         }
@@ -291,16 +289,11 @@ impl<'e> PixelSampler<'e> {
     fn vary(&self, pixel: &mut PixelSamples) {
         for place in &pixel.places {
             if let Some(near) = self.near {
-                near.at(
-                    self.patches.all(),
-                    place.patch,
-                    &place.world,
-                    |other, more| {
-                        pixel
-                            .detail
-                            .push((other, place.share.map(|share| share * more)));
-                    },
-                );
+                let patches = self.patches.all();
+                near.at(patches, place.patch, &place.world, |other, more| {
+                    let share = place.share.map(|share| share * more);
+                    pixel.detail.push((other, share));
+                });
             }
             if let Some((gloss, part)) = place.gloss {
                 self.shine(place, gloss, part, &mut pixel.lobes);
@@ -319,12 +312,8 @@ impl<'e> PixelSampler<'e> {
             let way = other.polygon.centroid() - place.world;
             // Most directions are far from the lobe.
             let lobe = gloss.towards(&normal, &way.normalize(), &place.towards);
-            if lobe <= LEAST
-                || self
-                    .facets
-                    .obstacles()
-                    .blocked(&place.world, &other.polygon.centroid())
-            {
+            let hidden = |to| self.facets.obstacles().blocked(&place.world, to);
+            if lobe <= LEAST || hidden(&other.polygon.centroid()) {
                 continue;
             }
             let share = part * lobe * from_point(&place.world, &normal, &other.polygon);

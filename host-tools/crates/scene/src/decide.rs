@@ -4,6 +4,7 @@ use super::description::{Albedo, Camera, Projector, Scene};
 use super::effects::{Decisions, Effect};
 use super::estimate::{self, Estimate};
 use super::facets::Facets;
+use super::patches::PatchExtent;
 use super::sensor::Sensor;
 use iltm_picture::{
     Response,
@@ -183,21 +184,13 @@ pub(super) fn shadows(facets: &Facets<'_>, decisions: &mut Decisions) -> bool {
     decisions.weigh(Effect::Shadows, found, nothing)
 }
 
-/// Which surfaces take part in interreflection: what is in the frame, beside it,
-/// behind.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct InterreflectionExtent {
-    pub(super) interreflection: bool,
-    pub(super) surroundings: bool,
-    pub(super) backs: bool,
-}
-
-/// Decides about light between surfaces.
+/// Decides about light between surfaces: whether there is any, and which surfaces take part
+/// beside those in the frame.
 pub(super) fn between_surfaces(
     facets: &Facets<'_>,
     threshold: f64,
     decisions: &mut Decisions,
-) -> InterreflectionExtent {
+) -> (bool, PatchExtent) {
     let scene = facets.scene();
     let ambient = if decisions.on(Effect::Ambient) {
         scene.ambient.into_iter().fold(0.0, f64::max)
@@ -222,8 +215,7 @@ pub(super) fn between_surfaces(
         let found = light.map(|light| (light >= threshold, words(light)));
         decisions.weigh(effect, found, nothing)
     };
-    InterreflectionExtent {
-        interreflection,
+    let extent = PatchExtent {
         surroundings: side(
             Effect::Surroundings,
             estimate.surroundings,
@@ -236,5 +228,6 @@ pub(super) fn between_surfaces(
             "back sides",
             "no back side gets light and is seen",
         ),
-    }
+    };
+    (interreflection, extent)
 }

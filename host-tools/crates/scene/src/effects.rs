@@ -95,26 +95,20 @@ pub struct Decision {
 
 /// Effects that are wanted or unwanted whatever the scene says.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Forced {
-    on: Vec<Effect>,
-    off: Vec<Effect>,
-}
+pub struct Forced(Vec<(Effect, bool)>);
 
 impl Forced {
     /// Wants `effect` on or off.
     #[must_use]
     pub fn with(mut self, effect: Effect, on: bool) -> Self {
-        self.on.retain(|e| *e != effect);
-        self.off.retain(|e| *e != effect);
-        if on { &mut self.on } else { &mut self.off }.push(effect);
+        self.0.retain(|(e, _)| *e != effect);
+        self.0.push((effect, on));
         self
     }
 
     fn wanted(&self, effect: Effect) -> Option<bool> {
-        if self.on.contains(&effect) {
-            return Some(true);
-        }
-        self.off.contains(&effect).then_some(false)
+        let found = self.0.iter().find(|(e, _)| *e == effect);
+        found.map(|(_, on)| *on)
     }
 }
 

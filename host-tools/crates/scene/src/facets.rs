@@ -7,7 +7,7 @@ use super::pinhole::Pinhole;
 use nalgebra::Vector2;
 
 /// Metres in front of the projector where its light begins.
-const NEAREST: f64 = 1e-3;
+pub(super) const NEAREST: f64 = 1e-3;
 /// Overlap in the frame that still counts as touching: panels share edges.
 const TOUCHING: f64 = 1e-9;
 

@@ -5,14 +5,12 @@
 //! frame, and the sides that are turned away from the projector, are cut into pieces
 //! of about a cell's size.
 
-use super::facets::Facets;
+use super::facets::{Facets, NEAREST};
 use super::geometry::{Plane, Polygon};
 use super::pinhole::Pinhole;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Metres in front of the projector where its light begins.
-const NEAREST: f64 = 1e-3;
 /// Side of a piece that no cell lights, in sides of a mean patch in the frame.
 const COARSE: f64 = 2.0;
 /// Samples along each side of a patch that its albedo is averaged over.

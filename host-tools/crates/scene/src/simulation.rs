@@ -8,7 +8,7 @@ use super::effects::{Decision, Decisions, Effect, Forced};
 use super::facets::Facets;
 use super::interreflection;
 use super::near_field::NearField;
-use super::patches::{Patch, PatchExtent, Patches};
+use super::patches::{Patch, Patches};
 use super::projector_light::{Beam, ProjectorLight};
 use super::radiosity::{FormFactorError, FormFactorMatrix, RadiosityError};
 use super::sensor::{Readout, Sensor};
@@ -113,13 +113,9 @@ impl<'s> Simulation<'s> {
             shadows: decide::shadows(&facets, &mut decisions),
         };
         let clock = Instant::now();
-        let taking = decide::between_surfaces(&facets, threshold, &mut decisions);
+        let (bounces, extent) = decide::between_surfaces(&facets, threshold, &mut decisions);
         decisions.took(Effect::Interreflection, clock.elapsed().as_secs_f64());
-        let cut = PatchExtent {
-            surroundings: taking.surroundings,
-            backs: taking.backs,
-        };
-        let patches = Patches::new(&facets, cut);
+        let patches = Patches::new(&facets, extent);
         let light = ProjectorLight::new(&facets, beam);
         let clock = Instant::now();
         let on_patches = light.on_patches(patches.all());
@@ -129,13 +125,10 @@ impl<'s> Simulation<'s> {
         if beam.shadows {
             decisions.took(Effect::Shadows, clock.elapsed().as_secs_f64());
         }
-        let exchange = if taking.interreflection {
-            Some(interreflection::exchange(
-                &facets,
-                patches.all(),
-                &mut decisions,
-                progress,
-            )?)
+        let exchange = if bounces {
+            let all = patches.all();
+            let found = interreflection::exchange(&facets, all, &mut decisions, progress);
+            Some(found?)
         } else {
             decisions.rule_out(Effect::Occlusion, "no light goes between surfaces");
             None
@@ -197,17 +190,14 @@ impl<'s> Simulation<'s> {
             .map(|leaving| near.largest(&self.patches, leaving.as_slice()))
             .fold(0.0, f64::max)
             / level;
-        let on = self.decisions.decide(
-            Effect::Detail,
-            largest >= self.threshold,
-            format!(
-                "bounced light differs within a patch by up to {} of white, from {} neighbours",
-                percent(largest),
-                near.pairs()
-            ),
+        let reason = format!(
+            "bounced light differs within a patch by up to {} of white, from {} neighbours",
+            percent(largest),
+            near.pairs()
         );
-        self.decisions
-            .took(Effect::Detail, clock.elapsed().as_secs_f64());
+        let (decisions, shows) = (&mut self.decisions, largest >= self.threshold);
+        let on = decisions.decide(Effect::Detail, shows, reason);
+        decisions.took(Effect::Detail, clock.elapsed().as_secs_f64());
         Ok(on.then_some(near))
     }
 

@@ -149,11 +149,8 @@ impl Surfaces<'_> {
         for ray in 0..rays.0 * rays.1 {
             let (across, down) = (along(ray % rays.0, rays.0), along(ray / rays.0, rays.1));
             let way = view.ray(across, down);
-            let Some(hit) = self
-                .facets
-                .obstacles()
-                .first_hit(&view.position(), &way, 0.0)
-            else {
+            let obstacles = self.facets.obstacles();
+            let Some(hit) = obstacles.first_hit(&view.position(), &way, 0.0) else {
                 continue;
             };
             let on_mirror = view.position() + hit.along * way;
@@ -190,10 +187,8 @@ impl Surfaces<'_> {
             kept *= self.mirror(mirror);
             let normal = self.facets.polygon(mirror).normal();
             way -= 2.0 * way.dot(&normal) * normal;
-            let hit = self
-                .facets
-                .obstacles()
-                .first_hit(&origin, &way, 1e-9 / way.norm())?;
+            let obstacles = self.facets.obstacles();
+            let hit = obstacles.first_hit(&origin, &way, 1e-9 / way.norm())?;
             origin += hit.along * way;
             let back = self.facets.polygon(hit.facet).normal().dot(&way) > 0.0;
             if back || self.mirror(hit.facet) == 0.0 {

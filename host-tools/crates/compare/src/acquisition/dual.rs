@@ -200,6 +200,7 @@ mod tests {
     use crate::test_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
+    use nalgebra::DVector;
 
     #[test]
     fn without_noise_it_ends_where_one_light_at_a_time_does() {
@@ -217,13 +218,8 @@ mod tests {
     #[test]
     fn a_flat_wall_takes_four_photographs_for_each_halving() {
         let grid = Grid::new(8, 8).unwrap();
-        let transport = DMatrix::from_fn(
-            64,
-            64,
-            |i, j| {
-                if i == j { 0.3 + i as f64 / 100.0 } else { 0.0 }
-            },
-        );
+        let own = DVector::from_fn(64, |i, _| 0.3 + i as f64 / 100.0);
+        let transport = DMatrix::from_diagonal(&own);
         let mut rig = rig(grid, &transport, &[true; 64], NoiseModel::default());
         let found = forward(&DualPhotography::default(), &mut rig);
         assert!((found - &transport).amax() < 1e-14);

@@ -138,14 +138,8 @@ mod tests {
                 f64::from(u8::from(code[(i + j) % prime]))
             });
             let quarter = (prime + 1) as f64 / 4.0;
-            let wanted =
-                DMatrix::from_fn(
-                    prime,
-                    prime,
-                    |i, j| {
-                        if i == j { 2.0 * quarter } else { quarter }
-                    },
-                );
+            let mut wanted = DMatrix::from_element(prime, prime, quarter);
+            wanted.fill_diagonal(2.0 * quarter);
             assert!((&s * s.transpose() - wanted).amax() < 1e-9);
         }
     }

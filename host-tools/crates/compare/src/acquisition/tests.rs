@@ -4,7 +4,7 @@ use super::*;
 use crate::test_scene::{m_scene, rig};
 use iltm_capture::NoiseModel;
 use iltm_runtime::Grid;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// What a method finds; `None` if the scene is none for it.
 fn found(method: &dyn Acquisition, rig: &mut Rig) -> Option<DMatrix<f64>> {
@@ -50,13 +50,8 @@ fn a_wall_of_one_cell_one_row_or_one_column_is_found_by_every_way() {
     for (rows, cols) in [(1, 1), (7, 1), (1, 7)] {
         let grid = Grid::new(rows, cols).unwrap();
         let cells = grid.cells();
-        let wanted = DMatrix::from_fn(cells, cells, |i, j| {
-            if i == j {
-                0.5 + 0.05 * (i % 3) as f64
-            } else {
-                0.0
-            }
-        });
+        let own = DVector::from_fn(cells, |i, _| 0.5 + 0.05 * (i % 3) as f64);
+        let wanted = DMatrix::from_diagonal(&own);
         let rig = rig(grid, &wanted, &vec![true; cells], NoiseModel::default());
         for method in all(40, 1) {
             let found = match method.acquire(&mut rig.clone()) {

@@ -162,10 +162,8 @@ mod tests {
     fn two_steps_are_exact_on_a_sphere() {
         let before = TestScene::sphere(3, 4, 0.8);
         let wanted = wanted(12);
-        let optical = Optical {
-            steps: 2,
-            scaled: false,
-        };
+        let (steps, scaled) = (2, false);
+        let optical = Optical { steps, scaled };
         let drive = before.drive(&optical, &wanted);
         assert!((&before.transport * drive - &wanted).norm() < 1e-12);
     }
@@ -173,10 +171,8 @@ mod tests {
     #[test]
     fn photographs_of_a_frame_are_those_that_are_counted() {
         let before = TestScene::textured(4, 6);
-        let optical = Optical {
-            steps: 3,
-            scaled: false,
-        };
+        let (steps, scaled) = (3, false);
+        let optical = Optical { steps, scaled };
         let counted = optical.invert(before.known()).unwrap().photographs;
         let mut rig = before.rig.clone();
         gmres(|x| product(&mut rig, x), &wanted(24), 3);
@@ -186,10 +182,8 @@ mod tests {
     #[test]
     fn noise_is_in_every_product() {
         let wanted = wanted(24);
-        let optical = Optical {
-            steps: 8,
-            scaled: true,
-        };
+        let (steps, scaled) = (8, true);
+        let optical = Optical { steps, scaled };
         let quiet = TestScene::panels(4, 6);
         let noisy = TestScene::panels(4, 6).noisy(1e-4);
         let error = |before: &TestScene| {

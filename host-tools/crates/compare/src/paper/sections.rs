@@ -45,16 +45,20 @@ pub(super) fn fourth(text: &mut String, samples: &[DrawErrors]) {
          and its 95 % interval (`fig4.csv` has each):\n\n\
          ![Errors of the second bounce over the draws](fig4-seeds.svg)\n"
     );
-    let names: Vec<&str> = Condition::ALL.iter().map(|c| c.name()).collect();
-    let _ = writeln!(text, "| second bounce | {} |", names.join(" | "));
-    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
-    rows(text, samples, DrawErrors::second_bounce);
-    let _ = writeln!(text, "\n| compensation | {} |", names.join(" | "));
-    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
-    rows(text, samples, DrawErrors::compensation);
+    rows(text, samples, ("second bounce", DrawErrors::second_bounce));
+    text.push('\n');
+    rows(text, samples, ("compensation", DrawErrors::compensation));
 }
 
-fn rows(text: &mut String, samples: &[DrawErrors], of: fn(&DrawErrors) -> Vec<f64>) {
+/// Means of an error, a row a method and a column a condition.
+fn rows(
+    text: &mut String,
+    samples: &[DrawErrors],
+    (name, of): (&str, fn(&DrawErrors) -> Vec<f64>),
+) {
+    let names = Condition::ALL.map(Condition::name);
+    let _ = writeln!(text, "| {name} | {} |", names.join(" | "));
+    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
     for (method, photographs) in ENTRIES {
         let cell = |condition: &Condition| {
             let Some(sample) = find(samples, *condition, (method, photographs)) else {
@@ -69,12 +73,8 @@ fn rows(text: &mut String, samples: &[DrawErrors], of: fn(&DrawErrors) -> Vec<f6
             format!("{} \u{b1} {half}{refused}", table::error(mean.mean))
         };
         let cells: Vec<String> = Condition::ALL.iter().map(cell).collect();
-        let _ = writeln!(
-            text,
-            "| {} | {} |",
-            words(method, photographs),
-            cells.join(" | ")
-        );
+        let (words, cells) = (words(method, photographs), cells.join(" | "));
+        let _ = writeln!(text, "| {words} | {cells} |");
     }
 }
 
@@ -92,13 +92,8 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
     let _ = writeln!(text, "|---|---|{}", "---:|".repeat(parts.len()));
     for counted in counts {
         let scene = surface(counted.textured);
-        let cells = counted.counts.map(|count| count.to_string());
-        let _ = writeln!(
-            text,
-            "| {scene} | {} | {} |",
-            counted.name,
-            cells.join(" | ")
-        );
+        let cells = counted.counts.map(|count| count.to_string()).join(" | ");
+        let _ = writeln!(text, "| {scene} | {} | {cells} |", counted.name);
     }
     let _ = writeln!(
         text,
@@ -134,15 +129,10 @@ pub(super) fn second(text: &mut String, places: &[TheoremBounds], counts: &[Coun
             place.photographs, place.k, place.kappa, place.gamma, place.product.0, place.product.1
         );
     }
-    let inside = places
-        .iter()
-        .filter(|place| place.product.1 < LIMIT)
-        .count();
-    let open = places
-        .iter()
-        .filter(|place| place.product.0 < LIMIT)
-        .count()
-        - inside;
+    let below =
+        |bound: fn(&TheoremBounds) -> f64| places.iter().filter(|p| bound(p) < LIMIT).count();
+    let inside = below(|place| place.product.1);
+    let open = below(|place| place.product.0) - inside;
     let a_row = |textured: bool| {
         let own = |c: &&Counted| c.textured == textured && c.name == INVERSE_IN_HAAR;
         let counted = counts.iter().find(own);
@@ -247,16 +237,13 @@ pub(super) fn time(text: &mut String, pictures: &CapturePictures) {
 pub(super) fn every(text: &mut String, contests: &[(&str, Vec<BenchmarkRow>, Vec<BenchmarkRow>)]) {
     let _ = writeln!(text, "\n## Every method on the same light\n");
     for (scene, photographed, inverted) in contests {
-        let _ = writeln!(
-            text,
-            "### Ways to photograph, {scene}\n\n{}",
-            table::markdown(photographed)
-        );
-        let _ = writeln!(
-            text,
-            "### Ways to invert or to do without an inverse, {scene}\n\n{}",
-            table::markdown(inverted)
-        );
+        for (ways, rows) in [
+            ("photograph", photographed),
+            ("invert or to do without an inverse", inverted),
+        ] {
+            let rows = table::markdown(rows);
+            let _ = writeln!(text, "### Ways to {ways}, {scene}\n\n{rows}");
+        }
     }
     let Some((_, photographed, inverted)) = contests.first() else {
         return;
