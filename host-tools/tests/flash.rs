@@ -621,7 +621,7 @@ fn a_report_has_what_support_needs_and_no_keys() {
     user.says(&["sign", "a.iltm", "--key", "iltm.key"]);
     user.says(&["flash", "a.iltm", "--port", port.path()]);
     user.says(&[
-        "report",
+        "support-bundle",
         "-o",
         "r.zip",
         "--seconds",
