@@ -9,6 +9,11 @@ use iltm_picture::progress::Silent;
 use nalgebra::DMatrix;
 use strum::VariantArray;
 
+const NO_NOISE: CellNoise = CellNoise {
+    lit: 0.0,
+    unlit: 0.0,
+};
+
 /// Owns what an [`Observed`] borrows.
 #[derive(Clone)]
 struct Capture {
@@ -88,15 +93,7 @@ fn corner(rows: u16, cols: u16) -> Corner {
 
 /// `diag(g) - K` of a channel.
 fn inverse(found: &InverseTransport, channel: usize) -> DMatrix<f64> {
-    let channel = &found.channels[channel];
-    let mut inverse = &found.shared * -channel.scale;
-    if let Some(deviation) = &channel.deviation {
-        inverse -= deviation;
-    }
-    for (cell, gain) in channel.gain.iter().enumerate() {
-        inverse[(cell, cell)] += gain;
-    }
-    inverse
+    found.channel(channel).dense()
 }
 
 fn relative(found: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
@@ -587,37 +584,15 @@ fn sizes_that_disagree_are_refused() {
 #[test]
 fn options_that_make_no_sense_are_refused() {
     let capture = Capture::new(&corner(3, 4), (3, 4), 20);
-    let default = SolveOptions::default();
-    for (name, options) in [
-        (
-            "lambda",
-            SolveOptions {
-                lambda: Some(f64::NAN),
-                ..default.clone()
-            },
-        ),
-        (
-            "lambda",
-            SolveOptions {
-                lambda: Some(-1.0),
-                ..default.clone()
-            },
-        ),
-        (
-            "tolerance",
-            SolveOptions {
-                tolerance: 0.0,
-                ..default.clone()
-            },
-        ),
-        (
-            "iterations",
-            SolveOptions {
-                iterations: 0,
-                ..default.clone()
-            },
-        ),
-    ] {
+    let wrong: [(&str, fn(&mut SolveOptions)); 4] = [
+        ("lambda", |options| options.lambda = Some(f64::NAN)),
+        ("lambda", |options| options.lambda = Some(-1.0)),
+        ("tolerance", |options| options.tolerance = 0.0),
+        ("iterations", |options| options.iterations = 0),
+    ];
+    for (name, spoil) in wrong {
+        let mut options = SolveOptions::default();
+        spoil(&mut options);
         let error = capture.solve(&options).unwrap_err();
         assert!(matches!(error, SolveError::Option { option, .. } if option == name));
     }
@@ -675,10 +650,7 @@ fn every_method_is_read_back_from_its_name() {
 fn least_squares_from_more_patterns_than_cells_is_exact() {
     let scene = corner(6, 8);
     let mut capture = Capture::new(&scene, (6, 8), 80);
-    capture.noise = CellNoise {
-        lit: 0.0,
-        unlit: 0.0,
-    };
+    capture.noise = NO_NOISE;
     let (found, report) = capture.solve(&method(Method::BruteForce)).unwrap();
     let exact = scene.inverse();
     assert!((found.channel(0).dense() - &exact).amax() < 1e-9);
@@ -690,10 +662,7 @@ fn least_squares_from_more_patterns_than_cells_is_exact() {
 fn forward_transport_first_ends_at_the_same_inverse_given_photographs_enough() {
     let scene = corner(6, 8);
     let mut capture = Capture::new(&scene, (6, 8), 80);
-    capture.noise = CellNoise {
-        lit: 0.0,
-        unlit: 0.0,
-    };
+    capture.noise = NO_NOISE;
     let options = SolveOptions {
         tolerance: 1e-6,
         iterations: 20_000,
