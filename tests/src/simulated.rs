@@ -1,8 +1,9 @@
 //! Simulated photographs: captures of the scenes that come with the tools, tables learned
 //! from them, and the errors that are on the wall then.
 
+use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::{CaptureOptions, NO_CELL, Registration, shown};
-use iltm::learn::{Learned, learn};
+
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Forced, Shooting, Simulation, SimulationOptions, folder};
@@ -43,9 +44,9 @@ pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
 }
 
 /// What is learned from a capture with the usual options.
-pub fn learned(capture: &Path) -> Learned {
+pub fn learned(capture: &Path) -> BuiltTable {
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
-    learn(capture, &photographs, &solve, None, &Silent).expect("a good capture")
+    build_table(capture, &photographs, &solve, None, &Silent).expect("a good capture")
 }
 
 /// Mean light of the pixels of each cell.

@@ -1,8 +1,8 @@
 //! `iltm compare`
 
 use super::args::Compare;
-use super::failure::{Failure, Kind};
-use super::output::{Output, cannot_write, write_file};
+use super::failure::{Failure, Kind, cannot_write};
+use super::output::{Output, make_folder, write_file};
 use super::progress::progress;
 use crate::compare::contest::{self, Row};
 use crate::compare::light::{Light, LightError};
@@ -10,11 +10,9 @@ use crate::compare::page::Contest;
 use crate::compare::paper::{self, Condition, File};
 use crate::compare::{Meter, table};
 use crate::demo;
-use crate::learn::LearnError;
 use iltm_picture::progress::Progress;
 use serde_json::{Value, json};
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
@@ -26,7 +24,7 @@ pub(super) fn run(
     let start = Instant::now();
     // A folder that cannot be made is known before the work, not after it.
     let folder = &arguments.output;
-    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    make_folder(folder)?;
     let bars = progress(output);
     let compared = match &arguments.light {
         Some(light) => of_light(light, arguments, meter, bars.as_ref()),
@@ -143,7 +141,7 @@ fn of_paper(
     }
     let room = tempfile::tempdir().map_err(|error| cannot_write(&std::env::temp_dir(), &error))?;
     let sample = room.path().join("m-panels-colour");
-    demo::sample::write(&sample).map_err(super::demo::failed)?;
+    demo::sample::write(&sample)?;
     let mut files = paper::files(&contests, &sample, progress).map_err(|error| {
         Failure::new(
             Kind::Write,
@@ -191,15 +189,15 @@ fn row(row: &Row) -> Value {
 /// Why there is nothing to compare on.
 fn dark(error: LightError) -> Failure {
     match error {
-        LightError::Capture(error) => LearnError::Capture(error).into(),
-        LightError::Solve(error) => LearnError::Solve(error).into(),
+        LightError::Capture(error) => error.into(),
+        LightError::Solve(error) => error.into(),
         LightError::Reference(error) => {
             let next_step = error.next_step();
             Failure::new(Kind::Capture, error, next_step)
         }
-        LightError::Scene(error) => super::simulate::unreadable(&error),
-        LightError::Simulation(error) => super::simulate::unsimulated(&error),
-        LightError::Folder(error) => super::simulate::untaken(error),
+        LightError::Scene(error) => error.into(),
+        LightError::Simulation(error) => error.into(),
+        LightError::Folder(error) => error.into(),
         LightError::Room(error) => cannot_write(&std::env::temp_dir(), &error),
         LightError::TooLarge { .. } => Failure::new(
             Kind::Usage,

@@ -1,9 +1,9 @@
 //! Closed loop: how far the picture on the wall is from the wanted one.
 
-use iltm::compile::white::reference_white;
-use iltm::content::wanted_images;
+use iltm::compile::reference_white::uniform_white;
 use iltm::scene::coaxial::Scene;
 use iltm::solve::InverseTransport;
+use iltm::solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Errors of one scene, each the mean over images of
@@ -35,7 +35,7 @@ pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
         .map(|cell| found.live[cell] && scene.coverage[cell] > 1e-9)
         .collect();
     let natural = wanted_images(scene.grid);
-    let white = reference_white(found).map_or(0.0, |white| white.light);
+    let white = uniform_white(found).unwrap_or(0.0);
     let wanted = match scene.blur {
         Some(_) => &transport * &natural,
         None => natural * white,

@@ -18,9 +18,9 @@
 //! inverse to the wall. `tolerance` is the relative residual at which the solver
 //! stops.
 
-use iltm::content::natural_images;
 use iltm::scene::coaxial::Scene;
-use iltm::solve::{Basis, Haar, SolveOptions};
+use iltm::solve::natural_images;
+use iltm::solve::{Haar, SolveOptions};
 use nalgebra::DMatrix;
 
 /// Largest over smallest singular value of `T` between the chosen cells.
@@ -62,7 +62,7 @@ struct Tails<'t> {
 impl<'t> Tails<'t> {
     fn new(scene: &Scene, transport: &DMatrix<f64>, live: &'t [bool]) -> Self {
         let chosen = chosen(live);
-        let haar = Haar::new(scene.grid, Basis::QuadTree);
+        let haar = Haar::new(scene.grid);
         let coefficients = part(transport, live).try_inverse().map(|inverse| {
             let mut operator = DMatrix::zeros(live.len(), live.len());
             for (row, i) in chosen.iter().enumerate() {

@@ -1,10 +1,9 @@
 //! Tables: what one computes against the inverse that it was made from, in `f64`, and the
 //! runtime's integer Haar basis against the solver's.
 
-use iltm::compile::content::natural_images;
 use iltm::compile::ladder::relative_error;
-use iltm::compile::white::reference_white;
-use iltm::solve::{Basis, Haar};
+use iltm::compile::reference_white::uniform_white;
+use iltm::solve::{Haar, natural_images};
 use iltm::video::OperatorMemory;
 use iltm_runtime::haar::{self, Function};
 use iltm_runtime::image::Table;
@@ -47,9 +46,7 @@ fn every_tier_keeps_its_promise<const C: usize>(rows: u16, cols: u16) {
     let grid = grid(rows, cols);
     let (inverse, image) = (wedge(grid, C), wedge_table(rows, cols, C));
     let table = Table::check(&image).expect("compile checked it");
-    let white = reference_white(&inverse)
-        .expect("the wedge can be lit")
-        .light;
+    let white = uniform_white(&inverse).expect("the wedge can be lit");
     // Bright enough everywhere that no cell is asked for less than it gets from
     // the others, which no projector input could reach.
     let wanted = natural_images(grid) * 0.5 + DMatrix::repeat(grid.cells(), 16, 0.45);
@@ -130,7 +127,7 @@ fn compiling_twice_gives_the_same_bytes() {
 fn both_bases_have_the_same_functions_in_the_same_order() {
     for (rows, cols) in [(1, 1), (1, 7), (6, 1), (5, 8), (13, 21), (16, 24)] {
         let grid = grid(rows, cols);
-        let float = Haar::new(grid, Basis::QuadTree);
+        let float = Haar::new(grid);
         let integer = haar::Basis::new(grid);
         for (index, function) in integer.functions().enumerate() {
             let mut unit = DVector::zeros(grid.cells());

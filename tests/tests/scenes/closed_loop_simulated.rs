@@ -1,10 +1,10 @@
 //! Closed loop: from simulated photographs to a projection that is photographed again: the
 //! error on the wall, cells that the surface covers only in part among them.
 
-use iltm::compile::white::reference_white;
-use iltm::content::natural_images;
+use iltm::compile::reference_white::uniform_white;
 use iltm::scene::description::Scene;
 use iltm::scene::{Effect, Forced};
+use iltm::solve::natural_images;
 use iltm_tests::simulated::{cell_means, error, learned, photograph, scene, simulation};
 use nalgebra::DMatrix;
 
@@ -23,7 +23,7 @@ fn errors(scene: &Scene) -> (usize, f64, f64) {
         .column(0)
         .into_owned();
     // Walls that light each other cannot be much darker than their neighbours.
-    let white = reference_white(inverse).unwrap().light;
+    let white = uniform_white(inverse).unwrap();
     let wanted = natural_images(inverse.grid).map(|light| white * (0.2 + 0.8 * light));
     let keep = |value: f64, cell: usize| {
         if live[cell] {

@@ -41,7 +41,7 @@ fn the_demo_learns_compensates_and_reports() {
     let paths = &outcome.paths;
 
     // Bounds with room for other seeds and solvers: measured .341, .105 and .0124.
-    let prediction = outcome.learned.report.prediction;
+    let prediction = outcome.built.report.prediction;
     assert!(prediction.uncompensated > 0.3);
     assert!((0.08..0.13).contains(&prediction.gain_only));
     assert!(prediction.compensated < 0.016, "{}", prediction.compensated);

@@ -3,8 +3,8 @@
 //! there is named before a solve, and what goes well is as good as with a laboratory's
 //! camera.
 
+use iltm::build_table::BuiltTable;
 use iltm::capture::{self, CameraSettings, CaptureOptions, GateName, Settings};
-use iltm::learn::Learned;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Effect, Fault, Forced, Mishap, Shooting, Simulation, retake};
@@ -106,7 +106,7 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
 
 /// Error on the wall of a table that was learned from photographs of `scene`: its
 /// verification, photographed by a camera without noise.
-fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (Learned, [f64; 2]) {
+fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 2]) {
     let folder = place.join("capture");
     photographed(&simulation(scene, Forced::default()), scene, &[], &folder);
     let learned = simulated::learned(&folder);

@@ -3,10 +3,10 @@
 //! reference -- --nocapture` prints the figures of `docs/measured.md`.
 
 use iltm::capture::{self, CaptureOptions, Measurements};
-use iltm::compile::content::natural_images;
 use iltm::compile::ladder::relative_error;
-use iltm::compile::white::reference_white;
+use iltm::compile::reference_white::uniform_white;
 use iltm::progress::Silent;
+use iltm::solve::natural_images;
 use iltm::solve::{InverseTransport, Method, SolveOptions, solve};
 use nalgebra::DMatrix;
 use std::fs::File;
@@ -50,7 +50,7 @@ fn learned(method: Method) -> (InverseTransport, f64) {
         ..SolveOptions::default()
     };
     let (inverse, _) = solve(measurements(), &options, &Silent).expect("the sample can be solved");
-    let white = reference_white(&inverse).expect("lit").light;
+    let white = uniform_white(&inverse).expect("lit");
     (inverse, white)
 }
 

@@ -2,8 +2,8 @@
 //! onto the simulated scene and measured without a camera's noise, in the cells that the
 //! table was learned in.
 
+use iltm::build_table::BuiltTable;
 use iltm::capture::Settings;
-use iltm::learn::Learned;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Effect, Forced, Shooting, retake};
@@ -26,14 +26,14 @@ fn white_of(verdict: &Verdict) -> &WhiteChange {
 }
 
 /// A table learned from simulated photographs, and what was learned.
-fn learned(scene: &Scene, place: &Path) -> Learned {
+fn learned(scene: &Scene, place: &Path) -> BuiltTable {
     let capture = place.join("capture");
     photograph(scene, 100, 3, &capture);
     simulated::learned(&capture)
 }
 
 /// A folder to verify `learned` with, photographed in `scene`.
-fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
+fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     let table = Table::check(&learned.compiled.image).unwrap();
     let projector = FrameSize::new(320, 200).unwrap();
     let layout = Layout::new(table.grid(), projector, 4).unwrap();
@@ -48,14 +48,14 @@ fn photographed(learned: &Learned, scene: &Scene, folder: &Path) {
     session.take_missing(&shooting, &Silent).unwrap();
 }
 
-fn verdict(learned: &Learned, folder: &Path) -> Result<Verdict, VerifyError> {
+fn verdict(learned: &BuiltTable, folder: &Path) -> Result<Verdict, VerifyError> {
     let table = Table::check(&learned.compiled.image).unwrap();
     let session = Session::read(folder, &table, &Silent)?;
     judge(folder, &table, &session, None)
 }
 
 /// Mean errors of plain and compensated pictures on the wall, without noise.
-fn truth(learned: &Learned, scene: &Scene, folder: &Path) -> [f64; 2] {
+fn truth(learned: &BuiltTable, scene: &Scene, folder: &Path) -> [f64; 2] {
     let table = Table::check(&learned.compiled.image).unwrap();
     let session = Session::read(folder, &table, &Silent).unwrap();
     let simulation = simulation(scene, Forced::default().with(Effect::Noise, false));

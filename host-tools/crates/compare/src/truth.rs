@@ -2,7 +2,7 @@
 
 use super::Answer;
 use iltm_runtime::Grid;
-use iltm_solve::{content::wanted_images, inverted};
+use iltm_solve::{inverted, wanted_images};
 use nalgebra::{DMatrix, DVector};
 
 /// A scene's transport, its inverse, and images to show in it.

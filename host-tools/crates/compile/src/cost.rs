@@ -1,4 +1,4 @@
-//! What a frame takes on the reference board, in instructions.
+//! Cost of a frame on the reference board, in instructions.
 //!
 //! A model of counts: QEMU's of the firmware for a Cortex-M7 (`docs/firmware.md`). Each
 //! of the three stages of a frame is a sum over what it works on:

@@ -2,7 +2,7 @@
 
 use iltm_picture::{ColourScale, Palette, Picture};
 use iltm_runtime::FrameSize;
-use iltm_solve::{Basis, Haar, InverseTransport};
+use iltm_solve::{Haar, InverseTransport};
 use nalgebra::DMatrix;
 
 /// Powers of ten below the largest coefficient that have colours of their own.
@@ -40,7 +40,7 @@ impl CoefficientMap {
     /// Draws the operator that all channels share.
     #[must_use]
     pub fn new(inverse: &InverseTransport) -> Self {
-        let haar = Haar::new(inverse.grid, Basis::QuadTree);
+        let haar = Haar::new(inverse.grid);
         let magnitudes = haar.analyse_operator(&inverse.shared).abs();
         let largest = magnitudes.amax();
         let scale = ColourScale::logarithmic(Palette::Viridis, 1.0, DECADES);

@@ -38,7 +38,7 @@ pub use predict::Projection;
 pub use summary::summary;
 pub use timing::{microseconds, microseconds_at};
 
-use iltm_compile::learn::Learned;
+use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
     ColourScale, LightPicture, Palette, Picture, html::PictureFile, progress::Progress,
     statistics::quantile,
@@ -90,7 +90,7 @@ pub enum ReportError {
 #[derive(Debug)]
 pub struct Report<'a> {
     /// What was learned.
-    pub learned: &'a Learned,
+    pub learned: &'a BuiltTable,
     /// The wanted images.
     pub examples: Vec<Example>,
     /// Colours of all error maps.
@@ -110,13 +110,13 @@ impl<'a> Report<'a> {
     /// [`ReportError`] if a wanted image is smaller than the grid or has another
     /// number of channels than the table.
     pub fn new(
-        learned: &'a Learned,
+        learned: &'a BuiltTable,
         wanted: Vec<Wanted>,
         progress: &dyn Progress,
     ) -> Result<Self, ReportError> {
         let table = Table::check(&learned.compiled.image).map_err(ReportError::Table)?;
         let projector = &learned.measurements.devices.projector;
-        let white = learned.compiled.white.light;
+        let white = learned.compiled.white;
         progress.begin("predicting photographs", wanted.len() as u64);
         let mut examples = Vec::new();
         for wanted in wanted {
@@ -151,7 +151,7 @@ impl<'a> Report<'a> {
 
 /// The flood photograph, black subtracted, as bright as a screen can show it;
 /// `None` of a camera whose sides a frame's do not reach.
-fn flood(learned: &Learned) -> Option<Picture> {
+fn flood(learned: &BuiltTable) -> Option<Picture> {
     let (width, height) = learned.measurements.registration.camera;
     let size = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
     let flood = LightPicture::new(size, learned.measurements.flood.clone())?;

@@ -274,7 +274,7 @@ mod tests {
             for fine in [None, Some(fine(&inverse))] {
                 let compiled = compile(&inverse, fine.as_ref(), &options).unwrap();
                 // A tenth darker, since fine gains reach above those of the cells.
-                let white = 0.9 * compiled.white.light;
+                let white = 0.9 * compiled.white;
                 let options = CompileOptions {
                     reference_white: Some(white),
                     ..options.clone()
@@ -321,8 +321,8 @@ mod tests {
         let compiled = compile(&inverse, None, &CompileOptions::default()).unwrap();
         let table = Table::check(&compiled.image).unwrap();
         let size = FrameSize::of_grid(inverse.grid);
-        let projection = Projection::new(&table, &inverse, compiled.white.light, size).unwrap();
-        let ambient = 0.004 / compiled.white.light;
+        let projection = Projection::new(&table, &inverse, compiled.white, size).unwrap();
+        let ambient = 0.004 / compiled.white;
         let grey = LightPicture::new(size, vec![vec![0.5; size.pixels()]]).unwrap();
         let bounced = projection.bounced(&grey);
         // At the grid's own size U and A do nothing: the sum of a row of K, over g.

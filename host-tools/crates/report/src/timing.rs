@@ -1,6 +1,5 @@
 //! What a tier costs on the machine that writes the report.
 
-use iltm_compile::content::natural_images;
 use iltm_picture::Response;
 use iltm_runtime::{
     FrameSize, Grid,
@@ -10,6 +9,7 @@ use iltm_runtime::{
     },
     units::Halfword,
 };
+use iltm_solve::natural_images;
 use iltm_video::OperatorMemory;
 use std::time::Instant;
 

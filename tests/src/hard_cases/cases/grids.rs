@@ -76,7 +76,7 @@ fn one_cell(_: u64) -> Outcome {
             Outcome::new(
                 right,
                 "gain 2, no operator",
-                format!("gain {gain:.6}, {}", report.compensation.name()),
+                format!("gain {gain:.6}, {}", report.compensation),
             )
         }
         Err(error) => Outcome::new(false, "an inverse", error.to_string()),

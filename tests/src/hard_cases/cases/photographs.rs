@@ -5,8 +5,8 @@ use super::super::closed_loop::errors;
 use super::super::grid;
 use super::super::observations::out_of_focus;
 use super::super::photographs::Camera;
+use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::CaptureOptions;
-use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
 use iltm::scene::coaxial::{Panels, Scene};
 use iltm::solve::{InverseTransport, SolveOptions};
@@ -117,7 +117,7 @@ fn flat() -> Outcome {
     match table(&scene, Camera::default(), "") {
         Ok(learned) => {
             let entries = learned.compiled.ladder.entries.len();
-            let chosen = learned.report.compensation.name();
+            let chosen = learned.report.compensation;
             Outcome::new(
                 entries == 0,
                 bound,
@@ -131,12 +131,12 @@ fn flat() -> Outcome {
     }
 }
 
-fn table(scene: &Scene, camera: Camera, settings: &str) -> Result<Learned, String> {
+fn table(scene: &Scene, camera: Camera, settings: &str) -> Result<BuiltTable, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     camera
         .write(scene, folder.path(), settings)
         .map_err(|error| error.to_string())?;
-    let learned = learn(
+    let learned = build_table(
         folder.path(),
         &CaptureOptions::default(),
         &SolveOptions::default(),

@@ -146,7 +146,7 @@ fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
                 let prediction = report.prediction;
                 errors = format!(
                     "{} (operator {:.4}, gain alone {:.4}, nothing {:.4} predicted)",
-                    report.compensation.name(),
+                    report.compensation,
                     prediction.compensated,
                     prediction.gain_only,
                     prediction.uncompensated
@@ -156,7 +156,7 @@ fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
         }
     }
     let all = names.len() as u64 == seeds && names.iter().all(|name| *name == wanted);
-    Outcome::new(all, format!("{} chosen", wanted.name()), errors)
+    Outcome::new(all, format!("{wanted} chosen"), errors)
 }
 
 fn shifted(_: u64) -> Outcome {

@@ -151,13 +151,12 @@ impl Tree {
 mod tests {
     use super::*;
     use iltm_runtime::Grid;
-    use iltm_solve::Basis;
 
     #[test]
     fn every_coefficient_but_the_constant_has_a_coarser_one_at_its_place() {
         for (rows, cols) in [(1, 1), (1, 6), (5, 7), (13, 21)] {
             let grid = Grid::new(rows, cols).unwrap();
-            let tree = Tree::new(&Haar::new(grid, Basis::QuadTree));
+            let tree = Tree::new(&Haar::new(grid));
             let last = grid.cells() - 1;
             for child in 0..last {
                 assert!(!tree.parents[child].is_empty());

@@ -17,7 +17,7 @@
 use super::greedy::{Estimate, Greedy};
 use crate::{Rig, Unfit};
 use iltm_capture::{Role, columns, shown};
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::{DMatrix, DVector};
 
 /// One photograph of so many is held out.
@@ -66,7 +66,7 @@ impl Sensing {
             lights *= f64::from(u8::from(*live));
         }
         let light = rig.photograph(&patterns);
-        let haar = Haar::new(rig.grid(), Basis::QuadTree);
+        let haar = Haar::new(rig.grid());
         let matrix = haar.analyse_columns(&signs(&patterns)).transpose();
         // The first is white's.
         let (held_out, kept): (Vec<_>, Vec<_>) =
@@ -171,7 +171,7 @@ mod tests {
     use iltm_capture::NoiseModel;
     use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
-    use iltm_solve::{Basis, Haar};
+    use iltm_solve::Haar;
     use nalgebra::DMatrix;
 
     /// Coded on both sides, each row has its parent's three coefficients: the constant,
@@ -185,7 +185,7 @@ mod tests {
             _ if column == row / 4 => -0.3,
             _ => 0.0,
         });
-        let transport = Haar::new(grid, Basis::QuadTree).synthesise_operator(&coded);
+        let transport = Haar::new(grid).synthesise_operator(&coded);
         let methods: [Box<dyn Acquisition>; 2] = [
             Box::new(CompressiveDual::new(40, 1)),
             Box::new(CompressiveSensing::new(40, 1)),

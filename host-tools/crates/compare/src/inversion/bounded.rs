@@ -4,7 +4,7 @@ use super::live::LiveTransport;
 use super::{Inversion, Inverted, Known};
 use crate::{Answer, Project, Source, Unfit};
 use iltm_picture::progress::Progress;
-use iltm_solve::content::wanted_images;
+use iltm_solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of one frame at most.

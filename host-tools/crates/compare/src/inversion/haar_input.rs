@@ -6,7 +6,7 @@ use super::wavelet_inverse::haar_multiplications;
 use super::{Inversion, Inverted, Known};
 use crate::{Answer, Project, Source, Unfit};
 use iltm_picture::progress::Progress;
-use iltm_solve::{Basis, Haar, content::natural_images, inverted};
+use iltm_solve::{Haar, inverted, natural_images};
 use nalgebra::{DMatrix, DVector};
 
 /// The largest Haar coefficients of each frame go through the operator's columns.
@@ -36,7 +36,7 @@ impl Coded {
     fn new(known: &Known<'_>) -> Result<Self, Unfit> {
         let inverse = inverted(known.transport, known.live).ok_or(Unfit::Singular)?;
         let gain = inverse.diagonal();
-        let haar = Haar::new(known.grid, Basis::QuadTree);
+        let haar = Haar::new(known.grid);
         let operator = haar.analyse_operator(&(DMatrix::from_diagonal(&gain) - inverse));
         Ok(Self {
             gain,

@@ -7,7 +7,7 @@ use super::{Inversion, Inverted, Known};
 use crate::{Answer, Rig, Source, Unfit};
 use iltm_capture::NoiseModel;
 use iltm_picture::progress::Progress;
-use iltm_solve::content::wanted_images;
+use iltm_solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Weights that are tried, each twice the one before.

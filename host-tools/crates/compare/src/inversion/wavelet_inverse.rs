@@ -8,7 +8,7 @@ use super::live::{LiveTransport, finite};
 use super::{Inversion, Inverted, Known};
 use crate::{Answer, Source, Unfit};
 use iltm_picture::progress::Progress;
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::{DMatrix, DVector};
 
 /// The sparse matrix `M` in Haar that brings `T^ M` nearest to the identity, column by
@@ -44,7 +44,7 @@ impl Inversion for WaveletInverse {
 
     fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let haar = Haar::new(known.grid, Basis::QuadTree);
+        let haar = Haar::new(known.grid);
         let transformed = haar.analyse_operator(&filled(&known, &live));
         let patterns = patterns(&transformed, self.entries);
         let stored: usize = patterns.iter().map(Vec::len).sum();

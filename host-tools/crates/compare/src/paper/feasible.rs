@@ -1,15 +1,15 @@
 //! Fig. 2: where Theorem 3.1 promises exact recovery, and where the scene lies.
 //!
 //! `kappa_2k(T)^2 gamma_2k < sqrt 2 + 1`. The exact constants are NP-hard; a scene's
-//! place is drawn at bounds from below ([`iltm_solve::recovery`]), so that it can
+//! place is drawn at bounds from below ([`iltm_solve::restricted_isometry`]), so that it can
 //! only be further from the region, not nearer.
 
 use super::scenes::{Condition, surface};
 use crate::chart::curves;
 use iltm_capture::{Role, columns, shown};
 use iltm_solve::{
-    Basis, Haar,
-    recovery::{LIMIT, Sampling, Sensing, signed},
+    Haar,
+    restricted_isometry::{LIMIT, Sampling, Sensing, signed},
 };
 use nalgebra::DVector;
 
@@ -42,7 +42,7 @@ pub(super) fn places() -> Vec<Place> {
         let Some((truth, _)) = condition.world(1) else {
             continue;
         };
-        let haar = Haar::new(truth.grid, Basis::QuadTree);
+        let haar = Haar::new(truth.grid);
         let flood = DVector::from_element(truth.grid.cells(), 1.0);
         for photographs in PHOTOGRAPHS {
             let taken: Vec<_> = shown(truth.grid, photographs, 1)

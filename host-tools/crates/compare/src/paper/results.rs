@@ -172,7 +172,7 @@ fn of_methods(
         let mut points: Vec<(f64, f64)> = own.map(&point).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points.dedup_by(|a, b| a.0.total_cmp(&b.0).is_eq());
-        (method.name().to_owned(), points)
+        (method.to_string(), points)
     };
     complexity::METHODS.map(of).to_vec()
 }

@@ -9,7 +9,7 @@ use super::seeds::{ENTRIES, Mean, SEEDS, Sample};
 use super::sparsity::{Counted, INVERSE_IN_HAAR, PARTS};
 use crate::contest::Row;
 use crate::table;
-use iltm_solve::{Method, recovery::LIMIT};
+use iltm_solve::{Method, restricted_isometry::LIMIT};
 use std::fmt::Write;
 
 /// What the page says of a method with so many photographs.

@@ -3,7 +3,7 @@
 use super::scenes::Condition;
 use iltm_picture::{ColourScale, ContactSheet, Palette, Picture, Tile};
 use iltm_runtime::FrameSize;
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::DMatrix;
 
 /// Parts of the energy that are counted for.
@@ -36,7 +36,7 @@ struct Matrices {
 
 fn matrices(condition: Condition) -> Option<Matrices> {
     let (truth, _) = condition.world(1)?;
-    let haar = Haar::new(truth.grid, Basis::QuadTree);
+    let haar = Haar::new(truth.grid);
     let mut operator = truth.inverse.clone();
     operator.fill_diagonal(0.0);
     Some(Matrices {

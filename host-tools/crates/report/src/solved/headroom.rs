@@ -2,7 +2,7 @@
 
 use super::Content;
 use iltm_capture::FineFlood;
-use iltm_compile::{content_white::Headroom, gain::fine_gains, learn::Learned, wish::headroom};
+use iltm_compile::{build_table::BuiltTable, clip_thresholds::ClipThresholds, gain::fine_gains};
 use iltm_picture::{
     LightPicture, Picture,
     canvas::Canvas,
@@ -22,7 +22,7 @@ const SHOWN: usize = 4;
 
 /// The section about reference white.
 pub(super) fn section(
-    learned: &Learned,
+    learned: &BuiltTable,
     table: &Table<'_>,
     content: &[Content],
     files: &mut Vec<PictureFile>,
@@ -80,7 +80,7 @@ struct Preview<'c> {
 }
 
 fn previews<'c>(
-    learned: &Learned,
+    learned: &BuiltTable,
     content: &'c [Content],
     files: &mut Vec<PictureFile>,
 ) -> Vec<Preview<'c>> {
@@ -88,7 +88,8 @@ fn previews<'c>(
     let mut previews = Vec::new();
     for (index, content) in content.iter().take(SHOWN).enumerate() {
         let light = content.light();
-        let Ok(Some(headroom)) = headroom(&learned.inverse, fine.as_ref(), &light) else {
+        let found = ClipThresholds::of(&learned.inverse, fine.as_ref(), &light);
+        let Ok(Some(thresholds)) = found else {
             continue;
         };
         let middle = light.len() / 2;
@@ -96,14 +97,14 @@ fn previews<'c>(
             continue;
         };
         let white = learned.white.light;
-        let still = painted(&headroom, white, middle..middle + 1, frame);
+        let still = painted(&thresholds, white, middle..middle + 1, frame);
         let dark = frame.scaled(0.25);
-        let map = painted(&headroom, white, 0..light.len(), &dark);
+        let map = painted(&thresholds, white, 0..light.len(), &dark);
         let preview = Preview {
             name: &content.name,
             content,
             frames: light.len(),
-            cut: headroom.cut(white),
+            cut: thresholds.cut(white),
             still: picture_file(&format!("headroom-{}-frame", index + 1), &still),
             map: picture_file(&format!("headroom-{}-map", index + 1), &map),
         };
@@ -127,13 +128,13 @@ fn cut_in_full(table: &Table<'_>, frames: &[Picture]) -> Option<f64> {
 
 /// A frame with the shares painted over it.
 fn painted(
-    headroom: &Headroom<'_>,
+    thresholds: &ClipThresholds,
     white: f64,
     frames: Range<usize>,
     under: &LightPicture,
 ) -> Picture {
-    let [bright, dark] = headroom.maps(white, frames);
-    let size = headroom.size();
+    let [bright, dark] = thresholds.maps(white, frames);
+    let size = thresholds.size();
     let mut shown = Canvas::new(under.size(), [0; 3]);
     shown.place(0, 0, &under.for_display());
     let (width, height) = (under.size().width(), under.size().height());

@@ -10,7 +10,7 @@ mod registered;
 mod wanted;
 
 use crate::{Command, Report, ReportError, Words};
-use iltm_compile::learn::Learned;
+use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{LightPicture, Picture, html::PictureFile, progress::Progress};
 use iltm_runtime::image::Table;
 use std::path::Path;
@@ -47,7 +47,7 @@ pub struct SolvedReport {
 /// # Errors
 /// [`ReportError`] if the table cannot show an image.
 pub fn report(
-    learned: &Learned,
+    learned: &BuiltTable,
     capture: &Path,
     table: &Path,
     content: &[Content],
@@ -67,7 +67,7 @@ pub fn report(
     Ok(SolvedReport { page, files })
 }
 
-fn words(learned: &Learned, capture: &Path, table: &Path) -> Words {
+fn words(learned: &BuiltTable, capture: &Path, table: &Path) -> Words {
     let named = &learned.measurements.settings.scene.name;
     let title = named.clone().unwrap_or_else(|| {
         let name = capture.file_name().unwrap_or(capture.as_os_str());

@@ -1,7 +1,7 @@
 //! Where the cells are in the photographs.
 
 use iltm_capture::NO_CELL;
-use iltm_compile::learn::Learned;
+use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
     canvas::Canvas,
     html::{PictureFile, img, percent, picture_file},
@@ -14,7 +14,7 @@ const COLOURS: [[u8; 3]; 2] = [[245, 180, 90], [70, 130, 200]];
 const UNUSED: [u8; 3] = [60, 62, 68];
 
 /// The section with the map of the cells.
-pub(super) fn section(learned: &Learned, files: &mut Vec<PictureFile>) -> Markup {
+pub(super) fn section(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Markup {
     let measurements = &learned.measurements;
     let registration = &measurements.registration;
     let (width, height) = registration.camera;

@@ -5,17 +5,13 @@ use crate::Wanted;
 use crate::stills::test_card;
 use iltm_picture::{LightPicture, Picture};
 use iltm_runtime::{FrameSize, Grid, image::Table};
-use iltm_solve::content::natural_images;
+use iltm_solve::{DARKEST_SHOWN, natural_images};
 
 /// Names for the user's own pictures; no more are shown.
 const OWN: [&str; 3] = ["content-1", "content-2", "content-3"];
 
 /// Pixels of a picture's longer side, about.
 const SIDE: usize = 384;
-
-/// Darkest light of the natural image, of white: walls that light each other cannot be
-/// black beside white.
-const DARKEST: f64 = 0.1;
 
 /// The user's own pictures; without any a natural image and a test card.
 pub(super) fn wanted(table: &Table<'_>, content: &[Content]) -> Vec<Wanted> {
@@ -73,7 +69,7 @@ fn natural(grid: Grid, channels: usize) -> Wanted {
         } else {
             0.6 * common + 0.4 * images[(cell, 1 + channel)]
         };
-        (DARKEST + (1.0 - DARKEST) * light) as f32
+        (DARKEST_SHOWN + (1.0 - DARKEST_SHOWN) * light) as f32
     });
     Wanted {
         name: "natural",

@@ -3,10 +3,7 @@
 use super::operator::{Entries, Entry, Numbers};
 use iltm_compile::ladder::relative_error;
 use iltm_runtime::Grid;
-use iltm_solve::{
-    InverseTransport,
-    content::{natural_images, wanted_images},
-};
+use iltm_solve::{InverseTransport, natural_images, wanted_images};
 use nalgebra::DMatrix;
 
 /// Error of too much or too little `light` of a channel, all channels together as the

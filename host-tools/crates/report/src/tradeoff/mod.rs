@@ -33,7 +33,7 @@ mod points;
 mod sweep;
 
 use iltm_capture::ReferenceError;
-use iltm_compile::{CompileError, cost::BUDGET, learn::LearnError};
+use iltm_compile::{CompileError, build_table::BuildError, cost::BUDGET};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
     Grid,
@@ -165,7 +165,7 @@ pub struct Tradeoff {
 pub enum TradeoffError {
     /// The capture does not become a table.
     #[error(transparent)]
-    Learn(#[from] LearnError),
+    Build(#[from] BuildError),
     /// The reference cannot be used.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
@@ -185,7 +185,7 @@ pub enum TradeoffError {
 
 impl From<iltm_capture::CaptureError> for TradeoffError {
     fn from(error: iltm_capture::CaptureError) -> Self {
-        Self::Learn(error.into())
+        Self::Build(error.into())
     }
 }
 

@@ -12,7 +12,7 @@ use iltm_runtime::{
     operator::{Channels, Operator, Row, Segment},
     units::CORRECTION_GUARD_BITS,
 };
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::DMatrix;
 
 /// Bounces that are followed at most.
@@ -59,7 +59,7 @@ impl<'t> Numbers<'t> {
         Self {
             table,
             functions: table.basis().functions().collect(),
-            haar: Haar::new(grid, Basis::QuadTree),
+            haar: Haar::new(grid),
             pixels: grid,
             lattice: None,
             gains,
@@ -235,7 +235,7 @@ fn by_column(matrix: &DMatrix<f64>, of: impl Fn(&[f64]) -> Vec<f64>) -> DMatrix<
 mod tests {
     use super::*;
     use iltm_compile::{CompileOptions, compile};
-    use iltm_solve::{InverseTransport, content::natural_images};
+    use iltm_solve::{InverseTransport, natural_images};
 
     fn inverse(channels: usize) -> InverseTransport {
         iltm_tests_wedge(channels)
@@ -289,13 +289,13 @@ mod tests {
             let entries = numbers.entries(&numbers.segments(1));
             for (channel, entries) in entries.iter().enumerate().take(channels) {
                 let expected = inverse.channel(channel);
-                let bounced = &expected.operator * &wanted * compiled.white.light;
+                let bounced = &expected.operator * &wanted * compiled.white;
                 let found = numbers.bounced(entries, &wanted);
                 let error = (&found - &bounced).norm() / bounced.norm();
                 // 16 bits a value.
                 assert!(error < 2e-4, "channel {channel} of {channels}: {error}");
                 let light = numbers.light(channel, entries, &wanted).unwrap();
-                let expected = expected.light(&wanted).unwrap() / compiled.white.light;
+                let expected = expected.light(&wanted).unwrap() / compiled.white;
                 let error = (&light - &expected).norm() / expected.norm();
                 assert!(
                     error < 2e-4,

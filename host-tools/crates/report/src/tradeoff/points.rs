@@ -26,7 +26,7 @@ impl Common {
         Self {
             sweep,
             setting,
-            method: Some(report.method.name().to_owned()),
+            method: Some(report.method.to_string()),
             photographs: Some((counts.white + counts.gray_code + counts.bernoulli) as u64),
             seconds: Some(seconds.prepare + seconds.choose + seconds.solve + seconds.finish),
         }

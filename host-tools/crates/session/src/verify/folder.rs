@@ -1,12 +1,11 @@
-//! Writes the folder of pictures that a table is verified with.
+//! Verification folder: writes the pictures that a table is verified with.
 
 use super::images::test_images;
+use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
-use super::role::{VerifyManifest, VerifyRole};
 use super::{TestImage, VerifyError};
 use crate::{Layout, slide_name};
-use iltm_capture::VERIFY_FILE;
-use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, numbered, shown};
+use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, shown};
 use iltm_picture::{Picture, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::Compensator;
@@ -110,17 +109,10 @@ fn slides(
         })
     };
     let coded = shown(table.grid(), BERNOULLI, SEED);
-    let ends = || {
-        coded
-            .iter()
-            .take(2)
-            .map(code)
-            .collect::<Result<Vec<_>, VerifyError>>()
-    };
-    let mut slides = coded
-        .iter()
-        .map(code)
-        .collect::<Result<Vec<_>, VerifyError>>()?;
+    let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
+    // White and black.
+    let ends = || all(&coded[..2]);
+    let mut slides = all(&coded)?;
     slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);

@@ -1,4 +1,4 @@
-//! From photographs to a verdict.
+//! Verdict: from photographs to errors before and after.
 //!
 //! The error is the one that a solve predicts and the documentation measures: a
 //! photograph against the wanted light at the one scale, for all cells and colours, that

@@ -1,4 +1,4 @@
-//! The pictures of a verdict: maps of the cells, and the test images as the wall showed
+//! Pictures of a verdict: maps of the cells, and the test images as the wall showed
 //! them.
 
 use super::judge::over_images;

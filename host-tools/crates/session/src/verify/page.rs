@@ -1,4 +1,4 @@
-//! The verdict as a page: one HTML file with everything inside.
+//! Page of a verdict: one HTML file with everything inside.
 
 use super::maps::{drift_scale, error_scale};
 use super::{ImageVerdict, TestImage, Verdict};

@@ -1,4 +1,4 @@
-//! Natural images through a projector that can show no less than nothing and no
+//! Clipped projection: natural images through a projector that can show no less than nothing and no
 //! more than white.
 //!
 //! Held-out photographs judge the inverse, not what becomes of inputs that clip:
@@ -9,15 +9,15 @@
 
 use super::forward::product;
 use super::gain_only::gains;
+use super::natural_images::wanted_images;
 use super::prepare::Prepared;
 use super::report::Prediction;
 use super::solution::Candidate;
-use crate::content::wanted_images;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
 /// Images and the scene as it was found.
-pub(super) struct ContentLoop<'c> {
+pub(super) struct ClippedProjection<'c> {
     prepared: &'c Prepared,
     candidates: &'c [Candidate],
     blur: Option<&'c DMatrix<f64>>,
@@ -27,7 +27,7 @@ pub(super) struct ContentLoop<'c> {
     pub(super) reachable: Option<DMatrix<f64>>,
 }
 
-impl<'c> ContentLoop<'c> {
+impl<'c> ClippedProjection<'c> {
     /// `blur` is that of live cells only.
     pub(super) fn new(
         grid: Grid,

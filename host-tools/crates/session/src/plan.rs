@@ -1,4 +1,4 @@
-//! What is to be photographed, and what is still missing.
+//! Plan of a session: what is to be photographed, and what is still missing.
 
 use super::{SLIDES_FOLDER, SessionError};
 use iltm_capture::{CaptureError, Exposed, find_photo, listed, pictures_of_stem};

@@ -1,14 +1,14 @@
 //! The bounds against exact constants, found by going through every support.
 
 use super::super::forward::Inverse;
-use super::super::haar::{Basis, Haar};
+use super::super::haar::Haar;
 use super::super::test_scene::{Corner, patterns};
 use super::*;
 use iltm_runtime::Grid;
 use nalgebra::DVector;
 
 fn haar(rows: u16, cols: u16) -> Haar {
-    Haar::new(Grid::new(rows, cols).unwrap(), Basis::QuadTree)
+    Haar::new(Grid::new(rows, cols).unwrap())
 }
 
 /// `W`, column by column.

@@ -1,23 +1,24 @@
-//! Reference white chosen by what is going to be shown: the brightest at which no more
-//! than a stated share of the content is cut.
+//! Clipping thresholds: the reference white from which each sample of the content is cut,
+//! and the brightest at which no more than a stated share is.
 //!
 //! A sample of wanted light `w d(x)` needs `p = w s - t` with `s = g d - U K A d` and
 //! `t = g a - U K a`, so it is cut at the projector's white as soon as
 //! `w > (1 + t) / s`. The share of samples whose threshold lies below `w` is the share that
 //! is cut: the answer is a quantile, and needs no search.
 
-use super::FineGains;
+use super::{CompileError, FineGains};
 use iltm_picture::{Lattice, LightPicture};
 use iltm_runtime::FrameSize;
 use iltm_solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
-/// The choice, and what it costs.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct ContentWhite {
-    /// Light of reference white, camera units.
-    pub light: f64,
-    /// Share of the samples that are cut at the projector's white.
+/// What of the content is cut.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Cut {
+    /// Share of the samples that may be cut at the projector's white.
+    pub allowed: f64,
+    /// Share of the samples that are.
     pub bright: f64,
     /// Share of the samples that are cut at its black, whatever the reference white: more
     /// light arrives from elsewhere than is wanted.
@@ -29,11 +30,10 @@ pub struct ContentWhite {
 /// Where content is cut, sample by sample, on the grid of the fine gains or, without
 /// any, of the cells.
 #[derive(Debug)]
-pub struct Headroom<'i> {
+pub struct ClipThresholds {
     size: FrameSize,
     lattice: Lattice,
     channels: Vec<Channel>,
-    inverse: &'i InverseTransport,
     /// Of every frame given so far.
     thresholds: Vec<Vec<f32>>,
 }
@@ -52,10 +52,27 @@ const DARK: f32 = -1.0;
 /// Threshold of a sample that nothing cuts.
 const NEVER: f32 = f32::INFINITY;
 
-impl<'i> Headroom<'i> {
-    /// For frames on `inverse`'s scene; `None` if the fine gains are not of its grid.
-    #[must_use]
-    pub fn new(inverse: &'i InverseTransport, fine: Option<&FineGains>) -> Option<Self> {
+impl ClipThresholds {
+    /// For frames on `inverse`'s scene, light relative to white, of any size; `None` if the
+    /// fine gains are not of its grid.
+    ///
+    /// # Errors
+    /// [`CompileError::GreyContent`].
+    pub fn of(
+        inverse: &InverseTransport,
+        fine: Option<&FineGains>,
+        frames: &[LightPicture],
+    ) -> Result<Option<Self>, CompileError> {
+        let Some(mut thresholds) = Self::new(inverse, fine) else {
+            return Ok(None);
+        };
+        if !frames.iter().all(|frame| thresholds.add(frame)) {
+            return Err(CompileError::GreyContent);
+        }
+        Ok(Some(thresholds))
+    }
+
+    fn new(inverse: &InverseTransport, fine: Option<&FineGains>) -> Option<Self> {
         let size = fine.map_or(FrameSize::of_grid(inverse.grid), |fine| fine.size);
         let lattice = Lattice::new(inverse.grid, size)?;
         let channel = |index: usize| {
@@ -79,7 +96,6 @@ impl<'i> Headroom<'i> {
             size,
             channels: (0..inverse.channels.len()).map(channel).collect(),
             lattice,
-            inverse,
             thresholds: Vec::new(),
         })
     }
@@ -90,10 +106,9 @@ impl<'i> Headroom<'i> {
         self.size
     }
 
-    /// Takes a frame of content into account: light relative to white, of any size. A grey
-    /// table shows each colour as it shows grey; `false` for a grey frame with a colour
-    /// table, which cannot be shown.
-    pub fn add(&mut self, frame: &LightPicture) -> bool {
+    /// Takes a frame of content into account. A grey table shows each colour as it shows
+    /// grey; `false` for a grey frame with a colour table, which cannot be shown.
+    fn add(&mut self, frame: &LightPicture) -> bool {
         let colours = frame.planes().len();
         if colours < self.channels.len() {
             return false;
@@ -137,9 +152,10 @@ impl<'i> Headroom<'i> {
     }
 
     /// The brightest reference white at which at most `share` of all samples is cut at the
-    /// projector's white; `None` without content that could be cut.
+    /// projector's white, camera units, with what that cuts; `None` without content that
+    /// could be cut.
     #[must_use]
-    pub fn choose(&self, share: f64) -> Option<ContentWhite> {
+    pub fn choose(&self, share: f64) -> Option<(f64, Cut)> {
         let mut bright: Vec<f32> = Vec::new();
         let (mut dark, mut total) = (0_usize, 0_usize);
         for threshold in self.thresholds.iter().flatten() {
@@ -155,12 +171,13 @@ impl<'i> Headroom<'i> {
         let (_, light, _) = bright.select_nth_unstable_by(allowed, f32::total_cmp);
         let light = *light;
         let below = bright.iter().filter(|threshold| **threshold < light);
-        Some(ContentWhite {
-            light: f64::from(light),
+        let cut = Cut {
+            allowed: share,
             bright: below.count() as f64 / total as f64,
             dark: dark as f64 / total as f64,
             frames: self.thresholds.len(),
-        })
+        };
+        Some((f64::from(light), cut))
     }
 
     /// Share of all frames' samples that are cut at a reference white: at the projector's
@@ -197,12 +214,6 @@ impl<'i> Headroom<'i> {
         }
         maps
     }
-
-    /// The scene that it is about.
-    #[must_use]
-    pub const fn inverse(&self) -> &'i InverseTransport {
-        self.inverse
-    }
 }
 
 /// Means over the pixels of each place, or the pixel there.
@@ -229,8 +240,8 @@ fn resampled(plane: &[f32], from: FrameSize, to: FrameSize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reference_white::uniform_white;
     use crate::test_scene::scene;
-    use crate::white::reference_white;
 
     fn grey(inverse: &InverseTransport, light: impl Fn(usize) -> f32) -> LightPicture {
         let size = FrameSize::of_grid(inverse.grid);
@@ -240,58 +251,55 @@ mod tests {
     #[test]
     fn for_even_white_with_nothing_cut_it_is_the_uniform_reference_white() {
         let inverse = scene(1);
-        let mut headroom = Headroom::new(&inverse, None).unwrap();
-        assert!(headroom.add(&grey(&inverse, |_| 1.0)));
-        let chosen = headroom.choose(0.0).unwrap();
-        let uniform = reference_white(&inverse).unwrap().light;
-        assert!((chosen.light / uniform - 1.0).abs() < 1e-6);
-        assert!(chosen.bright <= 0.0 && chosen.dark <= 0.0);
+        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        assert!(thresholds.add(&grey(&inverse, |_| 1.0)));
+        let (light, cut) = thresholds.choose(0.0).unwrap();
+        let uniform = uniform_white(&inverse).unwrap();
+        assert!((light / uniform - 1.0).abs() < 1e-6);
+        assert!(cut.bright <= 0.0 && cut.dark <= 0.0);
     }
 
     #[test]
     fn content_of_half_the_light_gets_twice_the_white_but_for_ambient_light() {
         let mut inverse = scene(1);
         inverse.channels[0].ambient.fill(0.0);
-        let mut headroom = Headroom::new(&inverse, None).unwrap();
-        headroom.add(&grey(&inverse, |_| 0.5));
-        let uniform = reference_white(&inverse).unwrap().light;
-        let chosen = headroom.choose(0.0).unwrap().light;
+        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        thresholds.add(&grey(&inverse, |_| 0.5));
+        let uniform = uniform_white(&inverse).unwrap();
+        let chosen = thresholds.choose(0.0).unwrap().0;
         assert!((chosen / (2.0 * uniform) - 1.0).abs() < 1e-6);
     }
 
     #[test]
     fn no_more_than_the_share_is_cut_and_a_little_more_white_cuts_more() {
         let inverse = scene(1);
-        let mut headroom = Headroom::new(&inverse, None).unwrap();
+        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
         for frame in 0..8_usize {
-            headroom.add(&grey(&inverse, |cell| {
+            thresholds.add(&grey(&inverse, |cell| {
                 0.3 + 0.7 * ((cell * 7 + frame * 13) % 40) as f32 / 40.0
             }));
         }
         let mut before = 0.0;
         for share in [0.0, 0.01, 0.05, 0.2] {
-            let chosen = headroom.choose(share).unwrap();
-            assert!(
-                chosen.bright <= share && chosen.light >= before,
-                "{chosen:?}"
-            );
-            let (cut, _) = headroom.cut(chosen.light * 1.000_01);
-            assert!(cut > share, "{cut} {share}");
-            let [map, _] = headroom.maps(chosen.light, 0..8);
+            let (light, cut) = thresholds.choose(share).unwrap();
+            assert!(cut.bright <= share && light >= before, "{cut:?}");
+            let (more, _) = thresholds.cut(light * 1.000_01);
+            assert!(more > share, "{more} {share}");
+            let [map, _] = thresholds.maps(light, 0..8);
             let mean = map.iter().sum::<f64>() / map.len() as f64;
-            assert!((mean - chosen.bright).abs() < 1e-9);
-            before = chosen.light;
+            assert!((mean - cut.bright).abs() < 1e-9);
+            before = light;
         }
     }
 
     #[test]
     fn what_bounces_onto_wanted_black_is_cut_at_any_white() {
         let inverse = scene(1);
-        let mut headroom = Headroom::new(&inverse, None).unwrap();
-        headroom.add(&grey(&inverse, |cell| f32::from(cell != 11)));
-        let chosen = headroom.choose(0.0).unwrap();
-        assert!((chosen.dark - 1.0 / 40.0).abs() < 1e-9, "{chosen:?}");
-        let [_, dark] = headroom.maps(chosen.light, 0..1);
+        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        thresholds.add(&grey(&inverse, |cell| f32::from(cell != 11)));
+        let (light, cut) = thresholds.choose(0.0).unwrap();
+        assert!((cut.dark - 1.0 / 40.0).abs() < 1e-9, "{cut:?}");
+        let [_, dark] = thresholds.maps(light, 0..1);
         assert!(
             dark.iter()
                 .enumerate()

@@ -1,4 +1,5 @@
-//! From `T0^-1 = diag(g) - K` to `T^-1 = B^-1 T0^-1` for a projector out of focus.
+//! Deblurring: from `T0^-1 = diag(g) - K` to `T^-1 = B^-1 T0^-1` for a projector out of
+//! focus.
 //!
 //! A blur takes fine detail away, and nothing brings back what is not there. So
 //! its inverse is approached in a few rounds (Landweber's, with a Tikhonov step:
@@ -7,18 +8,18 @@
 //! where they are far below. The softness is tried out on natural images and on
 //! those that the blurred projector can show.
 
-use super::content_loop::ContentLoop;
+use super::clipped_projection::ClippedProjection;
 use super::forward::product;
 use super::solution::{Candidate, Channel, drop_dead};
 use nalgebra::{DMatrix, DVector};
 
-/// Softnesses that are tried; infinite sharpens nothing.
+/// Softnesses that are tried; infinite undoes nothing.
 const SOFTNESS: [f64; 7] = [0.02, 0.05, 0.1, 0.2, 0.4, 1.0, f64::INFINITY];
 /// Rounds of the approach.
 const ROUNDS: usize = 6;
 
 /// What an inverse that undoes the blur as well consists of.
-pub(super) struct Sharpened {
+pub(super) struct Deblurred {
     /// Error on natural images.
     pub(super) error: f64,
     /// The operator all channels share, and the channels.
@@ -26,16 +27,16 @@ pub(super) struct Sharpened {
 }
 
 /// `blur` is that of live cells only; `None` if there is no channel.
-pub(super) fn sharpen(
+pub(super) fn deblur(
     blur: &DMatrix<f64>,
     live: &[bool],
     candidates: &[Candidate],
-    content: &ContentLoop<'_>,
-) -> Option<Sharpened> {
+    content: &ClippedProjection<'_>,
+) -> Option<Deblurred> {
     let wholes: Vec<DMatrix<f64>> = candidates.iter().map(|c| c.inverse.dense()).collect();
     let mut best: Option<(f64, f64, Vec<DMatrix<f64>>)> = None;
     for softness in SOFTNESS {
-        let sharper = sharpener(blur, softness);
+        let sharper = regularised_inverse(blur, softness);
         let sharp: Vec<_> = wholes
             .iter()
             .map(|whole| product(&sharper, whole))
@@ -51,7 +52,7 @@ pub(super) fn sharpen(
         drop_dead(&mut operator, live);
         (candidate.inverse.gain.clone(), operator)
     });
-    Some(Sharpened {
+    Some(Deblurred {
         error,
         parts: parts(operators.collect()),
     })
@@ -75,7 +76,7 @@ fn parts(operators: Vec<(DVector<f64>, DMatrix<f64>)>) -> (DMatrix<f64>, Vec<Cha
     (shared, channels)
 }
 
-fn sharpener(blur: &DMatrix<f64>, softness: f64) -> DMatrix<f64> {
+fn regularised_inverse(blur: &DMatrix<f64>, softness: f64) -> DMatrix<f64> {
     let cells = blur.nrows();
     let one = DMatrix::identity(cells, cells);
     let normal = blur.tr_mul(blur) + &one * (softness * softness);

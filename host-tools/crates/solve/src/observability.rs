@@ -1,4 +1,4 @@
-//! Which cells can be solved for: those that answer to their own light.
+//! Observability: which cells can be solved for, namely those that answer to their own light.
 //!
 //! A cell's own light is what it gives back more when the projector lights it
 //! than when not, whatever the other cells do: the slope of its series over its

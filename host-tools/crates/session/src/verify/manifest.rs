@@ -1,7 +1,6 @@
-//! What a picture of `verify.csv` was shown for, and its name there.
+//! `verify.csv`: its lines, and the names of what each picture was shown for.
 
-use iltm_capture::VERIFY_FILE;
-use iltm_capture::{CaptureError, ListedRole, ManifestOf, Role, ShotOf};
+use iltm_capture::{CaptureError, ListedRole, ManifestOf, Role, ShotOf, VERIFY_FILE};
 use std::fmt;
 use std::path::Path;
 

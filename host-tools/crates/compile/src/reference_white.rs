@@ -1,7 +1,6 @@
-//! Which reference white was asked for, and which it became.
+//! Reference white: what a wanted 255 means in camera units, as asked for and as it became.
 
-use super::content_white::Headroom;
-use super::white::reference_white;
+use super::clip_thresholds::{ClipThresholds, Cut};
 use super::{CompileError, FineGains};
 use iltm_picture::LightPicture;
 use iltm_solve::InverseTransport;
@@ -10,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// What reference white is asked for, if not the brightest even grey that every live cell
 /// reaches.
 #[derive(Clone, Copy, Debug)]
-pub enum WhiteWish<'c> {
+pub enum WhiteRequest<'c> {
     /// This light, camera units.
     Light(f64),
     /// The brightest at which no more than a share of the content is cut.
@@ -24,7 +23,7 @@ pub enum WhiteWish<'c> {
 
 /// The reference white of a table, and why it is that.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub struct ChosenWhite {
+pub struct ReferenceWhite {
     /// Light of reference white, camera units.
     pub light: f64,
     /// The brightest even grey that every live cell reaches, camera units.
@@ -48,20 +47,7 @@ pub enum Chosen {
     Content,
 }
 
-/// What of the content is cut.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
-pub struct Cut {
-    /// Share of the samples that may be cut at the projector's white.
-    pub allowed: f64,
-    /// Share of the samples that are.
-    pub bright: f64,
-    /// Share of the samples that are cut at its black, whatever the reference white.
-    pub dark: f64,
-    /// Frames looked at.
-    pub frames: usize,
-}
-
-impl ChosenWhite {
+impl ReferenceWhite {
     /// Chooses as asked. Content that nothing could cut, black all over, leaves it to the
     /// even grey.
     ///
@@ -71,30 +57,25 @@ impl ChosenWhite {
     pub fn new(
         inverse: &InverseTransport,
         fine: Option<&FineGains>,
-        wish: Option<WhiteWish<'_>>,
+        request: Option<WhiteRequest<'_>>,
     ) -> Result<Self, CompileError> {
-        let uniform = reference_white(inverse).ok_or(CompileError::Dark)?.light;
+        let uniform = uniform_white(inverse).ok_or(CompileError::Dark)?;
         let mut own = Self {
             light: uniform,
             uniform,
             chosen: Chosen::Uniform,
             content: None,
         };
-        match wish {
+        match request {
             None => {}
-            Some(WhiteWish::Light(light)) => {
+            Some(WhiteRequest::Light(light)) => {
                 (own.light, own.chosen) = (light, Chosen::Given);
             }
-            Some(WhiteWish::Content { frames, share }) => {
-                let headroom = headroom(inverse, fine, frames)?;
-                if let Some(white) = headroom.as_ref().and_then(|h| h.choose(share)) {
-                    (own.light, own.chosen) = (white.light, Chosen::Content);
-                    own.content = Some(Cut {
-                        allowed: share,
-                        bright: white.bright,
-                        dark: white.dark,
-                        frames: white.frames,
-                    });
+            Some(WhiteRequest::Content { frames, share }) => {
+                let thresholds = ClipThresholds::of(inverse, fine, frames)?;
+                if let Some((light, cut)) = thresholds.and_then(|found| found.choose(share)) {
+                    (own.light, own.chosen) = (light, Chosen::Content);
+                    own.content = Some(cut);
                 }
             }
         }
@@ -124,22 +105,36 @@ impl ChosenWhite {
     }
 }
 
-/// Where content is cut, frame by frame; `None` if the fine gains are of another grid.
+/// Light of the brightest uniform grey, the same in all channels, that every live cell
+/// reaches without clipping, camera units; `None` if there is no such cell or light.
 ///
-/// # Errors
-/// [`CompileError::GreyContent`].
-pub fn headroom<'i>(
-    inverse: &'i InverseTransport,
-    fine: Option<&FineGains>,
-    frames: &[LightPicture],
-) -> Result<Option<Headroom<'i>>, CompileError> {
-    let Some(mut headroom) = Headroom::new(inverse, fine) else {
-        return Ok(None);
-    };
-    for frame in frames {
-        if !headroom.add(frame) {
-            return Err(CompileError::GreyContent);
+/// For a wanted light `w` everywhere, cell `i` needs
+/// `p_i = w s_i - t_i` with `s = g - K 1` and `t = g a - K a`, so it reaches
+/// `w <= (1 + t_i) / s_i`.
+#[must_use]
+pub fn uniform_white(inverse: &InverseTransport) -> Option<f64> {
+    let mut lowest: Option<f64> = None;
+    for (index, channel) in inverse.channels.iter().enumerate() {
+        let operator = inverse.channel(index).operator;
+        let live = |cell: usize| inverse.live.get(cell).copied().unwrap_or(false);
+        for cell in (0..inverse.grid.cells()).filter(|cell| live(*cell)) {
+            let row = operator.row(cell);
+            let (mut slope, mut offset) = (
+                channel.gain[cell],
+                channel.gain[cell] * channel.ambient[cell],
+            );
+            for (source, value) in row.iter().enumerate().filter(|(source, _)| live(*source)) {
+                slope -= value;
+                offset -= value * channel.ambient[source];
+            }
+            if slope <= 0.0 {
+                continue;
+            }
+            let light = (1.0 + offset) / slope;
+            if light.is_finite() && light > 0.0 && lowest.is_none_or(|low| light < low) {
+                lowest = Some(light);
+            }
         }
     }
-    Ok(Some(headroom))
+    lowest
 }

@@ -1,10 +1,10 @@
-//! `iltm report`
+//! `iltm support-bundle`: a zip file for whoever helps, and never a key in it.
 
-use super::args::Report;
+use super::args::SupportBundle;
 use super::connect::{Connection, connect};
 use super::failure::Failure;
 use super::output::{Output, write_file};
-use super::{slots, status};
+use super::words::{identity, slots_data, status_data};
 use crate::device::logs::Logs;
 use crate::device::{DeviceError, Incoming};
 use crate::user::{Config, Folders, transcripts};
@@ -20,9 +20,8 @@ use zip::write::SimpleFileOptions;
 /// Files of the zip: name and content.
 type Files = Vec<(String, Vec<u8>)>;
 
-pub(super) fn run(arguments: &Report, output: &Output) -> Result<(), Failure> {
-    let logs = arguments.firmware.as_deref().map(super::monitor::words);
-    let logs = logs.transpose()?;
+pub(super) fn run(arguments: &SupportBundle, output: &Output) -> Result<(), Failure> {
+    let logs = arguments.firmware.as_deref().map(Logs::read).transpose()?;
     let mut files: Files = vec![("versions.json".to_owned(), pretty(&versions()))];
     // A device that does not answer is a reason for a report, not against one.
     let device = match connect(&arguments.line, output) {
@@ -68,14 +67,14 @@ fn versions() -> Value {
         "system": std::env::consts::OS,
         "machine": std::env::consts::ARCH,
         "release": fs::read_to_string("/etc/os-release").ok(),
-        "time": jiff::Zoned::now().to_string(),
+        "time": chrono::Local::now().to_rfc3339(),
     })
 }
 
 /// What the device says.
 fn of_device(
     connection: &mut Connection,
-    arguments: &Report,
+    arguments: &SupportBundle,
     logs: Option<&Logs>,
     files: &mut Files,
 ) -> Result<(), DeviceError> {
@@ -97,19 +96,19 @@ fn of_device(
 
 fn ask(
     connection: &mut Connection,
-    arguments: &Report,
+    arguments: &SupportBundle,
     logs: Option<&Logs>,
     files: &mut Files,
 ) -> Result<(), DeviceError> {
     let client = &mut connection.client;
-    let mut data = status::identity(client.device());
+    let mut data = identity(client.device());
     data["port"] = json!(connection.port);
     data["baud"] = json!(connection.baud);
     files.push(("device.json".to_owned(), pretty(&data)));
     let status = client.status()?;
-    files.push(("status.json".to_owned(), pretty(&status::data(&status))));
+    files.push(("status.json".to_owned(), pretty(&status_data(&status))));
     match client.slots() {
-        Ok(slots) => files.push(("slots.json".to_owned(), pretty(&slots::data(&slots)))),
+        Ok(slots) => files.push(("slots.json".to_owned(), pretty(&slots_data(&slots)))),
         Err(DeviceError::Refused { .. }) => {}
         Err(error) => return Err(error),
     }

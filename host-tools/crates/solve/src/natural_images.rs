@@ -1,6 +1,6 @@
-//! What video looks like: the images that tiers are chosen and judged by.
+//! Natural images as dead leaves: what video looks like, to choose and judge tiers by.
 //!
-//! Dead leaves: opaque discs over each other with radii of density `r^-3`, which
+//! Dead leaves are opaque discs over each other with radii of density `r^-3`, which
 //! give the scale invariance, edges and power spectrum of natural images (Lee,
 //! Mumford and Huang, *Occlusion models for natural images*, 2001). The seed is
 //! fixed, so a table comes out the same every time.
@@ -41,13 +41,16 @@ pub fn natural_images(grid: Grid) -> DMatrix<f64> {
 
 /// Darkest light of [`wanted_images`], of white: walls that light each other cannot be
 /// black beside white.
-pub const DARKEST: f64 = 0.2;
+pub const DARKEST_WANTED: f64 = 0.2;
+
+/// The same of an image that is only shown, where a little clipping does not matter.
+pub const DARKEST_SHOWN: f64 = 0.1;
 
 /// Natural images that a scene with interreflection can show, `N x IMAGES`, linear light
-/// from [`DARKEST`] to 1.
+/// from [`DARKEST_WANTED`] to 1.
 #[must_use]
 pub fn wanted_images(grid: Grid) -> DMatrix<f64> {
-    natural_images(grid).map(|light| DARKEST + (1.0 - DARKEST) * light)
+    natural_images(grid).map(|light| DARKEST_WANTED + (1.0 - DARKEST_WANTED) * light)
 }
 
 /// One image, row by row, `SUPERSAMPLING` times finer than the grid.
