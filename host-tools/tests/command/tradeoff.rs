@@ -172,7 +172,7 @@ fn what_is_no_capture_no_table_or_in_the_way_is_refused_and_left_as_it_was() {
     user.write("none.iltm", b"no table");
     user.write("mine", b"mine");
     for (line, code, words) in [
-        ("tradeoff missing -o out", 3, "missing"),
+        ("tradeoff missing -o unmade", 3, "missing"),
         ("tradeoff empty -o out", 3, "capture.csv"),
         ("tradeoff none.iltm -o out", 7, "none.iltm"),
         ("tradeoff SAMPLE -o mine", 9, "a file is in its place"),
@@ -180,7 +180,7 @@ fn what_is_no_capture_no_table_or_in_the_way_is_refused_and_left_as_it_was() {
     ] {
         contains(&user.fails(code, line), &[words]);
     }
-    assert!(!user.path("out").exists());
+    assert!(!user.path("unmade").exists());
     assert_eq!(user.read("mine"), b"mine");
     // Nothing half-written beside it.
     assert_eq!(user.names("taken"), ["tradeoff.html"]);
