@@ -26,18 +26,10 @@ pub(super) fn curves<'w>(
     Chart {
         title,
         size: SIZE,
-        x: logarithmic(x),
-        y: logarithmic(y),
+        x: Axis::logarithmic(x),
+        y: Axis::logarithmic(y),
         series: series.collect(),
         ..Chart::default()
-    }
-}
-
-const fn logarithmic(label: &str) -> Axis<'_> {
-    Axis {
-        label,
-        logarithmic: true,
-        range: None,
     }
 }
 
@@ -92,7 +84,7 @@ pub(super) fn intervals<'w>(
     Chart {
         title,
         size: (SIZE.0, 110.0 + ROW * rows.len() as f64),
-        x: logarithmic(x),
+        x: Axis::logarithmic(x),
         y: Axis {
             range: Some((-(rows.len() as f64), 0.0)),
             ..Axis::default()

@@ -44,6 +44,27 @@ pub struct Axis<'a> {
     pub range: Option<(f64, f64)>,
 }
 
+impl<'a> Axis<'a> {
+    /// An axis with equal differences equally long, as the data have it.
+    #[must_use]
+    pub const fn linear(label: &'a str) -> Self {
+        Self {
+            label,
+            logarithmic: false,
+            range: None,
+        }
+    }
+
+    /// An axis with equal ratios equally long, as the data have it.
+    #[must_use]
+    pub const fn logarithmic(label: &'a str) -> Self {
+        Self {
+            logarithmic: true,
+            ..Self::linear(label)
+        }
+    }
+}
+
 /// Points that belong together, as dots, as a line or as both.
 #[derive(Clone, Debug)]
 pub struct Series {
@@ -357,11 +378,6 @@ mod tests {
 
     #[test]
     fn every_point_and_tick_lies_inside_the_chart() {
-        let logarithmic = Axis {
-            label: "x",
-            logarithmic: true,
-            range: None,
-        };
         let series = Series {
             points: vec![(1e-4, 0.3), (1e-2, 0.1), (0.0, 0.1), (1.0, 0.2)],
             marked: Some(1),
@@ -369,7 +385,7 @@ mod tests {
             ..Series::default()
         };
         let chart = Chart {
-            x: logarithmic,
+            x: Axis::logarithmic("x"),
             series: vec![series],
             ..Chart::default()
         };
@@ -390,11 +406,7 @@ mod tests {
 
     #[test]
     fn a_short_logarithmic_axis_has_ticks_between_the_powers_of_ten() {
-        let axis = Axis {
-            logarithmic: true,
-            ..Axis::default()
-        };
-        let scale = Scale::new(axis, [0.02, 0.09].into_iter(), (0.0, 1.0));
+        let scale = Scale::new(Axis::logarithmic(""), [0.02, 0.09].into_iter(), (0.0, 1.0));
         assert_eq!(scale.ticks(), [0.02, 0.05, 0.1]);
     }
 

@@ -111,9 +111,8 @@ fn chart(x: &str, y: &str, points: &[(f64, f64)], limit: Option<f64>, joined: bo
         title: y,
         size: (560.0, 220.0),
         x: Axis {
-            label: x,
             range: Some(range(points.iter().map(|p| p.0))),
-            ..Axis::default()
+            ..Axis::linear(x)
         },
         y: Axis {
             range: Some(range(points.iter().map(|p| p.1).chain(limit))),

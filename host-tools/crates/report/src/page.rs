@@ -291,15 +291,8 @@ impl Report<'_> {
         };
         let chart = Chart {
             title: "What each tier leaves out against the time it takes",
-            x: Axis {
-                label: "microseconds a frame, one core of this machine",
-                ..Axis::default()
-            },
-            y: Axis {
-                label: "left out (relative error)",
-                logarithmic: true,
-                range: None,
-            },
+            x: Axis::linear("microseconds a frame, one core of this machine"),
+            y: Axis::logarithmic("left out (relative error)"),
             limit: Some((own, "error of the inverse itself")),
             series: vec![series],
             ..Chart::default()
@@ -352,15 +345,8 @@ impl Report<'_> {
         };
         let chart = Chart {
             title: "Misfit of held-out photographs by the weight of sparsity",
-            x: Axis {
-                label: "weight of sparsity \u{3bb}",
-                logarithmic: true,
-                range: None,
-            },
-            y: Axis {
-                label: "misfit of held-out photographs, %",
-                ..Axis::default()
-            },
+            x: Axis::logarithmic("weight of sparsity \u{3bb}"),
+            y: Axis::linear("misfit of held-out photographs, %"),
             series: vec![series],
             ..Chart::default()
         };

@@ -144,7 +144,7 @@ fn lettered(picture: &Picture) -> Picture {
     };
     let (width, height) = (picture.size().width(), picture.size().height());
     let mut canvas = Canvas::new(picture.size(), [0; 3]);
-    canvas.place(0, 0, &picture);
+    canvas.place(0, 0, picture);
     let text = "LIGHT TRANSPORT";
     let left = width.saturating_sub(letters.width(text)) / 2;
     let top = (height / 2).saturating_sub(letters.height.val() / 2);

@@ -71,18 +71,13 @@ impl Tradeoff {
             CLOCK / 1_000_000,
             BUDGET / 1000
         );
-        let axis = |label| Axis {
-            label,
-            logarithmic: true,
-            range: None,
-        };
         let near = drawn.iter().any(|point| point.predicted < 1.4 * STEP);
         let chart = Chart {
             title: &title,
             notes: wrapped(&self.advice(), 128),
             size: (960.0, 640.0),
-            x: axis(&x),
-            y: axis("predicted error, relative, %"),
+            x: Axis::logarithmic(&x),
+            y: Axis::logarithmic("predicted error, relative, %"),
             limit: near.then_some((100.0 * STEP, "1/255")),
             series,
             ..Chart::default()
