@@ -1,6 +1,6 @@
 //! Reference transport: the whole job on the grey sample against the path tracer's own
 //! transport, measured one light at a time. `cargo test --release -p iltm-tests --test
-//! reference -- --nocapture` prints the figures of `docs/measured.md`.
+//! scenes reference -- --nocapture` prints the figures of `docs/measured.md`.
 
 use iltm::capture::{self, CaptureOptions, Measurements};
 use iltm::compile::ladder::relative_error;
