@@ -44,7 +44,6 @@ pub use sensing::Sensing;
 
 pub(super) use report::of_direct;
 
-use super::haar::Haar;
 use nalgebra::DMatrix;
 use std::f64::consts::SQRT_2;
 
@@ -77,24 +76,6 @@ pub struct RecoveryBounds {
     pub ratio: Bounds,
     /// Supports that the lower bounds are from.
     pub supports: usize,
-}
-
-/// Bounds for rows of `k` coefficients: `transport` is `T`, `N x N`, and `patterns`
-/// what was projected, `N x m`, as the l1 problem uses it (see [`signed`]).
-///
-/// For several `k` make a [`Sensing`] once.
-///
-/// # Panics
-/// If the sizes do not agree with the basis.
-#[must_use]
-pub fn recovery(
-    transport: &DMatrix<f64>,
-    haar: &Haar,
-    patterns: &DMatrix<f64>,
-    k: usize,
-    sampling: Sampling,
-) -> RecoveryBounds {
-    Sensing::new(transport, haar, patterns).bounds(k, sampling)
 }
 
 /// Patterns of 0 and 1 as `+1` and `-1`: twice each less `flood`, the pattern of white,

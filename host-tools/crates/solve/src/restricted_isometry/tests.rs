@@ -79,7 +79,6 @@ fn exact_constants_of_small_problems_lie_between_the_bounds() {
                     ..Sampling::default()
                 };
                 let bounds = sensing.bounds(k, sampling);
-                assert_eq!(bounds, recovery(&transport, &haar, &patterns, k, sampling));
                 for (bounds, exact) in [
                     (bounds.kappa, kappa),
                     (bounds.gamma, gamma),
@@ -117,7 +116,8 @@ fn an_orthonormal_transport_has_kappa_one_and_orthogonal_patterns_gamma_one() {
     };
     let hadamard = DMatrix::from_fn(16, 16, sign);
     for k in [1, 3, 8] {
-        let bounds = recovery(&transport, &haar, &hadamard, k, Sampling::default());
+        let sensing = Sensing::new(&transport, &haar, &hadamard);
+        let bounds = sensing.bounds(k, Sampling::default());
         for bounds in [bounds.kappa, bounds.gamma, bounds.ratio, bounds.product] {
             assert!((bounds.lower - 1.0).abs() < 1e-9, "{bounds:?}");
             assert!((bounds.upper - 1.0).abs() < 1e-9, "{bounds:?}");
@@ -131,13 +131,7 @@ fn fewer_photographs_than_coefficients_have_no_finite_gamma() {
     let haar = haar(4, 4);
     let bounds = |k| {
         let patterns = random_signs(16, 12, 3);
-        recovery(
-            &DMatrix::identity(16, 16),
-            &haar,
-            &patterns,
-            k,
-            Sampling::default(),
-        )
+        Sensing::new(&DMatrix::identity(16, 16), &haar, &patterns).bounds(k, Sampling::default())
     };
     assert!(bounds(7).gamma.lower.is_infinite());
     assert!((bounds(7).kappa.lower - 1.0).abs() < 1e-9);
@@ -178,7 +172,8 @@ fn corner_report(cells: (usize, usize), photographs: usize) -> (Recovery, Recove
     let inverse = Inverse::new(corner.gain.clone(), corner.operator.clone());
     let report = of_direct(&[&inverse], &haar, &shown, &flood).unwrap();
     let combined = signed(&shown, &flood);
-    let bounds = recovery(&transport, &haar, &combined, report.k, Sampling::default());
+    let sensing = Sensing::new(&transport, &haar, &combined);
+    let bounds = sensing.bounds(report.k, Sampling::default());
     (report, bounds)
 }
 
