@@ -1,7 +1,7 @@
 //! Which gates notice a fault of which size: photographs of a described scene are taken
 //! with the fault on purpose, and every gate is asked.
 
-use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, shown};
+use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, pattern_set};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Fault, Mishap, Shooting, Simulation, SimulationOptions, folder};

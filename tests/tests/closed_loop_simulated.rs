@@ -1,7 +1,7 @@
 //! From simulated photographs to a projection that is photographed again: the error on
 //! the wall, cells that the surface covers only in part among them.
 
-use iltm::capture::{CaptureOptions, NO_CELL, shown};
+use iltm::capture::{CaptureOptions, NO_CELL, pattern_set};
 use iltm::compile::white::reference_white;
 use iltm::content::natural_images;
 use iltm::learn::learn;
@@ -34,7 +34,7 @@ fn errors(scene: &Scene) -> (usize, f64, f64) {
     let simulation = Simulation::new(scene, &options, &Silent).unwrap();
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
-    let patterns = shown(simulation.grid(), 150, 3);
+    let patterns = pattern_set(simulation.grid(), 150, 3);
     let shooting = Shooting::new(scene, &simulation, 3).unwrap();
     folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());

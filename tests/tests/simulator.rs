@@ -1,7 +1,7 @@
 //! The simulator as its users meet it: effects that it leaves out do not show, flat
 //! scenes cost nothing, and what it photographs can be solved.
 
-use iltm::capture::{CaptureOptions, shown};
+use iltm::capture::{CaptureOptions, pattern_set};
 use iltm::learn::learn;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
@@ -154,7 +154,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let simulation = simulated(&scene, Forced::default());
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
-    let patterns = shown(simulation.grid(), 60, 1);
+    let patterns = pattern_set(simulation.grid(), 60, 1);
     let shooting = Shooting::new(&scene, &simulation, 1).unwrap();
     let written = folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());

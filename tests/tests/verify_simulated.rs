@@ -2,7 +2,7 @@
 //! simulated scene and measured without a camera's noise, in the cells that the table was
 //! learned in.
 
-use iltm::capture::{CaptureOptions, NO_CELL, Registration, Settings, shown};
+use iltm::capture::{CaptureOptions, NO_CELL, Registration, Settings, pattern_set};
 use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
@@ -37,7 +37,7 @@ fn learned(scene: &Scene, place: &Path) -> Learned {
     let simulation = Simulation::new(scene, &SimulationOptions::default(), &Silent).unwrap();
     let capture = place.join("capture");
     let shooting = Shooting::new(scene, &simulation, 3).unwrap();
-    let patterns = shown(simulation.grid(), 100, 3);
+    let patterns = pattern_set(simulation.grid(), 100, 3);
     folder::write(&shooting, &patterns, &capture, &Silent).unwrap();
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
     learn(&capture, &photographs, &solve, None, &Silent).unwrap()

@@ -1,6 +1,6 @@
 //! Projector, camera and cells as a capture shows them, for people and programs.
 
-use crate::capture::calibration::CameraFit;
+use crate::capture::CameraFit;
 use crate::capture::{Devices, Diagnostics, FileFormat, LeftOut, Measurements, Why};
 use crate::solve::{Flux, InverseTransport};
 use serde_json::{Value, json};

@@ -4,7 +4,7 @@ use super::args::Simulate;
 use super::failure::{Failure, Kind, kind_of};
 use super::output::{Output, cannot_write};
 use super::progress::progress;
-use crate::capture::shown;
+use crate::capture::pattern_set;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::{Scene, SceneError};
 use crate::scene::folder::{self, CaptureFolderError, Written};
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
             let count = photograph(arguments, folder, &shooting, bars.as_ref());
             taken = Some(count.map_err(|error| not_taken(&error))?);
         } else if let Some(out) = &arguments.output {
-            let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
+            let patterns = pattern_set(simulation.grid(), arguments.photos, arguments.seed);
             let done = folder::write(&shooting, &patterns, out, bars.as_ref());
             written = Some(done.map_err(untaken)?);
         }

@@ -7,7 +7,8 @@
 
 use super::{Rig, Truth};
 use iltm_capture::{
-    CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, read_reference, shown,
+    CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, pattern_set,
+    read_reference,
 };
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
@@ -119,7 +120,7 @@ impl Light {
         let simulation = Simulation::new(&scene, &SimulationOptions::default(), progress)?;
         let room = tempfile::tempdir()?;
         let folder = room.path().join("capture");
-        let patterns = shown(simulation.grid(), REGISTRATION, seed);
+        let patterns = pattern_set(simulation.grid(), REGISTRATION, seed);
         let shooting = Shooting::new(&scene, &simulation, seed)?;
         folder::write(&shooting, &patterns, &folder, progress)?;
         let measurements = iltm_capture::read(&folder, &CaptureOptions::default(), progress)?;

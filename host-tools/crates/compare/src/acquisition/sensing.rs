@@ -16,7 +16,7 @@
 
 use super::greedy::{Estimate, Greedy};
 use crate::{Rig, Unfit};
-use iltm_capture::{Role, columns, shown};
+use iltm_capture::{Role, columns, pattern_set};
 use iltm_solve::{Basis, Haar};
 use nalgebra::{DMatrix, DVector};
 
@@ -57,7 +57,7 @@ impl Sensing {
                 "{photographs} photographs leave none for Bernoulli patterns"
             )));
         }
-        let shown: Vec<_> = shown(rig.grid(), photographs - 1, seed)
+        let shown: Vec<_> = pattern_set(rig.grid(), photographs - 1, seed)
             .into_iter()
             .filter(|(role, _)| matches!(role, Role::White | Role::Bernoulli))
             .collect();

@@ -3,7 +3,7 @@
 use super::Acquisition;
 use super::compressive_dual::SEN_DARABI;
 use crate::{Found, Rig, Source, Unfit};
-use iltm_capture::{Role, columns, shown};
+use iltm_capture::{Role, columns, pattern_set};
 use iltm_picture::progress::Progress;
 use iltm_solve::{CellNoise, Method, Observed, ObservedChannel, SolveOptions, solve_observed};
 use nalgebra::DMatrix;
@@ -95,7 +95,7 @@ struct Taken {
 
 impl Sparse {
     fn take(&self, rig: &mut Rig) -> Result<Taken, Unfit> {
-        let shown: Vec<_> = shown(rig.grid(), self.photographs, self.seed)
+        let shown: Vec<_> = pattern_set(rig.grid(), self.photographs, self.seed)
             .into_iter()
             .filter(|(role, _)| match role {
                 Role::Black => false,

@@ -1,7 +1,7 @@
 //! Time against cells and photographs, and the exponents that fit it.
 
 use super::scenes::{grid, panels};
-use iltm_capture::{Role, columns, shown};
+use iltm_capture::{Role, columns, pattern_set};
 use iltm_picture::progress::{Progress, Silent};
 use iltm_runtime::Grid;
 use iltm_solve::{
@@ -72,7 +72,7 @@ pub(super) fn run(progress: &dyn Progress) -> Vec<Timed> {
 fn time(method: Method, grid: Grid, photographs: usize) -> Option<Timed> {
     let scene = panels(grid);
     let transport = scene.transport();
-    let taken: Vec<_> = shown(grid, photographs, 1)
+    let taken: Vec<_> = pattern_set(grid, photographs, 1)
         .into_iter()
         .filter(|(role, _)| *role != Role::Black)
         .filter(|(role, _)| {

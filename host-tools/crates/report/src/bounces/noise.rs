@@ -2,7 +2,7 @@
 //! seen.
 
 use super::wall::Wall;
-use iltm_capture::{Measurements, NoiseSource, ShotLight};
+use iltm_capture::{LinearPhotograph, Measurements, NoiseSource};
 
 /// Groups of pixels of similar brightness: light brings its own noise.
 const GROUPS: usize = 16;
@@ -21,7 +21,11 @@ pub struct Noise {
 /// From the capture's noise model where photographs of the same light tell it. Where
 /// nothing was photographed twice that model takes texture for noise; then the smaller
 /// of it and of [`by_curvature`], which takes less of it, counts.
-pub(super) fn noise(wall: &Wall, measurements: &Measurements, photograph: &ShotLight) -> Noise {
+pub(super) fn noise(
+    wall: &Wall,
+    measurements: &Measurements,
+    photograph: &LinearPhotograph,
+) -> Noise {
     let (averaged, blacks) = (photograph.averaged as f64, photograph.blacks as f64);
     let (mut pixels, mut cells) = (0.0, 0.0);
     for (channel, measured) in measurements.channels.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::role::{VerifyManifest, VerifyRole};
 use super::{TestImage, VerifyError};
 use crate::{Layout, slide_name};
 use iltm_capture::VERIFY_FILE;
-use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, numbered, shown};
+use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, numbered, pattern_set};
 use iltm_picture::{Picture, Samples, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::Compensator;
@@ -108,7 +108,7 @@ fn slides(
             cells,
         })
     };
-    let coded = shown(table.grid(), BERNOULLI, SEED);
+    let coded = pattern_set(table.grid(), BERNOULLI, SEED);
     let ends = || {
         coded
             .iter()
