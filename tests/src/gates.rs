@@ -2,7 +2,7 @@
 //! described scene are taken with the fault on purpose, and every gate is asked.
 
 use crate::simulated::simulation;
-use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, shown};
+use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, pattern_set};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{CaptureFault, Forced, InjectedFault, Simulation, VirtualCamera, folder};
@@ -58,7 +58,7 @@ impl<'s> Rig<'s> {
         let camera = VirtualCamera::new(self.scene, &self.simulation, SEED).expect("light");
         let faults: Vec<InjectedFault> = fault.into_iter().collect();
         let camera = camera.with_faults(&faults);
-        let patterns = shown(self.simulation.grid(), BERNOULLI, SEED);
+        let patterns = pattern_set(self.simulation.grid(), BERNOULLI, SEED);
         folder::write(&camera, &patterns, &out, &Silent).expect("written");
         let examined = capture::examine(&out, &CaptureOptions::default(), &Silent);
         Session {

@@ -2,7 +2,7 @@
 //! from them, and the errors that are on the wall then.
 
 use iltm::build_table::{BuiltTable, build_table};
-use iltm::capture::{CaptureOptions, NO_CELL, Registration, shown};
+use iltm::capture::{CaptureOptions, NO_CELL, Registration, pattern_set};
 
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
@@ -38,7 +38,7 @@ pub fn simulation(scene: &Scene, forced: Forced) -> Simulation<'_> {
 /// Writes a capture with so many random patterns; patterns and noise follow from the seed.
 pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
     let simulation = simulation(scene, Forced::default());
-    let patterns = shown(simulation.grid(), bernoulli, seed);
+    let patterns = pattern_set(simulation.grid(), bernoulli, seed);
     let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
     folder::write(&camera, &patterns, capture, &Silent).expect("written");
 }

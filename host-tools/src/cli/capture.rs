@@ -5,7 +5,7 @@ use super::failure::{Failure, Kind};
 use super::interrupt;
 use super::output::Output;
 use super::progress::progress;
-use crate::capture::{Exposed, MANIFEST_FILE, Role};
+use crate::capture::{MANIFEST_FILE, PhotoStats, Role};
 use crate::session::{
     Camera, CommandCamera, CommandScreen, Event, Screen, Session, SessionError, SessionOptions,
     State, Summary, WatchedFolder, ranges, with_window,
@@ -248,7 +248,7 @@ impl Teller<'_> {
 }
 
 /// What is to be said about the exposure of white.
-fn exposure(white: &Exposed) -> Option<String> {
+fn exposure(white: &PhotoStats) -> Option<String> {
     let percent = 100.0 * white.bright;
     if white.bright > TOO_BRIGHT {
         let advice = "expose shorter and begin again: nothing may clip";

@@ -4,7 +4,7 @@ use super::args::Simulate;
 use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::progress::progress;
-use crate::capture::shown;
+use crate::capture::pattern_set;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::Scene;
 use crate::scene::fill_capture::{FillCaptureError, UnfilledCapture};
@@ -120,7 +120,7 @@ fn shoot<'a>(
     let Some(out) = &arguments.output else {
         return Ok(Shot::Nothing);
     };
-    let patterns = shown(simulation.grid(), arguments.photos, arguments.seed);
+    let patterns = pattern_set(simulation.grid(), arguments.photos, arguments.seed);
     let written = folder::write(&camera()?, &patterns, out, progress)?;
     Ok(Shot::Capture(out, written))
 }

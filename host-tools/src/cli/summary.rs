@@ -2,7 +2,7 @@
 
 use super::words::lines;
 use crate::build_table::BuiltTable;
-use crate::capture::calibration::CameraFit;
+use crate::capture::CameraFit;
 use crate::capture::{Devices, Diagnostics, FileFormat, Gate, LeftOut, Measurements, Verdict, Why};
 use crate::solve::{Compensation, Flux, InverseTransport, Method, WhyLeftOut};
 use serde_json::{Value, json};

@@ -19,8 +19,8 @@ pub use targets::{TARGETS, Target};
 use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{
-    self, CalibrationRole, CaptureOptions, ListedRole, ManifestOf, Role, Settings, ShotLight,
-    parse_reference,
+    self, CalibrationRole, CaptureOptions, LinearPhotograph, ListedRole, ManifestOf, Role,
+    Settings, parse_reference,
 };
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};
@@ -142,7 +142,7 @@ pub fn photograph(bytes: &[u8]) {
         };
         let _ = capture::examine(folder, &options, &Silent);
         // Patterns are PNG; photographs are of many formats.
-        let _ = ShotLight::read(folder, None, &Silent);
+        let _ = LinearPhotograph::read(folder, None, &Silent);
     }
 }
 

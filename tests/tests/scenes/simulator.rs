@@ -1,7 +1,7 @@
 //! Simulator as its users meet it: effects that it leaves out do not show, flat scenes
 //! cost nothing, and what it photographs can be solved.
 
-use iltm::capture::shown;
+use iltm::capture::pattern_set;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
 use iltm::scene::description::Scene;
@@ -142,7 +142,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let simulation = simulation(&scene, Forced::default());
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
-    let patterns = shown(simulation.grid(), 60, 1);
+    let patterns = pattern_set(simulation.grid(), 60, 1);
     let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
     let written = folder::write(&camera, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());

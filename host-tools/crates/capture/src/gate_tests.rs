@@ -1,8 +1,8 @@
 //! Captures with what goes wrong at real installations, and good ones: which gates
 //! say so.
 
-use super::test_capture::{Dice, TestCapture};
 use super::*;
+use crate::test_capture::{Dice, TestCapture};
 use iltm_picture::progress::Silent;
 use image::{ImageBuffer, Luma};
 use std::fs;

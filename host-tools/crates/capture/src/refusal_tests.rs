@@ -1,8 +1,8 @@
 //! Whole captures with something wrong, and what they are refused with.
 
-use super::test_capture::{TestCapture, save_pattern};
-use super::tests::{capture, read_default};
 use super::*;
+use crate::test_capture::{TestCapture, save_pattern};
+use crate::tests::{capture, read_default};
 use iltm_picture::Response;
 use proptest::prelude::*;
 use std::fs;

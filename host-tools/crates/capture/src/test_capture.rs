@@ -1,22 +1,22 @@
 //! Small simulated captures for tests: a flat grid in front of a camera that
 //! does not line up with it, with bounced light, ambient light and noise.
 
-use iltm_capture::{CaptureOptions, Code, Manifest, Measurements, Pattern, Role, Shot};
+use iltm_capture::{Axis, CaptureOptions, Code, Manifest, Measurements, Pattern, Role, Shot};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use image::{ImageBuffer, Luma, Rgb};
 use std::path::Path;
 
 /// Repeatable random numbers (xorshift64*, Vigna 2016).
-pub(super) struct Dice(u64);
+pub(crate) struct Dice(u64);
 
 impl Dice {
-    pub(super) fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed | 1 << 40)
     }
 
     /// Uniform in 0 to 1.
-    pub(super) fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -24,42 +24,42 @@ impl Dice {
     }
 
     /// Standard normal: twelve uniforms, exact in mean and variance.
-    pub(super) fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 
 /// A simulated scene and how it is photographed.
 #[derive(Clone, Debug)]
-pub(super) struct TestCapture {
-    pub(super) rows: usize,
-    pub(super) cols: usize,
+pub(crate) struct TestCapture {
+    pub(crate) rows: usize,
+    pub(crate) cols: usize,
     /// Camera pixels along a cell's side; need not be whole.
-    pub(super) pitch: f64,
+    pub(crate) pitch: f64,
     /// Camera pixels between the picture's border and the grid.
-    pub(super) margin: f64,
+    pub(crate) margin: f64,
     /// Camera pixels over which a cell's border is blurred.
-    pub(super) blur: f64,
+    pub(crate) blur: f64,
     /// Light of one cell on its own patch, of full scale.
-    pub(super) direct: f64,
+    pub(crate) direct: f64,
     /// Light of one cell on each other patch and beside the grid.
-    pub(super) bounced: f64,
-    pub(super) ambient: f64,
+    pub(crate) bounced: f64,
+    pub(crate) ambient: f64,
     /// Standard deviation of a camera pixel.
-    pub(super) noise: f64,
-    pub(super) bernoulli: usize,
+    pub(crate) noise: f64,
+    pub(crate) bernoulli: usize,
     /// Photographs of white and of black each.
-    pub(super) repeats: usize,
+    pub(crate) repeats: usize,
     /// Number of the first column and of the first row in the Gray code.
-    pub(super) offset: [usize; 2],
+    pub(crate) offset: [usize; 2],
     /// Gain of each channel, 1 or 3.
-    pub(super) gains: Vec<f64>,
+    pub(crate) gains: Vec<f64>,
     /// Full scale of the files, 255 or 65535.
-    pub(super) full_scale: u16,
+    pub(crate) full_scale: u16,
     /// From light to the value in the file.
-    pub(super) encode: fn(f64) -> f64,
+    pub(crate) encode: fn(f64) -> f64,
     /// Albedo at a place in cell coordinates (row, column), relative.
-    pub(super) albedo: fn(f64, f64) -> f64,
+    pub(crate) albedo: fn(f64, f64) -> f64,
 }
 
 impl Default for TestCapture {
@@ -86,19 +86,19 @@ impl Default for TestCapture {
 }
 
 impl TestCapture {
-    pub(super) fn grid(&self) -> Grid {
+    pub(crate) fn grid(&self) -> Grid {
         Grid::new(self.rows as u16, self.cols as u16).unwrap()
     }
 
     /// Width and height of a photograph.
-    pub(super) fn camera(&self) -> (usize, usize) {
+    pub(crate) fn camera(&self) -> (usize, usize) {
         let side = |cells: usize| (2.0 * self.margin + self.pitch * cells as f64).ceil() as usize;
         (side(self.cols), side(self.rows))
     }
 
     /// Share of camera pixel `at`, widened to the blur, that lies in cell `index`,
     /// along one axis.
-    pub(super) fn overlap(&self, at: usize, index: usize) -> f64 {
+    pub(crate) fn overlap(&self, at: usize, index: usize) -> f64 {
         let from = self.margin + self.pitch * index as f64;
         let centre = at as f64 + 0.5;
         let (low, high) = (centre - 0.5 * self.blur, centre + 0.5 * self.blur);
@@ -106,30 +106,23 @@ impl TestCapture {
     }
 
     /// Every pattern with its role, in the order it is shown.
-    pub(super) fn patterns(&self) -> Vec<(Role, Pattern)> {
+    pub(crate) fn patterns(&self) -> Vec<(Role, Pattern)> {
         let grid = self.grid();
         let code = |cells: usize, offset: usize| Code {
             bits: (cells + offset).next_power_of_two().trailing_zeros() as u8,
             offset,
         };
-        let [column, row] = [
-            code(self.cols, self.offset[0]),
-            code(self.rows, self.offset[1]),
-        ];
+        let sides = [(self.cols, self.offset[0]), (self.rows, self.offset[1])];
+        let codes = sides.map(|(cells, offset)| code(cells, offset));
         let mut roles = [Role::White, Role::Black].repeat(self.repeats);
         for inverse in [false, true] {
-            roles.extend((0..column.bits).map(|bit| Role::Column { bit, inverse }));
-            roles.extend((0..row.bits).map(|bit| Role::Row { bit, inverse }));
+            for (axis, code) in [Axis::Column, Axis::Row].into_iter().zip(codes) {
+                roles.extend((0..code.bits).map(|bit| axis.stripe(bit, inverse)));
+            }
         }
         let coded = roles.into_iter().map(|role| {
-            let lit = (0..grid.cells()).map(|cell| match role {
-                Role::Column { bit, inverse } => column.lit(cell % self.cols, bit, inverse),
-                Role::Row { bit, inverse } => row.lit(cell / self.cols, bit, inverse),
-                role => Some(role == Role::White),
-            });
-            let lit = lit.collect::<Option<_>>().unwrap();
-            let (rows, cols) = (self.rows, self.cols);
-            (role, Pattern { rows, cols, lit })
+            let pattern = Pattern::of_codes((self.rows, self.cols), role, codes);
+            (role, pattern.unwrap())
         });
         let mut dice = Dice::new(1);
         let random = (0..self.bernoulli).map(|_| {
@@ -141,7 +134,7 @@ impl TestCapture {
     }
 
     /// Light in every pixel under a pattern, before the channel's gain and noise.
-    pub(super) fn light(&self, pattern: &Pattern) -> Vec<f64> {
+    pub(crate) fn light(&self, pattern: &Pattern) -> Vec<f64> {
         let (width, height) = self.camera();
         let far = pattern.lit.iter().filter(|&&lit| lit).count() as f64 * self.bounced;
         let pixel = |at: usize| {
@@ -158,7 +151,7 @@ impl TestCapture {
     }
 
     /// Writes the capture into a folder and returns its manifest.
-    pub(super) fn write(&self, folder: &Path) -> Manifest {
+    pub(crate) fn write(&self, folder: &Path) -> Manifest {
         for part in ["patterns", "photos"] {
             std::fs::create_dir_all(folder.join(part)).unwrap();
         }
@@ -214,7 +207,7 @@ impl TestCapture {
     }
 
     /// Writes the capture into a new folder and reads it.
-    pub(super) fn read(&self) -> Measurements {
+    pub(crate) fn read(&self) -> Measurements {
         let folder = tempfile::tempdir().unwrap();
         self.write(folder.path());
         iltm_capture::read(folder.path(), &CaptureOptions::default(), &Silent).unwrap()
@@ -222,7 +215,7 @@ impl TestCapture {
 }
 
 /// Writes a pattern as `iltm patterns` does.
-pub(super) fn save_pattern(pattern: &Pattern, path: &Path) {
+pub(crate) fn save_pattern(pattern: &Pattern, path: &Path) {
     let values = pattern.lit.iter().map(|&lit| 255 * u8::from(lit)).collect();
     let (width, height) = (pattern.cols as u32, pattern.rows as u32);
     let picture = ImageBuffer::<Luma<u8>, Vec<u8>>::from_raw(width, height, values).unwrap();

@@ -1,7 +1,7 @@
 //! Whole captures, read from folders.
 
-use super::test_capture::{TestCapture, save_pattern};
 use super::*;
+use crate::test_capture::{TestCapture, save_pattern};
 use iltm_picture::Response;
 use iltm_picture::progress::Silent;
 use std::fs;
@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use tempfile::TempDir;
 
 /// A default capture in a folder, changed by `change`.
-pub(super) fn capture(change: impl FnOnce(&Path, &mut Manifest)) -> TempDir {
+pub(crate) fn capture(change: impl FnOnce(&Path, &mut Manifest)) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut manifest = TestCapture::default().write(folder.path());
     change(folder.path(), &mut manifest);
@@ -17,7 +17,7 @@ pub(super) fn capture(change: impl FnOnce(&Path, &mut Manifest)) -> TempDir {
     folder
 }
 
-pub(super) fn read_default(folder: &Path) -> Result<Measurements, CaptureError> {
+pub(crate) fn read_default(folder: &Path) -> Result<Measurements, CaptureError> {
     read(folder, &CaptureOptions::default(), &Silent)
 }
 
@@ -474,28 +474,12 @@ fn patterns_of_more_cells_than_a_table_has_are_looked_at_in_blocks() {
     assert!(rows * cols > iltm_runtime::Grid::MAX_CELLS);
     fs::create_dir(folder.path().join("patterns")).unwrap();
     let mut roles = vec![Role::White, Role::Black];
-    let stripes = |bit| {
-        [
-            Role::Column {
-                bit,
-                inverse: false,
-            },
-            Role::Row {
-                bit,
-                inverse: false,
-            },
-        ]
-    };
+    let stripes = |bit| [Axis::Column, Axis::Row].map(|axis| axis.stripe(bit, false));
     roles.extend((0..8).flat_map(stripes));
-    let codes = [code::Code { bits: 8, offset: 0 }; 2];
+    let codes = [Code { bits: 8, offset: 0 }; 2];
     let mut shots = Vec::new();
     for (index, role) in (0..).zip(roles) {
-        let lit = |cell: usize| match role {
-            Role::Column { bit, inverse } => codes[0].lit(cell % cols, bit, inverse),
-            Role::Row { bit, inverse } => codes[1].lit(cell / cols, bit, inverse),
-            role => Some(role == Role::White),
-        };
-        let lit = (0..rows * cols).map(lit).collect::<Option<_>>().unwrap();
+        let pattern = Pattern::of_codes((rows, cols), role, codes).unwrap();
         let shot = Shot {
             index,
             role,
@@ -504,10 +488,7 @@ fn patterns_of_more_cells_than_a_table_has_are_looked_at_in_blocks() {
             exposure: None,
             line: u64::from(index) + 2,
         };
-        save_pattern(
-            &Pattern { rows, cols, lit },
-            &folder.path().join(&shot.pattern),
-        );
+        save_pattern(&pattern, &folder.path().join(&shot.pattern));
         shots.push(shot);
     }
     let read = |coarsen| {
@@ -516,7 +497,10 @@ fn patterns_of_more_cells_than_a_table_has_are_looked_at_in_blocks() {
             coarsen,
             ..CaptureOptions::default()
         };
-        Sequence::read(folder.path(), Chosen::new(folder.path(), &shots, &options)?)
+        Sequence::read(
+            folder.path(),
+            Selection::new(folder.path(), &shots, &options)?,
+        )
     };
     assert!(matches!(read(false), Err(CaptureError::TooLarge { .. })));
     let sequence = read(true).unwrap();

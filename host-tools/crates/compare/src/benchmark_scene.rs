@@ -8,7 +8,8 @@
 use super::{GroundTruth, Rig};
 use crate::rig::clear_dead;
 use iltm_capture::{
-    CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, read_reference, shown,
+    CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, pattern_set,
+    read_reference,
 };
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
@@ -124,7 +125,7 @@ impl BenchmarkScene {
         let simulation = Simulation::new(&scene, &SimulationOptions::default(), progress)?;
         let room = tempfile::tempdir()?;
         let folder = room.path().join("capture");
-        let patterns = shown(simulation.grid(), REGISTRATION, seed);
+        let patterns = pattern_set(simulation.grid(), REGISTRATION, seed);
         let camera = VirtualCamera::new(&scene, &simulation, seed)?;
         folder::write(&camera, &patterns, &folder, progress)?;
         let measurements = iltm_capture::read(&folder, &CaptureOptions::default(), progress)?;

@@ -3,7 +3,7 @@
 use super::description::Scene;
 use super::effects::Effect;
 use super::simulation::{Simulation, SimulationError, SimulationOptions};
-use iltm_capture::{columns, shown};
+use iltm_capture::{columns, pattern_set};
 use iltm_picture::progress::Progress;
 use std::time::Instant;
 
@@ -85,7 +85,7 @@ impl Photographed {
     ) -> Result<Self, SimulationError> {
         let start = Instant::now();
         let simulation = Simulation::new(scene, options, progress)?;
-        let patterns = shown(simulation.grid(), BERNOULLI, SEED);
+        let patterns = pattern_set(simulation.grid(), BERNOULLI, SEED);
         let exposed = simulation.expose(&columns(&patterns))?;
         let light: Vec<_> = (0..patterns.len())
             .map(|k| simulation.photograph(&exposed, k))

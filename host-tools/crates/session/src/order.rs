@@ -1,7 +1,7 @@
 //! Order of showing: which pictures, and one after the other.
 
 use super::calibration_pictures::{even, probes, ramp_roles};
-use iltm_capture::{CalibrationRole, Role, shown};
+use iltm_capture::{CalibrationRole, Role, pattern_set};
 use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid};
 
@@ -61,7 +61,7 @@ impl Default for OrderOptions {
 pub fn order(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
     let mut flood = Vec::new();
     let mut others = calibration(grid, options);
-    for (role, pattern) in shown(grid, options.bernoulli, options.seed) {
+    for (role, pattern) in pattern_set(grid, options.bernoulli, options.seed) {
         let list = match role {
             Role::White | Role::Black => &mut flood,
             _ => &mut others,
@@ -164,7 +164,7 @@ mod tests {
             .iter()
             .filter_map(|slide| Some((once(&slide.purpose)?, &slide.cells)))
             .collect();
-        let simulated = shown(grid, 40, 9);
+        let simulated = pattern_set(grid, 40, 9);
         assert_eq!(slides.len(), simulated.len() - 2);
         for ((role, cells), (expected, pattern)) in slides.iter().zip(&simulated[2..]) {
             assert_eq!(role, expected);

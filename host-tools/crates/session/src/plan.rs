@@ -1,7 +1,7 @@
 //! Plan of a session: what is to be photographed, and what is still missing.
 
 use super::{SLIDES_FOLDER, SessionError};
-use iltm_capture::{CaptureError, Exposed, find_photo, listed, pictures_of_stem};
+use iltm_capture::{CaptureError, PhotoStats, find_photo, listed, pictures_of_stem};
 use iltm_picture::progress::Progress;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ pub struct Planned {
 #[derive(Clone, PartialEq, Debug)]
 pub enum State {
     /// It is there, and whole.
-    Whole(Exposed),
+    Whole(PhotoStats),
     /// It is not there.
     Missing,
     /// It is there and of no use; why.
@@ -100,7 +100,7 @@ fn state(photo: &Path) -> State {
         let Some(file) = found else {
             return Ok(State::Missing);
         };
-        Exposed::read(&file).map(State::Whole)
+        PhotoStats::read(&file).map(State::Whole)
     });
     whole.unwrap_or_else(|error| State::Bad(error.to_string()))
 }
@@ -111,7 +111,7 @@ pub(super) fn endings(photo: &Path) -> Vec<PathBuf> {
 }
 
 /// In what a photograph differs from the others.
-pub(super) fn unlike(exposed: &Exposed, others: &Exposed) -> Option<String> {
+pub(super) fn unlike(exposed: &PhotoStats, others: &PhotoStats) -> Option<String> {
     if exposed.size != others.size {
         let ((width, height), (w, h)) = (exposed.size, others.size);
         return Some(format!(
@@ -119,7 +119,7 @@ pub(super) fn unlike(exposed: &Exposed, others: &Exposed) -> Option<String> {
         ));
     }
     (exposed.channels != others.channels).then(|| {
-        let colour = |exposed: &Exposed| match exposed.channels {
+        let colour = |exposed: &PhotoStats| match exposed.channels {
             1 => "grey",
             _ => "in colour",
         };

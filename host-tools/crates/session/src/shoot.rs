@@ -4,7 +4,7 @@ use super::latency::{Flash, Rig};
 use super::plan::{self, Planned, State, endings, unlike};
 use super::shell;
 use super::{Camera, Latency, Screen, SessionError, measure, states};
-use iltm_capture::{Exposed, Role};
+use iltm_capture::{PhotoStats, Role};
 use iltm_picture::progress::Progress;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ pub enum Event<'a> {
         /// Its file.
         photo: &'a Path,
         /// What it is like.
-        exposed: Exposed,
+        exposed: PhotoStats,
         /// Photographs that are still missing.
         left: usize,
     },
@@ -189,7 +189,7 @@ impl Session {
     }
 
     /// Another photograph, that the one at this place has to be like.
-    fn like(&self, at: usize) -> Option<Exposed> {
+    fn like(&self, at: usize) -> Option<PhotoStats> {
         let others = self.states.iter().enumerate();
         others
             .filter(|(other, _)| *other != at)
@@ -220,9 +220,9 @@ impl Shooting<'_> {
         &mut self,
         planned: &Planned,
         latency: Latency,
-        like: Option<&Exposed>,
+        like: Option<&PhotoStats>,
         tell: &mut dyn FnMut(&Event<'_>),
-    ) -> Result<(PathBuf, Exposed), SessionError> {
+    ) -> Result<(PathBuf, PhotoStats), SessionError> {
         self.stopped()?;
         self.screen.show(planned)?;
         if !shell::wait(latency.wait, self.stop) {
@@ -250,9 +250,9 @@ impl Shooting<'_> {
         &mut self,
         planned: &Planned,
         folder: &Path,
-    ) -> Result<(PathBuf, Exposed), SessionError> {
+    ) -> Result<(PathBuf, PhotoStats), SessionError> {
         let taken = self.camera.shoot(planned, folder)?;
-        match Exposed::read(&taken) {
+        match PhotoStats::read(&taken) {
             Ok(exposed) => Ok((taken, exposed)),
             Err(error) => Err(SessionError::Camera {
                 index: planned.index,

@@ -2,7 +2,7 @@
 //! `now`, which is the wall, and a photograph is a copy of that.
 
 use super::*;
-use iltm_capture::{CameraSettings, Exposed};
+use iltm_capture::{CameraSettings, PhotoStats};
 use iltm_picture::{png, progress::Silent};
 use iltm_runtime::{FrameSize, Grid};
 use std::cell::Cell;
@@ -358,7 +358,7 @@ fn photographs_that_appear_in_a_folder_are_taken_once_they_are_whole() {
     assert_eq!(summary.taken, 2);
     let name = format!("{only_two:03}.PNG");
     let photo = rig.capture().join("photos").join(&name);
-    assert_eq!(Exposed::read(&photo).unwrap().size, (24, 18), "{name}");
+    assert_eq!(PhotoStats::read(&photo).unwrap().size, (24, 18), "{name}");
     let slide = rig.capture().join(slide_name(only_two));
     assert_eq!(fs::read(photo).unwrap(), fs::read(slide).unwrap());
 }

@@ -1,7 +1,8 @@
 //! Gate `coverage`: which cells the camera sees.
 
-use super::super::{LeftOut, Why};
-use super::{Evidence, Gate, GateName, Verdict};
+use crate::cells::cell_pixels::{LeftOut, Why};
+use crate::format::sequence::Sequence;
+use crate::gate::{Evidence, Gate, GateName, Verdict};
 use iltm_runtime::Grid;
 
 /// Share of the cells that must be found.
@@ -10,15 +11,15 @@ const LEAST: f64 = 0.1;
 /// Share of missing cells from which it is worth a word.
 const WARN: f64 = 0.1;
 
-/// Judges the cells that were found, each of which stands for 2^`coarser` columns and
+/// Judges the cells that were found, each of which stands for 2^`sequence.coarser` columns and
 /// rows of the patterns.
-pub(crate) fn judge(
-    grid: Grid,
-    coarser: u8,
+pub(super) fn judge(
+    sequence: &Sequence,
     live: &[bool],
     pixels: &[u32],
     left_out: &[LeftOut],
 ) -> Gate {
+    let grid = sequence.grid;
     let cells = grid.cells();
     let found = live.iter().filter(|live| **live).count();
     let missing = (cells - found) as f64 / cells as f64;
@@ -40,7 +41,7 @@ pub(crate) fn judge(
             region(grid, &unseen)
         ),
     };
-    let what = match coarser {
+    let what = match sequence.coarser {
         0 => what,
         steps => format!(
             "{what} ({} x {} blocks of {side} x {side} pixels: finer stripes are left out, a \

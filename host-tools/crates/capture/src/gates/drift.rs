@@ -1,8 +1,8 @@
 //! Gate `drift`: lamp, lens and daylight changed slowly, and by little.
 
-use super::super::drift::Steadiness;
-use super::super::sequence::Sequence;
-use super::{Evidence, Gate, GateName, Verdict};
+use crate::cells::drift::{Drift, Steadiness};
+use crate::format::sequence::Sequence;
+use crate::gate::{Evidence, Gate, GateName, Verdict};
 use std::fmt::Write;
 
 /// Change over the session from which it is worth a word.
@@ -12,7 +12,7 @@ const WARN: f64 = 0.1;
 const MOST: f64 = 0.3;
 
 /// Judges the slow changes.
-pub(crate) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
+pub(super) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
     let name = GateName::Drift;
     if steadiness.shots.len() < 2 {
         let why = "white was photographed once, and there are too few other photographs to tell \
@@ -21,7 +21,7 @@ pub(crate) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
     }
     let size = steadiness.size.max(0.0);
     let verdict = Verdict::of(size, WARN, MOST);
-    let corrected = steadiness.drift != super::super::drift::Drift::default();
+    let corrected = steadiness.drift != Drift::default();
     let mut what = if corrected {
         format!(
             "brightness drifted by {:.1} % over the session, which is corrected",

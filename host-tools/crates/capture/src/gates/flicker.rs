@@ -1,11 +1,11 @@
 //! Gate `flicker`: brightness does not jump from photograph to photograph, nor from
 //! row to row within one.
 
-use super::super::Registration;
-use super::super::drift::Steadiness;
-use super::super::sequence::Sequence;
-use super::bands::{self, Bands};
-use super::{Evidence, Gate, GateName, Verdict};
+use crate::cells::drift::Steadiness;
+use crate::cells::mains_banding::MainsBanding;
+use crate::format::sequence::Sequence;
+use crate::gate::{Evidence, Gate, GateName, Verdict};
+use iltm_picture::statistics::median;
 
 /// Scatter of the brightness from which it is worth a word.
 const WARN: f64 = 0.006;
@@ -14,10 +14,10 @@ const WARN: f64 = 0.006;
 const MOST: f64 = 0.015;
 
 /// Judges the fast changes.
-pub(crate) fn judge(
+pub(super) fn judge(
     sequence: &Sequence,
-    registration: &Registration,
     steadiness: &Steadiness,
+    bands: Option<&MainsBanding>,
 ) -> Gate {
     let name = GateName::Flicker;
     if steadiness.models.is_empty() {
@@ -30,21 +30,18 @@ pub(crate) fn judge(
         .map(|(gain, slow)| gain / slow - 1.0)
         .collect();
     let scatter = scatter(&offs, &steadiness.errors);
-    let bands = bands::find(registration, &steadiness.models);
     // The root mean square of a sine is its amplitude over the root of 2.
-    let striped = bands
-        .as_ref()
-        .map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
+    let striped = bands.map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
     let number = scatter.max(striped);
     let verdict = Verdict::of(number, WARN, MOST);
-    let what = match (verdict, &bands) {
+    let what = match (verdict, bands) {
         (Verdict::Pass, _) => format!(
             "brightness jumps by {:.2} % from photograph to photograph",
             100.0 * scatter
         ),
         (
             _,
-            Some(Bands {
+            Some(MainsBanding {
                 cycles, amplitude, ..
             }),
         ) if striped > scatter => format!(
@@ -95,7 +92,7 @@ pub(crate) fn judge(
 /// Standard deviation of what is off the slow curve, robust, without what the gains
 /// themselves are uncertain by.
 fn scatter(offs: &[f64], errors: &[f64]) -> f64 {
-    let middle = |values: Vec<f64>| super::superposition::median(values).unwrap_or(0.0);
+    let middle = |values: Vec<f64>| median(values).unwrap_or(0.0);
     let spread = 1.4826 * middle(offs.iter().map(|off| off.abs()).collect());
     let own = middle(errors.to_vec());
     (spread * spread - own * own).max(0.0).sqrt()

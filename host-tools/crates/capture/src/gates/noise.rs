@@ -5,8 +5,8 @@
 //! figures erred by .008, at 50 dB by .003 to .004, at 60 dB by .0015. Photographs
 //! average each other's noise, and the inverse amplifies it by as much.
 
-use super::super::{ChannelMeasurements, Measurements};
-use super::{Evidence, Gate, GateName, Verdict};
+use crate::cells::measurements::{ChannelMeasurements, Measurements};
+use crate::gate::{Evidence, Gate, GateName, Verdict};
 use iltm_runtime::Grid;
 
 /// Step of an 8-bit display, of its white: errors below are not seen.
@@ -16,7 +16,7 @@ const GOAL: f64 = 1.0 / 255.0;
 const MOST: f64 = 0.05;
 
 /// Judges the noise of the observations under white, `repeats` photographs of it.
-pub(crate) fn judge(
+pub(super) fn judge(
     grid: Grid,
     channels: &[ChannelMeasurements],
     live: &[bool],

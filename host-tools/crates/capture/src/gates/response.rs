@@ -1,10 +1,10 @@
 //! Gate `response`: the declared responses are those of the devices, and the
 //! projector shows a colour as the sum of its primaries.
 
-use super::super::calibration::CameraFit;
-use super::super::{Devices, RampChannel};
-use super::cause::Cause;
-use super::{Evidence, Gate, GateName, Verdict};
+use crate::cells::nonlinearity::Nonlinearity;
+use crate::devices::{CameraFit, Devices, Ramp};
+use crate::format::calibration_role::RampChannel;
+use crate::gate::{Evidence, Gate, GateName, Verdict};
 
 /// Misfit of the declared camera response beyond that of the best one.
 const WARN: f64 = 0.01;
@@ -15,10 +15,13 @@ const WARN_STEPS: f64 = 2.5;
 const MOST_STEPS: f64 = 8.0;
 
 /// Judges what was measured of the devices; `cause` is why light does not add up.
-pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
+pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
     let name = GateName::Response;
     // A camera that exposes for the picture looks like one with another curve.
-    let curved = matches!(cause, None | Some(Cause::Curve { .. } | Cause::Unknown));
+    let curved = matches!(
+        cause,
+        None | Some(Nonlinearity::Curve { .. } | Nonlinearity::Unknown)
+    );
     let camera = devices
         .camera_fit
         .as_ref()
@@ -27,7 +30,7 @@ pub(crate) fn judge(devices: &Devices, cause: Option<Cause>) -> Gate {
     let complaints = devices
         .ramp
         .as_ref()
-        .map_or_else(Vec::new, super::super::calibration::ramp::Ramp::complaints);
+        .map_or_else(Vec::new, Ramp::complaints);
     let gate = |verdict, number, limit, unit, what, next_step| Gate {
         name,
         verdict,

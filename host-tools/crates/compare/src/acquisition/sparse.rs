@@ -3,7 +3,7 @@
 use super::Acquisition;
 use super::compressive::SEN_DARABI;
 use crate::{Acquired, Citation, Description, Rig, Unfit};
-use iltm_capture::{Pattern, Role, columns, shown};
+use iltm_capture::{Pattern, Role, columns, pattern_set};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use iltm_solve::{
@@ -99,7 +99,7 @@ pub(crate) fn patterns(
         Role::White | Role::Bernoulli => true,
         Role::Column { .. } | Role::Row { .. } => method == Method::Joint,
     };
-    let shown = shown(grid, photographs, seed).into_iter();
+    let shown = pattern_set(grid, photographs, seed).into_iter();
     let shown = shown.filter(|(role, _)| wanted(*role));
     shown.take(photographs).collect()
 }

@@ -6,7 +6,7 @@
 
 use super::scenes::{Condition, surface};
 use crate::chart::curves;
-use iltm_capture::{Role, columns, shown};
+use iltm_capture::{Role, columns, pattern_set};
 use iltm_solve::{
     Haar,
     restricted_isometry::{LIMIT, Sampling, Sensing, signed},
@@ -45,7 +45,7 @@ pub(super) fn places() -> Vec<TheoremBounds> {
         let haar = Haar::new(truth.grid);
         let flood = DVector::from_element(truth.grid.cells(), 1.0);
         for photographs in PHOTOGRAPHS {
-            let taken: Vec<_> = shown(truth.grid, photographs, 1)
+            let taken: Vec<_> = pattern_set(truth.grid, photographs, 1)
                 .into_iter()
                 .filter(|(role, _)| *role == Role::Bernoulli)
                 .collect();

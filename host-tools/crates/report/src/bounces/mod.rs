@@ -8,7 +8,7 @@
 //! is peeled the same way, again and again.
 //!
 //! ```text
-//! iltm_capture::ShotLight -> the photograph
+//! iltm_capture::LinearPhotograph -> the photograph
 //! capture, solve     -> bounce_operator   which cells light a camera pixel by way of others
 //!                       noise             what a bounce has to exceed to be seen
 //!                       separate          one bounce after the other, until the noise
@@ -30,7 +30,7 @@ pub use noise::PhotographNoise;
 pub use separate::{Layer, LayerKind, MOST_BOUNCES, Separated};
 pub use sheet::sheet;
 
-use iltm_capture::{CaptureError, CaptureOptions, Measurements, Shot, ShotLight};
+use iltm_capture::{CaptureError, CaptureOptions, LinearPhotograph, Measurements, Shot};
 use iltm_picture::{FolderError, progress::Progress};
 use iltm_solve::{InverseTransport, Observed, SolveError, SolveOptions, SolveReport};
 use nalgebra::DMatrix;
@@ -119,11 +119,11 @@ pub fn bounces(
     progress: &dyn Progress,
 ) -> Result<Bounces, BouncesError> {
     // An index that is not there is known before the work, not after it.
-    let mut photograph = ShotLight::read(folder, options.photograph, progress)?;
+    let mut photograph = LinearPhotograph::read(folder, options.photograph, progress)?;
     let measurements = iltm_capture::read(folder, &options.capture, progress)?;
     let devices = &measurements.devices;
     if devices.change_light(&measurements.settings) {
-        photograph = ShotLight::read_as(folder, options.photograph, devices, progress)?;
+        photograph = LinearPhotograph::read_as(folder, options.photograph, devices, progress)?;
     }
     let (inverse, report) = solved(&measurements, &options.solve, progress)?;
     let channels = photograph.planes.len();
@@ -170,7 +170,7 @@ fn solved(
     iltm_solve::solve_observed(&observed, options, progress)
 }
 
-fn ambient_share(photograph: &ShotLight) -> f64 {
+fn ambient_share(photograph: &LinearPhotograph) -> f64 {
     let sum =
         |planes: &[Vec<f32>]| -> f64 { planes.iter().flatten().copied().map(f64::from).sum() };
     let black = sum(&photograph.black);

@@ -1,7 +1,7 @@
 //! Camera noise of one photograph: what a bounce has to exceed to be seen.
 
 use super::bounce_operator::BounceOperator;
-use iltm_capture::{Measurements, NoiseSource, ShotLight};
+use iltm_capture::{LinearPhotograph, Measurements, NoiseSource};
 
 /// Groups of pixels of similar brightness: light brings its own noise.
 const GROUPS: usize = 16;
@@ -23,7 +23,7 @@ pub struct PhotographNoise {
 pub(super) fn noise(
     wall: &BounceOperator,
     measurements: &Measurements,
-    photograph: &ShotLight,
+    photograph: &LinearPhotograph,
 ) -> PhotographNoise {
     let (averaged, blacks) = (photograph.averaged as f64, photograph.blacks as f64);
     let (mut pixels, mut cells) = (0.0, 0.0);

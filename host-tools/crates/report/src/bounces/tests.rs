@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::test_scene;
-use iltm_capture::{Registration, Role, shown};
+use iltm_capture::{Registration, Role, pattern_set};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use iltm_scene::{
@@ -103,7 +103,7 @@ fn every_bounce_of_a_known_scene_is_found_with_its_exact_inverse() {
 fn bounces_of_a_known_scene_are_found_from_its_photographs() {
     let scene = textured_valleys();
     let cells = scene.grid.cells();
-    let mut patterns = shown(scene.grid, 60, 7);
+    let mut patterns = pattern_set(scene.grid, 60, 7);
     patterns.retain(|(role, _)| *role != Role::Black);
     let roles: Vec<Role> = patterns.iter().map(|(role, _)| *role).collect();
     let patterns = DMatrix::from_fn(cells, patterns.len(), |cell, k| {
@@ -230,7 +230,7 @@ fn direct_light_is_what_the_camera_sees_without_interreflection() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/m-panels.toml");
     let scene = Scene::read(Path::new(path)).unwrap();
     let simulation = Simulation::new(&scene, &SimulationOptions::default(), &Silent).unwrap();
-    let patterns = shown(simulation.grid(), 60, 3);
+    let patterns = pattern_set(simulation.grid(), 60, 3);
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
     let camera = VirtualCamera::new(&scene, &simulation, 3).unwrap();

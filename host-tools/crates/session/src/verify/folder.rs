@@ -5,7 +5,7 @@ use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
 use super::{TestImage, VerifyError};
 use crate::{Layout, slide_name};
-use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, shown};
+use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, pattern_set};
 use iltm_picture::{Picture, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::Compensator;
@@ -108,7 +108,7 @@ fn slides(
             cells,
         })
     };
-    let coded = shown(table.grid(), BERNOULLI, SEED);
+    let coded = pattern_set(table.grid(), BERNOULLI, SEED);
     let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
     // White and black.
     let ends = || all(&coded[..2]);

@@ -5,7 +5,7 @@ use super::manifest::{VerifyManifest, VerifyRole, VerifyShot};
 use super::response::ProjectorCurves;
 use super::{Expected, VerifyError};
 use iltm_capture::VERIFY_FILE;
-use iltm_capture::{CaptureError, CellPlanes, Revisited, Settings, Shot, find_photo, revisit};
+use iltm_capture::{CaptureError, CellPlanes, CellReadings, Settings, Shot, find_photo, remeasure};
 use iltm_compile::Provenance;
 use iltm_picture::{LightPicture, Picture, Response, Samples, png, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
@@ -37,7 +37,7 @@ pub struct Session {
     /// The test images, by number.
     pub shown: Vec<Shown>,
     /// The cells, white and black.
-    pub revisited: Revisited,
+    pub revisited: CellReadings,
     /// Cells that the table has gains for and that were measured, length `N`.
     pub live: Vec<bool>,
 }
@@ -95,7 +95,7 @@ impl Session {
         let shots: Vec<Shot> = flat
             .map(|shot| with_role(shot, iltm_capture::Role::White))
             .collect();
-        let revisited = revisit(folder, &settings, mixing, (&code, &shots), progress)?;
+        let revisited = remeasure(folder, &settings, mixing, (&code, &shots), progress)?;
         let live = live(folder, table, &revisited)?;
         let shown = pairs
             .into_iter()
@@ -244,7 +244,11 @@ fn input(picture: &Picture, curves: &ProjectorCurves) -> CellPlanes {
 }
 
 /// The cells that can be compared.
-fn live(folder: &Path, table: &Table<'_>, revisited: &Revisited) -> Result<Vec<bool>, VerifyError> {
+fn live(
+    folder: &Path,
+    table: &Table<'_>,
+    revisited: &CellReadings,
+) -> Result<Vec<bool>, VerifyError> {
     let path = || folder.to_owned();
     if revisited.grid != table.grid() {
         return Err(VerifyError::Grid {

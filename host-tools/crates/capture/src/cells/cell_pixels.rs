@@ -1,0 +1,136 @@
+//! Cell pixels: the cells that can be measured, and the camera pixels that are averaged
+//! for each.
+
+use crate::format::sequence::Sequence;
+use crate::registration::cell_map::{NO_CELL, Registration};
+use nalgebra::DMatrix;
+
+/// A cell that was not measured.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LeftOut {
+    /// Its index, `row * cols + col`.
+    pub cell: usize,
+    /// Why.
+    pub why: Why,
+}
+
+/// Why a cell was not measured.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Why {
+    /// Too few camera pixels see it, and it alone.
+    TooFewPixels {
+        /// How many do.
+        pixels: u32,
+    },
+    /// Its pixels reach the camera's full scale in the flood photograph.
+    Saturated {
+        /// How many of them.
+        saturated: u32,
+        /// All of them.
+        pixels: u32,
+    },
+}
+
+/// Camera pixels that a cell must keep: one could be a defect of the sensor.
+const MIN_PIXELS: u32 = 2;
+
+/// Share of a cell's pixels that may be saturated. These are not used, but more
+/// of them mean that the rest is close to saturation too.
+const SATURATED_PIXELS: f64 = 0.1;
+
+/// The cells that can be measured, and their pixels.
+pub(crate) struct CellPixels {
+    /// Pixels of all live cells, cell after cell.
+    pixels: Vec<u32>,
+    /// Where each cell's pixels begin in `pixels`, length `N + 1`.
+    begin: Vec<usize>,
+    pub(crate) live: Vec<bool>,
+    pub(crate) left_out: Vec<LeftOut>,
+}
+
+impl CellPixels {
+    /// Chooses the pixels to average: registered ones that are not `saturated`
+    /// under white.
+    pub(crate) fn choose(registration: &Registration, saturated: &[bool]) -> Self {
+        let cells = registration.centre.len();
+        let mut of_cell: Vec<Vec<u32>> = vec![Vec::new(); cells];
+        let mut lost = vec![0_u32; cells];
+        for (pixel, &cell) in (0_u32..).zip(&registration.cell_of_pixel) {
+            if cell == NO_CELL {
+                continue;
+            }
+            if saturated[pixel as usize] {
+                lost[cell as usize] += 1;
+            } else {
+                of_cell[cell as usize].push(pixel);
+            }
+        }
+        let why = |cell: usize| {
+            let (pixels, saturated) = (of_cell[cell].len() as u32, lost[cell]);
+            let all = pixels + saturated;
+            if f64::from(saturated) > SATURATED_PIXELS * f64::from(all) {
+                return Some(Why::Saturated {
+                    saturated,
+                    pixels: all,
+                });
+            }
+            (pixels < MIN_PIXELS).then_some(Why::TooFewPixels { pixels })
+        };
+        let left_out: Vec<LeftOut> = (0..cells)
+            .filter_map(|cell| why(cell).map(|why| LeftOut { cell, why }))
+            .collect();
+        let mut live = vec![true; cells];
+        for out in &left_out {
+            live[out.cell] = false;
+        }
+        let mut begin = vec![0];
+        let mut pixels = Vec::new();
+        for (cell, of_cell) in of_cell.iter().enumerate() {
+            if live[cell] {
+                pixels.extend(of_cell);
+            }
+            begin.push(pixels.len());
+        }
+        Self {
+            pixels,
+            begin,
+            live,
+            left_out,
+        }
+    }
+
+    /// Number of cells.
+    pub(super) fn cells(&self) -> usize {
+        self.live.len()
+    }
+
+    /// Pixels of each cell, `N` slices; empty for a cell that is not live.
+    pub(crate) fn of_cells(&self) -> impl Iterator<Item = &[u32]> {
+        let range = |range: &[usize]| &self.pixels[range[0]..range[1]];
+        self.begin.windows(2).map(range)
+    }
+
+    /// Number of pixels of each cell, length `N`.
+    pub(crate) fn counts(&self) -> Vec<u32> {
+        self.of_cells().map(|pixels| pixels.len() as u32).collect()
+    }
+
+    /// Mean of a plane over each cell; 0 for a cell that is not live.
+    pub(crate) fn mean(&self, plane: &[f32]) -> Vec<f64> {
+        let mean = |pixels: &[u32]| {
+            let sum: f64 = pixels.iter().map(|&p| f64::from(plane[p as usize])).sum();
+            sum / pixels.len().max(1) as f64
+        };
+        self.of_cells().map(mean).collect()
+    }
+}
+
+/// Mean of the photographs of black in each cell, length `N`.
+pub(crate) fn black(sequence: &Sequence, light: &DMatrix<f64>) -> Vec<f64> {
+    let share = 1.0 / sequence.black.len() as f64;
+    let of_cell = |cell: usize| -> f64 {
+        let black = sequence.black.iter().map(|&shot| light[(cell, shot)]);
+        share * black.sum::<f64>()
+    };
+    (0..light.nrows()).map(of_cell).collect()
+}

@@ -1,0 +1,87 @@
+//! Cells: one observation of each cell in each photograph, its noise, and what all of them
+//! show of the session.
+//!
+//! | what | module |
+//! |---|---|
+//! | which pixels are averaged for a cell | `cell_pixels` |
+//! | one number a cell and view | `measure`, `measurements` |
+//! | noise of a pixel | `noise`, `noise_samples` |
+//! | brightness of a photograph against all others | `leave_one_out`, `drift`, `mains_banding` |
+//! | whether light adds up, and why not | `superposition`, `nonlinearity` |
+//! | between the cells and within one | `cell_interpolation`, `fine_flood` |
+
+mod cell_interpolation;
+pub(crate) mod cell_pixels;
+pub(crate) mod drift;
+pub(crate) mod fine_flood;
+mod leave_one_out;
+pub(crate) mod mains_banding;
+mod measure;
+pub(crate) mod measurements;
+pub(crate) mod noise;
+mod noise_samples;
+pub(crate) mod nonlinearity;
+pub(crate) mod superposition;
+
+use crate::format::error::CaptureError;
+use crate::format::sequence::Sequence;
+use crate::photographs::Photographs;
+use crate::photographs::sampled::Sampled;
+use crate::registration::cell_map::Registration;
+use cell_pixels::CellPixels;
+use drift::{Drift, Steadiness};
+use iltm_picture::progress::Progress;
+use mains_banding::MainsBanding;
+use measurements::ChannelMeasurements;
+use noise::NoiseSource;
+use nonlinearity::Nonlinearity;
+use superposition::Sums;
+
+/// Light of all cells, and what it shows of the session.
+pub(crate) struct CellEvidence {
+    pub(crate) channels: Vec<ChannelMeasurements>,
+    pub(crate) noise: NoiseSource,
+    pub(crate) steadiness: Steadiness,
+    pub(crate) banding: Option<MainsBanding>,
+    /// How well light adds up; `None` without inverses.
+    pub(crate) sums: Option<Sums>,
+    /// Why light does not add up, where it does not.
+    pub(crate) nonlinearity: Option<Nonlinearity>,
+}
+
+impl CellEvidence {
+    /// Measures all cells in all photographs.
+    ///
+    /// # Errors
+    /// A photograph's own error.
+    pub(crate) fn measure(
+        sequence: &Sequence,
+        photographs: &mut Photographs<'_>,
+        registration: &Registration,
+        pixels: &CellPixels,
+        sampled: &Sampled,
+        progress: &dyn Progress,
+    ) -> Result<Self, CaptureError> {
+        progress.begin("measuring cells", sequence.shots.len() as u64);
+        let light = measure::observe(sequence, photographs, pixels, progress)?;
+        progress.end();
+        let steadiness = drift::assess(sequence, &pixels.live, &light.channels);
+        let observed = measure::average(sequence, &light, pixels, &steadiness.drift);
+        // Before one white there is nothing to follow the light by: what bends it would be
+        // taken for drift, and the sums for sound.
+        let single = sequence.white().shots.len() == 1;
+        let plain = single.then(|| measure::average(sequence, &light, pixels, &Drift::default()));
+        let summed = &plain.as_ref().unwrap_or(&observed).channels;
+        let sums = Sums::new(sequence, summed, &pixels.live);
+        let off = sums.as_ref().is_some_and(Sums::off);
+        let find = || nonlinearity::find(sequence, &pixels.live, &light.channels, sampled);
+        Ok(Self {
+            nonlinearity: off.then(find),
+            sums,
+            banding: mains_banding::find(registration, &steadiness.models),
+            steadiness,
+            channels: observed.channels,
+            noise: observed.noise,
+        })
+    }
+}

@@ -1,0 +1,224 @@
+//! Nonlinearity: why light does not add up, a curve that nobody declared, or brightness that
+//! follows the picture.
+//!
+//! A curved response is one number for all photographs. A camera that exposes for
+//! the picture, or a projector that dims its lamp for it, is one factor for each
+//! photograph and the same in all cells. Whichever leaves less of the misfit over
+//! is the cause. Camera and projector are told apart by ambient light, which only
+//! the camera's factor changes.
+
+use crate::format::sequence::Sequence;
+use crate::photographs::sampled::{SIDE, Sampled};
+use iltm_picture::statistics::median;
+use nalgebra::{DMatrix, Matrix2, Vector2};
+
+/// What must be left of a misfit at most for its cause to be found.
+const EXPLAINED: f64 = 0.5;
+
+/// How many times its scatter the brightness of pairs must be off white's.
+const STEADY: f64 = 3.0;
+
+/// Light of lit cells, in that under white, that white itself cannot have.
+const OUTSHINE: f64 = 1.03;
+
+/// Why light does not add up.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Nonlinearity {
+    /// The light that was read follows this power of the true light's inverse.
+    Curve {
+        /// Light would add up if it were raised to this power.
+        gamma: f64,
+    },
+    /// The camera's exposure follows the picture.
+    Exposure,
+    /// The projector's brightness follows the picture.
+    Projector,
+    /// One of the last two.
+    Either,
+    /// None of these.
+    Unknown,
+}
+
+impl Nonlinearity {
+    /// Whether it says why brightness differs from photograph to photograph.
+    pub(crate) const fn is_known(self) -> bool {
+        !matches!(self, Self::Unknown)
+    }
+}
+
+/// Light of all live cells in white, black and the photographs of each pair.
+struct Pairs {
+    white: Vec<f64>,
+    black: Vec<f64>,
+    both: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+/// Finds the cause; `channels` are the light of all cells in all photographs,
+/// `N x shots` each, black included.
+pub(crate) fn find(
+    sequence: &Sequence,
+    live: &[bool],
+    channels: &[DMatrix<f64>],
+    sampled: &Sampled,
+) -> Nonlinearity {
+    let brightest = channels.iter().max_by(|a, b| a.sum().total_cmp(&b.sum()));
+    let Some(light) = brightest else {
+        return Nonlinearity::Unknown;
+    };
+    let mean = |shots: &[usize]| -> Vec<f64> {
+        let share = 1.0 / shots.len().max(1) as f64;
+        (0..live.len())
+            .filter(|&cell| live[cell])
+            .map(|cell| share * shots.iter().map(|&shot| light[(cell, shot)]).sum::<f64>())
+            .collect()
+    };
+    let views = &sequence.views;
+    let pairs = Pairs {
+        white: mean(&sequence.white().shots),
+        black: mean(&sequence.black),
+        both: (sequence.code_pairs().into_iter())
+            .map(|(a, b)| (mean(&views[a].shots), mean(&views[b].shots)))
+            .collect(),
+    };
+    if pairs.both.is_empty() {
+        return Nonlinearity::Unknown;
+    }
+    let before = pairs.misfit(1.0);
+    let (gamma, curved) = pairs.best_gamma();
+    let (factors, followed) = pairs.best_factors();
+    let middle = median(factors.clone()).unwrap_or(1.0);
+    let off = median(factors.iter().map(|f| (f - middle).abs()).collect()).unwrap_or(0.0);
+    let follows = followed < EXPLAINED * before && (middle - 1.0).abs() > STEADY * off;
+    let bent = curved < EXPLAINED * before;
+    // A curve that brightens explains as much as a factor does where the scene is even;
+    // but it leaves nothing brighter than white.
+    let either = middle > 1.0 && bent;
+    if pairs.outshine() || follows && !either && followed < 1.2 * curved {
+        ambient(sequence, sampled)
+    } else if bent {
+        Nonlinearity::Curve { gamma }
+    } else {
+        Nonlinearity::Unknown
+    }
+}
+
+impl Pairs {
+    /// Whether most photographs are brighter than white where they are lit: no curve
+    /// makes less light look like more.
+    fn outshine(&self) -> bool {
+        let ratio = |light: &[f64]| {
+            let lit = light
+                .iter()
+                .zip(&self.white)
+                .filter(|(l, w)| *l > &(0.5 * *w));
+            median(lit.map(|(light, white)| light / white).collect())
+        };
+        let each = self.both.iter().flat_map(|(a, b)| [ratio(a), ratio(b)]);
+        let ratios: Vec<f64> = each.flatten().collect();
+        let brighter = ratios.iter().filter(|ratio| **ratio > OUTSHINE).count();
+        2 * brighter > ratios.len()
+    }
+
+    /// How far sums are off if all light is raised to a power, relative to white.
+    fn misfit(&self, power: f64) -> f64 {
+        let raise = |light: &f64| light.max(0.0).powf(power);
+        let (mut off, mut all) = (0.0, 0.0);
+        for (a, b) in &self.both {
+            for (cell, (a, b)) in a.iter().zip(b).enumerate() {
+                let (white, black) = (raise(&self.white[cell]), raise(&self.black[cell]));
+                off += (raise(a) + raise(b) - white - black).powi(2);
+                all += (white - black).powi(2);
+            }
+        }
+        (off / all.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// The power with the least misfit.
+    fn best_gamma(&self) -> (f64, f64) {
+        let powers = (-40..=40).map(|k| (f64::from(k) * 0.04).exp());
+        let tried = powers.map(|power| (power, self.misfit(power)));
+        tried
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or((1.0, f64::INFINITY))
+    }
+
+    /// A factor for each photograph, and the misfit that they leave.
+    fn best_factors(&self) -> (Vec<f64>, f64) {
+        let (mut factors, mut off, mut all) = (Vec::new(), 0.0, 0.0);
+        for (a, b) in &self.both {
+            let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+            let row = |cell: usize| {
+                let black = self.black[cell];
+                let known = Vector2::new(a[cell] - black, b[cell] - black);
+                (known, self.white[cell] - black)
+            };
+            for cell in 0..self.white.len() {
+                let (known, white) = row(cell);
+                normal += known * known.transpose();
+                right += known * white;
+            }
+            let Some(inverse) = normal.try_inverse() else {
+                continue;
+            };
+            let solved = inverse * right;
+            for cell in 0..self.white.len() {
+                let (known, white) = row(cell);
+                off += (known.dot(&solved) - white).powi(2);
+                all += white * white;
+            }
+            factors.extend(solved.iter().map(|share| 1.0 / share.max(1e-3)));
+        }
+        (factors, (off / all.max(f64::MIN_POSITIVE)).sqrt())
+    }
+}
+
+/// Whether ambient light follows the picture too. Sums of pairs are compared with
+/// white's light and with black's over squares of the whole photograph: one factor
+/// for each.
+fn ambient(sequence: &Sequence, sampled: &Sampled) -> Nonlinearity {
+    let white = by_square(&sampled.mean(&sequence.white().shots));
+    let black = by_square(&sampled.mean(&sequence.black));
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    let mut rows = Vec::new();
+    for (a, b) in sequence.code_pairs() {
+        let one = by_square(&sampled.mean(&sequence.views[a].shots));
+        let other = by_square(&sampled.mean(&sequence.views[b].shots));
+        for square in 0..white.len() {
+            let known = Vector2::new(white[square] - black[square], 2.0 * black[square]);
+            let sum = one[square] + other[square];
+            normal += known * known.transpose();
+            right += known * sum;
+            rows.push((known, sum));
+        }
+    }
+    let Some(inverse) = normal.try_inverse() else {
+        return Nonlinearity::Either;
+    };
+    let factors = inverse * right;
+    let left: f64 = rows
+        .iter()
+        .map(|(k, sum)| (k.dot(&factors) - sum).powi(2))
+        .sum();
+    let error = (left / rows.len().max(1) as f64 * inverse[(1, 1)]).sqrt();
+    let followed = (factors[1] - 1.0) / (factors[0] - 1.0);
+    // A camera that exposes for the picture exposes black longest of all: then black has
+    // more ambient light than the pairs, or looks like white.
+    let total = |squares: &[f64]| squares.iter().sum::<f64>();
+    if total(&black) > 0.5 * total(&white) || followed < -0.2 {
+        Nonlinearity::Exposure
+    } else if !followed.is_finite() || error > 0.2 * (factors[0] - 1.0).abs() {
+        Nonlinearity::Either
+    } else if followed > 0.6 {
+        Nonlinearity::Exposure
+    } else if followed < 0.4 {
+        Nonlinearity::Projector
+    } else {
+        Nonlinearity::Either
+    }
+}
+
+/// Sum of each square of sampled pixels.
+fn by_square(values: &[f32]) -> Vec<f64> {
+    let sum = |square: &[f32]| square.iter().map(|v| f64::from(*v)).sum();
+    values.chunks(SIDE * SIDE).map(sum).collect()
+}

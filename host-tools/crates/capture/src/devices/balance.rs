@@ -1,0 +1,138 @@
+//! Balances: sums of photographs that must come out as nothing, whatever the scene, from
+//! which a camera's response is recovered.
+//!
+//! A pattern and its inverse are together white and black, in every pixel; two
+//! exposures of one pattern are in proportion to their times. Both hold for light
+//! and not for the values of a curved camera. Averages over pixels of similar
+//! values tell curvature from noise.
+
+use iltm_picture::DeviceResponse;
+
+/// Values of one pixel and the weights with which their light adds up to nothing.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Balance {
+    pub(crate) values: [f32; 4],
+    pub(crate) weights: [f32; 4],
+}
+
+/// Balances of many pixels, in groups of similar ones.
+pub(crate) struct Balances {
+    balances: Vec<Balance>,
+    /// Where each group ends in `balances`.
+    ends: Vec<usize>,
+}
+
+/// Groups along each of two keys.
+const GROUPS: usize = 8;
+
+/// Fewest balances that are worth averaging.
+const FEWEST: usize = 64;
+
+/// Points at which a response is tabulated.
+const POINTS: usize = 2048;
+
+/// A response as a table, for millions of look-ups.
+pub(crate) struct Lookup(Vec<f64>);
+
+impl Lookup {
+    pub(crate) fn new(light: impl Fn(f64) -> f64) -> Self {
+        Self(
+            (0..=POINTS)
+                .map(|k| light(k as f64 / POINTS as f64))
+                .collect(),
+        )
+    }
+
+    fn light(&self, value: f32) -> f64 {
+        let place = f64::from(value.clamp(0.0, 1.0)) * POINTS as f64;
+        let below = (place as usize).min(POINTS - 1);
+        let part = place - below as f64;
+        self.0[below] + part * (self.0[below + 1] - self.0[below])
+    }
+}
+
+impl Balances {
+    /// Groups the balances by how bright they are and, among equals, by how far
+    /// what is added is apart; `None` if there are too few.
+    ///
+    /// Both keys are sums whose noise has nothing to do with that of the balance:
+    /// groups by the brightest value would collect those whose noise is high.
+    pub(crate) fn new(mut balances: Vec<Balance>) -> Option<Self> {
+        if balances.len() < FEWEST {
+            return None;
+        }
+        let brightness = |b: &Balance| {
+            let terms = b.values.iter().zip(b.weights).filter(|term| term.1 != 0.0);
+            terms
+                .map(|(value, weight)| value / weight.abs())
+                .sum::<f32>()
+        };
+        let apart = |b: &Balance| {
+            if b.weights[1] > 0.0 {
+                (b.values[0] - b.values[1]).abs()
+            } else {
+                0.0
+            }
+        };
+        balances.sort_by(|a, b| brightness(a).total_cmp(&brightness(b)));
+        let size = balances.len().div_ceil(GROUPS);
+        let mut ends = Vec::new();
+        let mut begin = 0;
+        for group in balances.chunks_mut(size) {
+            group.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let size = group.len().div_ceil(GROUPS);
+            let inner = group.chunks(size).scan(begin, |end, part| {
+                *end += part.len();
+                Some(*end)
+            });
+            ends.extend(inner);
+            begin += group.len();
+        }
+        Some(Self { balances, ends })
+    }
+
+    fn groups(&self) -> impl Iterator<Item = &[Balance]> {
+        let begins = std::iter::once(&0).chain(&self.ends);
+        begins
+            .zip(&self.ends)
+            .map(|(from, to)| &self.balances[*from..*to])
+    }
+
+    /// Mean sum of each group under a response.
+    pub(crate) fn sums(&self, response: &Lookup) -> Vec<f64> {
+        let sum = |b: &Balance| -> f64 {
+            let terms = b.values.iter().zip(b.weights);
+            terms
+                .map(|(value, weight)| f64::from(weight) * response.light(*value))
+                .sum()
+        };
+        self.groups()
+            .map(|group| group.iter().map(sum).sum::<f64>() / group.len() as f64)
+            .collect()
+    }
+
+    /// Mean light of each group: half of all that is added and subtracted.
+    pub(crate) fn light(&self, response: &Lookup) -> Vec<f64> {
+        let half = |b: &Balance| -> f64 {
+            let terms = b.values.iter().zip(b.weights);
+            let light = terms.map(|(v, weight)| f64::from(weight.abs()) * response.light(*v));
+            0.5 * light.sum::<f64>()
+        };
+        self.groups()
+            .map(|group| group.iter().map(half).sum::<f64>() / group.len() as f64)
+            .collect()
+    }
+
+    /// How far the groups are from nothing under a response, relative to their
+    /// light: root mean square over groups.
+    pub(crate) fn misfit(&self, response: &Lookup) -> f64 {
+        let (sums, light) = (self.sums(response), self.light(response));
+        let relative = sums.iter().zip(&light).filter(|(_, light)| **light > 0.0);
+        let squares: Vec<f64> = relative.map(|(sum, light)| (sum / light).powi(2)).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    }
+
+    pub(crate) fn misfit_of(&self, response: &DeviceResponse) -> f64 {
+        self.misfit(&Lookup::new(|value| response.light(value)))
+    }
+}

@@ -1,0 +1,142 @@
+//! Evidence: what the phases found in a capture, one after the other. [`gates`](crate::gates)
+//! judge it afterwards; what is left of it are [`Measurements`].
+
+use crate::cells::CellEvidence;
+use crate::cells::cell_pixels::CellPixels;
+use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
+use crate::devices::{Devices, MeasuredDevices};
+use crate::format::error::CaptureError;
+use crate::format::picture_file::FileFormat;
+use crate::format::sequence::Sequence;
+use crate::format::settings::Settings;
+use crate::photographs::clipping::{self, Clipped};
+use crate::photographs::linearise::LinearPhotographs;
+use crate::photographs::order::{self, Order};
+use crate::photographs::sampled::Sampled;
+use crate::registration::movement::{self, Moved};
+use crate::registration::{self, Registered};
+use iltm_picture::progress::Progress;
+use iltm_picture::statistics::quantile;
+use nalgebra::DMatrix;
+use std::path::Path;
+
+/// What the photographs of a sequence show.
+pub(crate) struct CaptureEvidence {
+    /// What the photographs' files are, and bits of a sample in them.
+    pub(crate) files: (FileFormat, u8),
+    pub(crate) clipped: Clipped,
+    pub(crate) devices: Devices,
+    pub(crate) order: Option<Order>,
+    pub(crate) registered: Registered,
+    pub(crate) pixels: CellPixels,
+    pub(crate) moved: Option<Moved>,
+    /// `None` if no cell was found.
+    pub(crate) cells: Option<CellEvidence>,
+    /// The flood photograph with black subtracted, one plane a channel.
+    flood: Vec<Vec<f32>>,
+}
+
+impl CaptureEvidence {
+    /// Goes through all phases.
+    ///
+    /// # Errors
+    /// A photograph's own error, or a phase's.
+    pub(crate) fn collect(
+        folder: &Path,
+        sequence: &Sequence,
+        settings: &Settings,
+        progress: &dyn Progress,
+    ) -> Result<Self, CaptureError> {
+        let reading = settings.camera.reading();
+        let mut linear = LinearPhotographs::read(folder, sequence, &reading, progress)?;
+        // In the camera's own channels, where a ceiling is one value.
+        let clipped = clipping::find(sequence, &mut linear, progress)?;
+        let devices = MeasuredDevices::measure(folder, sequence, settings, &mut linear, progress)?;
+        let sampled = Sampled::take(&mut linear.photographs, sequence.shots.len(), progress)?;
+        let registered = registration::register(sequence, &mut linear, progress)?;
+        let registration = &registered.registration;
+        let pixels = CellPixels::choose(registration, &linear.saturated);
+        let photographs = &mut linear.photographs;
+        let measure = || {
+            CellEvidence::measure(
+                sequence,
+                photographs,
+                registration,
+                &pixels,
+                &sampled,
+                progress,
+            )
+        };
+        let found = pixels.live.contains(&true);
+        let cells = found.then(measure).transpose()?;
+        let format = &linear.photographs.format;
+        let files = (format.file, format.bits);
+        let flood = linear.into_flood();
+        let blur = settings.projector.blur;
+        Ok(Self {
+            files,
+            clipped,
+            devices: devices.with_blur(sequence.grid, registration, &flood, blur),
+            order: order::find(sequence, &sampled),
+            moved: movement::find(sequence, &sampled, registration),
+            cells,
+            registered,
+            pixels,
+            flood,
+        })
+    }
+
+    /// What a solve needs of it; `None` if no cell was found.
+    pub(crate) fn into_measurements(
+        self,
+        sequence: &Sequence,
+        settings: &Settings,
+    ) -> Option<Measurements> {
+        let cells = self.cells?;
+        let diagnostics = Diagnostics {
+            file: self.files.0,
+            bits: self.files.1,
+            photographs: sequence.brackets.iter().map(|b| b.shots.len()).sum(),
+            bernoulli: sequence.bernoulli().len(),
+            bernoulli_taken: sequence.bernoulli().len(),
+            method: self.registered.method,
+            pixels: self.registered.count,
+            exposure: exposure(&cells.channels, &self.pixels.live),
+            noise: cells.noise,
+            superposition: cells.sums.map(|sums| sums.overall),
+            left_out: self.pixels.left_out.clone(),
+            gates: Vec::new(),
+        };
+        let views = &sequence.views;
+        Some(Measurements {
+            grid: sequence.grid,
+            patterns: DMatrix::from_fn(sequence.grid.cells(), views.len(), |cell, view| {
+                f64::from(views[view].lit[cell])
+            }),
+            roles: views.iter().map(|view| view.role).collect(),
+            repeats: views.iter().map(|view| view.shots.len() as u32).collect(),
+            channels: cells.channels,
+            pixels: self.pixels.counts(),
+            live: self.pixels.live,
+            registration: self.registered.registration,
+            flood: self.flood,
+            devices: self.devices,
+            settings: settings.clone(),
+            diagnostics,
+        })
+    }
+}
+
+/// 95th percentile of the flood light over the live cells, in the brightest
+/// channel, ambient included.
+fn exposure(channels: &[ChannelMeasurements], live: &[bool]) -> f64 {
+    let of_channel = |channel: &ChannelMeasurements| {
+        let flood = channel.observations.column(Measurements::WHITE);
+        let mut light: Vec<f32> = (flood.iter().zip(&channel.ambient).zip(live))
+            .filter(|(_, live)| **live)
+            .map(|((flood, ambient), _)| (flood + ambient) as f32)
+            .collect();
+        quantile(&mut light, 0.95).map_or(0.0, f64::from)
+    };
+    channels.iter().map(of_channel).fold(0.0, f64::max)
+}

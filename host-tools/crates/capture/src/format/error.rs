@@ -1,0 +1,424 @@
+//! Capture errors: everything that can be wrong with a capture folder.
+
+use super::role::{Axis, Role};
+use crate::gate::Gate;
+use iltm_runtime::GridError;
+use std::path::PathBuf;
+
+/// Why a capture could not be read. Every case carries its place;
+/// [`CaptureError::next_step`] says what to do about it.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// A file could not be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The folder holds no `capture.csv`.
+    #[error("{}: no such file, so the folder is not a capture", path.display())]
+    NoManifest {
+        /// Where it should be.
+        path: PathBuf,
+    },
+    /// A line of `capture.csv` is not `index,role,pattern,photo`.
+    #[error("{}, line {line}: {reason}", path.display())]
+    ManifestLine {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Line, the first is 1.
+        line: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A role that is not one of the known ones.
+    #[error("{}, line {line}: unknown role \"{role}\"", path.display())]
+    UnknownRole {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Line, the first is 1.
+        line: u64,
+        /// What stands there.
+        role: String,
+    },
+    /// Two lines have the same index.
+    #[error("{}, line {line}: index {index} is already used in line {first_line}", path.display())]
+    DuplicateIndex {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Line, the first is 1.
+        line: u64,
+        /// The index.
+        index: u32,
+        /// Line that used it first.
+        first_line: u64,
+    },
+    /// A pattern or photograph is looked for outside of the capture folder.
+    #[error("{}, line {line}: {file:?} is not a relative path inside the capture without \\ : \" % {{ }} or control characters", path.display())]
+    OutsideFolder {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Line, the first is 1.
+        line: u64,
+        /// What stands there.
+        file: String,
+    },
+    /// A file that `capture.csv` names is not there.
+    #[error("{}: missing {what}, named in line {line} of capture.csv", path.display())]
+    MissingFile {
+        /// The file.
+        path: PathBuf,
+        /// "pattern" or "photograph".
+        what: &'static str,
+        /// Line of `capture.csv` that names it.
+        line: u64,
+    },
+    /// `capture.toml` is not what it should be.
+    #[error("{}: {reason}", path.display())]
+    Settings {
+        /// The `capture.toml`.
+        path: PathBuf,
+        /// What is wrong, with the line.
+        reason: String,
+    },
+    /// A response shall be measured, and the photographs do not tell it.
+    #[error("{}: {device}.response is to be measured, but the photographs do not tell it", path.display())]
+    ResponseUnknown {
+        /// The `capture.toml`.
+        path: PathBuf,
+        /// "camera" or "projector".
+        device: &'static str,
+    },
+    /// A picture cannot be decoded.
+    #[error("{}: {reason}", path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong, with what the decoder says.
+        reason: String,
+    },
+    /// A floating point picture has a value that is no number.
+    #[error("{}: the value at row {row}, column {col} is not a finite number", path.display())]
+    NotFinite {
+        /// The picture.
+        path: PathBuf,
+        /// Row of the first such pixel.
+        row: u32,
+        /// Column of the first such pixel.
+        col: u32,
+    },
+    /// A photograph is missing under its name, and several could stand for it.
+    #[error("{}: missing, and both {} and {} could stand for it", path.display(), first.display(), second.display())]
+    Ambiguous {
+        /// The file that the manifest names.
+        path: PathBuf,
+        /// One candidate.
+        first: PathBuf,
+        /// Another.
+        second: PathBuf,
+    },
+    /// A picture says it is larger than any camera's.
+    #[error("{}: {width} x {height} pixels; at most {limit} pixels are read", path.display())]
+    TooLarge {
+        /// The picture.
+        path: PathBuf,
+        /// Its width in pixels.
+        width: u32,
+        /// Its height in pixels.
+        height: u32,
+        /// Pixels it may have.
+        limit: u64,
+    },
+    /// A picture is see-through somewhere, so that its values mean nothing.
+    #[error("{}: pixel at row {row}, column {col} is transparent", path.display())]
+    Transparent {
+        /// The picture.
+        path: PathBuf,
+        /// Row of the first such pixel.
+        row: u32,
+        /// Column of the first such pixel.
+        col: u32,
+    },
+    /// A pattern has a value that is neither 0 nor 255.
+    #[error("{}: row {row}, column {col} is {value}; a pattern holds only 0 and 255", path.display())]
+    PatternValue {
+        /// The pattern.
+        path: PathBuf,
+        /// Row of the first such cell.
+        row: u32,
+        /// Column of the first such cell.
+        col: u32,
+        /// What stands there.
+        value: String,
+    },
+    /// A pattern has another size than the first one.
+    #[error("{}: {} x {} cells (rows x columns), but {} has {} x {}",
+        path.display(), found.0, found.1, first.display(), expected.0, expected.1)]
+    PatternSize {
+        /// The pattern.
+        path: PathBuf,
+        /// Its rows and columns.
+        found: (u32, u32),
+        /// The first pattern.
+        first: PathBuf,
+        /// The first pattern's rows and columns.
+        expected: (u32, u32),
+    },
+    /// A pattern's cells are not those of its role.
+    #[error("{}: row {row}, column {col} is not what \"{role}\" lights there", path.display())]
+    PatternRole {
+        /// The pattern.
+        path: PathBuf,
+        /// The role given in `capture.csv`.
+        role: Role,
+        /// Row of the first wrong cell.
+        row: u32,
+        /// Column of the first wrong cell.
+        col: u32,
+    },
+    /// The patterns have no cells or more than a table can index.
+    #[error("{}: {source}", path.display())]
+    Grid {
+        /// The first pattern.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: GridError,
+    },
+    /// A photograph has another size than the first one.
+    #[error("{}: {} x {} pixels, but {} has {} x {}",
+        path.display(), found.0, found.1, first.display(), expected.0, expected.1)]
+    PhotoSize {
+        /// The photograph.
+        path: PathBuf,
+        /// Its width and height.
+        found: (u32, u32),
+        /// The first photograph.
+        first: PathBuf,
+        /// The first photograph's width and height.
+        expected: (u32, u32),
+    },
+    /// Some photographs are grey and some in colour.
+    #[error("{}: {found} colour channels, but {} has {expected}", path.display(), first.display())]
+    PhotoChannels {
+        /// The photograph.
+        path: PathBuf,
+        /// Its channels, 1 or 3.
+        found: usize,
+        /// The first photograph.
+        first: PathBuf,
+        /// The first photograph's channels.
+        expected: usize,
+    },
+    /// There is no black photograph.
+    #[error("{}: no photograph of the black pattern", path.display())]
+    NoBlack {
+        /// The `capture.csv`.
+        path: PathBuf,
+    },
+    /// There is no flood photograph.
+    #[error("{}: no photograph of the white pattern", path.display())]
+    NoWhite {
+        /// The `capture.csv`.
+        path: PathBuf,
+    },
+    /// The Gray code has too few bits to tell all columns or rows apart.
+    #[error("{}: the Gray code has {given} {axis} bits, but {cells} {axis}s need {needed}", path.display())]
+    GridNotCovered {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Columns or rows.
+        axis: Axis,
+        /// How many of them there are.
+        cells: usize,
+        /// Bits needed to tell them apart.
+        needed: u8,
+        /// Bits that were photographed.
+        given: u8,
+    },
+    /// The Gray code lacks a bit between others.
+    #[error("{}: no photograph of {axis}-{bit}, though there is one of {axis}-{last}", path.display())]
+    MissingBit {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Columns or rows.
+        axis: Axis,
+        /// The missing bit.
+        bit: u8,
+        /// The last bit that was photographed.
+        last: u8,
+    },
+    /// More Bernoulli photographs were asked for than the capture holds.
+    #[error("{}: {asked} Bernoulli photographs asked for; the capture has {found}", path.display())]
+    MorePhotographsThanTaken {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Asked for.
+        asked: usize,
+        /// In the capture.
+        found: usize,
+    },
+    /// A photograph was asked for that the capture does not have.
+    #[error("{}: there is no photograph with the index {index}; the last one is {last}", path.display())]
+    UnknownIndex {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Asked for.
+        index: u32,
+        /// The largest index there is.
+        last: u32,
+    },
+    /// The photograph that was asked for shows what is subtracted from all others.
+    #[error("{}, line {line}: the photograph with the index {index} is of black: it shows the ambient \
+        light, which is subtracted from every other, and nothing of the projector's", path.display())]
+    BlackIndex {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Asked for.
+        index: u32,
+        /// Its line.
+        line: u64,
+    },
+    /// Too few Bernoulli photographs to learn an inverse from.
+    #[error("{}: {used} Bernoulli photographs used, a solve needs at least {needed}: \
+        the Gray code's stripes alone cannot tell which cell of a row or column the light came from",
+        path.display())]
+    TooFewPhotographs {
+        /// The `capture.csv`.
+        path: PathBuf,
+        /// Bernoulli photographs used.
+        used: usize,
+        /// Least number.
+        needed: usize,
+    },
+    /// The flood photograph is no brighter than the black one.
+    #[error("{}: the flood photograph is no brighter than the black one", path.display())]
+    NoLight {
+        /// The flood photograph.
+        path: PathBuf,
+    },
+    /// Gates say that the photographs cannot be used.
+    #[error("{}: {}", path.display(), failures(gates))]
+    Refused {
+        /// The capture folder.
+        path: PathBuf,
+        /// The gates that fail, at least one, what explains others first.
+        gates: Vec<Gate>,
+    },
+}
+
+/// What the gates that fail say.
+fn failures(gates: &[Gate]) -> String {
+    let failed: Vec<String> = gates.iter().map(ToString::to_string).collect();
+    match failed.len() {
+        1 => format!("the photographs do not pass the gate {}", failed[0]),
+        count => format!(
+            "the photographs do not pass {count} gates: {}",
+            failed.join("; ")
+        ),
+    }
+}
+
+impl CaptureError {
+    /// What to do about it, one sentence.
+    #[must_use]
+    pub fn next_step(&self) -> &'static str {
+        match self {
+            Self::Io { .. } => "Check that the file exists and may be read.",
+            Self::NoManifest { .. } => {
+                "Give the folder that holds capture.csv; `iltm patterns` makes one."
+            }
+            Self::ManifestLine { .. } => {
+                "Write the header and every line as index,role,pattern,photo."
+            }
+            Self::UnknownRole { .. } => {
+                "Use white, black, column-B, column-B-inverse, row-B, row-B-inverse or bernoulli, \
+                 B being a bit from 0."
+            }
+            Self::DuplicateIndex { .. } => "Give every line an index of its own.",
+            Self::OutsideFolder { .. } => {
+                "Copy the file into the capture folder and name it relative to that folder."
+            }
+            Self::MissingFile { .. } => {
+                "Put the file there, or remove its line if it was never taken."
+            }
+            Self::Settings { .. } => {
+                "Correct capture.toml; it may hold camera.response, camera.full_scale, \
+                 projector.response, projector.blur and scene.name."
+            }
+            Self::ResponseUnknown {
+                device: "camera", ..
+            } => {
+                "Photograph a few patterns with two or three exposures, or write the camera's \
+                 response (\"srgb\" for camera JPEGs)."
+            }
+            Self::ResponseUnknown { .. } => {
+                "Photograph the pictures of calibration.csv, or write the projector's response."
+            }
+            Self::Picture { .. } => {
+                "Copy or export the picture again: photographs as PNG, TIFF, JPEG, OpenEXR, PGM \
+                 or PPM, patterns as PNG with 8 bit."
+            }
+            Self::NotFinite { .. } => "Export the picture again, without undefined pixels.",
+            Self::Ambiguous { .. } => "Name the right one in capture.csv, or remove the other.",
+            Self::TooLarge { .. } => "Scale the photographs down, all by the same factor.",
+            Self::Transparent { .. } => "Export the picture without an alpha channel.",
+            Self::PatternValue { .. } => {
+                "Use the pattern file as `iltm patterns` wrote it: one pixel a cell, not scaled."
+            }
+            Self::PatternSize { .. } => "Use patterns of one grid only.",
+            Self::PatternRole { .. } => {
+                "Correct the role in capture.csv, or name the pattern that was really shown."
+            }
+            Self::Grid { .. } => "Use fewer cells: a pattern has one pixel a cell.",
+            Self::PhotoSize { .. } => {
+                "Take all photographs with one camera setting, without cropping."
+            }
+            Self::PhotoChannels { .. } => "Export all photographs grey, or all in colour.",
+            Self::NoBlack { .. } => {
+                "Photograph the black pattern with the same exposure; ambient light is subtracted \
+                 with it."
+            }
+            Self::NoWhite { .. } => {
+                "Photograph the white pattern with the same exposure; it sets the gains."
+            }
+            Self::GridNotCovered { .. } | Self::MissingBit { .. } => {
+                "Photograph the missing Gray code patterns, or check the roles in capture.csv."
+            }
+            Self::MorePhotographsThanTaken { .. } => "Ask for fewer, or leave --photos away.",
+            Self::UnknownIndex { .. } | Self::BlackIndex { .. } => {
+                "Choose another index from the first column of capture.csv, or leave it out for white."
+            }
+            Self::TooFewPhotographs { .. } => {
+                "Photograph more Bernoulli patterns, or ask for more; 40 are a good start."
+            }
+            Self::NoLight { .. } => {
+                "Check that the projector lit the scene, and that white and black are not exchanged."
+            }
+            Self::Refused { gates, .. } => gates
+                .first()
+                .map_or("Run `iltm check` on the capture.", |gate| gate.next_step),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_names_its_place_and_fits_a_register_sized_result() {
+        let error = CaptureError::UnknownRole {
+            path: "c/capture.csv".into(),
+            line: 7,
+            role: "whit".into(),
+        };
+        assert_eq!(
+            error.to_string(),
+            "c/capture.csv, line 7: unknown role \"whit\""
+        );
+        assert!(error.next_step().contains("white"));
+        assert!(size_of::<CaptureError>() <= 128);
+    }
+}

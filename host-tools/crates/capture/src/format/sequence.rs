@@ -1,0 +1,473 @@
+//! Pattern sequence: the patterns that were shown, checked against each other before any
+//! photograph is decoded.
+
+use super::bracket::{self, Bracket};
+use super::code::{Code, Stripes, lit_by_role};
+use super::error::CaptureError;
+use super::manifest::{MANIFEST_FILE, Shot};
+use super::pattern::Pattern;
+use super::photo_files::{PhotoFiles, find_all};
+use super::picture_file::Source;
+use super::role::{Axis, Role};
+use crate::gate::GateName;
+use iltm_runtime::Grid;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Bernoulli photographs that a capture needs at least.
+///
+/// Gray code stripes light whole columns and rows, so that only Bernoulli
+/// patterns tell a cell's light from that of the others in its column or row;
+/// and a solve keeps some of them back to choose its sparsity with.
+pub const MIN_BERNOULLI: usize = 10;
+
+/// Cells from which on two equal Bernoulli patterns are the same one shown again:
+/// by chance, one in 16 million pairs is. On fewer cells chance draws patterns
+/// twice, and each draw counts.
+const FEWEST_FOR_REPEATS: usize = 24;
+
+/// Pixels of the largest projector whose patterns are looked at more coarsely.
+const MOST_PROJECTOR_PIXELS: usize = 4096 * 2160;
+
+/// Memory that patterns may take while they are looked at more coarsely.
+const MOST_BYTES: usize = 1 << 30;
+
+/// How to read a capture.
+#[derive(Clone, PartialEq, Debug)]
+pub struct CaptureOptions {
+    /// Use only this many Bernoulli photographs, the first ones, beside all
+    /// others; `None` for all.
+    pub bernoulli: Option<usize>,
+    /// Fewer Bernoulli photographs than this are refused.
+    pub min_bernoulli: usize,
+    /// Of stripes finer than a table or the camera can have, without Bernoulli
+    /// patterns, the finest are left out, so that a cell is a block of the patterns'.
+    pub coarsen: bool,
+    /// Gates that may fail: [`read`](crate::read) goes on despite them, as far as it can.
+    pub ignore: Vec<GateName>,
+}
+
+impl Default for CaptureOptions {
+    fn default() -> Self {
+        Self {
+            bernoulli: None,
+            min_bernoulli: MIN_BERNOULLI,
+            coarsen: false,
+            ignore: Vec::new(),
+        }
+    }
+}
+
+/// One pattern and the photographs of it.
+#[derive(Clone, Debug)]
+pub(crate) struct View {
+    /// What it was shown for; never black.
+    pub(crate) role: Role,
+    /// Frames of it, as indices into the used ones. More than one where it was
+    /// photographed again.
+    pub(crate) shots: Vec<usize>,
+    /// Whether each cell is lit, length `N`.
+    pub(crate) lit: Vec<bool>,
+}
+
+/// All used patterns of a capture.
+#[derive(Clone, Debug)]
+pub(crate) struct Sequence {
+    pub(crate) grid: Grid,
+    /// Used brackets, in the order they were taken.
+    pub(crate) brackets: Vec<Bracket>,
+    /// The longest exposure, if exposures are given.
+    pub(crate) longest: Option<f64>,
+    /// The first photograph of each bracket.
+    pub(crate) shots: Vec<Shot>,
+    /// Photographs of black, as indices into `shots`, at least one.
+    pub(crate) black: Vec<usize>,
+    /// The white view, then the Gray code, then the Bernoulli patterns.
+    pub(crate) views: Vec<View>,
+    /// The column code and the row code.
+    pub(crate) codes: [Code; 2],
+    /// Columns and rows of the patterns that each cell stands for, as a power of 2.
+    pub(crate) coarser: u8,
+    /// Where the Gray code ends and the Bernoulli patterns begin in `views`.
+    bernoulli_from: usize,
+}
+
+/// The brackets that a capture is learned from.
+#[derive(Clone, Debug)]
+pub(crate) struct Selection {
+    pub(crate) brackets: Vec<Bracket>,
+    /// The longest exposure, if exposures are given.
+    longest: Option<f64>,
+    /// [`CaptureOptions::coarsen`], if there is nothing that forbids it.
+    coarsen: bool,
+}
+
+impl Selection {
+    /// Chooses the brackets that `options` ask for. `shots` are ordered by index.
+    ///
+    /// # Errors
+    /// What [`CaptureError`] says about roles and the number of photographs; a
+    /// pattern's own error where brackets need it.
+    pub(crate) fn new(
+        folder: &Path,
+        shots: &[Shot],
+        options: &CaptureOptions,
+    ) -> Result<Self, CaptureError> {
+        let manifest = folder.join(MANIFEST_FILE);
+        check_levels(shots, &manifest)?;
+        let longest = bracket::longest(shots, &manifest)?;
+        // Stripes may be looked at by fewer bits; a Bernoulli pattern is what it is.
+        let coarsen = options.coarsen && shots.iter().all(|shot| shot.role != Role::Bernoulli);
+        let brackets = match longest {
+            Some(longest) => {
+                bracket::bracketed(shots, &read_patterns(folder, shots, coarsen)?, longest)
+            }
+            None => Bracket::of_each(shots, None),
+        };
+        let brackets = chosen(brackets, options, &manifest)?;
+        Ok(Self {
+            brackets,
+            longest,
+            coarsen,
+        })
+    }
+
+    /// Names in each shot the file that stands for its photograph; shots without one are
+    /// taken out.
+    ///
+    /// # Errors
+    /// [`CaptureError::Ambiguous`] if several files could be meant.
+    pub(crate) fn find_photographs(&mut self, folder: &Path) -> Result<PhotoFiles, CaptureError> {
+        find_all(folder, &mut self.brackets)
+    }
+}
+
+impl Sequence {
+    /// Reads the patterns of the brackets that were chosen and checks them.
+    ///
+    /// # Errors
+    /// What [`CaptureError`] says about roles and patterns.
+    pub(crate) fn read(folder: &Path, chosen: Selection) -> Result<Self, CaptureError> {
+        let manifest = folder.join(MANIFEST_FILE);
+        let Selection {
+            mut brackets,
+            longest,
+            coarsen,
+        } = chosen;
+        let first = |bracket: &Bracket| bracket.shots[0].clone();
+        let mut shots: Vec<Shot> = brackets.iter().map(first).collect();
+        check_levels(&shots, &manifest)?;
+        let mut patterns = read_patterns(folder, &shots, coarsen)?;
+        let (rows, cols) = common_size(folder, &shots, &patterns)?;
+        let sides = [(Axis::Column, cols), (Axis::Row, rows)];
+        let mut given = [0; 2];
+        for (given, (axis, _)) in given.iter_mut().zip(sides) {
+            *given = code_bits(axis, &shots, &manifest)?;
+        }
+        let mut codes: [Code; 2] = std::array::from_fn(|k| {
+            let (axis, cells) = sides[k];
+            Code::find(&stripes(axis, &shots, &patterns), given[k], cells)
+        });
+        let missing = |k: usize| codes[k].bits - given[k];
+        if let (Some(k), false) = ((0..2).find(|&k| missing(k) > 0), coarsen) {
+            return Err(CaptureError::GridNotCovered {
+                path: manifest,
+                axis: sides[k].0,
+                cells: sides[k].1,
+                needed: codes[k].bits,
+                given: given[k],
+            });
+        }
+        for (shot, pattern) in shots.iter().zip(&patterns) {
+            check_role(folder, shot, pattern, codes)?;
+        }
+        let fewest = missing(0).max(missing(1));
+        let blocks = |steps: u8| {
+            let [cols, rows] = [0, 1].map(|k| codes[k].firsts(steps, sides[k].1).len());
+            rows * cols
+        };
+        let fits = |steps: &u8| blocks(*steps) <= Grid::MAX_CELLS;
+        let coarser = (fewest..Role::MAX_BITS).find(fits).unwrap_or(fewest);
+        if coarser > 0 {
+            let firsts = [0, 1].map(|k| codes[k].firsts(coarser, sides[k].1));
+            codes = codes.map(|code| code.coarser(coarser));
+            patterns = patterns
+                .iter()
+                .map(|pattern| pattern.sampled(&firsts[1], &firsts[0]))
+                .collect();
+            let encoded = |shot: &Shot| encoded_by(shot.role, codes);
+            let kept: Vec<bool> = shots.iter().map(encoded).collect();
+            keep(&mut brackets, &kept);
+            keep(&mut shots, &kept);
+            keep(&mut patterns, &kept);
+        }
+        let grid = grid_of(folder, &shots, &patterns)?;
+        let mut sequence = Self::grouped(grid, brackets, shots, patterns);
+        sequence.codes = codes;
+        sequence.coarser = coarser;
+        sequence.longest = longest;
+        Ok(sequence)
+    }
+
+    /// Puts photographs of one pattern together.
+    fn grouped(
+        grid: Grid,
+        brackets: Vec<Bracket>,
+        shots: Vec<Shot>,
+        patterns: Vec<Pattern>,
+    ) -> Self {
+        let mut black = Vec::new();
+        let mut coded: Vec<View> = Vec::new();
+        let mut bernoulli: Vec<View> = Vec::new();
+        let again =
+            |known: &View, view: &View| grid.cells() >= FEWEST_FOR_REPEATS && known.lit == view.lit;
+        for (at, (shot, pattern)) in shots.iter().zip(patterns).enumerate() {
+            let role = shot.role;
+            let view = View {
+                role,
+                shots: vec![at],
+                lit: pattern.lit,
+            };
+            match role {
+                Role::Black => black.push(at),
+                Role::Bernoulli => match bernoulli.iter_mut().find(|known| again(known, &view)) {
+                    Some(known) => known.shots.push(at),
+                    None => bernoulli.push(view),
+                },
+                _ => match coded.iter_mut().find(|view| view.role == role) {
+                    Some(view) => view.shots.push(at),
+                    None => coded.push(view),
+                },
+            }
+        }
+        // Stable: the Gray code stays in the order it was taken.
+        coded.sort_by_key(|view| view.role != Role::White);
+        let bernoulli_from = coded.len();
+        coded.append(&mut bernoulli);
+        Self {
+            grid,
+            brackets,
+            longest: None,
+            shots,
+            black,
+            views: coded,
+            codes: [Code::default(); 2],
+            coarser: 0,
+            bernoulli_from,
+        }
+    }
+
+    /// The white view.
+    pub(crate) fn white(&self) -> &View {
+        // `chosen` refuses a capture without white and `grouped` puts it first.
+        &self.views[0]
+    }
+
+    /// The view of a role, if it was photographed.
+    pub(crate) fn view(&self, role: Role) -> Option<&View> {
+        self.views.iter().find(|view| view.role == role)
+    }
+
+    /// Places of the Gray code in `views`.
+    pub(crate) fn coded(&self) -> Range<usize> {
+        1..self.bernoulli_from
+    }
+
+    /// Places in `views` of each Gray code pattern that has an inverse, and of
+    /// that inverse.
+    pub(crate) fn code_pairs(&self) -> Vec<(usize, usize)> {
+        let place = |role| self.coded().find(|&at| self.views[at].role == role);
+        let pair = |at: usize| match self.views[at].role.as_stripe()? {
+            (axis, bit, false) => Some((at, place(axis.stripe(bit, true))?)),
+            _ => None,
+        };
+        self.coded().filter_map(pair).collect()
+    }
+
+    /// Places of the Bernoulli patterns in `views`.
+    pub(crate) fn bernoulli(&self) -> Range<usize> {
+        self.bernoulli_from..self.views.len()
+    }
+}
+
+/// Reads patterns of as many cells as a table may have; of more where they may be
+/// looked at more coarsely.
+fn read_patterns(
+    folder: &Path,
+    shots: &[Shot],
+    coarsen: bool,
+) -> Result<Vec<Pattern>, CaptureError> {
+    let most = if coarsen {
+        (MOST_BYTES / shots.len().max(1)).clamp(Grid::MAX_CELLS, MOST_PROJECTOR_PIXELS)
+    } else {
+        Grid::MAX_CELLS
+    };
+    let read = |shot: &Shot| {
+        let source = Source {
+            path: &folder.join(&shot.pattern),
+            what: "pattern",
+            line: shot.line,
+        };
+        Pattern::read(source, most as u64)
+    };
+    let patterns: Vec<_> = shots.par_iter().map(read).collect();
+    patterns.into_iter().collect()
+}
+
+/// Refuses a capture without black or without white.
+fn check_levels(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
+    let path = || manifest.to_owned();
+    let has = |role| shots.iter().any(|shot| shot.role == role);
+    if !has(Role::Black) {
+        return Err(CaptureError::NoBlack { path: path() });
+    }
+    if !has(Role::White) {
+        return Err(CaptureError::NoWhite { path: path() });
+    }
+    Ok(())
+}
+
+/// The brackets to use: all but the Bernoulli ones beyond the number asked for.
+fn chosen(
+    brackets: Vec<Bracket>,
+    options: &CaptureOptions,
+    manifest: &Path,
+) -> Result<Vec<Bracket>, CaptureError> {
+    let path = || manifest.to_owned();
+    let is_bernoulli = |bracket: &Bracket| bracket.shots[0].role == Role::Bernoulli;
+    let found = brackets
+        .iter()
+        .filter(|bracket| is_bernoulli(bracket))
+        .count();
+    let used = options.bernoulli.unwrap_or(found);
+    if used > found {
+        return Err(CaptureError::MorePhotographsThanTaken {
+            path: path(),
+            asked: used,
+            found,
+        });
+    }
+    if used < options.min_bernoulli {
+        return Err(CaptureError::TooFewPhotographs {
+            path: path(),
+            used,
+            needed: options.min_bernoulli,
+        });
+    }
+    let mut left = used;
+    let mut wanted = |bracket: &Bracket| {
+        if !is_bernoulli(bracket) {
+            return true;
+        }
+        let wanted = left > 0;
+        left = left.saturating_sub(1);
+        wanted
+    };
+    Ok(brackets
+        .into_iter()
+        .filter(|bracket| wanted(bracket))
+        .collect())
+}
+
+/// Rows and columns that all patterns have.
+fn common_size(
+    folder: &Path,
+    shots: &[Shot],
+    patterns: &[Pattern],
+) -> Result<(usize, usize), CaptureError> {
+    let path = |at: usize| -> PathBuf { folder.join(&shots[at].pattern) };
+    let size = |pattern: &Pattern| (pattern.rows as u32, pattern.cols as u32);
+    let expected = size(&patterns[0]);
+    match patterns.iter().position(|p| size(p) != expected) {
+        Some(at) => Err(CaptureError::PatternSize {
+            path: path(at),
+            found: size(&patterns[at]),
+            first: path(0),
+            expected,
+        }),
+        None => Ok((patterns[0].rows, patterns[0].cols)),
+    }
+}
+
+/// The grid of patterns that have one size.
+fn grid_of(folder: &Path, shots: &[Shot], patterns: &[Pattern]) -> Result<Grid, CaptureError> {
+    // A pattern of at most `Grid::MAX_CELLS` cells has sides that fit 16 bits.
+    let side = |cells: usize| u16::try_from(cells).unwrap_or(u16::MAX);
+    let (rows, cols) = (patterns[0].rows, patterns[0].cols);
+    Grid::new(side(rows), side(cols)).map_err(|source| CaptureError::Grid {
+        path: folder.join(&shots[0].pattern),
+        source,
+    })
+}
+
+/// The Gray code patterns of one axis, along it.
+fn stripes(axis: Axis, shots: &[Shot], patterns: &[Pattern]) -> Vec<Stripes> {
+    let of_shot = |(shot, pattern): (&Shot, &Pattern)| {
+        let (along, bit, inverse) = shot.role.as_stripe()?;
+        let step = match axis {
+            Axis::Column => 1,
+            Axis::Row => pattern.cols,
+        };
+        let cells = pattern.lit.iter().step_by(step);
+        let count = [pattern.cols, pattern.rows][axis as usize];
+        (along == axis).then(|| Stripes {
+            bit,
+            inverse,
+            lit: cells.take(count).copied().collect(),
+        })
+    };
+    shots.iter().zip(patterns).filter_map(of_shot).collect()
+}
+
+/// Whether the codes, perhaps coarser than the patterns', still have what a role shows.
+fn encoded_by(role: Role, codes: [Code; 2]) -> bool {
+    role.as_stripe()
+        .is_none_or(|(axis, bit, _)| bit < codes[axis as usize].bits)
+}
+
+/// Keeps the items that have `true` at their place.
+fn keep<T>(items: &mut Vec<T>, wanted: &[bool]) {
+    let mut wanted = wanted.iter();
+    items.retain(|_| wanted.next() == Some(&true));
+}
+
+/// Bits of the Gray code of one axis that were photographed, as a pattern or as its
+/// inverse.
+fn code_bits(axis: Axis, shots: &[Shot], manifest: &Path) -> Result<u8, CaptureError> {
+    let mut seen = [false; Role::MAX_BITS as usize];
+    for (along, bit, _) in shots.iter().filter_map(|shot| shot.role.as_stripe()) {
+        seen[usize::from(bit)] |= along == axis;
+    }
+    let given = seen.iter().rposition(|&seen| seen).map_or(0, |bit| bit + 1);
+    match seen[..given].iter().position(|&seen| !seen) {
+        Some(bit) => Err(CaptureError::MissingBit {
+            path: manifest.to_owned(),
+            axis,
+            bit: bit as u8,
+            last: given as u8 - 1,
+        }),
+        None => Ok(given as u8),
+    }
+}
+
+/// Refuses a pattern that lights other cells than its role says.
+fn check_role(
+    folder: &Path,
+    shot: &Shot,
+    pattern: &Pattern,
+    codes: [Code; 2],
+) -> Result<(), CaptureError> {
+    let expected =
+        |cell: usize| lit_by_role(shot.role, codes, cell / pattern.cols, cell % pattern.cols);
+    let wrong = |(cell, lit): (usize, &bool)| expected(cell).is_some_and(|e| e != *lit);
+    let wrong = pattern.lit.iter().enumerate().position(wrong);
+    wrong.map_or(Ok(()), |cell| {
+        Err(CaptureError::PatternRole {
+            path: folder.join(&shot.pattern),
+            role: shot.role,
+            row: (cell / pattern.cols) as u32,
+            col: (cell % pattern.cols) as u32,
+        })
+    })
+}

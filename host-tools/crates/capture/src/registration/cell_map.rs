@@ -1,0 +1,77 @@
+//! Cell map: which camera pixel belongs to which cell, and where the cells are.
+
+use iltm_runtime::Grid;
+
+/// What [`Registration`] holds for a camera pixel without a cell.
+pub const NO_CELL: u32 = u32::MAX;
+
+/// Where each cell is in the photographs.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Registration {
+    /// Width and height of the registered photographs in pixels.
+    pub camera: (usize, usize),
+    /// Side of the square of file pixels that one registered pixel averages: 1
+    /// unless the photographs are larger than 4 megapixels.
+    pub binning: usize,
+    /// Cell of each camera pixel whose light is used, row by row, or
+    /// [`NO_CELL`], length `width * height`.
+    pub cell_of_pixel: Vec<u32>,
+    /// The same before pixels that see two cells were left out: the map of the
+    /// whole projection.
+    pub seen_cell: Vec<u32>,
+    /// Mean position `[x, y]` of each cell's pixels in `seen_cell`, in pixels,
+    /// the centre of the first pixel being `[0, 0]`; `None` where the camera
+    /// sees nothing of the cell. Length `N`.
+    pub centre: Vec<Option<[f64; 2]>>,
+}
+
+/// A camera pixel with a cell, while its registration is worked out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub(super) pixel: u32,
+    pub(super) cell: u32,
+    /// Light that the pixel gets from each of the 3 x 3 cells around `cell`,
+    /// row by row, camera units.
+    pub(super) weights: [f32; 9],
+    /// Part of a second cell, or of none, in the pixel, relative to its own
+    /// cell's: smaller is purer.
+    pub(super) mixed: f32,
+}
+
+impl Candidate {
+    /// A pixel before anything is known but its cell.
+    pub(super) const fn new(pixel: u32, cell: u32) -> Self {
+        Self {
+            pixel,
+            cell,
+            weights: [0.0; 9],
+            mixed: 0.0,
+        }
+    }
+
+    /// Light from all 3 x 3 cells.
+    pub(super) fn direct(&self) -> f32 {
+        self.weights.iter().sum()
+    }
+
+    /// Light from the brightest 2 x 2 of them: no more cells meet in a pixel.
+    pub(super) fn nearest(&self) -> f32 {
+        let squares = [[0, 1, 3, 4], [1, 2, 4, 5], [3, 4, 6, 7], [4, 5, 7, 8]];
+        let light = |square: [usize; 4]| square.iter().map(|&k| self.weights[k].max(0.0)).sum();
+        squares.map(light).into_iter().fold(0.0, f32::max)
+    }
+}
+
+/// Mean camera position of the pixels of each cell.
+pub(super) fn centres(grid: Grid, camera: (usize, usize), cell: &[u32]) -> Vec<Option<[f64; 2]>> {
+    let mut sums = vec![[0.0; 3]; grid.cells()];
+    for (pixel, &cell) in cell.iter().enumerate() {
+        if let Some(sum) = sums.get_mut(cell as usize) {
+            sum[0] += (pixel % camera.0) as f64;
+            sum[1] += (pixel / camera.0) as f64;
+            sum[2] += 1.0;
+        }
+    }
+    let mean = |[x, y, n]: [f64; 3]| (n > 0.0).then(|| [x / n, y / n]);
+    sums.into_iter().map(mean).collect()
+}

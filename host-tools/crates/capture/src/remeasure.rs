@@ -1,0 +1,112 @@
+//! Remeasuring: the light of every cell in photographs of pictures that are no patterns, taken from
+//! anywhere: a Gray code among them says anew where the cells are.
+
+use crate::cells::cell_pixels::{CellPixels, LeftOut};
+use crate::devices::{ColourMixingMatrix, MeasuredDevices};
+use crate::format::bracket::Bracket;
+use crate::format::error::CaptureError;
+use crate::format::manifest::Shot;
+use crate::format::photo_files::resolve;
+use crate::format::sequence::{CaptureOptions, Selection, Sequence};
+use crate::format::settings::Settings;
+use crate::photographs::clipping;
+use crate::photographs::linearise::LinearPhotographs;
+use crate::registration::cell_map::Registration;
+use crate::registration::register;
+use iltm_picture::progress::Progress;
+use iltm_runtime::Grid;
+use std::path::Path;
+
+/// Light of the cells in one photograph: one entry a channel, in each one a cell, camera
+/// units; 0 where a cell was not measured.
+pub type CellPlanes = Vec<Vec<f64>>;
+
+/// What photographs of a scene show of its cells.
+#[derive(Clone, Debug)]
+pub struct CellReadings {
+    /// Cells of the projector, as the Gray code's patterns have them.
+    pub grid: Grid,
+    /// Channels of the photographs, 1 or 3.
+    pub channels: usize,
+    /// Whether the cell was measured, length `N`.
+    pub live: Vec<bool>,
+    /// Why others were not.
+    pub left_out: Vec<LeftOut>,
+    /// Where the cells are.
+    pub registration: Registration,
+    /// Each photograph of white, ambient light included.
+    pub white: Vec<CellPlanes>,
+    /// Mean of the photographs of black: ambient light and the projector's black.
+    pub black: CellPlanes,
+    /// The photographs of the pictures, in their order, ambient light included.
+    pub pictures: Vec<CellPlanes>,
+}
+
+/// Registers the cells by the photographs of `code` (white, black, the Gray code of both
+/// axes and any Bernoulli patterns) and measures them in those of `pictures`. Of the
+/// latter only photograph and line are looked at. With `mixing`, of camera channels by
+/// projector channels, all light is that of the projector's channels.
+///
+/// # Errors
+/// [`CaptureError`] for whatever is missing, contradictory or unusable.
+pub fn remeasure(
+    folder: &Path,
+    settings: &Settings,
+    mixing: Option<[[f64; 3]; 3]>,
+    (code, pictures): (&[Shot], &[Shot]),
+    progress: &dyn Progress,
+) -> Result<CellReadings, CaptureError> {
+    let options = CaptureOptions {
+        min_bernoulli: 0,
+        ..CaptureOptions::default()
+    };
+    let mut code = code.to_vec();
+    let mut pictures = pictures.to_vec();
+    resolve(folder, &mut code)?;
+    resolve(folder, &mut pictures)?;
+    let mut sequence = Sequence::read(folder, Selection::new(folder, &code, &options)?)?;
+    // Behind the patterns, where only their places here lead to them.
+    let first = sequence.brackets.len();
+    sequence
+        .brackets
+        .extend(Bracket::of_each(&pictures, sequence.longest));
+    let reading = settings.camera.reading();
+    let mut linear = LinearPhotographs::read(folder, &sequence, &reading, progress)?;
+    clipping::find(&sequence, &mut linear, progress)?;
+    MeasuredDevices::measure(folder, &sequence, settings, &mut linear, progress)?;
+    let known = mixing.map(|matrix| ColourMixingMatrix {
+        matrix,
+        deviation: 0.0,
+        white: None,
+    });
+    if let Some(inverse) = known.as_ref().and_then(ColourMixingMatrix::inverse) {
+        linear.unmix(inverse, &sequence, progress)?;
+    }
+    let registered = register(&sequence, &mut linear, progress)?;
+    let cells = CellPixels::choose(&registered.registration, &linear.saturated);
+
+    progress.begin("measuring cells", pictures.len() as u64);
+    let mut measure = |brackets: &[usize]| -> Result<Vec<CellPlanes>, CaptureError> {
+        let mut light = Vec::with_capacity(brackets.len());
+        linear
+            .photographs
+            .for_batches(brackets, progress, |photos| {
+                let planes = photos.iter().map(|(_, photo)| &photo.planes);
+                light.extend(planes.map(|planes| planes.iter().map(|p| cells.mean(p)).collect()));
+            })?;
+        Ok(light)
+    };
+    let white = measure(&sequence.white().shots)?;
+    let pictures = measure(&(first..sequence.brackets.len()).collect::<Vec<_>>())?;
+    progress.end();
+    Ok(CellReadings {
+        grid: sequence.grid,
+        channels: linear.black.len(),
+        black: linear.black.iter().map(|plane| cells.mean(plane)).collect(),
+        live: cells.live,
+        left_out: cells.left_out,
+        registration: registered.registration,
+        white,
+        pictures,
+    })
+}
