@@ -143,7 +143,9 @@ impl<'f> ProjectorLight<'f> {
         if !scale.is_finite() {
             return Vec::new();
         }
-        cells.iter_mut().for_each(|(_, light)| *light *= scale);
+        for (_, light) in &mut cells {
+            *light *= scale;
+        }
         merge(&mut cells, |sum, more| *sum += more);
         cells
     }

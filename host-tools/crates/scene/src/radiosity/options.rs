@@ -1,4 +1,4 @@
-//! Options of a [`FormFactorMatrix`]: what is asked of it(super::FormFactorMatrix), and why it was refused.
+//! Options of a [`FormFactorMatrix`](super::FormFactorMatrix), and why one was refused.
 
 use crate::form_factor::Tolerance;
 use thiserror::Error;
