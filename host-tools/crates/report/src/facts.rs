@@ -45,7 +45,7 @@ fn of_photographs(learned: &Learned) -> Vec<Fact> {
         "{} lit, {} used; {} left out at borders of cells, {} too weak or contradicted",
         grouped(pixels.lit as u64),
         grouped(pixels.kept as u64),
-        grouped(pixels.shared as u64),
+        grouped(pixels.mixed as u64),
         grouped(pixels.weak as u64)
     );
     let registration = match diagnostics.method {
