@@ -68,7 +68,7 @@ impl<'s> Rig<'s> {
         let shooting = Shooting::new(self.scene, &self.simulation, SEED).expect("light");
         let faults: Vec<Fault> = fault.into_iter().collect();
         let shooting = shooting.with_faults(&faults);
-        let patterns = shown(self.simulation.grid(), BERNOULLI, SEED);
+        let patterns = pattern_set(self.simulation.grid(), BERNOULLI, SEED);
         folder::write(&shooting, &patterns, &out, &Silent).expect("written");
         let examined = capture::examine(&out, &CaptureOptions::default(), &Silent);
         Session {
