@@ -113,7 +113,7 @@ fn measure(
     let Some(report) = last else { return };
     println!(
         "{:7} {:8} {:5}  {:11}  {:8}  {:7.3} ({:.3} + {:.3})  {:15.1}  {:10}",
-        method.name(),
+        method,
         format!("{rows}x{cols}"),
         grid.cells(),
         bernoulli + 1,

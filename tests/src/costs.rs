@@ -1,38 +1,15 @@
-//! Frames of many shapes on the reference board, for the model of what a frame takes.
+//! Cost model: frames of many shapes on the reference board, which it is compared with.
 //!
 //! Tables are made up as in [`stages`](crate::stages): what a frame takes depends on
 //! grid, channels, ambient light, size of the frame and numbers of pairs in the rows,
 //! and on nothing else but clipped samples. `docs/costs.csv` holds the counts, and a
 //! test compares the model (`iltm::compile::cost`) with every one of them.
 
-use crate::firmware::elf;
-use crate::instructions::bench;
-use crate::made_up::MadeUp;
+use crate::instructions::{Case, Count};
+use crate::made_up::{MadeUp, pairs};
 use iltm::compile::image::StoredRow;
-use iltm::device::emulator::Board;
 use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write as _;
-
-/// A made-up table and the size of the frames it is counted with.
-pub struct Case {
-    /// What it is, as the list has it.
-    pub name: String,
-    /// The table's image.
-    pub image: Vec<u8>,
-    /// Size of its frames.
-    pub size: FrameSize,
-}
-
-/// Instructions of a frame with the operator, and without.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Count {
-    /// The case's name.
-    pub case: String,
-    /// The tier.
-    pub tier: u8,
-    /// Instructions of the three stages.
-    pub stages: [u64; 3],
-}
 
 /// See [`SHAPES`].
 type Shape = (u16, u16, usize, bool, usize, u16, u16);
@@ -76,21 +53,13 @@ const SHAPES: [Shape; 33] = [
 ];
 
 /// The cases of the list.
-///
-/// # Panics
-/// If one cannot be made: then whoever asked for them has failed.
-#[must_use]
 pub fn cases() -> Vec<Case> {
     let case = |&(rows, cols, channels, ambient, pairs, width, height): &Shape| {
-        let grid = Grid::new(rows, cols).expect("a small grid");
-        let mut table = MadeUp::new(grid, channels);
-        // Just under one, so that natural frames are not clipped more than usual.
-        table.gains.fill(7_800);
-        table.ambient = ambient.then(|| vec![330; table.gains.len()]);
+        let grid = crate::grid(rows, cols);
+        let mut table = MadeUp::nearly_plain(grid, channels, ambient);
         table.response = true;
         table.rows = self::rows(grid, pairs);
-        let own = FrameSize::of_grid(grid);
-        let size = FrameSize::new(width, height).unwrap_or(own);
+        let size = FrameSize::new(width, height).unwrap_or(FrameSize::of_grid(grid));
         let (colour, light) = (
             if channels == 3 { "colour" } else { "grey" },
             if ambient { "ambient" } else { "dark" },
@@ -106,54 +75,22 @@ pub fn cases() -> Vec<Case> {
 
 /// Three of four rows, each with so many pairs at places of their own, two more or two
 /// fewer.
-fn rows(grid: Grid, pairs: usize) -> Vec<StoredRow> {
+fn rows(grid: Grid, count: usize) -> Vec<StoredRow> {
     let mut random = fastrand::Rng::with_seed(0xC057);
     let cells = grid.cells() as u16;
-    let mut row = |index| {
-        let pairs = (pairs + random.usize(..5)).saturating_sub(2).max(1);
-        let mut places = std::collections::BTreeSet::new();
-        while places.len() < pairs.min(usize::from(cells) / 4) {
-            places.insert(2 * random.u16(..cells / 2));
-        }
-        let pair = |at: u16| [(at, random.i16(1..20)), (at + 1, -random.i16(1..20))];
+    let row = |index| {
+        let count = (count + random.usize(..5)).saturating_sub(2).max(1);
         StoredRow {
             index,
             shift: 9,
-            entries: places
-                .into_iter()
-                .flat_map(pair)
-                .filter(|(at, _)| *at < cells)
-                .collect(),
+            entries: pairs(&mut random, cells, count.min(usize::from(cells) / 4)),
         }
     };
-    (0..cells)
-        .filter(|index| index % 4 != 1)
-        .map(&mut row)
-        .collect()
-}
-
-/// Counts all cases.
-///
-/// # Panics
-/// If the bench cannot be built or run.
-#[must_use]
-pub fn counts() -> Vec<Count> {
-    let elf = elf(Board::An500, "bench");
-    let of_case = |case: Case| {
-        let lines = bench(&elf, &case.image, case.size, None);
-        lines
-            .into_iter()
-            .map(move |[tier, first, second, last, ..]| Count {
-                case: case.name.clone(),
-                tier: tier as u8,
-                stages: [first, second, last],
-            })
-    };
-    cases().into_iter().flat_map(of_case).collect()
+    let rows = (0..cells).filter(|index| index % 4 != 1);
+    rows.map(row).collect()
 }
 
 /// The list as `docs/costs.csv` holds it.
-#[must_use]
 pub fn csv(counts: &[Count]) -> String {
     let mut text = String::from("frame,tier,first,operator,last\n");
     for count in counts {

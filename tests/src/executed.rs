@@ -1,4 +1,4 @@
-//! Which code of a firmware a run comes to, by the emulator's own record.
+//! Code coverage of a firmware: which code a run comes to, by the emulator's own record.
 //!
 //! With `-d in_asm` QEMU writes down every block of instructions when it translates it,
 //! which it does when the program first gets there and never before. The ELF file says
@@ -25,10 +25,6 @@ pub struct Executed(BTreeSet<Place>);
 
 impl Executed {
     /// From what QEMU wrote down while it ran an ELF file.
-    ///
-    /// # Panics
-    /// If one of the files is not what it should be.
-    #[must_use]
     pub fn read(log: &Path, elf: &Path) -> Self {
         let log = std::fs::read_to_string(log).expect("QEMU wrote it");
         let addresses: BTreeSet<u64> = log.lines().filter_map(address).collect();
@@ -53,7 +49,6 @@ impl Executed {
     }
 
     /// Those of both.
-    #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.0.extend(other.0);
         self

@@ -1,19 +1,105 @@
-//! A device that is none: the runtime's session over a made-up status, at the end
-//! of a line in memory or of a pseudo-terminal.
+//! Fake device: the runtime's session over a made-up status and simulated table slots, at
+//! the end of a line in memory or of a pseudo-terminal.
 
-use crate::fake_tables::FakeTables;
+use crate::flash_simulator::NorSimulator;
 use crate::line_faults::{FarEnd, PacedLine};
+use crate::slots::{Layout, SimDevice};
 use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
     Clipping, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode, Name,
     PROTOCOL_VERSION, PassThrough, Refusal, Request, Response, SerialCounts, Session, SlotState,
     Stack, Status, TableName, Version,
 };
+use iltm_runtime::store::{Slot, Updater};
 use std::fmt;
 use std::io::{Read, Write};
+use std::ops::Range;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
+
+/// Bytes of a sector of the fake device's flash, which is written in words.
+pub const SECTOR: usize = 4_096;
+
+/// The fake device's flash.
+pub type Flash = NorSimulator<4, SECTOR>;
+
+const LAYOUT: Layout = Layout {
+    slot: 32,
+    sector: SECTOR,
+};
+
+/// Where each slot is.
+pub const fn slot(index: usize) -> Range<usize> {
+    LAYOUT.slot(Slot::ALL[index])
+}
+
+/// The table slots of a fake device, and what a test orders them to do.
+#[derive(Debug)]
+pub struct FakeTables {
+    device: SimDevice<4, SECTOR>,
+    /// Offset of every chunk that came.
+    pub writes: Vec<u32>,
+    /// Restarts once so many chunks have come, before it answers the last.
+    pub restart_after: Option<usize>,
+    /// Carries out and answers nothing from the chunk of this number on.
+    pub mute_after: Option<usize>,
+}
+
+impl Default for FakeTables {
+    fn default() -> Self {
+        Self::new(Flash::new(LAYOUT.sectors(), 1))
+    }
+}
+
+impl FakeTables {
+    /// What a device finds in this flash when it starts.
+    pub fn new(flash: Flash) -> Self {
+        Self {
+            device: SimDevice::start(flash, LAYOUT),
+            writes: Vec::new(),
+            restart_after: None,
+            mute_after: None,
+        }
+    }
+
+    /// As after a loss of power.
+    pub fn restart(&mut self) {
+        self.device = self.device.clone().restarted();
+    }
+
+    /// Of a device with this key and number.
+    pub fn provisioned(key: [u8; 32], device: u64) -> Self {
+        let mut tables = Self::default();
+        let response = tables.device.ask(Request::Provision { key, device });
+        assert_eq!(response, Response::Provisioned);
+        tables
+    }
+
+    /// The updater.
+    pub const fn updater(&self) -> &Updater<Flash> {
+        &self.device.updater
+    }
+
+    /// What the flash holds.
+    pub fn contents(&self) -> Vec<u8> {
+        self.device.flash().contents().to_vec()
+    }
+
+    /// Whether it answers nothing any more.
+    pub fn is_mute(&self) -> bool {
+        self.mute_after
+            .is_some_and(|count| self.writes.len() >= count)
+    }
+
+    /// Whether it is about to restart; true once.
+    fn restarts(&mut self) -> bool {
+        let count = self.writes.len();
+        self.restart_after
+            .take_if(|after| count >= *after)
+            .is_some()
+    }
+}
 
 /// What the made-up device says of itself.
 #[derive(Debug)]
@@ -90,7 +176,6 @@ impl Default for FakeDevice {
 
 impl FakeDevice {
     /// A device with a flash for tables.
-    #[must_use]
     pub fn with_tables(tables: FakeTables) -> Self {
         Self {
             number: tables.updater().trust().device,
@@ -100,9 +185,6 @@ impl FakeDevice {
     }
 
     /// The tables of a device that has some.
-    ///
-    /// # Panics
-    /// If it has none.
     pub const fn tables(&mut self) -> &mut FakeTables {
         self.tables.as_mut().expect("a device with tables")
     }
@@ -112,7 +194,8 @@ impl FakeDevice {
         let tables = self.tables.as_mut()?;
         // A number that it was given counts from now on.
         self.number = tables.updater().trust().device;
-        let change = tables.poll(now_ms)?;
+        tables.device.poll(now_ms);
+        let change = tables.device.updater.take_change()?;
         Some(Event::TableChanged {
             table: change.table,
             reason: change.reason,
@@ -128,7 +211,6 @@ impl FakeDevice {
     }
 
     /// Who it says it is.
-    #[must_use]
     pub fn identity(&self) -> Hello {
         Hello {
             protocol: self.protocol,
@@ -140,7 +222,8 @@ impl FakeDevice {
             limits: Limits {
                 cells: 16_384,
                 frame_bytes: 230_400,
-                table_bytes: (self.tables.as_ref()).map_or(2_097_152, FakeTables::slot_bytes),
+                table_bytes: (self.tables.as_ref())
+                    .map_or(2_097_152, |tables| tables.updater().map().slot_bytes()),
             },
         }
     }
@@ -153,7 +236,12 @@ impl Device for FakeDevice {
 
     fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
         match &mut self.tables {
-            Some(tables) => tables.carry_out(request, now_ms),
+            Some(tables) => {
+                if let Request::Write { offset, .. } = request {
+                    tables.writes.push(offset);
+                }
+                Device::carry_out(&mut tables.device, request, now_ms)
+            }
             None => Response::Refused(Refusal::ReadOnly),
         }
     }
@@ -175,6 +263,28 @@ impl Device for FakeDevice {
     }
 }
 
+/// Tables and slots are its own, the rest is made up.
+impl<const W: usize, const E: usize> Device for SimDevice<W, E> {
+    fn identity(&self) -> Hello {
+        Hello {
+            device: self.updater.trust().device,
+            ..FakeDevice::default().identity()
+        }
+    }
+
+    fn status(&self) -> Status {
+        Status {
+            table: self.updater.table(),
+            slots: self.updater.states(),
+            ..FakeDevice::default().status
+        }
+    }
+
+    fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
+        self.updater.answer(request, now_ms, &mut self.tables)
+    }
+}
+
 /// A device in memory with its side of the conversation, as the far end of a line.
 #[derive(Debug)]
 pub struct FakeEnd {
@@ -189,7 +299,6 @@ pub type FakeLine = PacedLine<FakeEnd>;
 
 impl FakeDevice {
     /// A line with this device at its end.
-    #[must_use]
     pub fn line(self, baud: u32) -> FakeLine {
         let end = FakeEnd {
             session: Session::new(),
@@ -259,7 +368,6 @@ impl fmt::Debug for Look {
 }
 
 /// A pseudo-terminal with a device at its end.
-#[cfg(unix)]
 #[derive(Debug)]
 pub struct FakePort {
     path: String,
@@ -267,13 +375,8 @@ pub struct FakePort {
     thread: Option<JoinHandle<()>>,
 }
 
-#[cfg(unix)]
 impl FakePort {
     /// Plugs a device in.
-    ///
-    /// # Panics
-    /// If the system has no pseudo-terminal left.
-    #[must_use]
     pub fn new(device: FakeDevice) -> Self {
         use serialport::{SerialPort, TTYPort};
         let (mut ours, theirs) = TTYPort::pair().expect("a pseudo-terminal");
@@ -294,15 +397,11 @@ impl FakePort {
     }
 
     /// Where a host finds it.
-    #[must_use]
     pub fn path(&self) -> &str {
         &self.path
     }
 
     /// What there is to see in the device, or is after this was done to it.
-    ///
-    /// # Panics
-    /// If the device has vanished.
     pub fn look<T: Send + 'static>(
         &self,
         look: impl FnOnce(&mut FakeDevice) -> T + Send + 'static,
@@ -323,7 +422,6 @@ impl FakePort {
     }
 }
 
-#[cfg(unix)]
 impl Drop for FakePort {
     fn drop(&mut self) {
         self.order(Order::Vanish);
@@ -334,7 +432,6 @@ impl Drop for FakePort {
 }
 
 /// The firmware's loop, as it were.
-#[cfg(unix)]
 fn run(line: &mut (impl Read + Write), mut device: FakeDevice, orders: &Receiver<Order>) {
     let mut session = Session::new();
     let mut started = Instant::now();

@@ -1,22 +1,29 @@
-//! The firmware in the emulator, and tables for it.
+//! Firmware in the emulator (QEMU): building it, boards that run it, their lines, and
+//! tables and frames for them.
 
 use crate::wedge;
 use iltm::compile::{CompileOptions, FineGains, compile};
-use iltm::device::emulator::Board;
+use iltm::device::emulator::{Board, Emulator};
 use iltm::device::memory::BoardMemory;
 use iltm::device::playback::Playback;
+use iltm::device::port::BAUD;
+use iltm::device::{Client, Line, Patience, Port};
 use iltm::{
     picture::{Picture, Response, Samples},
     video::{CompensateOptions, Compensator},
 };
-use iltm_runtime::frame_buffers::{Format, psram};
+use iltm_runtime::frame_buffers::{Format, Layout, psram};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use std::collections::HashMap;
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::Mutex;
+use std::thread;
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 
 /// Longest that anything is waited for: far more than it takes on a busy machine.
 pub const PATIENCE: Duration = Duration::from_mins(1);
@@ -28,20 +35,12 @@ pub const ALL_STAGES: &str = "stages";
 pub const LEAN: &str = "";
 
 /// The ELF file of a firmware (`firmware`, `selftest` or `bench`), built for the board.
-///
-/// # Panics
-/// If it cannot be built, with the reason.
-#[must_use]
 pub fn elf(board: Board, bin: &'static str) -> PathBuf {
     elf_of(board, ALL_STAGES, bin)
 }
 
 /// The same with these stages only, features of the firmware with commas between them.
 /// Of those between [`LEAN`] and [`ALL_STAGES`] the last one built is kept.
-///
-/// # Panics
-/// If it cannot be built, with the reason.
-#[must_use]
 pub fn elf_of(board: Board, stages: &str, bin: &'static str) -> PathBuf {
     static BUILT: Mutex<Option<HashMap<(String, &str), PathBuf>>> = Mutex::new(None);
     let key = (format!("{board} {stages}"), bin);
@@ -87,10 +86,6 @@ pub fn without_cargos_variables(command: &mut Command) {
 }
 
 /// Bytes of flash that an ELF file takes.
-///
-/// # Panics
-/// If it is none.
-#[must_use]
 pub fn flash_bytes(elf: &Path) -> u64 {
     use object::{Object, ObjectSegment};
     let bytes = std::fs::read(elf).expect("it has just been built");
@@ -100,69 +95,39 @@ pub fn flash_bytes(elf: &Path) -> u64 {
 
 /// Orders and findings of the self-test, by the names in
 /// `runtime/firmware/src/bin/selftest.rs`.
+#[allow(missing_docs, reason = "the self-test explains them")]
 pub mod word {
-    /// See the self-test.
     pub const TIER: usize = 0;
-    /// See the self-test.
     pub const HANG: usize = 1;
-    /// See the self-test.
     pub const FRAMES: usize = 2;
-    /// See the self-test.
     pub const SIZE: usize = 3;
-    /// See the self-test.
     pub const CHANNELS: usize = 4;
-    /// See the self-test.
     pub const PERIOD: usize = 5;
-    /// See the self-test.
     pub const SLOW_FROM: usize = 6;
-    /// See the self-test.
     pub const SLOW_UNTIL: usize = 7;
-    /// See the self-test.
     pub const SLOW_BY: usize = 8;
-    /// See the self-test.
     pub const SLOW_BY_TIER: usize = 9;
-    /// See the self-test.
     pub const OUTPUT: usize = 10;
-    /// See the self-test.
     pub const TEAR: usize = 11;
-    /// See the self-test.
     pub const PANIC: usize = 12;
-    /// See the self-test.
     pub const NEW_OUTPUT: usize = 13;
-    /// See the self-test.
     pub const SHOWN: usize = 32;
-    /// See the self-test.
     pub const WRONG: usize = 33;
-    /// See the self-test.
     pub const OVER: usize = 34;
-    /// See the self-test.
     pub const LATE: usize = 35;
-    /// See the self-test.
     pub const DROPPED: usize = 36;
-    /// See the self-test.
     pub const BROKEN: usize = 37;
-    /// See the self-test.
     pub const STACK: usize = 38;
-    /// See the self-test.
     pub const WORST: usize = 39;
-    /// See the self-test.
     pub const CHANGES: usize = 40;
-    /// See the self-test.
     pub const NEW: usize = 41;
-    /// See the self-test.
     pub const TURNS: usize = 42;
-    /// See the self-test.
     pub const TURN: usize = 43;
-    /// See the self-test.
     pub const SKIPPED: usize = 44;
-    /// See the self-test.
     pub const CHANGE: usize = 64;
 }
 
 /// Gives the self-test an order.
-///
-/// # Panics
-/// If the memory's file cannot be written.
 pub fn order(memory: &BoardMemory, word: usize, value: u32) {
     let at = psram::SELF_TEST.start + 4 * word;
     let written = memory.write(&(at..at + 4), &value.to_le_bytes());
@@ -170,10 +135,6 @@ pub fn order(memory: &BoardMemory, word: usize, value: u32) {
 }
 
 /// What the self-test found.
-///
-/// # Panics
-/// If the memory's file cannot be read.
-#[must_use]
 pub fn finding(memory: &BoardMemory, word: usize) -> u32 {
     let at = psram::SELF_TEST.start + 4 * word;
     let mut bytes = [0; 4];
@@ -182,9 +143,31 @@ pub fn finding(memory: &BoardMemory, word: usize) -> u32 {
     u32::from_le_bytes(bytes)
 }
 
+/// A board's memory with this in slot A.
+pub fn memory_with(slot: &[u8]) -> BoardMemory {
+    let memory = BoardMemory::temporary().expect("a temporary file");
+    memory.write(&psram::SLOT_A, slot).expect("room");
+    memory
+}
+
+/// Runs a firmware on a board with this memory, until what is returned is dropped.
+pub fn start(board: Board, elf: &Path, memory: &BoardMemory) -> Emulator {
+    let emulator = Emulator::start(board, elf, memory);
+    emulator.expect("qemu-system-arm is installed: tests/run.sh does it")
+}
+
+/// A client of a running board.
+pub fn client(emulator: &Emulator) -> Client<Port> {
+    let port = Port::open(emulator.port(), BAUD).expect("the emulator's port");
+    let patience = Patience {
+        tries: 40,
+        ..Patience::default()
+    };
+    Client::greet(port, patience).expect("the device answers")
+}
+
 /// QEMU with every instruction taking a nanosecond, so that each run is the same;
 /// `serial` is its option of that name.
-#[must_use]
 pub fn counted(board: Board, elf: &Path, memory: &BoardMemory, serial: &str) -> Command {
     let mut qemu = Command::new("qemu-system-arm");
     qemu.arg("-machine")
@@ -212,15 +195,99 @@ pub fn counted(board: Board, elf: &Path, memory: &BoardMemory, serial: &str) -> 
     qemu
 }
 
+/// The self-test on a board that counts instructions and has a [`Socket`] for its line,
+/// until it is dropped.
+#[derive(Debug)]
+pub struct CountedBoard {
+    qemu: Child,
+    folder: TempDir,
+}
+
+impl CountedBoard {
+    /// Starts it with this memory.
+    pub fn start(memory: &BoardMemory) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("line");
+        let serial = format!("unix:{},server=on,wait=off", path.display());
+        let firmware = elf(Board::An500, "selftest");
+        let mut qemu = counted(Board::An500, &firmware, memory, &serial);
+        let qemu = qemu.spawn();
+        Self {
+            qemu: qemu.expect("qemu-system-arm is installed: tests/run.sh does it"),
+            folder,
+        }
+    }
+
+    /// Its line.
+    pub fn line(&self) -> Socket {
+        Socket::connect(&self.folder.path().join("line"), PATIENCE)
+    }
+}
+
+impl Drop for CountedBoard {
+    fn drop(&mut self) {
+        let _ = self.qemu.kill();
+        let _ = self.qemu.wait();
+    }
+}
+
+/// Orders the self-test to play so many frames by itself, which all look like this.
+pub fn play(memory: &BoardMemory, count: u32, format: Format, frame: &[u8]) {
+    let size = format.size();
+    let sides = size.width() as u32 | (size.height() as u32) << 16;
+    order(memory, word::FRAMES, count);
+    order(memory, word::SIZE, sides);
+    order(memory, word::CHANNELS, u32::from(format.channels()));
+    order(memory, word::PERIOD, format.period_us());
+    let layout = Layout::new(format, psram::FRAMES.len()).expect("it fits");
+    for buffer in 0..2 {
+        let start = psram::FRAMES.start + layout.input(buffer).start;
+        let written = memory.write(&(start..start + frame.len()), frame);
+        written.expect("room");
+    }
+}
+
+/// A serial line as a socket of the emulator's, which takes bytes faster than a terminal.
+#[derive(Debug)]
+pub struct Socket(UnixStream);
+
+impl Socket {
+    /// Waits for the emulator to make the socket.
+    pub fn connect(path: &Path, patience: Duration) -> Self {
+        let end = Instant::now() + patience;
+        loop {
+            match UnixStream::connect(path) {
+                Ok(stream) => return Self(stream),
+                Err(error) => assert!(Instant::now() < end, "no line: {error}"),
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Line for Socket {
+    fn read(&mut self, bytes: &mut [u8], wait: Duration) -> io::Result<usize> {
+        let wait = wait.max(Duration::from_millis(1));
+        self.0.set_read_timeout(Some(wait))?;
+        match self.0.read(bytes) {
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                Ok(0)
+            }
+            other => other,
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.write_all(bytes)
+    }
+}
+
 /// Gives one frame and returns the projector input that the device makes of it.
-///
-/// # Panics
-/// If nothing is shown in a long time.
 pub fn through(playback: &mut Playback<'_>, frame: &[u8]) -> Vec<u8> {
     let end = Instant::now() + PATIENCE;
     while !playback.attached() {
         assert!(Instant::now() < end, "the device takes no frames");
-        std::thread::sleep(Duration::from_millis(1));
+        thread::sleep(Duration::from_millis(1));
     }
     let refused = playback.counts().refused;
     playback.give(frame).expect("the memory's file is there");
@@ -229,9 +296,6 @@ pub fn through(playback: &mut Playback<'_>, frame: &[u8]) -> Vec<u8> {
 }
 
 /// The next frame shown.
-///
-/// # Panics
-/// If nothing is shown by then.
 pub fn wait_for_frame(playback: &mut Playback<'_>, end: Instant) -> Vec<u8> {
     loop {
         let mut shown = None;
@@ -242,15 +306,11 @@ pub fn wait_for_frame(playback: &mut Playback<'_>, end: Instant) -> Vec<u8> {
             return shown;
         }
         assert!(Instant::now() < end, "the device shows nothing");
-        std::thread::sleep(Duration::from_micros(200));
+        thread::sleep(Duration::from_micros(200));
     }
 }
 
 /// What the host makes of a frame.
-///
-/// # Panics
-/// If it cannot: tables and frames of tests fit each other.
-#[must_use]
 pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Vec<u8>, u64) {
     let settings = CompensateOptions {
         tier: Some(tier),
@@ -267,6 +327,20 @@ pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Ve
         Samples::Eight(samples) => (samples.clone(), summary.clipped),
         Samples::Sixteen(_) => unreachable!("the samples were bytes"),
     }
+}
+
+/// Samples that the host clips of a frame at the tier at which it makes of it what was
+/// shown: a governor has chosen the tier. `None` if there is no such tier.
+pub fn clipped_on_host(
+    table: &Table<'_>,
+    format: Format,
+    frame: &[u8],
+    shown: &[u8],
+) -> Option<u64> {
+    (0..=table.top_tier()).find_map(|tier| {
+        let (made, clipped) = on_host(table, tier, format, frame);
+        (made == shown).then_some(clipped)
+    })
 }
 
 /// What a table may need; any may be left out.
@@ -307,10 +381,6 @@ impl Effects {
 
 /// A table with these effects for a wedge whose texture and ambient light are
 /// random.
-///
-/// # Panics
-/// If it cannot be compiled.
-#[must_use]
 pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(seed);
     let cells = grid.cells();
@@ -358,7 +428,6 @@ pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) ->
 }
 
 /// A frame with all kinds of content: noise, a ramp, black, white.
-#[must_use]
 pub fn random_frame(format: Format, seed: u64) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(seed);
     let bytes = format.bytes();

@@ -1,10 +1,11 @@
-//! Which gates notice a fault of which size: photographs of a described scene are taken
-//! with the fault on purpose, and every gate is asked.
+//! Gates before a solve, and which of them notices a fault of which size: photographs of a
+//! described scene are taken with the fault on purpose, and every gate is asked.
 
+use crate::simulated::simulation;
 use iltm::capture::{self, CaptureOptions, Gate, GateName, Verdict, pattern_set};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Fault, Mishap, Shooting, Simulation, SimulationOptions, folder};
+use iltm::scene::{CaptureFault, Forced, InjectedFault, Simulation, VirtualCamera, folder};
 use std::fmt::Write;
 
 /// Seed of patterns and noise.
@@ -17,21 +18,19 @@ const BERNOULLI: usize = 60;
 #[derive(Clone, Debug)]
 pub struct Session {
     /// The fault, with its size.
-    pub fault: Option<Fault>,
+    pub fault: Option<InjectedFault>,
     /// All gates.
     pub gates: Vec<Gate>,
 }
 
 impl Session {
     /// The gates with this verdict.
-    #[must_use]
     pub fn that(&self, verdict: Verdict) -> Vec<GateName> {
         let that = self.gates.iter().filter(|gate| gate.verdict == verdict);
         that.map(|gate| gate.name).collect()
     }
 
     /// What the first gate that is not content says.
-    #[must_use]
     pub fn first_words(&self) -> &str {
         let worst = self.gates.iter().find(|gate| gate.fails());
         let remark = || self.gates.iter().find(|g| g.verdict == Verdict::Warn);
@@ -47,29 +46,20 @@ pub struct Rig<'s> {
 
 impl<'s> Rig<'s> {
     /// Computes the light of a scene.
-    ///
-    /// # Panics
-    /// If it cannot be simulated: the scenes are part of the project.
-    #[must_use]
     pub fn new(scene: &'s Scene) -> Self {
-        let options = SimulationOptions::default();
-        let simulation = Simulation::new(scene, &options, &Silent).expect("can be simulated");
+        let simulation = simulation(scene, Forced::default());
         Self { scene, simulation }
     }
 
     /// Takes photographs with a fault, or none, and asks the gates.
-    ///
-    /// # Panics
-    /// If the photographs cannot be written or are no capture.
-    #[must_use]
-    pub fn session(&self, fault: Option<Fault>) -> Session {
+    pub fn session(&self, fault: Option<InjectedFault>) -> Session {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("capture");
-        let shooting = Shooting::new(self.scene, &self.simulation, SEED).expect("light");
-        let faults: Vec<Fault> = fault.into_iter().collect();
-        let shooting = shooting.with_faults(&faults);
-        let patterns = shown(self.simulation.grid(), BERNOULLI, SEED);
-        folder::write(&shooting, &patterns, &out, &Silent).expect("written");
+        let camera = VirtualCamera::new(self.scene, &self.simulation, SEED).expect("light");
+        let faults: Vec<InjectedFault> = fault.into_iter().collect();
+        let camera = camera.with_faults(&faults);
+        let patterns = pattern_set(self.simulation.grid(), BERNOULLI, SEED);
+        folder::write(&camera, &patterns, &out, &Silent).expect("written");
         let examined = capture::examine(&out, &CaptureOptions::default(), &Silent);
         Session {
             fault,
@@ -79,51 +69,50 @@ impl<'s> Rig<'s> {
 }
 
 /// Faults and the sizes that are tried, the smallest first.
-#[must_use]
-pub fn tried() -> Vec<(Mishap, &'static str, Vec<f64>)> {
+pub fn tried() -> Vec<(CaptureFault, &'static str, Vec<f64>)> {
     vec![
         (
-            Mishap::Gamma,
+            CaptureFault::Gamma,
             "gamma of the camera that nobody declared",
             vec![1.02, 1.05, 1.1, 1.15, 1.2, 1.4, 1.8, 2.2],
         ),
         (
-            Mishap::AutoExposure,
+            CaptureFault::AutoExposure,
             "part of the brightness evened out by automatic exposure",
             vec![0.01, 0.02, 0.03, 0.05, 0.1, 0.3, 1.0],
         ),
         (
-            Mishap::Tripod,
+            CaptureFault::Tripod,
             "bump of the tripod, pixels (a cell is 8 wide)",
             vec![0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0, 10.0],
         ),
         (
-            Mishap::Swapped,
+            CaptureFault::Swapped,
             "one exchanged pair, at this part of the session",
             vec![0.06, 0.15, 0.3, 0.6, 0.95],
         ),
         (
-            Mishap::Dropped,
+            CaptureFault::Dropped,
             "one file missing, at this part of the session",
             vec![0.06, 0.3, 0.6, 0.95],
         ),
         (
-            Mishap::Skipped,
+            CaptureFault::Skipped,
             "one photograph never taken, all others moved up, from this part on",
             vec![0.06, 0.15, 0.3, 0.6, 0.95],
         ),
         (
-            Mishap::Clipped,
+            CaptureFault::Clipped,
             "times the right exposure",
             vec![1.1, 1.2, 1.25, 1.3, 1.4, 1.6, 2.5],
         ),
         (
-            Mishap::Vivid,
+            CaptureFault::Vivid,
             "vivid mode: part of the light that a dark picture loses",
             vec![0.01, 0.02, 0.03, 0.05, 0.1, 0.15, 0.3],
         ),
         (
-            Mishap::Flicker,
+            CaptureFault::Flicker,
             "amplitude of bands of mains light",
             vec![0.002, 0.005, 0.01, 0.02, 0.03, 0.06, 0.15],
         ),
@@ -131,7 +120,6 @@ pub fn tried() -> Vec<(Mishap, &'static str, Vec<f64>)> {
 }
 
 /// A table of what was noticed, a line for each fault.
-#[must_use]
 pub fn table(sessions: &[(&'static str, Vec<Session>)]) -> String {
     let mut text = String::from(
         "| fault | passes in silence | remark from | refused from | by |\n|---|---|---|---|---|\n",

@@ -1,4 +1,4 @@
-//! What frames take on the reference board, in instructions.
+//! Instruction counts: what frames take on the reference board.
 //!
 //! Counted by the firmware's `bench` in the emulator; the same binary, table and
 //! frame give the same count every time. `docs/firmware.md` shows the result,
@@ -6,15 +6,13 @@
 
 mod like_a_scene;
 
-use crate::firmware::{counted, elf, order};
-use iltm::compile::content::natural_images;
+use crate::firmware::{counted, elf, memory_with, order};
+use crate::grid;
+use crate::simulated::{host_tools, learned};
 use iltm::compile::{CompileOptions, compile};
 use iltm::device::emulator::Board;
-use iltm::device::memory::BoardMemory;
-use iltm::learn::learn;
-use iltm::progress::Silent;
-use iltm::solve::{ChannelInverse, SolveOptions};
-use iltm::{capture::CaptureOptions, picture::Response};
+use iltm::picture::Response;
+use iltm::solve::{ChannelInverse, natural_images};
 use iltm_runtime::frame_buffers::psram;
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
@@ -25,7 +23,7 @@ use std::process::Stdio;
 /// A table and frames to count.
 pub struct Case {
     /// Its name in the lists.
-    pub name: &'static str,
+    pub name: String,
     /// The table's image.
     pub image: Vec<u8>,
     /// Size of its frames.
@@ -52,18 +50,8 @@ pub struct Count {
 }
 
 /// The tables and frames of the list.
-///
-/// # Panics
-/// If one cannot be made: then whoever asked for them has failed.
-#[must_use]
 pub fn cases() -> Vec<Case> {
-    let grid = |rows, cols| Grid::new(rows, cols).expect("a small grid");
-    let sample = |name: &str| {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/samples");
-        let options = (CaptureOptions::default(), SolveOptions::default());
-        let learned = learn(&path.join(name), &options.0, &options.1, None, &Silent);
-        learned.expect("the sample is good")
-    };
+    let sample = |name: &str| learned(&host_tools().join("samples").join(name));
     let compiled = |inverse: &_, targets: &[f64]| {
         let options = CompileOptions {
             projector: Response::Srgb.into(),
@@ -96,7 +84,7 @@ pub fn cases() -> Vec<Case> {
         let own = FrameSize::of_grid(Table::check(&image).expect("a table").grid());
         let size = size.and_then(|(width, height)| FrameSize::new(width, height));
         Case {
-            name,
+            name: str::to_owned(name),
             size: size.unwrap_or(own),
             image,
         }
@@ -143,10 +131,6 @@ fn frame(size: FrameSize, channels: usize) -> Vec<u8> {
 }
 
 /// Counts all tiers of a case.
-///
-/// # Panics
-/// If the bench cannot be built or run.
-#[must_use]
 pub fn count(case: &Case) -> Vec<Count> {
     let table = Table::check(&case.image).expect("a table");
     let cells = table.grid().cells() as f64;
@@ -155,7 +139,7 @@ pub fn count(case: &Case) -> Vec<Count> {
         let info = &table.tiers()[tier as usize];
         let error: f64 = info.predicted_error.to_num();
         Count {
-            case: case.name.to_owned(),
+            case: case.name.clone(),
             tier: tier as u8,
             error: (error > 0.0).then_some(error),
             entries: f64::from(info.entries) / cells,
@@ -171,14 +155,9 @@ pub fn count(case: &Case) -> Vec<Count> {
 /// What the bench finds for a natural-looking frame: for every tier its number,
 /// instructions of the three stages and of all, and samples clipped. With `executed`,
 /// the emulator writes there each block of code that it comes to, once or more.
-///
-/// # Panics
-/// If the bench cannot be run, or refuses the table.
-#[must_use]
 pub fn bench(elf: &Path, image: &[u8], size: FrameSize, executed: Option<&Path>) -> Vec<[u64; 6]> {
     let table = Table::check(image).expect("a table");
-    let memory = BoardMemory::temporary().expect("a temporary file");
-    memory.write(&psram::SLOT_A, image).expect("room");
+    let memory = memory_with(image);
     let wanted = frame(size, usize::from(table.channels()));
     let frames = psram::FRAMES.start..psram::FRAMES.start + wanted.len();
     memory.write(&frames, &wanted).expect("room");
@@ -206,7 +185,6 @@ pub fn bench(elf: &Path, image: &[u8], size: FrameSize, executed: Option<&Path>)
 }
 
 /// The list as `docs/instructions.csv` holds it.
-#[must_use]
 pub fn csv(counts: &[Count]) -> String {
     let mut text =
         String::from("case,tier,error,entries a row,first,operator,last,frame,clipped\n");

@@ -1,10 +1,17 @@
-//! What the tests across crates share: a scene whose inverse is known exactly, and
-//! a device that is none.
+//! Test support: what the tests across crates share. A scene whose inverse is known exactly
+//! and its tables, devices and lines that are simulated, boards in the emulator, fuzz
+//! targets, and the cases whose results the pages list.
+
+#![allow(
+    clippy::missing_panics_doc,
+    clippy::must_use_candidate,
+    clippy::return_self_not_must_use,
+    reason = "where a helper of a test panics, that test has failed"
+)]
 
 pub mod costs;
 pub mod executed;
 pub mod fake_device;
-pub mod fake_tables;
 pub mod firmware;
 pub mod flash_simulator;
 pub mod fuzz;
@@ -15,16 +22,38 @@ pub mod instructions;
 pub mod line_faults;
 pub mod made_up;
 pub mod reference_pages;
+pub mod simulated;
 pub mod slots;
-#[cfg(unix)]
-pub mod socket;
 pub mod stages;
 
+use ed25519_dalek::SigningKey;
+use iltm::compile::sign::{SealTerms, sign};
 use iltm::compile::{CompileOptions, compile};
 use iltm::picture::Response;
 use iltm::solve::{ChannelInverse, InverseTransport};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
+
+/// A grid of these sides.
+pub fn grid(rows: u16, cols: u16) -> Grid {
+    Grid::new(rows, cols).expect("within a grid's limits")
+}
+
+/// A key that signs tables, another one for each seed.
+pub fn signing_key(seed: u8) -> SigningKey {
+    SigningKey::from_bytes(&[seed; 32])
+}
+
+/// The file of a table that is signed with a key, for the device of this number or, with 0,
+/// for any.
+pub fn signed(table: &[u8], key: &SigningKey, version: u32, oldest: u32, device: u64) -> Vec<u8> {
+    let terms = SealTerms {
+        version,
+        oldest,
+        device,
+    };
+    sign(table, key, terms).expect("a table")
+}
 
 /// A Lambertian wedge of two square panels at a right angle, hinged in the
 /// middle column, lit evenly.
@@ -33,7 +62,6 @@ use nalgebra::DMatrix;
 /// needed so that no cell sends out more than it receives. With three channels
 /// the albedos differ by channel and panel, and the blue channel has a small
 /// deviation and half the projector's light.
-#[must_use]
 pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
     let cells = grid.cells();
     let place = |cell: usize| {
@@ -93,24 +121,18 @@ pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
 }
 
 /// The table image of [`wedge`] for an sRGB projector.
-#[must_use]
 pub fn wedge_table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
     wedge_table_for(Response::Srgb, rows, cols, channels)
 }
 
 /// The table image of [`wedge`].
-///
-/// # Panics
-/// If it cannot be compiled: then the test that asked for it has failed.
-#[must_use]
 pub fn wedge_table_for(projector: Response, rows: u16, cols: u16, channels: usize) -> Vec<u8> {
-    let grid = Grid::new(rows, cols).expect("a small grid");
     let options = CompileOptions {
         projector: projector.into(),
         inverse_error: 0.005,
         provenance: "scene = \"wedge\"\n".to_owned(),
         ..CompileOptions::default()
     };
-    let compiled = compile(&wedge(grid, channels), None, &options);
+    let compiled = compile(&wedge(grid(rows, cols), channels), None, &options);
     compiled.expect("the wedge is a plain scene").image
 }

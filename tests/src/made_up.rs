@@ -1,6 +1,7 @@
-//! Tables that are made up: any gains, ambient light, response and operator, without a
-//! scene behind them.
+//! Made-up tables: any gains, ambient light, response and operator, without a scene behind
+//! them.
 
+use fastrand::Rng;
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
 use iltm::compile::response;
@@ -10,6 +11,7 @@ use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::SectionKind;
 use iltm_runtime::image::{Meta, TierInfo};
 use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use std::collections::BTreeSet;
 
 /// What a table is to hold.
 #[derive(Clone, Debug)]
@@ -34,7 +36,6 @@ pub struct MadeUp {
 
 impl MadeUp {
     /// Gain 1 and nothing else.
-    #[must_use]
     pub fn new(grid: Grid, channels: usize) -> Self {
         let mut scales = [U1F15::ZERO; 3];
         scales[..channels].fill(U1F15::ONE);
@@ -50,19 +51,13 @@ impl MadeUp {
         }
     }
 
-    /// The bounds that the runtime proves for its operator.
-    ///
-    /// # Errors
-    /// [`OperatorError`] as the runtime has it.
-    ///
-    /// # Panics
-    /// Never: a segment is made of whole words.
-    pub fn bounds(&self) -> Result<Bounds, OperatorError> {
-        if self.rows.is_empty() {
-            return Ok(Bounds::default());
-        }
-        let segment = segment_bytes(self.grid.cells(), &self.rows);
-        Ok(self.operator(&segment)?.bounds())
+    /// Just under gain 1, so that natural frames are not clipped more than usual, and with
+    /// ambient light if wanted.
+    pub fn nearly_plain(grid: Grid, channels: usize, ambient: bool) -> Self {
+        let mut table = Self::new(grid, channels);
+        table.gains.fill(7_800);
+        table.ambient = ambient.then(|| vec![330; table.gains.len()]);
+        table
     }
 
     fn operator<'a>(&self, segment: &'a [u8]) -> Result<Operator<'a>, OperatorError> {
@@ -73,10 +68,6 @@ impl MadeUp {
 
     /// The bytes of the image. Where the runtime refuses the operator, so does it the
     /// image, for the same reason.
-    ///
-    /// # Panics
-    /// If sRGB were linear.
-    #[must_use]
     pub fn image(&self) -> Vec<u8> {
         let segment = segment_bytes(self.grid.cells(), &self.rows);
         let operator = (!self.rows.is_empty()).then(|| self.operator(&segment));
@@ -125,6 +116,17 @@ impl MadeUp {
             channel_scales: self.scales,
         }
     }
+}
+
+/// Entries of a row: so many pairs at random even places, so that none runs into the next,
+/// with random values.
+pub fn pairs(random: &mut Rng, cells: u16, count: usize) -> Vec<(u16, i16)> {
+    let mut places = BTreeSet::new();
+    while places.len() < count {
+        places.insert(2 * random.u16(..cells / 2));
+    }
+    let pair = |at: u16| [(at, random.i16(1..20)), (at + 1, -random.i16(1..20))];
+    places.into_iter().flat_map(pair).collect()
 }
 
 fn halfwords(values: impl IntoIterator<Item = u16>) -> Vec<u8> {

@@ -1,10 +1,10 @@
-//! A device's table slots over simulated flash: the runtime's own updater and gate,
-//! with nothing but memory around them.
+//! Table slots of a simulated device: the runtime's own updater and admission over
+//! simulated flash, with nothing but memory around them.
 
-use crate::fake_device::FakeDevice;
 use crate::flash_simulator::NorSimulator;
+use ed25519_dalek::SigningKey;
 use iltm_runtime::image::content;
-use iltm_runtime::link::{Device, Digest, Hello, PassThrough, Refusal, Request, Response, Status};
+use iltm_runtime::link::{Digest, PassThrough, Refusal, Request, Response};
 use iltm_runtime::store::{Map, Slot, TableSlots, Updater};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
 use sha2::{Digest as _, Sha512};
@@ -22,13 +22,11 @@ pub struct Layout {
 
 impl Layout {
     /// Sectors in all.
-    #[must_use]
     pub const fn sectors(self) -> usize {
         2 * self.slot + 3
     }
 
     /// Where a slot is.
-    #[must_use]
     pub const fn slot(self, slot: Slot) -> Range<usize> {
         let length = self.slot * self.sector;
         let start = slot.index() * length;
@@ -40,17 +38,12 @@ impl Layout {
     }
 
     /// Where the device's key is.
-    #[must_use]
     pub const fn identity(self) -> Range<usize> {
         let start = (2 * self.slot + 2) * self.sector;
         start..start + self.sector
     }
 
     /// As the store wants it.
-    ///
-    /// # Panics
-    /// If the flash is smaller.
-    #[must_use]
     pub fn map<const W: usize, const E: usize>(self, flash: &NorSimulator<W, E>) -> Map {
         let slots = Slot::ALL.map(|slot| {
             let range = self.slot(slot);
@@ -126,14 +119,12 @@ pub struct SimDevice<const W: usize, const E: usize> {
 
 impl<const W: usize, const E: usize> SimDevice<W, E> {
     /// One fresh from the factory.
-    #[must_use]
     pub fn new(slot: usize, seed: u64) -> Self {
         let layout = Layout { slot, sector: E };
         Self::start(NorSimulator::new(layout.sectors(), seed), layout)
     }
 
     /// One that finds this in its flash when it starts.
-    #[must_use]
     pub fn start(flash: NorSimulator<W, E>, layout: Layout) -> Self {
         let mut tables = SimTables {
             layout,
@@ -152,7 +143,6 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
     }
 
     /// The same after a loss of power.
-    #[must_use]
     pub fn restarted(self) -> Self {
         let mut flash = self.updater.into_flash();
         flash.power_on();
@@ -166,24 +156,26 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
 
     /// Time passes.
     pub fn wait(&mut self, milliseconds: u64) {
-        self.now_ms += milliseconds;
-        self.updater.poll(self.now_ms, &mut self.tables);
+        self.poll(self.now_ms + milliseconds);
+    }
+
+    /// It is so late now; trials end.
+    pub fn poll(&mut self, now_ms: u64) {
+        self.now_ms = now_ms;
+        self.updater.poll(now_ms, &mut self.tables);
     }
 
     /// The flash.
-    #[must_use]
     pub const fn flash(&self) -> &NorSimulator<W, E> {
         self.updater.flash()
     }
 
     /// Where its slots are.
-    #[must_use]
     pub const fn layout(&self) -> Layout {
         self.layout
     }
 
     /// Whether frames go through exactly this file.
-    #[must_use]
     pub fn runs(&self, file: &[u8]) -> bool {
         let Some(slot) = self.updater.in_use() else {
             return false;
@@ -205,7 +197,6 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
     }
 
     /// The steps of [`update`](Self::update) from what is in the flash now.
-    #[must_use]
     pub fn plan(&self, file: &[u8], confirm: bool) -> Vec<Step> {
         let target = self.updater.in_use().map_or(Slot::A, Slot::other);
         let held = &self.flash().contents()[self.layout.slot(target)];
@@ -266,26 +257,10 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
     }
 }
 
-/// Tables and slots are its own, the rest is made up.
-impl<const W: usize, const E: usize> Device for SimDevice<W, E> {
-    fn identity(&self) -> Hello {
-        Hello {
-            device: self.updater.trust().device,
-            ..FakeDevice::default().identity()
-        }
-    }
-
-    fn status(&self) -> Status {
-        Status {
-            table: self.updater.table(),
-            slots: self.updater.states(),
-            ..FakeDevice::default().status
-        }
-    }
-
-    fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
-        self.updater.answer(request, now_ms, &mut self.tables)
-    }
+/// A request to give a device its number, and the key whose tables it takes from then on.
+pub fn provision(key: &SigningKey, device: u64) -> Request<'static> {
+    let key = key.verifying_key().to_bytes();
+    Request::Provision { key, device }
 }
 
 /// Seconds of a trial.
@@ -309,7 +284,6 @@ pub enum Step {
 }
 
 /// What tells a file from others.
-#[must_use]
 pub fn digest(file: &[u8]) -> Digest {
     Digest::of(&Sha512::digest(file))
 }

@@ -1,4 +1,4 @@
-//! What the stages of the pipeline take: instructions a sample, and bytes of firmware.
+//! Pipeline stages: what they take, in instructions a sample and bytes of firmware.
 //!
 //! Counted on the reference board as in [`instructions`](crate::instructions), for
 //! tables that are made up and list more stages one after the other.
@@ -7,7 +7,7 @@
 
 use crate::firmware::{elf, elf_of, flash_bytes};
 use crate::instructions::bench;
-use crate::made_up::MadeUp;
+use crate::made_up::{MadeUp, pairs};
 use iltm::compile::image::StoredRow;
 use iltm::device::emulator::Board;
 use iltm_runtime::features::Stage;
@@ -20,19 +20,9 @@ pub const ENTRIES: usize = 8;
 /// A table that lists these stages, and no others, for frames of the grid's size.
 /// [`Stage::FullResolution`] is no section of it but gains finer than the cells, which
 /// it has not.
-#[must_use]
 pub fn table(grid: Grid, stages: &[Stage]) -> MadeUp {
-    let channels = if stages.contains(&Stage::Colour) {
-        3
-    } else {
-        1
-    };
-    let mut table = MadeUp::new(grid, channels);
-    // Just under one, so that natural frames are not clipped more than usual.
-    table.gains.fill(7_800);
-    if stages.contains(&Stage::Ambient) {
-        table.ambient = Some(vec![330; table.gains.len()]);
-    }
+    let channels = 1 + 2 * usize::from(stages.contains(&Stage::Colour));
+    let mut table = MadeUp::nearly_plain(grid, channels, stages.contains(&Stage::Ambient));
     table.response = stages.contains(&Stage::Response);
     if stages.contains(&Stage::Operator) {
         table.rows = rows(grid);
@@ -40,23 +30,16 @@ pub fn table(grid: Grid, stages: &[Stage]) -> MadeUp {
     table
 }
 
-/// Pairs at random even places, so that none runs into the next.
+/// Rows of pairs at random places.
 fn rows(grid: Grid) -> Vec<StoredRow> {
     let mut random = fastrand::Rng::with_seed(0x57A6);
     let cells = grid.cells() as u16;
-    let mut row = |index| {
-        let mut places = std::collections::BTreeSet::new();
-        while places.len() < ENTRIES / 2 {
-            places.insert(2 * random.u16(..cells / 2));
-        }
-        let pair = |at: u16| [(at, random.i16(1..20)), (at + 1, -random.i16(1..20))];
-        StoredRow {
-            index,
-            shift: 8,
-            entries: places.into_iter().flat_map(pair).collect(),
-        }
+    let row = |index| StoredRow {
+        index,
+        shift: 8,
+        entries: pairs(&mut random, cells, ENTRIES / 2),
     };
-    (0..cells).map(&mut row).collect()
+    (0..cells).map(row).collect()
 }
 
 /// What a frame takes, instructions a sample.
@@ -96,10 +79,6 @@ const TABLES: [(&str, &[Stage]); 7] = [
 ];
 
 /// Instructions of a frame at the top tier.
-///
-/// # Panics
-/// If the bench cannot be run.
-#[must_use]
 pub fn instructions(table: &MadeUp, size: FrameSize, firmware_stages: &str) -> u64 {
     let bench_elf = elf_of(Board::An500, firmware_stages, "bench");
     let lines = bench(&bench_elf, &table.image(), size, None);
@@ -108,10 +87,6 @@ pub fn instructions(table: &MadeUp, size: FrameSize, firmware_stages: &str) -> u
 }
 
 /// Counts the tables of the list.
-///
-/// # Panics
-/// If the bench cannot be run.
-#[must_use]
 pub fn costs() -> Vec<Cost> {
     let grid = Grid::new(64, 64).expect("a small grid");
     let larger = FrameSize::new(256, 256).expect("not empty");
@@ -132,7 +107,6 @@ pub fn costs() -> Vec<Cost> {
 }
 
 /// The list as `docs/stages.csv` holds it.
-#[must_use]
 pub fn csv(costs: &[Cost]) -> String {
     let mut text =
         String::from("stages,instructions a sample,a sample of a frame with 16 pixels a cell\n");
@@ -144,17 +118,12 @@ pub fn csv(costs: &[Cost]) -> String {
 }
 
 /// The features of a firmware with some of the stages, as its build takes them.
-#[must_use]
 pub fn features(stages: &[Stage]) -> String {
     let names: Vec<_> = stages.iter().map(|stage| stage.feature()).collect();
     names.join(",")
 }
 
 /// Bytes of flash of a product with these features, none of which is lean.
-///
-/// # Panics
-/// If it cannot be built.
-#[must_use]
 pub fn flash(features: &str) -> u64 {
     let all = features == self::features(&Stage::ALL);
     flash_bytes(&if all {
@@ -165,10 +134,6 @@ pub fn flash(features: &str) -> u64 {
 }
 
 /// The line of `docs/firmware-sizes.csv` for a product with some of the stages.
-///
-/// # Panics
-/// If it cannot be built.
-#[must_use]
 pub fn size_line(stages: &[Stage]) -> String {
     let features = features(stages);
     let bytes = flash(&features);
@@ -180,7 +145,6 @@ pub fn size_line(stages: &[Stage]) -> String {
 }
 
 /// All choices of stages, none first, all last.
-#[must_use]
 pub fn choices() -> Vec<Vec<Stage>> {
     let choice = |bits: usize| {
         let chosen = |place: &usize| bits >> place & 1 == 1;

@@ -1,6 +1,6 @@
 //! Active table of a device, for whoever wants to know after something went wrong.
 
-use super::status::table_name;
+use super::words::{in_use, table_name};
 use crate::device::{Client, DeviceError, Line};
 use iltm_runtime::link::{Refusal, TableName};
 use serde_json::{Value, json};
@@ -81,7 +81,7 @@ impl Active {
         };
         match slots {
             Ok(slots) => Self::Known {
-                table: super::slots::in_use(&slots),
+                table: in_use(&slots),
                 trial_ms: slots.trial_ms,
             },
             Err(_) => Self::Unknown,

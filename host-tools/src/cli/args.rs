@@ -5,11 +5,11 @@ use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
-use crate::scene::{Effect, Fault};
+use crate::scene::{Effect, InjectedFault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
-use std::ops::RangeInclusive;
+use std::ops::{Bound, RangeBounds, RangeInclusive};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -68,7 +68,8 @@ pub(super) enum Command {
     /// Make, show and install keys that tables are signed with
     Key(Key),
     /// Write a zip file for support: versions, status, logs, transcripts; never keys
-    Report(Report),
+    #[command(alias = "report")]
+    SupportBundle(SupportBundle),
     /// Write manual pages
     Man(Man),
     /// Print completions for a shell
@@ -114,7 +115,7 @@ pub(super) struct Simulate {
     /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
     /// larger than usual; may be repeated
     #[arg(long, value_name = "FAULT")]
-    pub(super) fault: Vec<Fault>,
+    pub(super) fault: Vec<InjectedFault>,
     /// Say which effects are simulated and why
     #[arg(long)]
     pub(super) explain: bool,
@@ -411,7 +412,7 @@ pub(super) struct Install {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Report {
+pub(super) struct SupportBundle {
     /// Zip file to write
     #[arg(short, long, value_name = "FILE.zip")]
     pub(super) output: PathBuf,
@@ -604,25 +605,25 @@ fn indices(text: &str) -> Result<RangeInclusive<u32>, String> {
         .ok_or_else(|| "numbers of slides are written like 7 or 7-12".to_owned())
 }
 
+/// A number in a range; `otherwise` says what is asked for.
+fn number(text: &str, range: impl RangeBounds<f64>, otherwise: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|number| range.contains(number));
+    number.ok_or_else(|| otherwise.to_owned())
+}
+
 fn share(text: &str) -> Result<f64, String> {
-    let share = text.parse::<f64>().ok();
-    share
-        .filter(|share| (0.0..1.0).contains(share))
-        .ok_or_else(|| "a share is a number from 0 to 1".to_owned())
+    number(text, 0.0..1.0, "a share is a number from 0 to 1")
 }
 
 fn milliseconds(text: &str) -> Result<Duration, String> {
-    let time = text.parse::<f64>().ok();
-    time.filter(|time| (0.001..=60_000.0).contains(time))
-        .map(|time| Duration::from_secs_f64(time / 1e3))
-        .ok_or_else(|| "a budget is a number of milliseconds from 0.001 to 60000".to_owned())
+    let otherwise = "a budget is a number of milliseconds from 0.001 to 60000";
+    number(text, 0.001..=60_000.0, otherwise).map(|time| Duration::from_secs_f64(time / 1e3))
 }
 
 fn error_bound(text: &str) -> Result<f64, String> {
-    let error = text.parse::<f64>().ok();
-    error
-        .filter(|error| *error > 0.0 && *error <= 1.0)
-        .ok_or_else(|| "an error is a number above 0, at most 1".to_owned())
+    let range = (Bound::Excluded(0.0), Bound::Included(1.0));
+    number(text, range, "an error is a number above 0, at most 1")
 }
 
 fn frame_size(text: &str) -> Result<FrameSize, String> {
@@ -635,7 +636,5 @@ fn frame_size(text: &str) -> Result<FrameSize, String> {
 
 #[cfg(unix)]
 fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse::<f64>().ok();
-    rate.filter(|rate| (0.1..=1_000.0).contains(rate))
-        .ok_or_else(|| "a rate is a number from 0.1 to 1000".to_owned())
+    number(text, 0.1..=1_000.0, "a rate is a number from 0.1 to 1000")
 }

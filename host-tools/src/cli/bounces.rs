@@ -4,13 +4,12 @@ use super::args::Bounces;
 use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::progress::progress;
-use super::simulate::unwritten;
-use crate::bounces::{
-    self, BouncesError, BouncesOptions, Layer, LayerKind, Written, percent, times,
-};
+use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, WrittenBounces};
 use crate::capture::CaptureOptions;
-use crate::learn::LearnError;
-use iltm_picture::check_free;
+use iltm_picture::{
+    check_free,
+    numbers::{number, percent},
+};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::time::Instant;
@@ -18,7 +17,7 @@ use std::time::Instant;
 pub(super) fn run(arguments: &Bounces, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
     // A folder that is in the way is known before the work, not after it.
-    check_free(&arguments.output).map_err(unwritten)?;
+    check_free(&arguments.output)?;
     let options = BouncesOptions {
         photograph: arguments.photo,
         capture: CaptureOptions {
@@ -31,7 +30,7 @@ pub(super) fn run(arguments: &Bounces, output: &Output) -> Result<(), Failure> {
     let found = bounces::bounces(&arguments.capture, &options, bars.as_ref());
     bars.end();
     let found = found.map_err(failed)?;
-    let written = bounces::write(&found, &arguments.output).map_err(unwritten)?;
+    let written = bounces::write(&found, &arguments.output)?;
     let seconds = start.elapsed().as_secs_f64();
     let folder = arguments.output.display().to_string();
     let mut data = data(&found, &written);
@@ -53,9 +52,9 @@ pub(super) fn run(arguments: &Bounces, output: &Output) -> Result<(), Failure> {
 
 fn failed(error: BouncesError) -> Failure {
     match error {
-        BouncesError::Capture(error) => LearnError::from(error).into(),
-        BouncesError::Solve(error) => LearnError::from(error).into(),
-        BouncesError::Folder(error) => unwritten(error),
+        BouncesError::Capture(error) => error.into(),
+        BouncesError::Solve(error) => error.into(),
+        BouncesError::Folder(error) => error.into(),
         BouncesError::Changed { .. } => Failure::new(
             Kind::Photographs,
             error,
@@ -69,7 +68,7 @@ fn failed(error: BouncesError) -> Failure {
     }
 }
 
-fn data(found: &bounces::Bounces, written: &Written) -> Value {
+fn data(found: &bounces::Bounces, written: &WrittenBounces) -> Value {
     let separated = &found.separated;
     let layer = |layer: &Layer| {
         json!({
@@ -146,7 +145,7 @@ fn text(found: &bounces::Bounces) -> String {
             percent(layer.light_share),
             percent(layer.energy_share),
             layer.brightest,
-            times(layer.rms / found.noise.cell),
+            number(layer.rms / found.noise.cell),
             meaning(layer.kind),
         );
     }

@@ -2,14 +2,13 @@
 
 use super::args::Check;
 use super::failure::{Failure, Kind};
-use super::output::{Output, cannot_write, write_file};
+use super::output::{Output, make_folder, write_file};
 use super::progress::progress;
+use super::summary::gates;
 use crate::capture::{self, CaptureOptions, Examined, Gate, Verdict};
-use crate::learn::LearnError;
 use crate::report;
 use serde_json::{Value, json};
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 
 /// The page's name in the folder that `-o` gives.
@@ -26,10 +25,10 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let bars = progress(output);
     let examined = capture::examine(&arguments.capture, &options, bars.as_ref());
     bars.end();
-    let examined = examined.map_err(LearnError::Capture)?;
+    let examined = examined?;
     let failed = failed(&examined.gates);
     let page = arguments.output.as_deref().map(|folder| {
-        fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+        make_folder(folder)?;
         let page = folder.join(PAGE_FILE);
         let html = report::gates::page(&name(&arguments.capture), &examined.gates);
         write_file(&page, html.as_bytes()).map(|()| page)
@@ -51,9 +50,8 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         return Ok(());
     }
     output.people(&text);
-    let mut failure = refusal(&arguments.capture.display().to_string(), &failed);
-    failure.data = Some(Box::new(data));
-    Err(failure)
+    let failure = refusal(&arguments.capture.display().to_string(), &failed);
+    Err(failure.with_result(data))
 }
 
 /// The capture's name for people.
@@ -89,22 +87,6 @@ fn cells(examined: &Examined) -> Value {
             "live": m.live.iter().filter(|live| **live).count(),
         })
     })
-}
-
-/// The gates for programs.
-pub(super) fn gates(gates: &[Gate]) -> Vec<Value> {
-    let gate = |gate: &Gate| {
-        json!({
-            "name": gate.name.name(),
-            "verdict": gate.verdict.name(),
-            "number": gate.number,
-            "limit": gate.limit,
-            "unit": gate.unit,
-            "what": gate.what,
-            "next_step": gate.next_step,
-        })
-    };
-    gates.iter().map(gate).collect()
 }
 
 /// The gates for people, one or two lines each.

@@ -1,20 +1,18 @@
 //! `iltm compare`
 
 use super::args::Compare;
-use super::failure::{Failure, Kind};
-use super::output::{Output, cannot_write, write_file};
+use super::failure::{Failure, Kind, cannot_write};
+use super::output::{Output, make_folder, write_file};
 use super::progress::progress;
-use crate::compare::contest::{self, Row};
-use crate::compare::light::{Light, LightError};
-use crate::compare::page::Contest;
+use crate::compare::benchmark::{self, BenchmarkRow};
+use crate::compare::benchmark_scene::{BenchmarkScene, BenchmarkSceneError};
+use crate::compare::page::BenchmarkPage;
 use crate::compare::paper::{self, Condition, File};
 use crate::compare::{Meter, table};
 use crate::demo;
-use crate::learn::LearnError;
 use iltm_picture::progress::Progress;
 use serde_json::{Value, json};
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
@@ -26,7 +24,7 @@ pub(super) fn run(
     let start = Instant::now();
     // A folder that cannot be made is known before the work, not after it.
     let folder = &arguments.output;
-    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    make_folder(folder)?;
     let bars = progress(output);
     let compared = match &arguments.light {
         Some(light) => of_light(light, arguments, meter, bars.as_ref()),
@@ -70,19 +68,19 @@ fn of_light(
     progress: &dyn Progress,
 ) -> Result<Compared, Failure> {
     let light = if path.is_dir() {
-        Light::of_capture(path, arguments.seed, progress)
+        BenchmarkScene::of_capture(path, arguments.seed, progress)
     } else {
-        Light::of_scene(path, arguments.seed, progress)
+        BenchmarkScene::of_scene(path, arguments.seed, progress)
     };
     let light = light.map_err(dark)?;
-    let (photographed, inverted) = contest::every(
+    let (photographed, inverted) = benchmark::every(
         (&light.truth, &light.rig),
         arguments.photos,
         arguments.seed,
         meter,
         progress,
     );
-    let contest = Contest {
+    let contest = BenchmarkPage {
         name: &path.display().to_string(),
         light: &light,
         photographed: &photographed,
@@ -93,14 +91,8 @@ fn of_light(
         ("invert", inverted.as_slice()),
     ];
     let files = vec![
-        File {
-            name: "index.html".to_owned(),
-            bytes: contest.html().into_bytes(),
-        },
-        File {
-            name: "compare.csv".to_owned(),
-            bytes: table::csv(&groups).into_bytes(),
-        },
+        File::new("index.html", contest.html()),
+        File::new("compare.csv", table::csv(&groups)),
     ];
     let truth = &light.truth;
     let text = format!(
@@ -137,13 +129,13 @@ fn of_paper(
         if let Some((truth, rig)) = condition.world(arguments.seed) {
             let light = (&truth, &rig);
             let (photographed, inverted) =
-                contest::every(light, arguments.photos, arguments.seed, meter, progress);
+                benchmark::every(light, arguments.photos, arguments.seed, meter, progress);
             contests.push((condition.name(), photographed, inverted));
         }
     }
     let room = tempfile::tempdir().map_err(|error| cannot_write(&std::env::temp_dir(), &error))?;
     let sample = room.path().join("m-panels-colour");
-    demo::sample::write(&sample).map_err(super::demo::failed)?;
+    demo::sample::write(&sample)?;
     let mut files = paper::files(&contests, &sample, progress).map_err(|error| {
         Failure::new(
             Kind::Write,
@@ -151,7 +143,7 @@ fn of_paper(
             "Please report this: it needs nothing from outside.",
         )
     })?;
-    let groups: Vec<(&str, &[Row])> = contests
+    let groups: Vec<(&str, &[BenchmarkRow])> = contests
         .iter()
         .flat_map(|(name, photographed, inverted)| {
             [
@@ -160,10 +152,7 @@ fn of_paper(
             ]
         })
         .collect();
-    files.push(File {
-        name: "methods.csv".to_owned(),
-        bytes: table::csv(&groups).into_bytes(),
-    });
+    files.push(File::new("methods.csv", table::csv(&groups)));
     Ok(Compared {
         files,
         text: String::new(),
@@ -171,11 +160,11 @@ fn of_paper(
     })
 }
 
-fn row(row: &Row) -> Value {
+fn row(row: &BenchmarkRow) -> Value {
     let done = row.result.as_ref().ok();
     json!({
-        "method": row.name,
-        "source": row.source.to_string(),
+        "method": row.method.name,
+        "source": row.method.source.to_string(),
         "photographs": done.map(|done| done.photographs),
         "seconds": done.map(|done| done.seconds),
         "bytes": done.and_then(|done| done.memory),
@@ -189,24 +178,24 @@ fn row(row: &Row) -> Value {
 }
 
 /// Why there is nothing to compare on.
-fn dark(error: LightError) -> Failure {
+fn dark(error: BenchmarkSceneError) -> Failure {
     match error {
-        LightError::Capture(error) => LearnError::Capture(error).into(),
-        LightError::Solve(error) => LearnError::Solve(error).into(),
-        LightError::Reference(error) => {
+        BenchmarkSceneError::Capture(error) => error.into(),
+        BenchmarkSceneError::Solve(error) => error.into(),
+        BenchmarkSceneError::Reference(error) => {
             let next_step = error.next_step();
             Failure::new(Kind::Capture, error, next_step)
         }
-        LightError::Scene(error) => super::simulate::unreadable(&error),
-        LightError::Simulation(error) => super::simulate::unsimulated(&error),
-        LightError::Folder(error) => super::simulate::untaken(error),
-        LightError::Room(error) => cannot_write(&std::env::temp_dir(), &error),
-        LightError::TooLarge { .. } => Failure::new(
+        BenchmarkSceneError::Scene(error) => error.into(),
+        BenchmarkSceneError::Simulation(error) => error.into(),
+        BenchmarkSceneError::Folder(error) => error.into(),
+        BenchmarkSceneError::Room(error) => cannot_write(&std::env::temp_dir(), &error),
+        BenchmarkSceneError::TooLarge { .. } => Failure::new(
             Kind::Usage,
             error,
             "Compare on a coarser grid of the same scene.",
         ),
-        LightError::Singular => Failure::new(
+        BenchmarkSceneError::Singular => Failure::new(
             Kind::Solve,
             error,
             "Look at `iltm solve`: it says which cells cannot be solved for.",

@@ -1,15 +1,14 @@
 //! `iltm compensate`
 
 use super::args::Compensate;
-use super::failure::{Failure, Kind};
-use super::inspect::check;
-use super::output::{Output, cannot_read, read_file};
+use super::failure::{Failure, Kind, cannot_read};
+use super::output::{Output, read_file};
 use super::progress::progress;
+use super::tables::check;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
 use crate::video::watch::FileWatch;
-use crate::video::y4m::Y4mError;
 use crate::video::{CompensateOptions, Compensator, FrameTotals, VideoError};
-use iltm_picture::{WholeFile, png::PngError};
+use iltm_picture::WholeFile;
 use iltm_runtime::pipeline::Encoding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -35,7 +34,7 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     };
     let table = check(path, &image)?;
     let settings = settings(arguments);
-    let compensator = Compensator::new(&table, settings).map_err(|error| failed(&error))?;
+    let compensator = Compensator::new(&table, settings)?;
     let input = opened(&arguments.input)?;
     let bars = progress(output);
     let start = Instant::now();
@@ -87,12 +86,11 @@ fn written<T>(
     write: impl FnOnce(&mut (dyn Write + Send)) -> Result<T, VideoError>,
 ) -> Result<T, Failure> {
     if is_pipe(path) {
-        return write(&mut io::stdout()).map_err(|error| failed(&error));
+        return Ok(write(&mut io::stdout())?);
     }
-    let unwritten = |error| of_kind(Kind::Write, &VideoError::from(error));
-    let mut whole = WholeFile::create(path).map_err(unwritten)?;
-    let done = write(whole.file()).map_err(|error| failed(&error))?;
-    whole.finish().map_err(unwritten)?;
+    let mut whole = WholeFile::create(path).map_err(VideoError::from)?;
+    let done = write(whole.file())?;
+    whole.finish().map_err(VideoError::from)?;
     Ok(done)
 }
 
@@ -197,26 +195,4 @@ fn tiers(summary: &LiveSummary) -> Value {
     tiers
         .map(|(tier, frames)| json!({ "tier": tier, "frames": frames }))
         .collect()
-}
-
-/// What a failure while frames flow is counted as.
-pub(super) fn failed(error: &VideoError) -> Failure {
-    let kind = match error {
-        VideoError::NoSuchTier { .. } | VideoError::Threads { .. } | VideoError::Still => {
-            Kind::Usage
-        }
-        VideoError::Table(_) => Kind::Table,
-        VideoError::File { .. }
-        | VideoError::Y4m(Y4mError::Write { .. })
-        | VideoError::Png(PngError::Write { .. }) => Kind::Write,
-        VideoError::Read { .. }
-        | VideoError::Y4m(Y4mError::Read { .. })
-        | VideoError::Png(PngError::Read { .. }) => Kind::Read,
-        _ => Kind::Frames,
-    };
-    of_kind(kind, error)
-}
-
-fn of_kind(kind: Kind, error: &VideoError) -> Failure {
-    Failure::new(kind, error, error.next_step())
 }

@@ -1,8 +1,10 @@
 //! Connection to the device that is meant: its port is found and it is greeted.
 
+use super::active::Active;
 use super::args::SerialLine;
 use super::failure::{Failure, Kind};
 use super::output::Output;
+use super::words;
 use crate::device::discovery::{self, FoundDevice};
 use crate::device::port_scan::{ListedPort, PortScan};
 use crate::device::transcript::Transcribed;
@@ -131,6 +133,12 @@ impl Connection {
     pub(super) fn failed(&self, error: &DeviceError) -> Failure {
         Failure::of_device(&self.port, error)
     }
+
+    /// The same, with the table that is in use now, if it can be asked.
+    pub(super) fn failed_with_table(&mut self, error: &DeviceError) -> Failure {
+        let active = Active::ask(&mut self.client);
+        self.failed(error).with(active)
+    }
 }
 
 fn nobody(silent: &[(ListedPort, DeviceError)], unasked: &[ListedPort]) -> Failure {
@@ -184,7 +192,7 @@ fn choose(mut found: Vec<FoundDevice>, output: &Output) -> Result<FoundDevice, F
             "  {number}  {}  {} {}, firmware {}",
             device.port.path,
             device.device.board,
-            super::status::number(device.device.device),
+            words::number(device.device.device),
             device.device.firmware
         );
     }

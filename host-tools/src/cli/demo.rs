@@ -1,15 +1,13 @@
 //! `iltm demo`
 
 use super::args::Demo;
-use super::compensate;
-use super::failure::{Failure, Kind};
-use super::output::{Output, cannot_write};
+use super::failure::Failure;
+use super::output::Output;
 use super::progress::progress;
-use super::solve::summary;
-use crate::demo::{self, DemoError, Outcome};
+use super::summary;
+use crate::demo::{self, Outcome};
 use serde_json::{Value, json};
 use std::fmt::Write;
-use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Instant;
 
@@ -18,32 +16,10 @@ pub(super) fn run(arguments: &Demo, output: &Output) -> Result<(), Failure> {
     let bars = progress(output);
     let outcome = demo::run(&arguments.out, bars.as_ref());
     bars.end();
-    let outcome = outcome.map_err(failed)?;
+    let outcome = outcome?;
     let seconds = start.elapsed().as_secs_f64();
     output.result(&data(&outcome, seconds), &text(&outcome, seconds));
     Ok(())
-}
-
-pub(super) fn failed(error: DemoError) -> Failure {
-    match error {
-        DemoError::Folder { ref source, .. } => {
-            let next_step = match source.kind() {
-                ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
-                    "a file is in its place: move it away, or choose another folder with --out"
-                }
-                _ => "choose a folder that you may write to with --out",
-            };
-            Failure::new(Kind::Write, error, next_step)
-        }
-        DemoError::Write(error) => cannot_write(&error.path, &error.source),
-        DemoError::Learn(error) => error.into(),
-        DemoError::Video(error) => compensate::failed(&error),
-        DemoError::Report(error) => Failure::new(
-            Kind::Frames,
-            error,
-            "please report this: the demo brings all that it needs",
-        ),
-    }
 }
 
 fn shown(path: &Path) -> String {
@@ -67,7 +43,7 @@ fn data(outcome: &Outcome, seconds: f64) -> Value {
         .seconds
         .iter()
         .map(|(step, seconds)| json!({ "step": step, "seconds": seconds }));
-    let mut data = summary(&outcome.learned);
+    let mut data = summary::summary(&outcome.built);
     data["capture"] = json!(shown(&paths.capture));
     data["table"] = json!(shown(&paths.table));
     data["video"] = json!(shown(&paths.video));
@@ -85,7 +61,7 @@ fn data(outcome: &Outcome, seconds: f64) -> Value {
 
 fn text(outcome: &Outcome, seconds: f64) -> String {
     let paths = &outcome.paths;
-    let mut text = super::solve::text(&outcome.learned);
+    let mut text = summary::text(&outcome.built);
     let listed = [
         ("photographs", &paths.capture),
         ("table", &paths.table),

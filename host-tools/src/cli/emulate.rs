@@ -1,11 +1,10 @@
 //! `iltm emulate`
 
 use super::args::Emulate;
-use super::compensate;
-use super::failure::{Failure, Kind};
-use super::inspect::check;
+use super::failure::{Failure, Kind, cannot_read, cannot_write};
 use super::interrupt;
-use super::output::{Output, cannot_read, cannot_write, read_file};
+use super::output::{Output, read_file};
+use super::tables::check;
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameSource;
@@ -135,7 +134,7 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameSource,
         let frames = FrameSource::file(path, channels, arguments.fps);
         return frames.map_err(|error| match error {
             VideoError::File { path, source } => cannot_read(&path, &source),
-            error => compensate::failed(&error),
+            error => error.into(),
         });
     }
     let size = arguments.size.unwrap_or_else(|| scene_size(table));
@@ -250,9 +249,7 @@ fn play(
     let mut due = Instant::now();
     while !interrupt::stopped() {
         emulator.check().map_err(|error| emulator_failure(&error))?;
-        let frame = frames
-            .next_frame()
-            .map_err(|error| compensate::failed(&error))?;
+        let frame = frames.next_frame()?;
         wait_until(due);
         // After a pause, go on from now rather than make up for it in a burst.
         due = (due + period).max(Instant::now());

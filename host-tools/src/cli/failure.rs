@@ -1,87 +1,102 @@
 //! Failures of a command: words for people, an exit code for scripts.
 
 use super::active::Active;
-use super::check;
+use super::summary::gates;
+use crate::build_table::BuildError;
 use crate::capture::CaptureError;
 use crate::compile::CompileError;
 use crate::compile::sign::KeyError;
+use crate::demo::DemoError;
 use crate::device::DeviceError;
+use crate::device::logs::LogsError;
 use crate::device::upload::UploadError;
-use crate::learn::LearnError;
-use crate::session::SessionError;
+use crate::scene::SimulationError;
+use crate::scene::description::{SceneError, SceneProblem};
+use crate::scene::folder::CaptureFolderError;
+use crate::session::{PatternsError, SessionError};
+use crate::solve::SolveError;
 use crate::user::ConfigError;
+use crate::verify::VerifyError;
+use crate::video::VideoError;
+use crate::video::y4m::Y4mError;
+use iltm_picture::{FolderError, png::PngError};
 use iltm_runtime::{link::Refusal, trust::Rejected};
 use miette::Diagnostic;
 use serde_json::{Value, json};
 use std::fmt::{self, Write};
+use std::io;
+use std::path::Path;
+use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
 
-/// Causes of failure, each with an exit code of its own. The codes are a contract.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// Causes of failure, each with an exit code of its own, its name in kebab case, and what
+/// it means. The codes are a contract; `docs/errors.md` and `--help` are made from them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, EnumIter, EnumMessage, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub(super) enum Kind {
-    /// The command line cannot be understood.
+    #[strum(message = "the command line cannot be understood")]
     Usage = 2,
-    /// A file is not there or cannot be read.
+    #[strum(message = "a file is not there or cannot be read")]
     Read = 3,
-    /// A capture folder is not well-formed.
+    #[strum(message = "a capture folder is not well-formed")]
     Capture = 4,
-    /// Photographs are well-formed but show that something went wrong.
+    #[strum(message = "photographs show that something went wrong")]
     Photographs = 5,
-    /// No usable inverse was found.
+    #[strum(message = "no usable inverse was found")]
     Solve = 6,
-    /// Bytes are not a table, or one that is damaged.
+    #[strum(message = "a table is damaged, or not a table")]
     Table = 7,
-    /// A picture or video cannot be used.
+    #[strum(message = "a picture or video cannot be used")]
     Frames = 8,
-    /// The result cannot be written.
+    #[strum(message = "the result cannot be written")]
     Write = 9,
-    /// A serial port cannot be opened.
+    #[strum(message = "a serial port cannot be opened")]
     Port = 10,
-    /// A device does not answer.
+    #[strum(message = "a device does not answer")]
     NoAnswer = 11,
-    /// A device answers and cannot do what was asked.
+    #[strum(message = "a device cannot do what it was asked")]
     Device = 12,
-    /// The emulated board cannot be started.
+    #[strum(message = "the emulated board cannot be started")]
     Emulator = 13,
-    /// No device answers at any port.
+    #[strum(message = "no device answers at any port")]
     NoDevice = 14,
-    /// Several devices answer, and none was chosen.
+    #[strum(message = "several devices answer, and none was chosen")]
     SeveralDevices = 15,
-    /// The user's settings cannot be read or kept.
+    #[strum(message = "the user's settings cannot be read or kept")]
     Settings = 16,
-    /// A key cannot be read or made.
+    #[strum(message = "a key cannot be read or made")]
     Key = 17,
-    /// A table did not arrive whole.
+    #[strum(message = "a table did not arrive whole")]
     Transfer = 18,
-    /// A device's flash does not hold what is written to it.
+    #[strum(message = "a device's flash does not hold what is written to it")]
     Flash = 19,
-    /// A table is larger than the device has room for.
+    #[strum(message = "a table is larger than the device has room for")]
     TooLarge = 20,
-    /// A table is not signed, and the device wants that.
+    #[strum(message = "a table is not signed, and the device wants that")]
     Unsigned = 21,
-    /// A table is signed with another key than the device's.
+    #[strum(message = "a table is signed with another key than the device's")]
     WrongKey = 22,
-    /// A table's signature is false.
+    #[strum(message = "a table's signature is false")]
     Signature = 23,
-    /// A table is older than the device takes.
-    Older = 24,
-    /// A table is for another device.
+    #[strum(message = "a table is older than the device takes")]
+    OlderVersion = 24,
+    #[strum(message = "a table is for another device")]
     OtherDevice = 25,
-    /// Another table is on trial.
+    #[strum(message = "another table is on trial")]
     OnTrial = 26,
-    /// There is no table to confirm or to go back to.
+    #[strum(message = "there is no table to confirm or to go back to")]
     NoTable = 27,
-    /// A device has another key or number already.
+    #[strum(message = "a device has another key or number already")]
     HasKey = 28,
-    /// Stopped by the user before the end.
+    #[strum(message = "stopped by the user before the end")]
     Interrupted = 29,
-    /// A scene cannot be simulated as it is described.
+    #[strum(message = "a scene cannot be simulated as it is described")]
     Scene = 30,
-    /// A table does not keep its promise on the wall.
+    #[strum(message = "a table does not keep its promise on the wall")]
     Verdict = 31,
-    /// A camera gives no photograph, or none that can be used.
+    #[strum(message = "a camera gives no photograph that can be used")]
     Camera = 32,
-    /// Slides cannot be shown.
+    #[strum(message = "slides cannot be shown")]
     Display = 33,
 }
 
@@ -91,7 +106,7 @@ impl From<&Rejected> for Kind {
             Rejected::Unsigned => Self::Unsigned,
             Rejected::WrongKey => Self::WrongKey,
             Rejected::Signature => Self::Signature,
-            Rejected::Older { .. } => Self::Older,
+            Rejected::Older { .. } => Self::OlderVersion,
             Rejected::OtherDevice { .. } => Self::OtherDevice,
             Rejected::NotBuilt { .. } => Self::Device,
             Rejected::NotATable
@@ -141,137 +156,28 @@ impl From<&UploadError> for Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str, &'static str); 32] = [
-        (
-            Self::Usage,
-            "usage",
-            "the command line cannot be understood",
-        ),
-        (Self::Read, "read", "a file is not there or cannot be read"),
-        (
-            Self::Capture,
-            "capture",
-            "a capture folder is not well-formed",
-        ),
-        (
-            Self::Photographs,
-            "photographs",
-            "photographs show that something went wrong",
-        ),
-        (Self::Solve, "solve", "no usable inverse was found"),
-        (Self::Table, "table", "a table is damaged, or not a table"),
-        (Self::Frames, "frames", "a picture or video cannot be used"),
-        (Self::Write, "write", "the result cannot be written"),
-        (Self::Port, "port", "a serial port cannot be opened"),
-        (Self::NoAnswer, "no-answer", "a device does not answer"),
-        (
-            Self::Device,
-            "device",
-            "a device cannot do what it was asked",
-        ),
-        (
-            Self::Emulator,
-            "emulator",
-            "the emulated board cannot be started",
-        ),
-        (Self::NoDevice, "no-device", "no device answers at any port"),
-        (
-            Self::SeveralDevices,
-            "several-devices",
-            "several devices answer, and none was chosen",
-        ),
-        (
-            Self::Settings,
-            "settings",
-            "the user's settings cannot be read or kept",
-        ),
-        (Self::Key, "key", "a key cannot be read or made"),
-        (Self::Transfer, "transfer", "a table did not arrive whole"),
-        (
-            Self::Flash,
-            "flash",
-            "a device's flash does not hold what is written to it",
-        ),
-        (
-            Self::TooLarge,
-            "too-large",
-            "a table is larger than the device has room for",
-        ),
-        (
-            Self::Unsigned,
-            "unsigned",
-            "a table is not signed, and the device wants that",
-        ),
-        (
-            Self::WrongKey,
-            "wrong-key",
-            "a table is signed with another key than the device's",
-        ),
-        (Self::Signature, "signature", "a table's signature is false"),
-        (
-            Self::Older,
-            "older-version",
-            "a table is older than the device takes",
-        ),
-        (
-            Self::OtherDevice,
-            "other-device",
-            "a table is for another device",
-        ),
-        (Self::OnTrial, "on-trial", "another table is on trial"),
-        (
-            Self::NoTable,
-            "no-table",
-            "there is no table to confirm or to go back to",
-        ),
-        (
-            Self::HasKey,
-            "has-key",
-            "a device has another key or number already",
-        ),
-        (
-            Self::Interrupted,
-            "interrupted",
-            "stopped by the user before the end",
-        ),
-        (
-            Self::Scene,
-            "scene",
-            "a scene cannot be simulated as it is described",
-        ),
-        (
-            Self::Verdict,
-            "verdict",
-            "a table does not keep its promise on the wall",
-        ),
-        (
-            Self::Camera,
-            "camera",
-            "a camera gives no photograph that can be used",
-        ),
-        (Self::Display, "display", "slides cannot be shown"),
-    ];
-
     pub(super) const fn code(self) -> u8 {
         self as u8
     }
 
-    /// Every code with its name and its meaning.
-    pub(super) fn codes() -> Vec<(u8, &'static str, &'static str)> {
-        let code = |(kind, name, meaning): (Self, _, _)| (kind.code(), name, meaning);
-        Self::ALL.map(code).into()
+    pub(super) fn name(self) -> &'static str {
+        self.into()
     }
 
-    pub(super) fn name(self) -> &'static str {
-        let named = Self::ALL.iter().find(|(kind, ..)| *kind == self);
-        named.map_or("unknown", |(_, name, _)| name)
+    /// Every code with its name and its meaning.
+    pub(super) fn codes() -> Vec<(u8, &'static str, &'static str)> {
+        let code = |kind: Self| {
+            let meaning = kind.get_message().unwrap_or_default();
+            (kind.code(), kind.name(), meaning)
+        };
+        Self::iter().map(code).collect()
     }
 
     /// The list that `--help` ends with.
     pub(super) fn table() -> String {
         let mut text = String::from("Exit codes:\n   0  done");
-        for (kind, _, meaning) in Self::ALL {
-            let _ = write!(text, "\n  {:>2}  {meaning}", kind.code());
+        for (code, _, meaning) in Self::codes() {
+            let _ = write!(text, "\n  {code:>2}  {meaning}");
         }
         text
     }
@@ -323,9 +229,7 @@ impl Failure {
             None => self.next_step.clone(),
         }
     }
-}
 
-impl Failure {
     /// Of the device at a port.
     pub(super) fn of_device(port: &str, error: &DeviceError) -> Self {
         let kind = error.into();
@@ -351,24 +255,13 @@ impl Diagnostic for Failure {
     }
 }
 
-impl From<LearnError> for Failure {
-    fn from(error: LearnError) -> Self {
+impl From<BuildError> for Failure {
+    fn from(error: BuildError) -> Self {
         match error {
-            LearnError::Capture(error) => {
-                let mut failure = Self::new(kind_of(&error), &error, error.next_step());
-                if let CaptureError::Refused { gates, .. } = &error {
-                    failure.data = Some(Box::new(json!({ "gates": check::gates(gates) })));
-                }
-                failure
-            }
-            LearnError::Solve(error) => {
-                // The message of a solve error ends with what to do.
-                let message = error.to_string();
-                let (what, next_step) = message.rsplit_once("; ").unwrap_or((&message, ""));
-                Self::new(Kind::Solve, what, format!("{}.", capitalised(next_step)))
-            }
-            LearnError::Compile(error) => compile_failure(&error),
-            LearnError::Worse { .. } => Self::new(
+            BuildError::Capture(error) => error.into(),
+            BuildError::Solve(error) => error.into(),
+            BuildError::Compile(error) => error.into(),
+            BuildError::Worse { .. } => Self::new(
                 Kind::Solve,
                 error,
                 "Project as it is: an even, flat scene needs no table. If it is neither, take more \
@@ -378,10 +271,77 @@ impl From<LearnError> for Failure {
     }
 }
 
+impl From<CaptureError> for Failure {
+    /// Whether a capture cannot be read, is not well-formed, or shows bad light.
+    fn from(error: CaptureError) -> Self {
+        let kind = match &error {
+            CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
+            CaptureError::MorePhotographsThanTaken { .. }
+            | CaptureError::UnknownIndex { .. }
+            | CaptureError::BlackIndex { .. } => Kind::Usage,
+            CaptureError::TooFewPhotographs { .. }
+            | CaptureError::NoLight { .. }
+            | CaptureError::Refused { .. }
+            | CaptureError::ResponseUnknown { .. } => Kind::Photographs,
+            _ => Kind::Capture,
+        };
+        let failure = Self::new(kind, &error, error.next_step());
+        match &error {
+            CaptureError::Refused { gates: found, .. } => {
+                failure.with_result(json!({ "gates": gates(found) }))
+            }
+            _ => failure,
+        }
+    }
+}
+
+impl From<SolveError> for Failure {
+    fn from(error: SolveError) -> Self {
+        // The message of a solve error ends with what to do.
+        let message = error.to_string();
+        let (what, next_step) = message.rsplit_once("; ").unwrap_or((&message, ""));
+        Self::new(Kind::Solve, what, format!("{}.", capitalised(next_step)))
+    }
+}
+
+impl From<CompileError> for Failure {
+    fn from(error: CompileError) -> Self {
+        let kind = match error {
+            CompileError::ReferenceWhite { .. } => Kind::Usage,
+            _ => Kind::Solve,
+        };
+        Self::new(kind, &error, error.next_step())
+    }
+}
+
+impl From<DemoError> for Failure {
+    fn from(error: DemoError) -> Self {
+        match error {
+            DemoError::Folder { ref source, .. } => {
+                let next_step = match source.kind() {
+                    io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => {
+                        "a file is in its place: move it away, or choose another folder with --out"
+                    }
+                    _ => "choose a folder that you may write to with --out",
+                };
+                Self::new(Kind::Write, error, next_step)
+            }
+            DemoError::Write(error) => cannot_write(&error.path, &error.source),
+            DemoError::Build(error) => error.into(),
+            DemoError::Video(error) => error.into(),
+            DemoError::Report(error) => Self::new(
+                Kind::Frames,
+                error,
+                "please report this: the demo brings all that it needs",
+            ),
+        }
+    }
+}
+
 impl From<SessionError> for Failure {
     fn from(error: SessionError) -> Self {
-        let kind = match &error {
-            SessionError::Capture(error) => kind_of(error),
+        let kind = match error {
+            SessionError::Capture(error) => return error.into(),
             SessionError::IndexTwice { .. } => Kind::Capture,
             SessionError::NoIndex { .. } => Kind::Usage,
             SessionError::NoSlide { .. } => Kind::Read,
@@ -393,6 +353,99 @@ impl From<SessionError> for Failure {
             SessionError::Stopped => Kind::Interrupted,
         };
         Self::new(kind, &error, error.next_step())
+    }
+}
+
+impl From<PatternsError> for Failure {
+    fn from(error: PatternsError) -> Self {
+        match error {
+            PatternsError::Folder(error) => error.into(),
+            error => Self::new(Kind::Usage, &error, error.next_step()),
+        }
+    }
+}
+
+impl From<VerifyError> for Failure {
+    fn from(error: VerifyError) -> Self {
+        let kind = match error {
+            VerifyError::Folder(error) => return error.into(),
+            VerifyError::Video(error) => return error.into(),
+            VerifyError::Capture(error) => return error.into(),
+            VerifyError::Slides(_) => Kind::Usage,
+            VerifyError::NoManifest { .. } => Kind::Read,
+            VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,
+            VerifyError::OtherTable { .. } | VerifyError::Grid { .. } => Kind::Verdict,
+            VerifyError::Missing { .. }
+            | VerifyError::Unpaired { .. }
+            | VerifyError::NoImages { .. }
+            | VerifyError::Picture { .. }
+            | VerifyError::Channels { .. } => Kind::Capture,
+        };
+        Self::new(kind, &error, error.next_step())
+    }
+}
+
+impl From<VideoError> for Failure {
+    fn from(error: VideoError) -> Self {
+        let kind = match &error {
+            VideoError::NoSuchTier { .. } | VideoError::Threads { .. } | VideoError::Still => {
+                Kind::Usage
+            }
+            VideoError::Table(_) => Kind::Table,
+            VideoError::File { .. }
+            | VideoError::Y4m(Y4mError::Write { .. })
+            | VideoError::Png(PngError::Write { .. }) => Kind::Write,
+            VideoError::Read { .. }
+            | VideoError::Y4m(Y4mError::Read { .. })
+            | VideoError::Png(PngError::Read { .. }) => Kind::Read,
+            _ => Kind::Frames,
+        };
+        Self::new(kind, &error, error.next_step())
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        let kind = match error.problem {
+            SceneProblem::Io(_) => Kind::Read,
+            _ => Kind::Scene,
+        };
+        Self::new(kind, &error, error.next_step())
+    }
+}
+
+impl From<SimulationError> for Failure {
+    fn from(error: SimulationError) -> Self {
+        Self::new(Kind::Scene, &error, error.next_step())
+    }
+}
+
+impl From<CaptureFolderError> for Failure {
+    fn from(error: CaptureFolderError) -> Self {
+        match error {
+            CaptureFolderError::Simulation(error) => error.into(),
+            CaptureFolderError::Folder(error) => error.into(),
+        }
+    }
+}
+
+impl From<FolderError> for Failure {
+    fn from(error: FolderError) -> Self {
+        match error {
+            FolderError::Taken { .. } => Self::new(
+                Kind::Write,
+                error,
+                "Choose another folder, or move that one away.",
+            ),
+            FolderError::Io { path, source } => cannot_write(&path, &source),
+        }
+    }
+}
+
+impl From<LogsError> for Failure {
+    fn from(error: LogsError) -> Self {
+        let next_step = "Give the ELF file that the device's firmware was flashed from.";
+        Self::new(Kind::Read, error, next_step)
     }
 }
 
@@ -409,27 +462,20 @@ impl From<ConfigError> for Failure {
     }
 }
 
-fn compile_failure(error: &CompileError) -> Failure {
-    let kind = match error {
-        CompileError::ReferenceWhite { .. } => Kind::Usage,
-        _ => Kind::Solve,
+pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    let next_step = match error.kind() {
+        io::ErrorKind::StorageFull => "Free some space and run the command again.",
+        io::ErrorKind::PermissionDenied => "Choose a folder that you may write to.",
+        io::ErrorKind::NotFound => "Make the folder first, or choose another.",
+        _ => "Check the folder and run the command again.",
     };
-    Failure::new(kind, error, error.next_step())
+    let message = format!("{}: cannot be written: {error}", path.display());
+    Failure::new(Kind::Write, message, next_step)
 }
 
-/// Whether a capture cannot be read, is not well-formed, or shows bad light.
-pub(super) const fn kind_of(error: &CaptureError) -> Kind {
-    match error {
-        CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
-        CaptureError::MorePhotographsThanTaken { .. }
-        | CaptureError::UnknownIndex { .. }
-        | CaptureError::BlackIndex { .. } => Kind::Usage,
-        CaptureError::TooFewPhotographs { .. }
-        | CaptureError::NoLight { .. }
-        | CaptureError::Refused { .. }
-        | CaptureError::ResponseUnknown { .. } => Kind::Photographs,
-        _ => Kind::Capture,
-    }
+pub(super) fn cannot_read(path: &Path, error: &io::Error) -> Failure {
+    let message = format!("{}: cannot be read: {error}", path.display());
+    Failure::new(Kind::Read, message, "Check the name and the permissions.")
 }
 
 fn capitalised(text: &str) -> String {

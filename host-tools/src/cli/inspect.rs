@@ -1,18 +1,18 @@
 //! `iltm inspect`
 
 use super::args::Inspect;
-use super::failure::{Failure, Kind};
+use super::failure::Failure;
 use super::output::{Output, read_file};
-use super::slots::key_id;
-use super::solve::lines;
+use super::tables::check_sealed;
+use super::words::{key_id, lines};
+use crate::compile::Provenance;
 use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
 use crate::device::rejection_next_step;
-use crate::learn::{recovery_in, white_in};
-use crate::report::steps;
+use crate::report::tier_costs;
 use ed25519_dalek::VerifyingKey;
 use iltm_runtime::{
-    image::{Seal, Table, unseal},
+    image::{Seal, Table},
     operator::{Bounds, Operator},
     trust::Rejected,
 };
@@ -106,27 +106,6 @@ fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
     )
 }
 
-/// Checks the bytes of a table file. The signature is not looked at.
-pub(super) fn check<'a>(path: &Path, file: &'a [u8]) -> Result<Table<'a>, Failure> {
-    Ok(check_sealed(path, file)?.0)
-}
-
-/// The same, with the seal if there is one.
-pub(super) fn check_sealed<'a>(
-    path: &Path,
-    file: &'a [u8],
-) -> Result<(Table<'a>, Option<Seal>), Failure> {
-    let checked = unseal(file).and_then(|(image, seal)| Ok((Table::check(image)?, seal)));
-    checked.map_err(|error| {
-        let message = format!("{}: {error}", path.display());
-        Failure::new(
-            Kind::Table,
-            message,
-            "Copy the table again, or make it anew with `iltm solve`.",
-        )
-    })
-}
-
 /// The stages that the runtime builds for the table, with what each is there for.
 fn effects(table: &Table<'_>) -> Vec<&'static str> {
     let listed = [
@@ -147,7 +126,7 @@ fn inverse_error(table: &Table<'_>) -> Option<f64> {
 }
 
 fn data(table: &Table<'_>) -> Value {
-    let tiers = steps(table).into_iter().map(|step| {
+    let tiers = tier_costs(table).into_iter().map(|step| {
         json!({
             "error": step.left_out,
             "total_error": step.total,
@@ -203,7 +182,8 @@ fn text(path: &Path, table: &Table<'_>) -> String {
         "reference white  {:.4} of the camera's full scale",
         table.reference_white().to_num::<f64>()
     );
-    if let Some(white) = white_in(table.provenance()) {
+    let provenance = Provenance::read(table.provenance());
+    if let Some(white) = provenance.white {
         let _ = writeln!(text, "                 {}", white.reason());
     }
     let _ = match inverse_error(table) {
@@ -216,7 +196,7 @@ fn text(path: &Path, table: &Table<'_>) -> String {
             "error            not predicted: too few photographs to hold any out"
         ),
     };
-    if let Some(recovery) = recovery_in(table.provenance()) {
+    if let Some(recovery) = provenance.recovery {
         text += &lines("recovery         ", &recovery.lines());
     }
     if let Some(operator) = table.operator() {
@@ -231,11 +211,20 @@ fn text(path: &Path, table: &Table<'_>) -> String {
             100.0 * f64::from(correction) / Bounds::MAX_CORRECTION as f64
         );
     }
+    tiers(table, &mut text);
+    if !table.provenance().is_empty() {
+        let _ = writeln!(text, "\n{}", table.provenance().trim_end());
+    }
+    text
+}
+
+/// What each tier takes and leaves out.
+fn tiers(table: &Table<'_>, text: &mut String) {
     let _ = writeln!(
         text,
         "\ntier   left out   error in all   entries   multiplications   instructions   of a frame     bytes"
     );
-    for step in steps(table) {
+    for step in tier_costs(table) {
         let _ = writeln!(
             text,
             "{:>4}   {:>8.5}   {:>12.5}   {:>7}   {:>15}   {:>12}   {:>8.2} %   {:>7}",
@@ -256,8 +245,4 @@ fn text(path: &Path, table: &Table<'_>) -> String {
          Bytes: of a table with that tier and gain only.",
         CLOCK / 1_000_000
     );
-    if !table.provenance().is_empty() {
-        let _ = writeln!(text, "\n{}", table.provenance().trim_end());
-    }
-    text
 }

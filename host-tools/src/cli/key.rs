@@ -1,13 +1,13 @@
 //! `iltm key` and `iltm sign`
 
-use super::args::{Install, Key, KeyCommand, SealTerms as Given, Sign};
+use super::args::{Install, Key, KeyCommand, Sign};
 use super::connect::connect;
 use super::failure::{Failure, Kind};
 use super::output::{Output, read_file, write_file};
-use super::slots::{in_use, key_id};
-use super::status::number;
-use crate::compile::sign::{self, SealTerms, new_key, read_key, read_public_key};
-use ed25519_dalek::{SigningKey, VerifyingKey};
+use super::tables::{check, seal};
+use super::words::{in_use, key_id, number};
+use crate::compile::sign::{new_key, read_key, read_public_key};
+use ed25519_dalek::VerifyingKey;
 use iltm_runtime::image::Seal;
 use serde_json::{Value, json};
 use std::io::{self, IsTerminal, Write};
@@ -134,7 +134,7 @@ fn agree(
 pub(super) fn sign(arguments: &Sign, output: &Output) -> Result<(), Failure> {
     let key = read_key(&arguments.key)?;
     let file = read_file(&arguments.table)?;
-    super::inspect::check(&arguments.table, &file)?;
+    check(&arguments.table, &file)?;
     let signed = seal(&file, &key, &arguments.seal)?;
     let path = arguments.output.as_ref().unwrap_or(&arguments.table);
     write_file(path, &signed)?;
@@ -151,27 +151,4 @@ pub(super) fn sign(arguments: &Sign, output: &Output) -> Result<(), Failure> {
     );
     output.result(&data, &text);
     Ok(())
-}
-
-/// Signs a file on the terms of the command line.
-pub(super) fn seal(file: &[u8], key: &SigningKey, given: &Given) -> Result<Vec<u8>, Failure> {
-    if given.revoke_below > given.table_version {
-        return Err(Failure::new(
-            Kind::Usage,
-            format!(
-                "version {} would revoke itself: versions below {} are to be revoked",
-                given.table_version, given.revoke_below
-            ),
-            "Give --revoke-below at most the --table-version.",
-        ));
-    }
-    let terms = SealTerms {
-        version: given.table_version,
-        oldest: given.revoke_below,
-        device: given.for_device.unwrap_or(0),
-    };
-    sign::sign(file, key, terms).map_err(|error| {
-        let next_step = "Make the table anew with `iltm solve`.";
-        Failure::new(Kind::Table, error, next_step)
-    })
 }

@@ -1,17 +1,16 @@
 //! `iltm man` and `iltm completions`: what the command line knows about itself.
 
 use super::args::{Arguments, Completions, Man};
-use super::failure::Failure;
-use super::output::{Output, cannot_write, write_file};
+use super::failure::{Failure, cannot_write};
+use super::output::{Output, make_folder, write_file};
 use clap::CommandFactory;
 use serde_json::json;
-use std::fs;
 use std::io::{self, Write};
 
 /// Writes a manual page for `iltm` and one for each command, in section 1.
 pub(super) fn run(arguments: &Man, output: &Output) -> Result<(), Failure> {
     let folder = &arguments.output;
-    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    make_folder(folder)?;
     let mut pages = Vec::new();
     collect(super::command(), "", &mut pages).map_err(|error| cannot_write(folder, &error))?;
     for (name, page) in &pages {

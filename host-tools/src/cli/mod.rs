@@ -13,7 +13,6 @@ mod compare;
 mod compensate;
 mod connect;
 mod demo;
-mod devices;
 #[cfg(unix)]
 mod emulate;
 mod failure;
@@ -27,14 +26,16 @@ mod output;
 mod patterns;
 mod ports;
 mod progress;
-mod report;
 mod simulate;
-mod slots;
 mod solve;
 mod status;
+mod summary;
+mod support_bundle;
+mod tables;
 mod tradeoff;
 mod trial;
 mod verify;
+mod words;
 
 use crate::compare::Meter;
 use args::{Arguments, Command};
@@ -84,7 +85,7 @@ pub fn run(meter: Option<Meter>) -> ExitCode {
             man::completions(completions, &output);
             Ok(())
         }
-        Command::Report(report) => report::run(report, &output),
+        Command::SupportBundle(bundle) => support_bundle::run(bundle, &output),
         Command::Status(status) => status::run(status, &output),
         Command::Monitor(monitor) => monitor::run(monitor, &output),
         #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! Output of a command: words for people, JSON for programs, files whole or not at all.
 
 use super::active::Active;
-use super::failure::{Failure, Kind};
+use super::failure::{Failure, cannot_read, cannot_write};
 use iltm_picture::whole_file;
 use serde_json::{Value, json};
 use std::fs;
@@ -100,22 +100,11 @@ pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     whole_file::write(path, bytes).map_err(|error| cannot_write(&error.path, &error.source))
 }
 
-pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
-    let next_step = match error.kind() {
-        io::ErrorKind::StorageFull => "Free some space and run the command again.",
-        io::ErrorKind::PermissionDenied => "Choose a folder that you may write to.",
-        io::ErrorKind::NotFound => "Make the folder first, or choose another.",
-        _ => "Check the folder and run the command again.",
-    };
-    let message = format!("{}: cannot be written: {error}", path.display());
-    Failure::new(Kind::Write, message, next_step)
-}
-
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).map_err(|error| cannot_read(path, &error))
 }
 
-pub(super) fn cannot_read(path: &Path, error: &io::Error) -> Failure {
-    let message = format!("{}: cannot be read: {error}", path.display());
-    Failure::new(Kind::Read, message, "Check the name and the permissions.")
+/// Makes a folder and those that it lies in.
+pub(super) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))
 }

@@ -1,10 +1,9 @@
 //! `iltm patterns`
 
 use super::args::Patterns;
-use super::failure::{Failure, Kind};
+use super::failure::Failure;
 use super::output::Output;
 use super::progress::progress;
-use super::simulate::unwritten;
 use crate::session::{self, Layout, OrderOptions, PatternsError};
 use iltm_runtime::Grid;
 use serde_json::json;
@@ -12,9 +11,9 @@ use serde_json::json;
 pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> {
     let out = &arguments.output;
     // A folder that is in the way is known before the work, not after it.
-    iltm_picture::check_free(out).map_err(unwritten)?;
-    let grid = Grid::new(arguments.rows, arguments.cols).map_err(|error| unmade(error.into()))?;
-    let layout = Layout::new(grid, arguments.projector, arguments.border).map_err(unmade)?;
+    iltm_picture::check_free(out)?;
+    let grid = Grid::new(arguments.rows, arguments.cols).map_err(PatternsError::from)?;
+    let layout = Layout::new(grid, arguments.projector, arguments.border)?;
     let options = OrderOptions {
         bernoulli: arguments.photos.into(),
         seed: arguments.seed,
@@ -28,8 +27,7 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     };
     let slides = session::order(grid, &options);
     let bars = progress(output);
-    let made =
-        session::write(&slides, &layout, &arguments.camera, out, bars.as_ref()).map_err(unmade)?;
+    let made = session::write(&slides, &layout, &arguments.camera, out, bars.as_ref())?;
     let data = json!({
         "capture": out.display().to_string(),
         "rows": grid.rows(),
@@ -52,11 +50,4 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     );
     output.result(&data, &text);
     Ok(())
-}
-
-fn unmade(error: PatternsError) -> Failure {
-    match error {
-        PatternsError::Folder(error) => unwritten(error),
-        error => Failure::new(Kind::Usage, &error, error.next_step()),
-    }
 }

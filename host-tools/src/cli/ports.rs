@@ -3,7 +3,7 @@
 use super::args::Ports;
 use super::failure::Failure;
 use super::output::Output;
-use super::status::{identity, table_name};
+use super::words::{identity, table_in_use, table_name};
 use crate::device::DeviceError;
 use crate::device::discovery::{FoundDevice, ask};
 use crate::device::port_scan::{ListedPort, PortScan};
@@ -57,7 +57,7 @@ fn text(
 ) -> String {
     let mut rows = vec![["port", "board", "firmware", "number", "table"].map(str::to_owned)];
     for device in found {
-        let table = device.status.as_ref().map(super::status::table);
+        let table = device.status.as_ref().map(table_in_use);
         rows.push([
             device.port.path.clone(),
             device.device.board.to_string(),

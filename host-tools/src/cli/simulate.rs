@@ -1,18 +1,16 @@
 //! `iltm simulate`
 
 use super::args::Simulate;
-use super::failure::{Failure, Kind, kind_of};
-use super::output::{Output, cannot_write};
+use super::failure::{Failure, Kind};
+use super::output::Output;
 use super::progress::progress;
 use crate::capture::pattern_set;
 use crate::scene::ablation::{Ablated, ablate};
-use crate::scene::description::{Scene, SceneError};
-use crate::scene::folder::{self, CaptureFolderError, Written};
-use crate::scene::retake::{RetakeError, Session};
-use crate::scene::{
-    Decision, Effect, Forced, Shooting, Simulation, SimulationError, SimulationOptions, percent,
-};
-use iltm_picture::{FolderError, progress::Progress};
+use crate::scene::description::Scene;
+use crate::scene::fill_capture::{FillCaptureError, UnfilledCapture};
+use crate::scene::folder::{self, SimulatedCapture};
+use crate::scene::{Decision, Forced, Simulation, SimulationOptions, VirtualCamera};
+use iltm_picture::{numbers::percent, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -20,51 +18,21 @@ use std::time::Instant;
 
 pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
-    let scene = Scene::read(&arguments.scene).map_err(|error| unreadable(&error))?;
+    let scene = Scene::read(&arguments.scene)?;
     // A folder that is in the way is known before the work, not after it.
     if let (Some(out), None) = (&arguments.output, &arguments.photograph) {
-        iltm_picture::check_free(out).map_err(unwritten)?;
-    }
-    let mut forced = Forced::default();
-    let wanted = |effects: &[Effect], on| {
-        effects
-            .iter()
-            .map(move |effect| (*effect, on))
-            .collect::<Vec<_>>()
-    };
-    for (effect, on) in [
-        wanted(&arguments.with, true),
-        wanted(&arguments.without, false),
-    ]
-    .concat()
-    {
-        forced = forced.with(effect, on);
+        iltm_picture::check_free(out)?;
     }
     let options = SimulationOptions {
-        forced,
+        forced: forced(arguments),
         threshold: arguments.threshold,
     };
     let bars = progress(output);
-    let simulation = Simulation::new(&scene, &options, bars.as_ref());
-    let simulation = simulation.map_err(|error| unsimulated(&error))?;
+    let simulation = Simulation::new(&scene, &options, bars.as_ref())?;
     let ready = start.elapsed().as_secs_f64();
-    let mut written = None;
-    let mut taken = None;
-    if arguments.output.is_some() || arguments.photograph.is_some() {
-        let shooting = Shooting::new(&scene, &simulation, arguments.seed);
-        let shooting = shooting.map_err(|error| unsimulated(&error))?;
-        let shooting = shooting.with_faults(&arguments.fault);
-        if let Some(folder) = &arguments.photograph {
-            let count = photograph(arguments, folder, &shooting, bars.as_ref());
-            taken = Some(count.map_err(|error| not_taken(&error))?);
-        } else if let Some(out) = &arguments.output {
-            let patterns = pattern_set(simulation.grid(), arguments.photos, arguments.seed);
-            let done = folder::write(&shooting, &patterns, out, bars.as_ref());
-            written = Some(done.map_err(untaken)?);
-        }
-    }
+    let done = shoot(arguments, &scene, &simulation, bars.as_ref())?;
     let ablated = if arguments.ablate {
-        ablate(&scene, &options, bars.as_ref()).map_err(|error| unsimulated(&error))?
+        ablate(&scene, &options, bars.as_ref())?
     } else {
         Vec::new()
     };
@@ -89,65 +57,100 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
         data["ablated"] = ablated.iter().map(difference).collect();
         differences(&ablated, &mut text);
     }
-    if let (Some(out), Some(written)) = (&arguments.output, written) {
-        data["capture"] = json!(out.display().to_string());
-        data["photographs"] = json!(written.photographs);
-        data["bounces"] = json!(written.bounces);
-        let _ = writeln!(
-            text,
-            "capture     {}: {} photographs, {} in {seconds:.2} s ({ready:.2} s before the first)",
-            out.display(),
-            written.photographs,
-            bounces(written),
-        );
-    }
-    if let (Some(folder), Some(taken)) = (&arguments.photograph, taken) {
-        data["folder"] = json!(folder.display().to_string());
-        data["photographs"] = json!(taken);
-        let photographs = if taken == 1 {
-            "photograph"
-        } else {
-            "photographs"
-        };
-        let _ = writeln!(
-            text,
-            "{:<11} {}: {taken} {photographs} taken in {seconds:.2} s",
-            "session",
-            folder.display(),
-        );
+    match done {
+        Shot::Nothing => {}
+        Shot::Capture(out, written) => {
+            data["capture"] = json!(out.display().to_string());
+            data["photographs"] = json!(written.photographs);
+            data["bounces"] = json!(written.bounces);
+            let _ = writeln!(
+                text,
+                "capture     {}: {} photographs, {} in {seconds:.2} s ({ready:.2} s before the first)",
+                out.display(),
+                written.photographs,
+                bounces(written),
+            );
+        }
+        Shot::Missing(folder, taken) => {
+            data["folder"] = json!(folder.display().to_string());
+            data["photographs"] = json!(taken);
+            let plural = if taken == 1 { "" } else { "s" };
+            let _ = writeln!(
+                text,
+                "session     {}: {taken} photograph{plural} taken in {seconds:.2} s",
+                folder.display(),
+            );
+        }
     }
     output.result(&data, &text);
     Ok(())
+}
+
+/// The effects that the command line turns on and off.
+fn forced(arguments: &Simulate) -> Forced {
+    let on = arguments.with.iter().map(|effect| (*effect, true));
+    let off = arguments.without.iter().map(|effect| (*effect, false));
+    on.chain(off)
+        .fold(Forced::default(), |forced, (effect, on)| {
+            forced.with(effect, on)
+        })
+}
+
+/// What was photographed.
+enum Shot<'a> {
+    Nothing,
+    /// A capture folder, made anew.
+    Capture(&'a Path, SimulatedCapture),
+    /// So many photographs of those that a folder calls for.
+    Missing(&'a Path, usize),
+}
+
+fn shoot<'a>(
+    arguments: &'a Simulate,
+    scene: &Scene,
+    simulation: &Simulation<'_>,
+    progress: &dyn Progress,
+) -> Result<Shot<'a>, Failure> {
+    let camera = || VirtualCamera::new(scene, simulation, arguments.seed);
+    let camera = || camera().map(|camera| camera.with_faults(&arguments.fault));
+    if let Some(folder) = &arguments.photograph {
+        let taken = photograph(arguments, folder, &camera()?, progress).map_err(not_taken)?;
+        return Ok(Shot::Missing(folder, taken));
+    }
+    let Some(out) = &arguments.output else {
+        return Ok(Shot::Nothing);
+    };
+    let patterns = pattern_set(simulation.grid(), arguments.photos, arguments.seed);
+    let written = folder::write(&camera()?, &patterns, out, progress)?;
+    Ok(Shot::Capture(out, written))
 }
 
 /// Takes what a folder calls for; returns how many photographs.
 fn photograph(
     arguments: &Simulate,
     folder: &Path,
-    shooting: &Shooting<'_>,
+    camera: &VirtualCamera<'_>,
     progress: &dyn Progress,
-) -> Result<usize, RetakeError> {
-    let session = Session::read(folder, shooting.grid())?;
+) -> Result<usize, FillCaptureError> {
+    let session = UnfilledCapture::read(folder, camera.grid())?;
     match (arguments.shot, &arguments.output) {
-        (Some(index), Some(file)) => session.take_one(shooting, index, file).map(|()| 1),
-        _ => session.take_missing(shooting, progress),
+        (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),
+        _ => session.take_missing(camera, progress),
     }
 }
 
-fn not_taken(error: &RetakeError) -> Failure {
+fn not_taken(error: FillCaptureError) -> Failure {
     let kind = match error {
-        RetakeError::Capture(error) => {
-            return Failure::new(kind_of(error), error, error.next_step());
-        }
-        RetakeError::Simulation(error) => return unsimulated(error),
-        RetakeError::Pattern { .. } => Kind::Capture,
-        RetakeError::NoIndex { .. } | RetakeError::Missed { .. } => Kind::Usage,
-        RetakeError::Io { .. } => Kind::Write,
+        FillCaptureError::Capture(error) => return error.into(),
+        FillCaptureError::Simulation(error) => return error.into(),
+        FillCaptureError::Pattern { .. } => Kind::Capture,
+        FillCaptureError::NoIndex { .. } | FillCaptureError::Missed { .. } => Kind::Usage,
+        FillCaptureError::Io { .. } => Kind::Write,
     };
-    Failure::new(kind, error, error.next_step())
+    Failure::new(kind, &error, error.next_step())
 }
 
-fn bounces(written: Written) -> String {
+fn bounces(written: SimulatedCapture) -> String {
     match written.bounces {
         0 => "no bounces,".to_owned(),
         1 => "1 bounce,".to_owned(),
@@ -157,7 +160,7 @@ fn bounces(written: Written) -> String {
 
 fn effect(decision: &Decision) -> Value {
     json!({
-        "effect": decision.effect.name(),
+        "effect": decision.effect.to_string(),
         "on": decision.on,
         "forced": decision.forced,
         "reason": decision.reason,
@@ -204,7 +207,7 @@ fn explain(simulation: &Simulation<'_>, decisions: &[Decision], text: &mut Strin
 
 fn difference(ablated: &Ablated) -> Value {
     json!({
-        "effect": ablated.effect.name(),
+        "effect": ablated.effect.to_string(),
         "on": ablated.on,
         "error": ablated.error,
         "largest": ablated.largest,
@@ -231,34 +234,4 @@ fn differences(ablated: &[Ablated], text: &mut String) {
         );
     }
     text.push('\n');
-}
-
-pub(super) fn unreadable(error: &SceneError) -> Failure {
-    let kind = match error {
-        SceneError::Io { .. } => Kind::Read,
-        _ => Kind::Scene,
-    };
-    Failure::new(kind, error, error.next_step())
-}
-
-pub(super) fn unsimulated(error: &SimulationError) -> Failure {
-    Failure::new(Kind::Scene, error, error.next_step())
-}
-
-pub(super) fn untaken(error: CaptureFolderError) -> Failure {
-    match error {
-        CaptureFolderError::Simulation(error) => unsimulated(&error),
-        CaptureFolderError::Folder(error) => unwritten(error),
-    }
-}
-
-pub(super) fn unwritten(error: FolderError) -> Failure {
-    match error {
-        FolderError::Taken { .. } => Failure::new(
-            Kind::Write,
-            error,
-            "Choose another folder, or move that one away.",
-        ),
-        FolderError::Io { path, source } => cannot_write(&path, &source),
-    }
 }

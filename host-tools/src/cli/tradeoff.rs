@@ -1,10 +1,10 @@
 //! `iltm tradeoff`
 
 use super::args::Tradeoff as Arguments;
-use super::failure::{Failure, Kind};
-use super::inspect::check;
-use super::output::{Output, cannot_read, cannot_write, read_file, write_file};
+use super::failure::{Failure, Kind, cannot_read, cannot_write};
+use super::output::{Output, read_file, write_file};
 use super::progress::progress;
+use super::tables::check;
 use crate::tradeoff::{Tradeoff, TradeoffError};
 use serde_json::json;
 use std::fmt::Write;
@@ -65,7 +65,7 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
 
 fn failed(error: TradeoffError) -> Failure {
     match error {
-        TradeoffError::Learn(error) => error.into(),
+        TradeoffError::Build(error) => error.into(),
         TradeoffError::Reference(error) => Failure::new(Kind::Capture, &error, error.next_step()),
         TradeoffError::Compile(error) => Failure::new(Kind::Solve, &error, error.next_step()),
         TradeoffError::Table(_) | TradeoffError::Operator(_) | TradeoffError::Timing(_) => {

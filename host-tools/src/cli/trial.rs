@@ -5,7 +5,7 @@ use super::args::SerialLine;
 use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
 use super::output::Output;
-use super::slots::{in_use, other};
+use super::words::{in_use, other};
 use iltm_runtime::link::{Slots, TableName};
 use serde_json::json;
 
@@ -15,20 +15,12 @@ pub(super) fn confirm(line: &SerialLine, output: &Output) -> Result<(), Failure>
     let done = if slots.trial_ms == 0 {
         format!("Table {table} is in use and needs no confirmation.\n")
     } else {
-        keep(&mut connection, table)?;
+        let kept = connection.client.confirm(table.id);
+        kept.map_err(|error| connection.failed_with_table(&error))?;
         format!("Table {table} is in use, confirmed.\n")
     };
     finish(connection, output, Some(table), &done);
     Ok(())
-}
-
-/// Keeps the table that is on trial. A failure says which table is in use, if it can
-/// be asked.
-pub(super) fn keep(connection: &mut Connection, table: TableName) -> Result<(), Failure> {
-    match connection.client.confirm(table.id) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(failed(connection, &error)),
-    }
 }
 
 pub(super) fn rollback(line: &SerialLine, output: &Output) -> Result<(), Failure> {
@@ -43,22 +35,20 @@ pub(super) fn rollback(line: &SerialLine, output: &Output) -> Result<(), Failure
         let failure = Failure::new(Kind::NoTable, message, next_step);
         return Err(failure.with(Active::ask(&mut connection.client)));
     }
-    let now = match connection.client.rollback(table.id) {
-        Ok(now) => now.table,
-        Err(error) => return Err(failed(&mut connection, &error)),
-    };
-    let done = match now {
+    let now = connection.client.rollback(table.id);
+    let now = now.map_err(|error| connection.failed_with_table(&error))?;
+    let done = match now.table {
         Some(now) => format!("Table {now} is in use again, instead of {table}.\n"),
         None => format!("No table is in use now, instead of {table}: frames pass unchanged.\n"),
     };
-    finish(connection, output, now, &done);
+    finish(connection, output, now.table, &done);
     Ok(())
 }
 
 /// The slots, and the table in use.
 fn slots(connection: &mut Connection) -> Result<(Slots, TableName), Failure> {
     let slots = connection.client.slots();
-    let slots = slots.map_err(|error| failed(connection, &error))?;
+    let slots = slots.map_err(|error| connection.failed_with_table(&error))?;
     let table = in_use(&slots).ok_or_else(|| {
         let message = format!("{}: there is no table", connection.port);
         let failure = Failure::new(Kind::NoTable, message, "Flash one: `iltm flash TABLE`.");
@@ -68,11 +58,6 @@ fn slots(connection: &mut Connection) -> Result<(Slots, TableName), Failure> {
         })
     })?;
     Ok((slots, table))
-}
-
-fn failed(connection: &mut Connection, error: &crate::device::DeviceError) -> Failure {
-    let active = Active::ask(&mut connection.client);
-    connection.failed(error).with(active)
 }
 
 fn finish(mut connection: Connection, output: &Output, table: Option<TableName>, done: &str) {

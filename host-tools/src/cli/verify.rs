@@ -2,16 +2,13 @@
 
 use super::args::Verify;
 use super::failure::{Failure, Kind};
-use super::inspect::check;
-use super::output::{Output, read_file, write_file};
+use super::output::{Output, make_folder, read_file, write_file};
 use super::progress::progress;
-use super::simulate::unwritten;
-use super::{compensate, failure};
-use crate::learn::settings_in;
+use super::tables::check;
+use crate::compile::Provenance;
 use crate::session::Layout;
 use crate::verify::{
-    ImageVerdict, Session, TestImage, Verdict, VerifyError, html, judge, pictures, reason,
-    test_images, write,
+    ImageVerdict, Session, TestImage, Verdict, html, judge, pictures, reason, test_images, write,
 };
 use iltm_picture::progress::Progress;
 use iltm_runtime::{FrameSize, image::Table};
@@ -41,7 +38,9 @@ fn prepare(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
-    let settings = settings_in(table.provenance()).unwrap_or_default();
+    let settings = Provenance::read(table.provenance())
+        .capture
+        .unwrap_or_default();
     let own = settings.projector.size;
     let projector = arguments
         .projector
@@ -51,9 +50,8 @@ fn prepare(
         unreachable!("sides above zero");
     };
     let border = arguments.border.unwrap_or(settings.projector.border);
-    let layout = Layout::new(table.grid(), projector, border)
-        .map_err(|error| failed(VerifyError::Slides(error)))?;
-    let written = write(table, &layout, &settings, out, bars).map_err(failed)?;
+    let layout = Layout::new(table.grid(), projector, border)?;
+    let written = write(table, &layout, &settings, out, bars)?;
     bars.end();
     let data = json!({
         "folder": out.display().to_string(),
@@ -91,9 +89,9 @@ fn verdict(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
-    let session = Session::read(folder, table, bars).map_err(failed)?;
-    let verdict = judge(folder, table, &session, arguments.bound).map_err(failed)?;
-    let images = test_images(table).map_err(|error| compensate::failed(&error))?;
+    let session = Session::read(folder, table, bars)?;
+    let verdict = judge(folder, table, &session, arguments.bound)?;
+    let images = test_images(table)?;
     let out = arguments
         .report
         .clone()
@@ -129,7 +127,7 @@ fn report(
     images: &[TestImage],
     out: &Path,
 ) -> Result<PathBuf, Failure> {
-    std::fs::create_dir_all(out).map_err(|error| super::output::cannot_write(out, &error))?;
+    make_folder(out)?;
     let files = pictures(table, session, verdict);
     for file in &files {
         write_file(&out.join(&file.name).with_extension("png"), &file.png)?;
@@ -137,30 +135,6 @@ fn report(
     let page = out.join("verdict.html");
     write_file(&page, html(table, verdict, images, &files).as_bytes())?;
     Ok(page)
-}
-
-fn failed(error: VerifyError) -> Failure {
-    let next_step = error.next_step();
-    let kind = match &error {
-        VerifyError::Folder(_) => {
-            let VerifyError::Folder(error) = error else {
-                unreachable!("just matched");
-            };
-            return unwritten(error);
-        }
-        VerifyError::Video(error) => return compensate::failed(error),
-        VerifyError::Slides(_) => Kind::Usage,
-        VerifyError::Capture(error) => failure::kind_of(error),
-        VerifyError::NoManifest { .. } => Kind::Read,
-        VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,
-        VerifyError::OtherTable { .. } | VerifyError::Grid { .. } => Kind::Verdict,
-        VerifyError::Missing { .. }
-        | VerifyError::Unpaired { .. }
-        | VerifyError::NoImages { .. }
-        | VerifyError::Picture { .. }
-        | VerifyError::Channels { .. } => Kind::Capture,
-    };
-    Failure::new(kind, error, next_step)
 }
 
 fn title<'i>(images: &'i [TestImage], image: &ImageVerdict) -> &'i str {

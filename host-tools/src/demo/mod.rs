@@ -9,8 +9,8 @@ pub mod sample;
 mod video;
 mod words;
 
+use crate::build_table::{BuildError, BuiltTable, build_table};
 use crate::capture::CaptureOptions;
-use crate::learn::{LearnError, Learned, learn};
 use crate::report::{Example, Report, ReportError, Wanted, stills};
 use crate::solve::SolveOptions;
 use crate::video::{FrameTotals, VideoError};
@@ -43,7 +43,7 @@ pub enum DemoError {
     Write(#[from] FileError),
     /// The sample did not become a table.
     #[error(transparent)]
-    Learn(#[from] LearnError),
+    Build(#[from] BuildError),
     /// A file could not be put in its place, or the video not be compensated.
     #[error(transparent)]
     Video(#[from] VideoError),
@@ -87,10 +87,10 @@ impl Paths {
 pub struct Outcome {
     /// Where it is.
     pub paths: Paths,
-    /// What was learned from the sample.
-    pub learned: Learned,
+    /// What was built from the sample.
+    pub built: BuiltTable,
     /// Error of each of the report's images without compensation, with gain only
-    /// and compensated, as predicted by the learned transport.
+    /// and compensated, as predicted by the built transport.
     pub images: Vec<(&'static str, [f64; 3])>,
     /// The video: frames, and how many samples were clipped.
     pub video: FrameTotals,
@@ -114,15 +114,15 @@ pub fn run(out: &Path, progress: &dyn Progress) -> Result<Outcome, DemoError> {
     progress.end();
     clock.lap("writing the sample");
     let (photographs, options) = (CaptureOptions::default(), SolveOptions::default());
-    let learned = learn(&paths.capture, &photographs, &options, None, progress)?;
-    write_bytes(&paths.table, &learned.compiled.image)?;
+    let built = build_table(&paths.capture, &photographs, &options, None, progress)?;
+    write_bytes(&paths.table, &built.compiled.image)?;
     clock.lap("from photographs to table");
     video::write(&paths.video, size(VIDEO), progress)?;
     clock.lap("drawing the video");
-    let image = &learned.compiled.image;
+    let image = &built.compiled.image;
     let video = video::compensate(image, &paths.video, &paths.compensated, progress)?;
     clock.lap("compensating it");
-    let report = Report::new(&learned, wanted(), progress)?;
+    let report = Report::new(&built, wanted(), progress)?;
     clock.lap("predicting photographs");
     progress.begin("writing the report", 0);
     let page = report.html(&words::words(out, &clock.seconds));
@@ -144,7 +144,7 @@ pub fn run(out: &Path, progress: &dyn Progress) -> Result<Outcome, DemoError> {
         video,
         report_bytes: page.len(),
         seconds: clock.seconds,
-        learned,
+        built,
     })
 }
 

@@ -1,16 +1,12 @@
 //! Words of the demo's report about the sample, which photographs cannot say.
 
 use crate::report::{Command, Words};
-use crate::solved::quoted;
+use crate::solve_page::quoted;
 use std::path::Path;
 
 /// The words for a demo that was written to `out`.
 pub(super) fn words(out: &Path, seconds: &[(&'static str, f64)]) -> Words {
     let path = |name: &str| quoted(&out.join(name));
-    let command = |what: &str, line: String| Command {
-        what: what.to_owned(),
-        line,
-    };
     Words {
         title: "Light that bounces, learned and taken away".to_owned(),
         scene: "Four panels, red, white, blue and white, stand zigzag like the letter M. A projector \
@@ -19,13 +15,13 @@ pub(super) fn words(out: &Path, seconds: &[(&'static str, f64)]) -> Words {
                 for projector and noisy camera; nothing else is prepared.)"
             .to_owned(),
         commands: vec![
-            command("This page and everything beside it:", format!("iltm demo --out {}", quoted(out))),
-            command(
+            Command::new("This page and everything beside it:", format!("iltm demo --out {}", quoted(out))),
+            Command::new(
                 "The table alone, from the photographs; with --photos 20 from half of the random ones:",
                 format!("iltm solve {} -o {}", path("capture"), path("table.iltm")),
             ),
-            command("What is in it:", format!("iltm inspect {}", path("table.iltm"))),
-            command(
+            Command::new("What is in it:", format!("iltm inspect {}", path("table.iltm"))),
+            Command::new(
                 "A video or a picture of your own, or this one with tier 0 (gain only) for comparison:",
                 format!(
                     "iltm compensate {} {} -o {}\niltm compensate {} {} -o {} --tier 0",

@@ -1,11 +1,11 @@
-//! Somebody who follows a page: a fresh clone, stand-ins for hardware and for programs of
-//! others, and commands run by bash.
+//! Follower of a page: a fresh clone, stand-ins for hardware and for programs of others,
+//! and commands run by bash.
 
 use super::names::look_up;
 use super::page::{ALL_TESTS, Block};
-use super::root;
 use iltm::device::emulator::Board;
 use iltm_tests::firmware::{elf, without_cargos_variables};
+use iltm_tests::reference_pages::root;
 use serde_json::Value;
 use std::env;
 use std::ffi::OsStr;

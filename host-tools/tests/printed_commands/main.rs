@@ -25,24 +25,17 @@
 //! ILTM_PAGES=full cargo test -p iltm --test printed_commands
 //! ```
 
-#![cfg(unix)]
-
 mod follower;
 mod names;
 mod page;
 
 use follower::{Follower, video};
-use page::{Page, pages_in};
+use page::{Page, pages};
 use std::collections::BTreeSet;
 use std::env;
 use std::fs;
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
-
-/// The repository that this test was built from.
-fn root() -> PathBuf {
-    iltm_tests::reference_pages::root()
-}
 
 /// Follows a page; returns the clone in which this was done.
 fn follow(page: &str) -> PathBuf {
@@ -119,14 +112,14 @@ fn there(clone: &Path, names: &[&str]) {
 #[test]
 fn every_page_that_prints_commands_is_followed() {
     let mut with_commands = BTreeSet::new();
-    for path in pages_in(&root()) {
+    for path in pages() {
         let page = Page::read(&path);
         let loose = page.loose_commands();
         assert!(loose.is_empty(), "not in blocks marked ```sh: {loose:?}");
         if page.commands().next().is_some() {
-            with_commands.insert(page.path);
+            with_commands.insert(path);
         }
     }
-    let followed: BTreeSet<String> = PAGES.iter().map(|&page| page.to_owned()).collect();
+    let followed = PAGES.iter().map(|&page| page.to_owned()).collect();
     assert_eq!(with_commands, followed);
 }

@@ -1,33 +1,19 @@
-//! Names in commands: programs, packages, targets, features, profiles and options exist.
+//! Names in printed commands: programs, packages, targets, features, profiles and options
+//! exist.
 //!
 //! Looked up are commands that are too long to be run, those in the prose of the pages, and
 //! every `cargo` command in comments and messages of the sources.
 
 use super::follower::files;
-use super::page::{Page, has_extension, is_assignment, pages_in};
-use super::root;
+use super::page::{Page, has_extension, is_assignment, pages};
 use clap::ArgAction;
+use iltm_tests::reference_pages::{metadata, root};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
-use std::sync::OnceLock;
 
 /// Why a name of a command does not exist.
 type Unknown = String;
-
-/// What cargo knows of the workspace.
-fn metadata() -> &'static Value {
-    static METADATA: OnceLock<Value> = OnceLock::new();
-    METADATA.get_or_init(|| {
-        let metadata = Command::new(env!("CARGO"))
-            .args(["metadata", "--no-deps", "--format-version=1", "--locked"])
-            .current_dir(root())
-            .output()
-            .expect("cargo is there");
-        serde_json::from_slice(&metadata.stdout).expect("JSON")
-    })
-}
 
 fn items(value: &Value) -> impl Iterator<Item = &Value> {
     value.as_array().into_iter().flatten()
@@ -87,12 +73,11 @@ fn cargo<'w>(words: &[&'w str]) -> Result<Option<Vec<&'w str>>, Unknown> {
             }
         }
     }
-    if let Some(filter) = filter.filter(|_| own.contains(&"--lib")) {
+    let of_tests = own.contains(&"--lib") || own.contains(&"--test");
+    if let Some(filter) = filter.filter(|_| of_tests) {
         let name = filter.trim_end_matches("::").rsplit("::").next();
-        if !chosen
-            .iter()
-            .any(|package| has_tests(package, name.unwrap_or(filter)))
-        {
+        let name = name.unwrap_or(filter);
+        if !chosen.iter().any(|package| has_tests(package, name)) {
             return Err(format!("there are no tests `{filter}`"));
         }
     }
@@ -125,22 +110,18 @@ fn end_of_sentence(word: &str) -> &str {
     word.trim_end_matches(['.', ',', ';', '"', ')'])
 }
 
-/// Whether a package's library has tests, or a module, that the name is part of.
+/// Whether a package has tests, or a module, that the name is part of.
 fn has_tests(package: &Value, name: &str) -> bool {
     let manifest = package["manifest_path"].as_str().map(Path::new);
-    let sources = manifest.and_then(Path::parent).map(|it| it.join("src"));
-    let sources = sources.expect("a package has a folder");
-    let mut sources = files()
-        .into_iter()
-        .map(|path| root().join(path))
-        .filter(|path| path.starts_with(&sources));
+    let folder = manifest.and_then(Path::parent).expect("a package");
+    let paths = files().into_iter().map(|path| root().join(path));
+    let mut sources = paths.filter(|path| path.starts_with(folder));
     sources.any(|path| {
         let text = fs::read_to_string(path).unwrap_or_default();
         let mut lines = text.lines().map(str::trim_start);
         lines.any(|line| {
-            let named =
-                line.starts_with("fn ") || line.starts_with("mod ") || line.starts_with("pub mod ");
-            named && line.contains(name)
+            let item = line.strip_prefix("pub ").unwrap_or(line);
+            (item.starts_with("fn ") || item.starts_with("mod ")) && line.contains(name)
         })
     })
 }
@@ -216,7 +197,7 @@ const RULES: &str = "host-tools/crates/session/src/readme.md";
 fn every_command_in_a_sentence_of_a_page_names_what_exists() {
     let mut looked_up = 0;
     let others = [RULES, "CHANGELOG.md", "host-tools/samples/README.md"];
-    for path in pages_in(&root()).iter().map(String::as_str).chain(others) {
+    for path in pages().iter().map(String::as_str).chain(others) {
         let page = Page::read(path);
         let lines = page.loose_commands().into_iter();
         let lines = lines.map(|(_, line)| line.trim().to_owned());
@@ -272,6 +253,7 @@ fn names_that_do_not_exist_are_noticed() {
         "cargo run -p iltm-test --bin reference",
         "cargo run -p iltm-tests --bin references",
         "cargo test -p iltm --test power_cuts -- --nocapture",
+        "cargo test -p iltm-tests --test device power_cats -- --nocapture",
         "cargo bench -p iltm --bench solves",
         "cargo test -p iltm-scene --lib near_polygons_that_nobody_has",
         "cargo run --profile fuzzy -p iltm-tests --bin fuzz -- all",

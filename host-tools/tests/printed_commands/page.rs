@@ -1,8 +1,8 @@
-//! Pages in Markdown: their blocks of commands, and commands that stand elsewhere.
+//! Markdown pages: their blocks of commands, and commands that stand elsewhere.
 
-use super::root;
+use iltm_tests::reference_pages::{files_below, root};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Command with which the tests are run.
 pub(crate) const ALL_TESTS: &str = "bash tests/run.sh";
@@ -153,19 +153,12 @@ pub(crate) fn is_assignment(word: &str) -> bool {
 }
 
 /// The README and the pages of the site, from the root.
-pub(crate) fn pages_in(root: &Path) -> Vec<String> {
-    let mut pages = vec!["README.md".to_owned()];
-    let mut folders = vec!["docs".to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(root.join(&folder)).expect("a folder") {
-            let entry = entry.expect("an entry");
-            let path = format!("{folder}/{}", entry.file_name().to_string_lossy());
-            if entry.path().is_dir() {
-                folders.push(path);
-            } else if has_extension(&path, "md") {
-                pages.push(path);
-            }
-        }
-    }
+pub(crate) fn pages() -> Vec<String> {
+    let pages = files_below("docs", "md").expect("pages").into_iter();
+    let pages = pages.map(|path| path.strip_prefix(root()).expect("below").to_owned());
+    let readme = PathBuf::from("README.md");
+    let pages = std::iter::once(readme).chain(pages);
     pages
+        .map(|path| path.to_string_lossy().into_owned())
+        .collect()
 }

@@ -2,7 +2,7 @@
 //!
 //! Each does what plain code elsewhere defines, faster, on Arm processors with the DSP
 //! extension (Cortex-M4, M7 and up), and says whether it did. Hosts have the plain code
-//! only; `tests/tests/firmware.rs` compares whole frames of the two. With the
+//! only; `tests/tests/device/firmware.rs` compares whole frames of the two. With the
 //! feature `reference-kernel` an Arm target has no others either, to measure what
 //! the loops bring (`docs/firmware.md`).
 //!

@@ -1,4 +1,4 @@
-//! Runs fuzz targets for long, on all cores, without any other tool:
+//! Fuzz driver: runs fuzz targets for long, on all cores, without any other tool:
 //!
 //! ```text
 //! cargo run --profile fuzz -p iltm-tests --bin fuzz -- TARGET|all

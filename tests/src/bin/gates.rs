@@ -1,17 +1,15 @@
-//! Takes simulated photographs with every fault at several sizes and prints which gates
-//! notice: `cargo run --release -p iltm-tests --bin gates`.
+//! Gates before a solve: takes simulated photographs with every fault at several sizes and
+//! prints which gates notice: `cargo run --release -p iltm-tests --bin gates`.
 //!
 //! Words choose the faults whose names contain one of them.
 
 use iltm::capture::Verdict;
-use iltm::scene::description::Scene;
 use iltm_tests::gates::{Rig, Session, table, tried};
-use std::path::Path;
+use iltm_tests::simulated::scene;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools/scenes");
-    let scene = Scene::read(&scenes.join("m-panels.toml")).expect("a scene");
+    let scene = scene("m-panels", &[]);
     let rig = Rig::new(&scene);
     let say = |session: &Session| {
         let name = session
@@ -25,12 +23,12 @@ fn main() {
     };
     say(&rig.session(None));
     let mut all = Vec::new();
-    for (mishap, what, sizes) in tried() {
-        if !words.is_empty() && !words.iter().any(|word| mishap.name().contains(word)) {
+    for (kind, what, sizes) in tried() {
+        if !words.is_empty() && !words.iter().any(|word| kind.to_string().contains(word)) {
             continue;
         }
         let sessions = sizes.into_iter().map(|size| {
-            let session = rig.session(Some(iltm::scene::Fault { mishap, size }));
+            let session = rig.session(Some(iltm::scene::InjectedFault { kind, size }));
             say(&session);
             session
         });

@@ -1,5 +1,5 @@
-//! Runs every hard case and prints the page that lists them, or writes it:
-//! `cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md`.
+//! Hard cases: runs every one and prints the page that lists them, or writes it: `cargo
+//! run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md`.
 //!
 //! `--seeds N` (5) says how often each case is run; other words choose the cases
 //! whose names contain one of them.

@@ -1,5 +1,5 @@
-//! Writes the pages of the site that are made from the source: `docs/commands.md` and
-//! `docs/errors.md`.
+//! Reference pages: writes those of the site that are made from the source:
+//! `docs/commands.md` and `docs/errors.md`.
 //!
 //! ```sh
 //! cargo run -p iltm-tests --bin reference

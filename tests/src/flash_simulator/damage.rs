@@ -1,4 +1,4 @@
-//! What a power cut, age and wear do to cells.
+//! Damage to flash cells: what a power cut, age and wear do to cells.
 
 use super::{ERASE_STAGES, Wear};
 use fastrand::Rng;

@@ -132,7 +132,6 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// An erased flash of so many sectors. What is random in it follows from `seed`.
     ///
     /// That `W` divides `E` and that nothing is 0 is checked when it is compiled.
-    #[must_use]
     pub fn new(sectors: usize, seed: u64) -> Self {
         const { assert!(W > 0 && E > 0 && R > 0 && E.is_multiple_of(W)) };
         let capacity = sectors.saturating_mul(E);
@@ -156,7 +155,6 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
 
     /// As a part on which a unit may be programmed again, to clear more bits. Ones
     /// leave bits as they are.
-    #[must_use]
     pub const fn rewritable(mut self) -> Self {
         self.is_rewritable = true;
         self
@@ -164,7 +162,6 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
 
     /// As a part that clears all bits of a sector before it sets them all: an erase
     /// that is cut then leaves zeros as well where there were ones.
-    #[must_use]
     pub const fn with_preprogramming(mut self) -> Self {
         self.preprograms = true;
         self
@@ -173,14 +170,12 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// As a part on which bits that a cut caught in motion are *weak*: each read of
     /// one gives either value, until it is erased. (What reads well once after a cut
     /// may not do so again.)
-    #[must_use]
     pub fn with_weak_bits(mut self) -> Self {
         self.weak = Some(vec![0; self.cells.len()]);
         self
     }
 
     /// Notes every operation in [`log`](Self::log).
-    #[must_use]
     pub fn with_log(mut self) -> Self {
         self.log = Some(Vec::new());
         self
@@ -193,7 +188,6 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     }
 
     /// Steps done whole since the flash was made.
-    #[must_use]
     pub const fn steps(&self) -> u64 {
         self.steps
     }
@@ -217,13 +211,11 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     }
 
     /// Whether the power is on.
-    #[must_use]
     pub const fn is_on(&self) -> bool {
         self.is_on
     }
 
     /// The operation that the last cut fell into.
-    #[must_use]
     pub const fn last_cut(&self) -> Option<&Operation> {
         self.last_cut.as_ref()
     }
@@ -231,20 +223,17 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// All operations since the flash was made, with their errors, if
     /// [`with_log`](Self::with_log) was asked for; without those that found the power
     /// off already.
-    #[must_use]
     pub fn log(&self) -> &[Operation] {
         self.log.as_deref().unwrap_or_default()
     }
 
     /// How often its user broke a rule of the part.
-    #[must_use]
     pub const fn violations(&self) -> Violations {
         self.violations
     }
 
     /// How often a sector has been erased, cut erases included; `None` if there is no
     /// such sector.
-    #[must_use]
     pub fn erases(&self, sector: usize) -> Option<u32> {
         self.sectors.get(sector).map(|sector| sector.erases)
     }
@@ -279,7 +268,6 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
 
     /// What is in the cells, power or not. A weak bit shows as what it would be on
     /// its own.
-    #[must_use]
     pub fn contents(&self) -> &[u8] {
         &self.cells
     }

@@ -1,4 +1,4 @@
-//! What was asked of a simulated flash, and what came of it.
+//! Flash operations: what was asked of a simulated flash, and what came of it.
 
 use super::ERASE_STAGES;
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};

@@ -1,4 +1,4 @@
-//! Which write units may not be programmed any more before they are erased.
+//! Spent write units: which may not be programmed any more before they are erased.
 //!
 //! What a unit reads as does not say: an all-ones word that was programmed, or a
 //! program that was cut before its first bit moved, reads as erased.

@@ -1,3 +1,5 @@
+//! Tests of the NOR flash simulator.
+
 use super::*;
 use embedded_storage::nor_flash::{NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 

@@ -1,4 +1,4 @@
-//! What a simulated flash does when it is asked: read, program, erase.
+//! NOR flash work: what a simulated flash does when it is asked: read, program, erase.
 
 use super::damage;
 use super::{ERASE_STAGES, Misread, NorError, NorSimulator, Operation, Wear, Work};

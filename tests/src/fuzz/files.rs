@@ -1,4 +1,4 @@
-//! Files that a device may be sent, good ones and bad ones, and what must become of
+//! Table files that a device may be sent, good ones and bad ones, and what must become of
 //! each: known from how they were made, not from the code under test.
 
 use crate::wedge_table_for;

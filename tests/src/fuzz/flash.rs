@@ -1,4 +1,4 @@
-//! A device that starts on any flash, records that look right among them.
+//! Fuzzed flash: a device that starts on any flash, records that look right among them.
 
 use super::files::{DEVICES, Owner, files, keys};
 use crate::flash_simulator::{NorSimulator, Violations};

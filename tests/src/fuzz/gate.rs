@@ -1,4 +1,4 @@
-//! The gate before a table runs, and the parsers in front of it.
+//! Admission of a table before it may run, and the parsers in front of it.
 
 use super::files::{DEVICES, Owner, files, keys};
 use iltm_runtime::image::layout::{entry, header};

@@ -1,11 +1,10 @@
-//! One function for each parser of foreign bytes. Whatever the bytes, it must
-//! return: the fuzz targets in `tests/fuzz` and the smoke test in
-//! `tests/tests/foreign_bytes.rs` call the same functions.
+//! Fuzz targets: one function for each parser of foreign bytes. Whatever the bytes, it must
+//! return: the targets in `tests/fuzz` and the short runs in
+//! `tests/tests/runtime/foreign_bytes.rs` call the same functions.
 
 mod files;
 mod flash;
 mod gate;
-mod messages;
 pub mod mutate;
 mod pictures;
 mod session;
@@ -13,7 +12,6 @@ mod targets;
 
 pub use flash::flash;
 pub use gate::{contents, gate};
-pub use messages::messages;
 pub use pictures::pictures;
 pub use session::{described, session};
 pub use targets::{TARGETS, Target};
@@ -29,9 +27,10 @@ use iltm::scene::description::{Scene, parse_mesh};
 use iltm::video::{Compensator, OperatorMemory};
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
-use iltm_runtime::link::{DELIMITER, Decoder, Event, Response, Session};
+use iltm_runtime::link::{DELIMITER, Decoder, Event, MAX_PAYLOAD, Request, Response, Session};
 use iltm_runtime::pipeline::{Encoding, GridPipeline};
-use std::fmt;
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -87,7 +86,7 @@ pub fn manifest(bytes: &[u8]) {
     manifest_of::<CalibrationRole>(bytes);
 }
 
-fn manifest_of<R: ListedRole + PartialEq + fmt::Debug>(bytes: &[u8]) {
+fn manifest_of<R: ListedRole + PartialEq + Debug>(bytes: &[u8]) {
     let parse = |bytes: &[u8]| ManifestOf::<R>::parse(bytes, Path::new(R::FILE));
     if let Ok(manifest) = parse(bytes) {
         let mut again = parse(manifest.to_csv().as_bytes()).expect("a written manifest is good");
@@ -199,5 +198,40 @@ fn say(session: &mut Session, decoder: &mut Decoder) {
                 assert!(frame.is_ok(), "a device sends whole frames");
             }
         }
+    }
+}
+
+/// A payload as a request, a response and an event.
+///
+/// # Panics
+/// If a message that was read does not fit a frame, or is read as another one after
+/// it was written again.
+pub fn messages(bytes: &[u8]) {
+    let bytes = &bytes[..bytes.len().min(MAX_PAYLOAD)];
+    if let Ok(request) = Request::parse(bytes) {
+        again(&request, |bytes| {
+            assert_eq!(Request::parse(bytes), Ok(request), "written and read again");
+        });
+    }
+    both_ways::<Response>(bytes);
+    both_ways::<Event>(bytes);
+}
+
+fn both_ways<M: Serialize + for<'a> Deserialize<'a> + PartialEq + Debug>(bytes: &[u8]) {
+    if let Ok(message) = postcard::from_bytes::<M>(bytes) {
+        again(&message, |bytes| {
+            let read = postcard::from_bytes::<M>(bytes);
+            assert_eq!(read.as_ref(), Ok(&message), "written and read again");
+        });
+    }
+}
+
+fn again<M: Serialize + Debug>(message: &M, read: impl FnOnce(&[u8])) {
+    let mut bytes = [0; MAX_PAYLOAD];
+    match postcard::to_slice(message, &mut bytes) {
+        Ok(bytes) => read(bytes),
+        // Bytes of a chunk are what a payload has room for; a message as long as the
+        // payload that it was read from fits again.
+        Err(error) => panic!("{message:?} does not fit a frame: {error}"),
     }
 }

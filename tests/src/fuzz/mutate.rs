@@ -1,11 +1,10 @@
-//! Inputs made from good ones, each by its number: nothing else is needed to make it
-//! again.
+//! Mutation: inputs made from good ones, each by its number: nothing else is needed to
+//! make it again.
 
 use fastrand::Rng;
 
 /// Input number `index` of a run: one of the `seeds` with some of its bytes changed, in
 /// groups of `group` bytes behind the first `head`.
-#[must_use]
 pub fn input(seeds: &[Vec<u8>], (head, group): (usize, usize), run: u64, index: u64) -> Vec<u8> {
     let mut random = Rng::with_seed(run.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ index);
     // A generator whose seeds are neighbours starts alike.
@@ -65,7 +64,6 @@ fn mutate(bytes: &mut Vec<u8>, seeds: &[Vec<u8>], (head, group): (usize, usize),
 }
 
 /// The shortest and simplest input found that `fails` as well.
-#[must_use]
 pub fn minimised(
     mut bytes: Vec<u8>,
     (head, group): (usize, usize),

@@ -1,4 +1,4 @@
-//! A small photograph in every format that is read.
+//! Picture formats: a small photograph in every format that is read.
 
 use image::{DynamicImage, ImageBuffer, ImageFormat};
 use std::fmt::Write;
@@ -6,7 +6,6 @@ use std::io::Cursor;
 
 /// A picture of 8 x 6 pixels: grey and colour, 8 and 16 bit and floating point, as
 /// far as each format has them; the first ones are patterns too.
-#[must_use]
 pub fn pictures() -> Vec<Vec<u8>> {
     let lit = ImageBuffer::from_fn(8, 6, |_, _| image::Luma([255_u8]));
     let eight = ImageBuffer::from_fn(8, 6, |x, y| image::Luma([(30 * x + 7 * y) as u8]));

@@ -1,9 +1,9 @@
-//! All fuzz targets by name, with good inputs to start from.
+//! Table of the fuzz targets: all of them by name, with good inputs to start from.
 
 use super::{files, session};
+use crate::simulated::host_tools;
 use crate::{wedge_table, wedge_table_for};
 use iltm::picture::Response;
-use std::path::Path;
 
 /// What is fuzzed.
 #[derive(Clone, Copy, Debug)]
@@ -42,10 +42,10 @@ pub const TARGETS: [Target; 14] = [
     target(
         "scene",
         super::scene,
-        || scene("painted-corner.toml"),
+        || file("scenes/painted-corner.toml"),
         (0, 1),
     ),
-    target("mesh", super::mesh, || scene("dome.obj"), (0, 1)),
+    target("mesh", super::mesh, || file("scenes/dome.obj"), (0, 1)),
     target("reference", super::reference, arrays, (0, 1)),
     target("frames", super::frames, streams, (0, 1)),
     target("photograph", super::photograph, super::pictures, (0, 1)),
@@ -229,14 +229,14 @@ fn streams() -> Vec<Vec<u8>> {
     all
 }
 
-/// A file of the sample capture; nothing where the repository is not there.
+/// A file of the tools; nothing where the repository is not there.
+fn file(name: &str) -> Vec<Vec<u8>> {
+    std::fs::read(host_tools().join(name)).into_iter().collect()
+}
+
+/// A file of the sample capture.
 fn sample(name: &str) -> Vec<Vec<u8>> {
-    let samples = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../host-tools/samples/m-panels/"
-    );
-    let bytes = std::fs::read(Path::new(samples).join(name));
-    bytes.into_iter().collect()
+    file(&format!("samples/m-panels/{name}"))
 }
 
 /// `NumPy` arrays of a transport between four cells, 32 and 64 bits, in both orders, and
@@ -261,11 +261,4 @@ fn arrays() -> Vec<Vec<u8>> {
         array("<f8", "True", "4, 4", 128),
         array(">f4", "False", "3, 4, 4", 192),
     ]
-}
-
-/// A file beside the scenes.
-fn scene(name: &str) -> Vec<Vec<u8>> {
-    let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/../host-tools/scenes/");
-    let bytes = std::fs::read(Path::new(scenes).join(name));
-    bytes.into_iter().collect()
 }

@@ -1,9 +1,9 @@
-//! A hard case: what is hard about it, what must hold, and whether it does.
+//! Hard case: what is hard about it, what must hold, and whether it does.
 
 use super::closed_loop::{LoopErrors, errors};
 use super::theory;
 use crate::hard_cases::observations::Capture;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::{Compensation, SolveError, gain_only};
 
 /// One hard case.
@@ -34,7 +34,6 @@ pub struct Outcome {
 
 impl Outcome {
     /// Of a condition.
-    #[must_use]
     pub fn new(holds: bool, bound: impl Into<String>, measured: impl Into<String>) -> Self {
         Self {
             bound: bound.into(),
@@ -46,7 +45,6 @@ impl Outcome {
 
     /// Of input that must be refused with `words` in the diagnosis, which must
     /// have a number.
-    #[must_use]
     pub fn refusal(result: Result<String, String>, words: &str) -> Self {
         let bound = format!("refused: \u{201c}{words}\u{201d}");
         match result {
@@ -61,7 +59,6 @@ impl Outcome {
     }
 
     /// `within bound`, `refused` or `FAILS`.
-    #[must_use]
     pub const fn verdict(&self) -> &'static str {
         match (self.holds, self.refused) {
             (true, false) => "within bound",
@@ -86,9 +83,8 @@ pub struct Demand {
 /// Solves several captures of a scene as `iltm solve` would, operator, gains
 /// alone or refusal as predicted, and holds the closed loop against its bound.
 /// What is chosen may never be worse than gain alone or nothing.
-#[must_use]
 pub fn closed_loop(
-    scene: &Scene,
+    scene: &CoaxialScene,
     seeds: u64,
     demand: Demand,
     make: impl Fn(u64) -> Capture,
@@ -147,7 +143,7 @@ pub fn closed_loop(
 /// Error of what `iltm solve` would write, all errors, what it is and the cells
 /// that took part.
 fn loop_of(
-    scene: &Scene,
+    scene: &CoaxialScene,
     capture: &Capture,
 ) -> Result<(f64, LoopErrors, Compensation, Vec<bool>), SolveError> {
     let (inverse, report) = capture.solve()?;

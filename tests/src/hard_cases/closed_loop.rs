@@ -1,9 +1,9 @@
-//! How far the picture on the wall is from the wanted one.
+//! Closed loop: how far the picture on the wall is from the wanted one.
 
-use iltm::compile::white::reference_white;
-use iltm::content::wanted_images;
-use iltm::scene::coaxial::Scene;
+use iltm::compile::reference_white::uniform_white;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::InverseTransport;
+use iltm::solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Errors of one scene, each the mean over images of
@@ -29,14 +29,13 @@ pub struct LoopErrors {
 /// white: walls that light each other cannot be darker. A projector out of focus
 /// cannot show their edges at all; there the wanted images are those that it
 /// makes of natural ones.
-#[must_use]
-pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
+pub fn errors(scene: &CoaxialScene, found: &InverseTransport) -> LoopErrors {
     let transport = scene.transport();
     let judged: Vec<bool> = (0..scene.grid.cells())
         .map(|cell| found.live[cell] && scene.coverage[cell] > 1e-9)
         .collect();
     let natural = wanted_images(scene.grid);
-    let white = reference_white(found).map_or(0.0, |white| white.light);
+    let white = uniform_white(found).unwrap_or(0.0);
     let wanted = match scene.blur {
         Some(_) => &transport * &natural,
         None => natural * white,
@@ -76,7 +75,6 @@ pub fn errors(scene: &Scene, found: &InverseTransport) -> LoopErrors {
 }
 
 /// `diag(g) - K` of the first channel.
-#[must_use]
 pub fn dense(found: &InverseTransport) -> DMatrix<f64> {
     let channel = found.channel(0);
     DMatrix::from_diagonal(&channel.gain) - channel.operator

@@ -21,10 +21,6 @@ use iltm_runtime::Grid;
 pub const GRID: (u16, u16) = (13, 21);
 
 /// A grid of that size.
-///
-/// # Panics
-/// If there is no such grid.
-#[must_use]
 pub fn grid((rows, cols): (u16, u16)) -> Grid {
-    Grid::new(rows, cols).expect("a grid")
+    crate::grid(rows, cols)
 }

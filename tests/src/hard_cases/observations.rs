@@ -1,9 +1,9 @@
-//! Observations of a [`Scene`] for a solver: patterns as a real capture has them, and
+//! Observations of a [`CoaxialScene`] for a solver: patterns as a real capture has them, and
 //! what a noisy camera makes of them.
 
 use iltm::capture::{Pattern, Role};
 use iltm::progress::Silent;
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::{
     CellNoise, InverseTransport, Observed, ObservedChannel, SolveError, SolveOptions, SolveReport,
     blur, solve_observed,
@@ -35,8 +35,7 @@ pub struct Capture {
 impl Capture {
     /// White, Gray code with its inverses, and `bernoulli` random patterns,
     /// without noise.
-    #[must_use]
-    pub fn new(scene: &Scene, bernoulli: usize, seed: u64) -> Self {
+    pub fn new(scene: &CoaxialScene, bernoulli: usize, seed: u64) -> Self {
         let (patterns, roles) = sequence(scene.grid, bernoulli, seed);
         let light = vec![scene.transport() * &patterns];
         Self {
@@ -53,7 +52,6 @@ impl Capture {
 
     /// Adds white Gaussian noise, `decibels` below the root mean square of all
     /// observations of live cells.
-    #[must_use]
     pub fn noisy(mut self, decibels: f64, seed: u64) -> Self {
         let live = self.live.iter().filter(|live| **live).count();
         let elements = (live * self.patterns.ncols() * self.light.len()) as f64;
@@ -71,7 +69,6 @@ impl Capture {
     }
 
     /// Takes cells out of the camera's sight.
-    #[must_use]
     pub fn unseen(mut self, hidden: impl Fn(usize) -> bool) -> Self {
         for cell in (0..self.live.len()).filter(|cell| hidden(*cell)) {
             self.live[cell] = false;
@@ -83,14 +80,12 @@ impl Capture {
     }
 
     /// Says how far the projector is out of focus.
-    #[must_use]
     pub const fn with_blur(mut self, deviation: f64) -> Self {
         self.blur = deviation;
         self
     }
 
     /// Does something to all light.
-    #[must_use]
     pub fn map(mut self, with: impl Fn(f64) -> f64) -> Self {
         for light in &mut self.light {
             light.apply(|value| *value = with(*value));
@@ -99,7 +94,6 @@ impl Capture {
     }
 
     /// What the solver sees.
-    #[must_use]
     pub fn observed(&self) -> Observed<'_> {
         let noise = CellNoise {
             lit: self.noise,
@@ -130,7 +124,6 @@ impl Capture {
 }
 
 /// Patterns and roles of a capture without black, whose light is subtracted.
-#[must_use]
 pub fn sequence(grid: Grid, bernoulli: usize, seed: u64) -> (DMatrix<f64>, Vec<Role>) {
     let bits = |cells: usize| cells.next_power_of_two().trailing_zeros() as u8;
     let (column_bits, row_bits) = (bits(grid.cols()), bits(grid.rows()));
@@ -161,8 +154,7 @@ pub fn sequence(grid: Grid, bernoulli: usize, seed: u64) -> (DMatrix<f64>, Vec<R
 
 /// A scene whose projector is out of focus: a Gaussian of `deviation` cells, integrated
 /// over each cell; what falls beside the frame is lost.
-#[must_use]
-pub fn out_of_focus(scene: Scene, deviation: f64) -> Scene {
+pub fn out_of_focus(scene: CoaxialScene, deviation: f64) -> CoaxialScene {
     let blur = blur(scene.grid, deviation);
     scene.blurred(blur)
 }

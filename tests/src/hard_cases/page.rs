@@ -1,4 +1,4 @@
-//! The page of all cases.
+//! Page of hard cases: lists all of them.
 
 use super::case::{Case, Outcome};
 use crate::hard_frames::page::Row;
@@ -15,7 +15,7 @@ result. This command writes the page:
 cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md
 ```
 
-`cargo test -p iltm-tests --test hard_cases` checks every case.
+`cargo test -p iltm-tests --test scenes hard_cases` checks every case.
 
 Errors are those of the closed loop, `min_s |s T p - d| / |d|`, as the mean over 16 natural
 images `d` (dead leaves, darkest parts a fifth of white), where `p` is the projector's input
@@ -46,7 +46,6 @@ reference. A step is 2^-15 of the projector's white: 128 steps are an 8-bit code
 ";
 
 /// The page, and how many cases fail.
-#[must_use]
 pub fn render(groups: &[(&str, Vec<(Case, Outcome)>)], frames: &[Row]) -> (String, usize) {
     let mut page = HEAD.to_owned();
     let mut failures = 0;

@@ -1,9 +1,9 @@
-//! Whole captures of a [`Scene`], written as files: each cell is a square of
+//! Camera: whole captures of a [`CoaxialScene`], written as files: each cell is a square of
 //! camera pixels.
 
 use crate::hard_cases::observations::{normal, sequence};
 use iltm::capture::{MANIFEST_FILE, Manifest, Role, Shot};
-use iltm::scene::coaxial::Scene;
+use iltm::scene::coaxial::CoaxialScene;
 use image::{ImageBuffer, Luma};
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -48,7 +48,7 @@ impl Camera {
     /// What cannot be written.
     pub fn write(
         &self,
-        scene: &Scene,
+        scene: &CoaxialScene,
         folder: &Path,
         settings: &str,
     ) -> Result<(), image::ImageError> {

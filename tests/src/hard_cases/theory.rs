@@ -1,4 +1,4 @@
-//! The errors that theory allows.
+//! Error bounds: the errors that theory allows.
 //!
 //! For a closed loop with a learned inverse the bound is
 //!
@@ -18,13 +18,12 @@
 //! inverse to the wall. `tolerance` is the relative residual at which the solver
 //! stops.
 
-use iltm::content::natural_images;
-use iltm::scene::coaxial::Scene;
-use iltm::solve::{Basis, Haar, SolveOptions};
+use iltm::scene::coaxial::CoaxialScene;
+use iltm::solve::natural_images;
+use iltm::solve::{Haar, SolveOptions};
 use nalgebra::DMatrix;
 
 /// Largest over smallest singular value of `T` between the chosen cells.
-#[must_use]
 pub fn condition(transport: &DMatrix<f64>, live: &[bool]) -> f64 {
     let values = part(transport, live).singular_values();
     values.max() / values.min()
@@ -32,8 +31,13 @@ pub fn condition(transport: &DMatrix<f64>, live: &[bool]) -> f64 {
 
 /// Bound on the closed loop's error; `photographs` are all that the solver uses,
 /// `noise` is relative to the light's root mean square.
-#[must_use]
-pub fn bound(scene: &Scene, live: &[bool], photographs: usize, noise: f64, perfect: f64) -> f64 {
+pub fn bound(
+    scene: &CoaxialScene,
+    live: &[bool],
+    photographs: usize,
+    noise: f64,
+    perfect: f64,
+) -> f64 {
     let transport = scene.transport();
     let cells = live.iter().filter(|live| **live).count() as f64;
     let m = photographs as f64;
@@ -62,9 +66,9 @@ struct Tails<'t> {
 }
 
 impl<'t> Tails<'t> {
-    fn new(scene: &Scene, transport: &DMatrix<f64>, live: &'t [bool]) -> Self {
+    fn new(scene: &CoaxialScene, transport: &DMatrix<f64>, live: &'t [bool]) -> Self {
         let chosen = chosen(live);
-        let haar = Haar::new(scene.grid, Basis::QuadTree);
+        let haar = Haar::new(scene.grid);
         let coefficients = part(transport, live).try_inverse().map(|inverse| {
             let mut operator = DMatrix::zeros(live.len(), live.len());
             for (row, i) in chosen.iter().enumerate() {

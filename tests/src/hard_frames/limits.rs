@@ -1,7 +1,8 @@
-//! Tables at the edge of what the proof of the bounds takes, and the frames that it has
-//! in mind.
+//! Overflow limits: tables at the edge of what the proof of the bounds takes, and the
+//! frames that it has in mind.
 
-use super::{Frame, UNIT, grid};
+use super::{Frame, UNIT};
+use crate::grid;
 use crate::made_up::MadeUp;
 use iltm::compile::image::StoredRow;
 use iltm::video::OperatorMemory;
@@ -29,7 +30,6 @@ fn row(index: u16, shift: u16, values: &[i16]) -> StoredRow {
 
 /// A table whose accumulator can reach `2^14` times 131,068 + `more`; `2^31 - 1` is
 /// 131,071.99 times that.
-#[must_use]
 pub fn at_the_accumulators_limit(more: i16) -> MadeUp {
     let mut made = MadeUp::new(five_details(), 1);
     let most = i16::MAX;
@@ -39,7 +39,6 @@ pub fn at_the_accumulators_limit(more: i16) -> MadeUp {
 
 /// A table of whose corrections one can reach `2^12` times 262,142 + `more`, and 3 for
 /// what the three rows round; `2^30 - 1` is 262,143.99 times that.
-#[must_use]
 pub fn at_the_corrections_limit(more: i16) -> MadeUp {
     let mut made = MadeUp::new(five_details(), 1);
     let most = i16::MAX;
@@ -54,9 +53,6 @@ pub fn at_the_corrections_limit(more: i16) -> MadeUp {
 ///
 /// # Errors
 /// [`OperatorError`] if it is its operator that is refused.
-///
-/// # Panics
-/// If the table is refused for something else.
 pub fn verdict(made: &MadeUp) -> Result<Bounds, OperatorError> {
     let image = made.image();
     match Table::check(&image) {
@@ -68,10 +64,6 @@ pub fn verdict(made: &MadeUp) -> Result<Bounds, OperatorError> {
 
 /// The corrections of the cells, bits of
 /// [`Correction`](iltm_runtime::units::Correction), for a frame.
-///
-/// # Panics
-/// If the table is refused.
-#[must_use]
 pub fn corrections(made: &MadeUp, frame: Frame) -> Vec<i32> {
     let image = made.image();
     let table = Table::check(&image).expect("made to be taken");

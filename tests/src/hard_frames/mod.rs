@@ -1,4 +1,4 @@
-//! Frames and tables that are hard on integer arithmetic, against exact ones.
+//! Hard frames: frames and tables that are hard on integer arithmetic, against exact ones.
 //!
 //! The reference takes the entries that a checked table holds and does with them, in
 //! `f64`, what the documentation says: whole basis functions instead of the fast
@@ -22,6 +22,7 @@
 pub mod limits;
 pub mod page;
 
+use crate::grid;
 use crate::made_up::MadeUp;
 use iltm::compile::image::StoredRow;
 use iltm::video::OperatorMemory;
@@ -58,7 +59,6 @@ pub enum Frame {
 
 impl Frame {
     /// The light of the cells, 0 or 1.
-    #[must_use]
     pub fn light(self, grid: Grid) -> Vec<f64> {
         let basis = Basis::new(grid);
         let function = match self {
@@ -83,7 +83,6 @@ impl Frame {
     }
 
     /// Those of a grid that its size alone makes hard.
-    #[must_use]
     pub fn all(grid: Grid) -> Vec<Self> {
         let cells = grid.cells();
         let mut frames = vec![Self::Black, Self::White];
@@ -106,7 +105,6 @@ pub struct Reference<'t, 'a> {
 
 impl<'t, 'a> Reference<'t, 'a> {
     /// Of a table, at its top tier.
-    #[must_use]
     pub fn new(table: &'t Table<'a>) -> Self {
         let functions: Vec<_> = table.basis().functions().collect();
         let (count, cols) = (functions.len(), table.grid().cols());
@@ -122,7 +120,6 @@ impl<'t, 'a> Reference<'t, 'a> {
 
     /// The corrections of one channel, and how far rounding may take the runtime's from
     /// them, both in steps of a drive.
-    #[must_use]
     pub fn corrections(&self, scale: f64, light: &[f64]) -> (DVector<f64>, DVector<f64>) {
         let inputs = &self.values * DVector::from_column_slice(light) * UNIT;
         let count = light.len();
@@ -178,7 +175,6 @@ impl Worst {
     }
 
     /// The larger of each.
-    #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self {
             error: self.error.max(other.error),
@@ -190,7 +186,6 @@ impl Worst {
     }
 
     /// Whether all were within their bounds.
-    #[must_use]
     pub fn holds(&self) -> bool {
         self.share <= 1.0 && self.of_bytes <= 1.0
     }
@@ -208,10 +203,6 @@ impl fmt::Display for Worst {
 
 /// Drives of a frame of `C` channels, all of the same light, as the runtime makes them
 /// with 16-bit codes, and the clipped samples.
-///
-/// # Panics
-/// If the table has not `C` channels.
-#[must_use]
 pub fn runtime_drives<const C: usize>(table: &Table<'_>, light: &[f64]) -> (Vec<[f64; C]>, u32) {
     let (codes, clipped) = frame::<u16, C>(table, light, |light| (light * 65_535.0) as u16);
     let drives = codes
@@ -235,10 +226,6 @@ fn frame<S: Sample, const C: usize>(
 }
 
 /// The runtime against the reference for a frame.
-///
-/// # Panics
-/// If the table has not `C` channels.
-#[must_use]
 pub fn compare<const C: usize>(
     made: &MadeUp,
     reference: &Reference<'_, '_>,
@@ -279,7 +266,6 @@ pub fn compare<const C: usize>(
 
 /// A table whose gains, ambient light and operator are random: up to `entries` entries
 /// a row, as large as the proof of the bounds takes.
-#[must_use]
 pub fn random(grid: Grid, channels: usize, entries: usize, seed: u64) -> MadeUp {
     let mut random = fastrand::Rng::with_seed(seed);
     let samples = grid.cells() * channels;
@@ -313,10 +299,6 @@ pub fn random(grid: Grid, channels: usize, entries: usize, seed: u64) -> MadeUp 
 }
 
 /// [`compare`] for all hard frames of a random table.
-///
-/// # Panics
-/// If the table is refused: it is made to be taken.
-#[must_use]
 pub fn all_frames(made: &MadeUp, frames: &[Frame]) -> Worst {
     let image = made.image();
     let table = Table::check(&image).expect("made to be taken");
@@ -329,15 +311,6 @@ pub fn all_frames(made: &MadeUp, frames: &[Frame]) -> Worst {
         }
     };
     frames.iter().map(of).fold(Worst::default(), Worst::max)
-}
-
-/// A grid of the sides.
-///
-/// # Panics
-/// If there is no such grid.
-#[must_use]
-pub fn grid(rows: u16, cols: u16) -> Grid {
-    Grid::new(rows, cols).expect("within a grid's limits")
 }
 
 /// Grids whose sides the transform finds hard: none, one row, one column, primes, the
@@ -359,10 +332,6 @@ pub const GRIDS: [(u16, u16); 11] = [
 /// Frames of which the output differs from that of the first ones, among `count` that
 /// show the same two frames, unlike in every sample, in turn: black and white, then a
 /// checkerboard and its inverse. All stages at once, in 8 bits.
-///
-/// # Panics
-/// If the table is refused.
-#[must_use]
 pub fn drifted(count: usize) -> usize {
     let mut made = random(grid(5, 7), 3, 6, 5);
     made.response = true;

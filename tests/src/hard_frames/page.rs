@@ -1,7 +1,8 @@
-//! The lines of the page of hard cases that are about frames.
+//! Page of hard frames: the lines of the page of hard cases that are about frames.
 
 use super::limits::{at_the_accumulators_limit, at_the_corrections_limit, corrections, verdict};
-use super::{Frame, GRIDS, Worst, all_frames, drifted, grid, random};
+use super::{Frame, GRIDS, Worst, all_frames, drifted, random};
+use crate::grid;
 use crate::made_up::MadeUp;
 use iltm_runtime::operator::{Bounds, OperatorError};
 
@@ -21,10 +22,6 @@ pub struct Row {
 }
 
 /// The lines.
-///
-/// # Panics
-/// If a table that is made to be taken is refused.
-#[must_use]
 pub fn rows() -> Vec<Row> {
     let mut rows = frame_rows();
     rows.extend(limit_rows());

@@ -1,4 +1,4 @@
-//! Operators for grids whose real scenes take minutes to compile.
+//! Made-up operators for grids whose real scenes take minutes to compile.
 //!
 //! The operator's rows are copies of those of a real table, as to how many pairs and
 //! entries they have; where they lie and what their values are is made up. What a
@@ -13,12 +13,8 @@ use iltm_runtime::image::Table;
 /// A table with ambient light, response and an operator of one tier, about `entries`
 /// entries a row, with rows like those of the top tier of `shape`.
 pub(super) fn table(grid: Grid, channels: usize, entries: f64, shape: &Table<'_>) -> Vec<u8> {
-    let samples = grid.cells() * channels;
-    let mut table = MadeUp::new(grid, channels);
+    let mut table = MadeUp::nearly_plain(grid, channels, true);
     table.scales[..channels].fill(U1F15::from_num(0.9));
-    // Just under one, so that natural frames are not clipped more than usual.
-    table.gains = vec![7_800; samples];
-    table.ambient = Some(vec![330; samples]);
     table.response = true;
     table.rows = rows(grid, entries, shape);
     table.image()

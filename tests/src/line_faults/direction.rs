@@ -1,4 +1,4 @@
-//! One direction of a line that damages frames: bytes in, bytes out.
+//! Line direction: one direction of a line that damages frames: bytes in, bytes out.
 
 use super::faults::{FaultCounts, FaultKind, FaultRates};
 use fastrand::Rng;

@@ -1,4 +1,4 @@
-//! Rates and kinds of line faults, and counts of those that happened.
+//! Line faults: rates and kinds of line faults, and counts of those that happened.
 
 use std::time::Duration;
 
@@ -38,7 +38,6 @@ pub(super) enum FaultKind {
 impl FaultRates {
     /// So many parts of 1,000 are faulty: dropped, duplicated, corrupted, reordered
     /// and cut alike often.
-    #[must_use]
     pub const fn evenly(parts: u16) -> Self {
         // What five does not divide goes to the first.
         let each = parts / 5;
@@ -54,7 +53,6 @@ impl FaultRates {
     }
 
     /// Nothing arrives.
-    #[must_use]
     pub fn silence() -> Self {
         Self {
             drop: 1_000,
@@ -97,7 +95,6 @@ pub struct Faults {
 
 impl Faults {
     /// The same rates in both directions.
-    #[must_use]
     pub const fn both_ways(rates: FaultRates, seed: u64) -> Self {
         Self {
             to_device: rates,
@@ -108,7 +105,6 @@ impl Faults {
     }
 
     /// Unplugs the line as well, after so many frames.
-    #[must_use]
     pub const fn unplugged_after(mut self, frames: u64) -> Self {
         self.unplug_after = Some(frames);
         self
@@ -136,7 +132,6 @@ pub struct FaultCounts {
 
 impl FaultCounts {
     /// Frames that had a fault.
-    #[must_use]
     pub const fn faulty(&self) -> u64 {
         self.dropped + self.duplicated + self.corrupted + self.reordered + self.delayed + self.cut
     }

@@ -1,4 +1,4 @@
-//! A line that damages frames on their way.
+//! Lossy line: damages frames on their way.
 
 use super::direction::Direction;
 use super::faults::{FaultCounts, Faults};
@@ -25,7 +25,6 @@ pub struct LossyLine<L> {
 
 impl<L: Line> LossyLine<L> {
     /// Puts these faults between a host and this line.
-    #[must_use]
     pub fn new(line: L, faults: Faults) -> Self {
         let mut seeds = fastrand::Rng::with_seed(faults.seed);
         Self {
@@ -37,25 +36,21 @@ impl<L: Line> LossyLine<L> {
     }
 
     /// The line within.
-    #[must_use]
     pub const fn line(&self) -> &L {
         &self.line
     }
 
     /// The line within, to do other things to it.
-    #[must_use]
     pub const fn line_mut(&mut self) -> &mut L {
         &mut self.line
     }
 
     /// What became of frames from host to device.
-    #[must_use]
     pub const fn to_device(&self) -> FaultCounts {
         self.to_device.counts
     }
 
     /// What became of frames from device to host.
-    #[must_use]
     pub const fn to_host(&self) -> FaultCounts {
         self.to_host.counts
     }
@@ -73,7 +68,6 @@ impl<L: Line> LossyLine<L> {
     }
 
     /// Whether it has been unplugged.
-    #[must_use]
     pub const fn is_unplugged(&self) -> bool {
         self.left == 0
     }

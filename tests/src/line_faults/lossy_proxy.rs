@@ -1,4 +1,4 @@
-//! A port that damages frames, before a real one.
+//! Lossy proxy: a port that damages frames, before a real one.
 
 use super::faults::{FaultCounts, Faults};
 use super::lossy_line::LossyLine;
@@ -88,25 +88,21 @@ impl LossyProxy {
     }
 
     /// Where a client finds it.
-    #[must_use]
     pub fn path(&self) -> &str {
         &self.path
     }
 
     /// Whether it has gone: unplugged by order, or with the real port.
-    #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.is_over.load(Ordering::Relaxed)
     }
 
     /// What became of frames from host to device.
-    #[must_use]
     pub fn to_device(&self) -> FaultCounts {
         self.counts().0
     }
 
     /// What became of frames from device to host.
-    #[must_use]
     pub fn to_host(&self) -> FaultCounts {
         self.counts().1
     }

@@ -1,4 +1,4 @@
-//! Serial lines that fail by order, to test clients and devices against.
+//! Line faults: serial lines that fail by order, to test clients and devices against.
 //!
 //! | simulator | file | what for |
 //! |---|---|---|
@@ -37,7 +37,6 @@
 mod direction;
 mod faults;
 mod lossy_line;
-#[cfg(unix)]
 mod lossy_proxy;
 mod paced_line;
 #[cfg(test)]
@@ -46,6 +45,5 @@ mod wire;
 
 pub use faults::{FaultCounts, FaultRates, Faults};
 pub use lossy_line::LossyLine;
-#[cfg(unix)]
 pub use lossy_proxy::LossyProxy;
 pub use paced_line::{FarEnd, PacedLine};

@@ -1,4 +1,4 @@
-//! A serial line of a given speed, on a clock of its own.
+//! Paced line: a serial line of a given speed, on a clock of its own.
 
 use super::wire::Wire;
 use iltm::device::Line;
@@ -87,7 +87,6 @@ const LONGEST_WAIT: Duration = Duration::from_hours(1);
 impl<F: FarEnd> PacedLine<F> {
     /// A line of so many bits a second (at least 1). The device takes a turn every
     /// .1 ms, at first at 0.
-    #[must_use]
     pub fn new(far_end: F, baud: u32) -> Self {
         Self {
             far_end,
@@ -104,7 +103,6 @@ impl<F: FarEnd> PacedLine<F> {
     /// Lets the device take a turn once in a `period` (at least 1 us): how long its
     /// loop may take, and how finely its answers are timed. Turns are what a simulated
     /// second costs.
-    #[must_use]
     pub fn with_turns_every(mut self, period: Duration) -> Self {
         self.period = nanoseconds(period).max(1_000);
         self
@@ -112,7 +110,6 @@ impl<F: FarEnd> PacedLine<F> {
 
     /// Lets every byte arrive so much later, both ways, as behind a USB adapter that
     /// collects bytes before it passes them on.
-    #[must_use]
     pub fn with_latency(mut self, latency: Duration) -> Self {
         let latency = nanoseconds(latency.min(LONGEST_WAIT));
         (self.to_device.latency, self.to_host.latency) = (latency, latency);
@@ -120,31 +117,26 @@ impl<F: FarEnd> PacedLine<F> {
     }
 
     /// Time since the start of the line, by its clock.
-    #[must_use]
     pub const fn elapsed(&self) -> Duration {
         Duration::from_nanos(self.now)
     }
 
     /// Bytes that the device has been given.
-    #[must_use]
     pub const fn bytes_to_device(&self) -> u64 {
         self.to_device.carried
     }
 
     /// Bytes that the host has read.
-    #[must_use]
     pub const fn bytes_to_host(&self) -> u64 {
         self.to_host.carried
     }
 
     /// The device.
-    #[must_use]
     pub const fn far_end(&self) -> &F {
         &self.far_end
     }
 
     /// The device, to do something to it.
-    #[must_use]
     pub const fn far_end_mut(&mut self) -> &mut F {
         &mut self.far_end
     }

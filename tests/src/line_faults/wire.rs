@@ -1,4 +1,4 @@
-//! One direction of a serial line of a given speed, by a clock in nanoseconds.
+//! Wire: one direction of a serial line of a given speed, by a clock in nanoseconds.
 
 use std::collections::VecDeque;
 

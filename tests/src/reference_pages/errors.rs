@@ -1,9 +1,9 @@
-//! Reads error types from the source: their words are where they are made, and nowhere else.
+//! Error types, read from the source: their words are where they are made, and nowhere else.
 
 use std::collections::HashMap;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::PathBuf;
 use syn::{Arm, Attribute, Expr, ImplItem, Item, ItemEnum, ItemImpl, Lit, Meta, Pat};
 
 /// An error type.
@@ -22,14 +22,12 @@ pub(super) struct Case {
     pub(super) next_step: Option<String>,
 }
 
-/// Public error types in all files of a folder, ordered by name.
-pub(super) fn in_folder(folder: &Path) -> io::Result<Vec<ErrorType>> {
-    let mut files = Vec::new();
-    rust_files(folder, &mut files)?;
+/// Public error types in these files, ordered by name.
+pub(super) fn in_files(files: &[PathBuf]) -> io::Result<Vec<ErrorType>> {
     let mut found = Vec::new();
     let mut advice = HashMap::new();
     for path in files {
-        let text = fs::read_to_string(&path)?;
+        let text = fs::read_to_string(path)?;
         let file = syn::parse_file(&text).map_err(|error| {
             io::Error::new(
                 io::ErrorKind::InvalidData,
@@ -53,18 +51,6 @@ pub(super) fn in_folder(folder: &Path) -> io::Result<Vec<ErrorType>> {
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(found)
-}
-
-fn rust_files(folder: &Path, files: &mut Vec<std::path::PathBuf>) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path.is_dir() {
-            rust_files(&path, files)?;
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-    Ok(())
 }
 
 /// Public, and by its name or its derives an error.

@@ -1,11 +1,15 @@
-//! Pages of the site that are made from the source: every command with its options, and
-//! every error with what to do about it.
+//! Reference pages: the pages of the site that are made from the source, with every command
+//! and its options, and every error and what to do about it. Besides, what tests of pages
+//! ask of the repository.
 
 mod errors;
 
+use serde_json::Value;
 use std::fmt::Write;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
 
 /// The pages with their paths.
 ///
@@ -20,10 +24,42 @@ pub fn pages() -> io::Result<Vec<(PathBuf, String)>> {
 }
 
 /// The repository.
-#[must_use]
 pub fn root() -> PathBuf {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
     tests.parent().unwrap_or(tests).to_owned()
+}
+
+/// All files below a folder of the repository whose names end with `.` and `extension`.
+///
+/// # Errors
+/// If a folder cannot be read.
+pub fn files_below(folder: &str, extension: &str) -> io::Result<Vec<PathBuf>> {
+    let mut folders = vec![root().join(folder)];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|its| its == extension) {
+                files.push(path);
+            }
+        }
+    }
+    Ok(files)
+}
+
+/// What cargo knows of the workspace.
+pub fn metadata() -> &'static Value {
+    static METADATA: OnceLock<Value> = OnceLock::new();
+    METADATA.get_or_init(|| {
+        let metadata = Command::new(env!("CARGO"))
+            .args(["metadata", "--no-deps", "--format-version=1", "--locked"])
+            .current_dir(root())
+            .output()
+            .expect("cargo is there");
+        serde_json::from_slice(&metadata.stdout).expect("JSON")
+    })
 }
 
 fn commands() -> String {
@@ -53,7 +89,7 @@ fn errors() -> io::Result<String> {
          solve have [their own page](gates.md).\n",
     );
     for house in ["host-tools/crates", "host-tools/src", "runtime/src"] {
-        for error in errors::in_folder(&root().join(house))? {
+        for error in errors::in_files(&files_below(house, "rs")?)? {
             let _ = write!(text, "\n## {}\n\n{}\n\n", error.name, error.about);
             for case in &error.cases {
                 let _ = write!(text, "- **{}**: {}", case.name, case.about);

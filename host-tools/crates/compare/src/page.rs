@@ -1,12 +1,13 @@
-//! The page of a contest: pictures first, numbers beside them.
+//! HTML page of a contest: pictures first, numbers beside them.
 
-use super::contest::{Done, Row};
-use super::light::Light;
-use super::sheet::{Tile, encoded, sheet};
+use super::benchmark::{BenchmarkRow, MethodResult};
+use super::benchmark_scene::BenchmarkScene;
 use super::table::{COLUMNS, cells};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use iltm_picture::{ColourScale, Palette, html::document};
+use iltm_picture::{
+    ColourScale, ContactSheet, Palette, Tile,
+    html::{document, img},
+    png,
+};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
 
@@ -19,18 +20,18 @@ const WORST: (f64, i32) = (0.3, 3);
 
 /// Two groups of rows and the light they were made with.
 #[derive(Debug)]
-pub struct Contest<'c> {
+pub struct BenchmarkPage<'c> {
     /// What was compared on, for the heading.
     pub name: &'c str,
     /// The light.
-    pub light: &'c Light,
+    pub light: &'c BenchmarkScene,
     /// Ways to photograph.
-    pub photographed: &'c [Row],
+    pub photographed: &'c [BenchmarkRow],
     /// Ways to invert, given the transport itself.
-    pub inverted: &'c [Row],
+    pub inverted: &'c [BenchmarkRow],
 }
 
-impl Contest<'_> {
+impl BenchmarkPage<'_> {
     /// The page as HTML, complete in itself.
     #[must_use]
     pub fn html(&self) -> String {
@@ -55,14 +56,14 @@ impl Contest<'_> {
         document(&format!("Methods compared: {}", self.name), "", &body)
     }
 
-    fn group(&self, title: &str, words: &str, rows: &[Row]) -> Markup {
+    fn group(&self, title: &str, words: &str, rows: &[BenchmarkRow]) -> Markup {
         html! {
             section {
                 h2 { (title) }
                 p { (words) " Errors are relative: of the inverse (Frobenius), of the second bounce\u{2019}s picture under white, and of what compensated images look like, clipping included." }
                 @if let Some(picture) = self.pictures(rows) {
                     figure {
-                        img src=(picture) alt=(format!("{title}: where a compensated image errs"));
+                        (img(&picture, &format!("{title}: where a compensated image errs")))
                         figcaption { "One natural image on the wall, and where it errs by each method." }
                     }
                 }
@@ -74,7 +75,7 @@ impl Contest<'_> {
                                 Ok(_) => @for (at, cell) in cells(row).into_iter().enumerate() {
                                     td .(if at == 0 { "" } else { "formula" }) { (cell) }
                                 },
-                                Err(why) => { td { (row.name) } td colspan="7" { "no answer: " (why) } },
+                                Err(why) => { td { (row.method.name) } td colspan="7" { "no answer: " (why) } },
                             }
                         }
                     }
@@ -90,10 +91,10 @@ impl Contest<'_> {
                 h2 { "What they are, and where they come from" }
                 dl .facts {
                     @for row in rows {
-                        dt { strong { (row.name) } }
+                        dt { strong { (row.method.name) } }
                         dd {
-                            (row.how) " " em { (row.source) "." }
-                            @if let Ok(Done { remark, .. }) = &row.result { @if !remark.is_empty() { " Here: " (remark) "." } }
+                            (row.method.how) " " em { (row.method.source) "." }
+                            @if let Ok(MethodResult { remark, .. }) = &row.result { @if !remark.is_empty() { " Here: " (remark) "." } }
                         }
                     }
                 }
@@ -101,18 +102,13 @@ impl Contest<'_> {
         }
     }
 
-    /// Where one image errs, by method, as a data URL.
-    fn pictures(&self, rows: &[Row]) -> Option<String> {
+    /// Where one image errs, by method, as a PNG file.
+    fn pictures(&self, rows: &[BenchmarkRow]) -> Option<Vec<u8>> {
         let truth = &self.light.truth;
         let scale = ColourScale::logarithmic(Palette::Magma, WORST.0, WORST.1);
         let size = FrameSize::of_grid(truth.grid);
         let wanted = truth.images.column(0).into_owned();
-        let wanted_tile = Tile::light(
-            ("wanted", ""),
-            truth.grid,
-            wanted.iter().copied(),
-            truth.white,
-        );
+        let wanted_tile = Tile::light(("wanted", ""), size, wanted.iter().copied(), truth.white);
         let mut tiles = vec![wanted_tile];
         for row in rows {
             let Ok(done) = &row.result else { continue };
@@ -123,13 +119,18 @@ impl Contest<'_> {
                 super::table::error(done.errors.compensation)
             );
             let values = off.iter().map(|value| value.abs());
-            tiles.push(Tile::scaled((&row.name, &caption), size, values, &scale));
+            tiles.push(Tile::scaled(
+                (&row.method.name, &caption),
+                size,
+                values,
+                &scale,
+            ));
         }
-        let rows: Vec<Vec<Tile>> = tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect();
-        let picture = sheet(&rows, Some((&scale, "error, relative to reference white")))?;
-        Some(format!(
-            "data:image/png;base64,{}",
-            STANDARD.encode(encoded(&picture))
-        ))
+        let sheet = ContactSheet {
+            rows: tiles.chunks(ACROSS).map(<[Tile]>::to_vec).collect(),
+            bar: Some((&scale, "error, relative to reference white")),
+            ..ContactSheet::default()
+        };
+        Some(png::encode_small(&sheet.compose()?))
     }
 }

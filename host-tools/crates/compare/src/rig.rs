@@ -1,4 +1,4 @@
-//! A projector and a camera before a scene whose transport is known.
+//! Simulated rig: a projector and a camera before a scene whose transport is known.
 //!
 //! Stands for a real rig where a method wants patterns that nobody photographed: one
 //! light at a time, stripes, patterns that depend on the photographs before.
@@ -9,6 +9,19 @@ use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+
+/// Indices of the cells that are `live`, ascending.
+pub(crate) fn live_cells(live: &[bool]) -> Vec<usize> {
+    (0..live.len()).filter(|cell| live[*cell]).collect()
+}
+
+/// Sets rows and columns of cells that are not `live` to zero.
+pub(crate) fn clear_dead(matrix: &mut DMatrix<f64>, live: &[bool]) {
+    for cell in (0..live.len()).filter(|cell| !live[*cell]) {
+        matrix.row_mut(cell).fill(0.0);
+        matrix.column_mut(cell).fill(0.0);
+    }
+}
 
 /// Photographs cell by cell, with a camera's noise, and counts them.
 #[derive(Clone, Debug)]
@@ -64,9 +77,7 @@ impl Rig {
     /// The same, by index.
     #[must_use]
     pub fn live_cells(&self) -> Vec<usize> {
-        (0..self.live.len())
-            .filter(|cell| self.live[*cell])
-            .collect()
+        live_cells(&self.live)
     }
 
     /// Noise of one cell's observation in one photograph.

@@ -1,12 +1,13 @@
-//! Rows of a contest as CSV, Markdown and text.
+//! Benchmark tables: rows as CSV, Markdown and text.
 
-use super::contest::{Done, Row};
+use super::benchmark::{BenchmarkRow, MethodResult};
+use iltm_picture::numbers::grouped;
 use std::fmt::Write;
 
 /// Rows as comma-separated values with a heading; a method that gives no answer has
 /// its reason in the last column.
 #[must_use]
-pub fn csv(groups: &[(&str, &[Row])]) -> String {
+pub fn csv(groups: &[(&str, &[BenchmarkRow])]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut put = |fields: [String; 12]| {
         // Writing to memory does not fail.
@@ -31,13 +32,13 @@ pub fn csv(groups: &[(&str, &[Row])]) -> String {
         for row in *rows {
             let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
             let done = row.result.as_ref().ok();
-            let whole = |of: fn(&Done) -> Option<usize>| {
+            let whole = |of: fn(&MethodResult) -> Option<usize>| {
                 done.and_then(of)
                     .map_or_else(String::new, |v| v.to_string())
             };
             put([
                 (*group).to_owned(),
-                row.name.clone(),
+                row.method.name.clone(),
                 whole(|done| Some(done.photographs)),
                 number(done.map(|done| done.seconds)),
                 whole(|done| done.memory),
@@ -45,8 +46,8 @@ pub fn csv(groups: &[(&str, &[Row])]) -> String {
                 number(done.and_then(|done| done.errors.inverse)),
                 number(done.and_then(|done| done.errors.second_bounce)),
                 number(done.map(|done| done.errors.compensation)),
-                format!("{}: {}", row.source.authors, row.source.title),
-                row.source.year.to_string(),
+                format!("{}: {}", row.method.source.authors, row.method.source.title),
+                row.method.source.year.to_string(),
                 match &row.result {
                     Ok(done) => done.remark.clone(),
                     Err(why) => why.to_string(),
@@ -71,10 +72,10 @@ pub(super) const COLUMNS: [&str; 8] = [
 ];
 
 /// A row's cells in the order of [`COLUMNS`].
-pub(super) fn cells(row: &Row) -> [String; 8] {
+pub(super) fn cells(row: &BenchmarkRow) -> [String; 8] {
     let Ok(done) = &row.result else {
         let mut cells = [const { String::new() }; 8];
-        cells[0].clone_from(&row.name);
+        cells[0].clone_from(&row.method.name);
         return cells;
     };
     let photographs = match done.photographs {
@@ -82,11 +83,12 @@ pub(super) fn cells(row: &Row) -> [String; 8] {
         count => count.to_string(),
     };
     [
-        row.name.clone(),
+        row.method.name.clone(),
         photographs,
         seconds(done.seconds),
         done.memory.map_or_else(String::new, bytes),
-        done.multiplications.map_or_else(String::new, thousands),
+        done.multiplications
+            .map_or_else(String::new, |count| grouped(count.round() as u64)),
         done.errors.inverse.map_or_else(String::new, error),
         done.errors.second_bounce.map_or_else(String::new, error),
         error(done.errors.compensation),
@@ -95,7 +97,7 @@ pub(super) fn cells(row: &Row) -> [String; 8] {
 
 /// Rows as a Markdown table.
 #[must_use]
-pub fn markdown(rows: &[Row]) -> String {
+pub fn markdown(rows: &[BenchmarkRow]) -> String {
     let mut text = String::new();
     let _ = writeln!(text, "| {} |", COLUMNS.join(" | "));
     let _ = writeln!(text, "|---{}", "|---:".repeat(COLUMNS.len() - 1) + "|");
@@ -105,7 +107,11 @@ pub fn markdown(rows: &[Row]) -> String {
                 let _ = writeln!(text, "| {} |", cells(row).join(" | "));
             }
             Err(why) => {
-                let _ = writeln!(text, "| {} | | | | | | | no answer: {why} |", row.name);
+                let _ = writeln!(
+                    text,
+                    "| {} | | | | | | | no answer: {why} |",
+                    row.method.name
+                );
             }
         }
     }
@@ -114,7 +120,7 @@ pub fn markdown(rows: &[Row]) -> String {
 
 /// Rows for a terminal.
 #[must_use]
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[BenchmarkRow]) -> String {
     let mut text = String::new();
     let heads = [
         "",
@@ -126,7 +132,7 @@ pub fn text(rows: &[Row]) -> String {
         "2nd bounce",
         "comp.",
     ];
-    let longest = rows.iter().map(|row| row.name.chars().count()).max();
+    let longest = rows.iter().map(|row| row.method.name.chars().count()).max();
     let longest = longest.unwrap_or(0);
     let mut line = |cells: &[String]| {
         let _ = write!(text, "{:longest$}", cells[0]);
@@ -139,7 +145,7 @@ pub fn text(rows: &[Row]) -> String {
     for row in rows {
         match &row.result {
             Ok(_) => line(&cells(row)),
-            Err(why) => line(&[row.name.clone(), format!("   no answer: {why}")]),
+            Err(why) => line(&[row.method.name.clone(), format!("   no answer: {why}")]),
         }
     }
     text
@@ -173,19 +179,6 @@ fn bytes(bytes: usize) -> String {
     }
 }
 
-/// A count with commas.
-fn thousands(count: f64) -> String {
-    let digits = format!("{count:.0}");
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,11 +202,5 @@ mod tests {
                 "0", ".0001", ".0123", ".250", "1.0", "1.2", "120", "diverges"
             ]
         );
-    }
-
-    #[test]
-    fn large_counts_have_commas() {
-        assert_eq!(thousands(1_234_567.0), "1,234,567");
-        assert_eq!(thousands(12.0), "12");
     }
 }

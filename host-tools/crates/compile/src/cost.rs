@@ -1,4 +1,4 @@
-//! What a frame takes on the reference board, in instructions.
+//! Cost of a frame on the reference board, in instructions.
 //!
 //! A model of counts: QEMU's of the firmware for a Cortex-M7 (`docs/firmware.md`). Each
 //! of the three stages of a frame is a sum over what it works on:
@@ -12,9 +12,9 @@
 //! Rows and pairs have the numbers of instructions of the kernel's loops, read off
 //! `runtime/src/kernel/arm/gather.rs`. All other numbers were fitted by least squares
 //! to the 33 kinds of frames of `docs/costs.csv` (`cargo run --release -p iltm-tests
-//! --bin costs`) and to `docs/instructions.csv`: no frame there is off by more than
+//! --bin counts -- costs`) and to `docs/instructions.csv`: no frame there is off by more than
 //! 1.1 %. Those of `docs/stages.csv`, to which nothing was fitted, are off by up to
-//! 1.9 %. `tests/tests/costs.rs` holds the model to 2 % of every one.
+//! 1.9 %. `tests/tests/runtime/costs.rs` holds the model to 2 % of every one.
 //!
 //! Instructions are not cycles: a Cortex-M7 can do two at once, and waits for memory.
 //! [`BUDGET`] takes one cycle for each.

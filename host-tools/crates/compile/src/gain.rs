@@ -15,7 +15,7 @@ pub struct FineGains {
 
 /// Darkest flood light, relative to its cell's, that still gets its own gain;
 /// darker samples are treated as being that bright, since noise rules there.
-const DARKEST: f64 = 0.2;
+const LEAST_FLOOD: f64 = 0.2;
 
 /// The fine gain map from a flood photograph `b`: `g(x) = (1 + (U K A b)(x)) / b(x)`.
 ///
@@ -76,7 +76,7 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
                 if !inverse.live[cell] || cell_light[cell] <= 0.0 {
                     return 0.0;
                 }
-                let light = f64::from(flood_light[index]).max(DARKEST * cell_light[cell]);
+                let light = f64::from(flood_light[index]).max(LEAST_FLOOD * cell_light[cell]);
                 interpolate(index) / light
             })
             .collect()

@@ -1,7 +1,8 @@
-//! The bytes of an image. Knows the layout and nothing of what it means.
+//! Table image: its bytes. Knows the layout and nothing of what it means.
 
 use super::ladder::Part;
 use super::quantise::Quantised;
+pub use super::quantise::StoredRow;
 use iltm_runtime::{
     image::{
         crc32,
@@ -61,35 +62,6 @@ pub(super) fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
 /// `u16`s as bytes.
 pub(super) fn halfwords(values: impl IntoIterator<Item = u16>) -> Vec<u8> {
     values.into_iter().flat_map(u16::to_le_bytes).collect()
-}
-
-/// One row of an operator as a segment stores it.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct StoredRow {
-    /// Index of the output coefficient.
-    pub index: u16,
-    /// Bits by which its sum is shifted right.
-    pub shift: u16,
-    /// Index of the input coefficient and value of each entry, ascending.
-    pub entries: Vec<(u16, i16)>,
-}
-
-impl StoredRow {
-    /// Its entries two by two where they are neighbours: index of the first, and
-    /// the values of that and of the next.
-    fn pairs(&self, cells: usize) -> Vec<(u16, [i16; 2])> {
-        let last = cells.saturating_sub(2) as u16;
-        let mut pairs: Vec<(u16, [i16; 2])> = Vec::new();
-        for &(index, value) in &self.entries {
-            match pairs.last_mut() {
-                Some((first, values)) if *first + 1 == index => values[1] = value,
-                // The very last coefficient has no next one.
-                _ if index > last => pairs.push((last, [0, value])),
-                _ => pairs.push((index, [value, 0])),
-            }
-        }
-        pairs
-    }
 }
 
 /// The bytes of an operator section: rows, given in ascending order of their index,

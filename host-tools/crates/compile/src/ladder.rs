@@ -1,14 +1,13 @@
-//! Which operator entries a tier needs.
+//! Accuracy ladder: which operator entries a tier needs.
 //!
 //! Entry `(i, j)` of `K^ = W^T K W` changes the light of a frame by about
 //! `|K^_ij| sigma_j`, with `sigma_j` the root mean square of input coefficient
-//! `j` over [natural images](super::content). In that order, the first tier takes
+//! `j` over [natural images](iltm_solve::natural_images). In that order, the first tier takes
 //! as many entries as its error needs, the next one adds to it, and so on. The
 //! entries of the shared operator and those that one channel adds stand in one
 //! queue: an entry is worth what it changes per multiplication.
 
-use super::content::IMAGES;
-use iltm_solve::{Basis, Haar, Inverse, InverseTransport};
+use iltm_solve::{Haar, IMAGES, Inverse, InverseTransport};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -65,12 +64,12 @@ pub struct Ladder {
     pub tiers: Vec<Tier>,
 }
 
-/// Chooses entries and tiers. `content` holds [natural images](super::content), in
+/// Chooses entries and tiers. `content` holds [natural images](iltm_solve::natural_images), in
 /// camera units; `sigma` comes from them. `targets` are the errors that the tiers aim
 /// for, descending.
 #[must_use]
 pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]) -> Ladder {
-    let haar = Haar::new(inverse.grid, Basis::QuadTree);
+    let haar = Haar::new(inverse.grid);
     let coefficients = haar.analyse_columns(content);
     let sigma = DVector::from_iterator(
         coefficients.nrows(),

@@ -2,10 +2,10 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | light of the brightest uniform grey | [`white`] |
-//! | which white was asked for, and which it became | [`wish`] |
-//! | a white that suits the user's own content | [`content_white`] |
-//! | what video looks like, for choosing and predicting | [`content`] |
+//! | all of it, from a capture folder | [`build_table`] |
+//! | light of reference white: the brightest even grey, or as asked for | [`reference_white`] |
+//! | from which white on the user's own content is cut | [`clip_thresholds`] |
+//! | what video looks like, for choosing and predicting | [`iltm_solve::natural_images`] |
 //! | `K` in the Haar domain, most useful entries first, cut into tiers | [`ladder`] |
 //! | `i16` entries with a power of two a row | [`quantise`] |
 //! | gains, also finer than the cells | [`gain`] |
@@ -17,22 +17,22 @@
 //! The image is checked by the runtime's own reader before it is returned, so
 //! what leaves here is known to load.
 
-pub mod content_white;
+pub mod build_table;
+pub mod clip_thresholds;
 pub mod cost;
 pub mod gain;
 pub mod image;
 pub mod ladder;
-pub mod learn;
+mod provenance;
 pub mod quantise;
+pub mod reference_white;
 pub mod response;
 pub mod sign;
 mod table;
 #[cfg(test)]
 mod test_scene;
-pub mod white;
-pub mod wish;
 
 pub use gain::FineGains;
-pub use iltm_solve::content;
 pub use ladder::Ladder;
+pub use provenance::{Photographs, PredictedError, Provenance};
 pub use table::{CompileError, CompileOptions, Compiled, compile};

@@ -1,4 +1,4 @@
-//! Operator entries as the runtime multiplies them: `i16`, a power of two a row.
+//! Quantisation: operator entries as the runtime multiplies them: `i16`, a power of two a row.
 //!
 //! With the runtime's integer basis `S` and norms `n`, `K = S M S^T` where
 //! `M_ij = K^_ij / (n_i n_j)`. The runtime multiplies
@@ -6,7 +6,6 @@
 //! and shifts the row's sum right by `shift_i`; so `shift_i` is chosen as large as
 //! the value's 16 bits and the proof against overflow allow.
 
-use super::image::StoredRow;
 use super::ladder::{Entry, Part};
 use iltm_runtime::{
     haar::{Basis, Function},
@@ -23,6 +22,35 @@ pub struct Quantised {
     pub tier: u8,
     /// Rows that have entries, in ascending order of their index.
     pub rows: Vec<StoredRow>,
+}
+
+/// One row of an operator as a segment stores it.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct StoredRow {
+    /// Index of the output coefficient.
+    pub index: u16,
+    /// Bits by which its sum is shifted right.
+    pub shift: u16,
+    /// Index of the input coefficient and value of each entry, ascending.
+    pub entries: Vec<(u16, i16)>,
+}
+
+impl StoredRow {
+    /// Its entries two by two where they are neighbours: index of the first, and
+    /// the values of that and of the next.
+    pub(super) fn pairs(&self, cells: usize) -> Vec<(u16, [i16; 2])> {
+        let last = cells.saturating_sub(2) as u16;
+        let mut pairs: Vec<(u16, [i16; 2])> = Vec::new();
+        for &(index, value) in &self.entries {
+            match pairs.last_mut() {
+                Some((first, values)) if *first + 1 == index => values[1] = value,
+                // The very last coefficient has no next one.
+                _ if index > last => pairs.push((last, [0, value])),
+                _ => pairs.push((index, [value, 0])),
+            }
+        }
+        pairs
+    }
 }
 
 /// A row too strong for any shift.

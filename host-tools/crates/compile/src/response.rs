@@ -1,4 +1,4 @@
-//! Projector codes at the knots of a table's response section.
+//! Projector response: codes at the knots of a table's response section.
 
 use iltm_picture::{DeviceResponse, ProjectorResponse};
 use iltm_runtime::response::{CODES, RESPONSE_KNOTS, ResponseCurve, code_of_index, knot_drive};

@@ -1,12 +1,11 @@
-//! The whole way from an inverse to a checked image.
+//! Compiling: from an inverse to a checked image.
 
-use super::content::natural_images;
 use super::gain::FineGains;
 use super::image::{ImageWriter, halfwords, operator_sections};
 use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
+use super::reference_white::uniform_white;
 use super::response;
-use super::white::{ReferenceWhite, reference_white};
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm_picture::ProjectorResponse;
 use iltm_runtime::{
@@ -18,7 +17,7 @@ use iltm_runtime::{
     operator::{Bounds, Channels, Operator, OperatorError, Segment},
     units::Light,
 };
-use iltm_solve::InverseTransport;
+use iltm_solve::{InverseTransport, natural_images};
 use std::ops::Range;
 use thiserror::Error;
 
@@ -50,8 +49,8 @@ const MOST_AMBIENT: f64 = 256.0;
 pub struct Compiled {
     /// The image, checked.
     pub image: Vec<u8>,
-    /// What limits the brightness.
-    pub white: ReferenceWhite,
+    /// Light of reference white, camera units.
+    pub white: f64,
     /// What the tiers leave out.
     pub ladder: Ladder,
 }
@@ -167,20 +166,20 @@ pub fn compile(
         });
     }
     check_options(options)?;
-    let mut white = reference_white(inverse).ok_or(CompileError::Dark)?;
-    white.light = options.reference_white.unwrap_or(white.light);
-    if !WHITES.contains(&white.light) {
-        return Err(CompileError::ReferenceWhite { light: white.light });
+    let white = options.reference_white.or_else(|| uniform_white(inverse));
+    let white = white.ok_or(CompileError::Dark)?;
+    if !WHITES.contains(&white) {
+        return Err(CompileError::ReferenceWhite { light: white });
     }
-    let content = natural_images(inverse.grid) * white.light;
+    let content = natural_images(inverse.grid) * white;
     let ladder = ladder::build(
         inverse,
         &live_only(inverse, content),
         options.targets.as_deref().unwrap_or(&ladder::TARGETS),
     );
     let basis = Basis::new(inverse.grid);
-    let operator = StoredOperator::new(inverse, &basis, &ladder, white.light)?;
-    let gains = Gains::new(inverse, fine, white.light)?;
+    let operator = StoredOperator::new(inverse, &basis, &ladder, white)?;
+    let gains = Gains::new(inverse, fine, white)?;
     let channels = inverse.channels.len() as u8;
 
     let mut image = ImageWriter::default();
@@ -188,7 +187,7 @@ pub fn compile(
         grid: inverse.grid,
         channels,
         gain_fraction: gains.fraction,
-        reference_white: U8F24::saturating_from_num(white.light).max(U8F24::DELTA),
+        reference_white: U8F24::saturating_from_num(white).max(U8F24::DELTA),
         inverse_error: U0F32::saturating_from_num(options.inverse_error.max(0.0)),
         bounds: operator.bounds,
         channel_scales: operator.scales,
@@ -196,7 +195,7 @@ pub fn compile(
     image.section(SectionKind::Meta, 0, head.emit().to_vec());
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));
     image.section(SectionKind::Gain, 0, halfwords(gains.cells));
-    if let Some(ambient) = ambient(inverse, white.light) {
+    if let Some(ambient) = ambient(inverse, white) {
         image.section(SectionKind::Ambient, 0, halfwords(ambient));
     }
     if let Some(knots) = response::knots(&options.projector, inverse.channels.len()) {
@@ -209,10 +208,8 @@ pub fn compile(
         bytes.extend(halfwords(values));
         image.section(SectionKind::FineGain, 0, bytes);
     }
-    if !operator.sections.is_empty() {
-        for (selector, bytes) in operator.sections {
-            image.section(SectionKind::Operator, selector, bytes);
-        }
+    for (selector, bytes) in operator.sections {
+        image.section(SectionKind::Operator, selector, bytes);
     }
     let provenance = options.provenance.clone().into_bytes();
     image.section(SectionKind::Provenance, 0, provenance);

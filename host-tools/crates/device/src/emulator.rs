@@ -2,14 +2,13 @@
 
 use super::memory::BoardMemory;
 use iltm_runtime::frame_buffers::psram;
-use std::fmt;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::str::FromStr;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
+use strum::{Display, EnumString, IntoStaticStr};
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
@@ -18,42 +17,28 @@ const PROGRAM: &str = "qemu-system-arm";
 const START: Duration = Duration::from_secs(20);
 
 /// A board that can be emulated.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Display, EnumString, IntoStaticStr)]
+#[strum(parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Board {
     /// Arm MPS2 with the AN500 image: Cortex-M7 with FPU.
     #[default]
+    #[strum(serialize = "mps2-an500")]
     An500,
     /// Arm MPS2 with the AN386 image: Cortex-M4F.
+    #[strum(serialize = "mps2-an386")]
     An386,
 }
 
 impl Board {
     /// Its name, which QEMU uses as well.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::An500 => "mps2-an500",
-            Self::An386 => "mps2-an386",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
-impl fmt::Display for Board {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Board {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let known = [Self::An500, Self::An386].into_iter();
-        known
-            .into_iter()
-            .find(|board| board.name() == name)
-            .ok_or_else(|| "the boards are mps2-an500 and mps2-an386".to_owned())
-    }
+fn unknown(_: &str) -> String {
+    "the boards are mps2-an500 and mps2-an386".to_owned()
 }
 
 /// Why there is no emulated board.

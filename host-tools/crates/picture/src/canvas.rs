@@ -1,9 +1,9 @@
 //! Canvas: RGB pixels to compose pictures and a few words on.
 
-use crate::light_picture::picture;
 use crate::{Picture, Samples};
 use iltm_runtime::FrameSize;
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+pub use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
+use noto_sans_mono_bitmap::{get_raster, get_raster_width};
 
 /// An sRGB colour.
 pub type Colour = [u8; 3];
@@ -51,22 +51,10 @@ impl Canvas {
         }
     }
 
-    /// Begins from a picture; `None` if it is not 8-bit RGB.
-    #[must_use]
-    pub fn over(picture: &Picture) -> Option<Self> {
-        match (picture.channels(), picture.samples()) {
-            (3, Samples::Eight(samples)) => Some(Self {
-                size: picture.size(),
-                samples: samples.clone(),
-            }),
-            _ => None,
-        }
-    }
-
     /// What was drawn.
     #[must_use]
     pub fn finish(self) -> Picture {
-        picture(self.size, self.samples)
+        Picture::of_colours(self.size, self.samples)
     }
 
     fn pixel(&mut self, x: usize, y: usize) -> Option<&mut Colour> {

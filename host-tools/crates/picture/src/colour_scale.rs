@@ -4,7 +4,6 @@
 //! looks like more, also in grey and to eyes that see fewer colours.
 
 use crate::Picture;
-use crate::light_picture::picture;
 use crate::numbers::{decades, number, steps};
 use iltm_runtime::FrameSize;
 
@@ -111,7 +110,9 @@ impl ColourScale {
     pub fn picture(&self, size: FrameSize, values: impl IntoIterator<Item = f64>) -> Picture {
         let last = f64::from(SHADES - 1);
         let shade = |value| self.colour_at((self.place(value) * last).round() / last);
-        picture(size, values.into_iter().flat_map(shade).collect())
+        let samples: Vec<u8> = values.into_iter().flat_map(shade).collect();
+        assert_eq!(samples.len(), 3 * size.pixels(), "a number a pixel");
+        Picture::of_colours(size, samples)
     }
 
     /// Places to label: powers of ten, or steps of 1, 2 or 5.

@@ -1,7 +1,7 @@
 //! HTML pages that are complete in themselves: the frame that every page stands in, and
-//! pictures and colour bars inside of one.
+//! pictures, colour bars and [number words](crate::numbers) inside of one.
 
-use crate::{ColourScale, Picture, png};
+use crate::{ColourScale, Picture, numbers, png};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -16,7 +16,7 @@ pub fn document(title: &str, style: &str, body: &Markup) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) }
-                style { (PreEscaped(include_str!("style.css"))) (PreEscaped(style)) }
+                style { (PreEscaped(concat!(include_str!("style.css"), include_str!("chart.css")))) (PreEscaped(style)) }
             }
             body { (body) }
         }
@@ -42,10 +42,25 @@ pub fn picture_file(name: &str, picture: &Picture) -> PictureFile {
     }
 }
 
-/// A picture inside of a page.
+/// A PNG file inside of a page.
 #[must_use]
-pub fn embedded(file: &PictureFile, alt: &str) -> Markup {
-    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt); }
+pub fn img(png: &[u8], alt: &str) -> Markup {
+    html! { img src=(format!("data:image/png;base64,{}", STANDARD.encode(png))) alt=(alt); }
+}
+
+/// The picture of this name inside of a page; nothing if there is none.
+#[must_use]
+pub fn img_named(files: &[PictureFile], name: &str, alt: &str) -> Markup {
+    let file = files.iter().find(|file| file.name == name);
+    html! { @if let Some(file) = file { (img(&file.png, alt)) } }
+}
+
+/// A text with a capital letter in front.
+#[must_use]
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
 }
 
 /// The colours of a scale with its ticks; `open` where greater numbers have its last colour.
@@ -72,4 +87,28 @@ pub fn colour_bar(scale: &ColourScale, open: bool) -> Markup {
             }
         }
     }
+}
+
+/// [`numbers::number`] as pages have it.
+#[must_use]
+pub fn number(value: f64) -> String {
+    typeset(&numbers::number(value))
+}
+
+/// [`numbers::percent`] as pages have it.
+#[must_use]
+pub fn percent(share: f64) -> String {
+    typeset(&numbers::percent(share))
+}
+
+/// [`numbers::grouped`] as pages have it.
+#[must_use]
+pub fn grouped(value: u64) -> String {
+    typeset(&numbers::grouped(value))
+}
+
+/// Minus signs, and narrow spaces at which no line breaks.
+fn typeset(number: &str) -> String {
+    let spaced = number.replace([' ', ','], "\u{202f}");
+    spaced.replace('-', "\u{2212}")
 }

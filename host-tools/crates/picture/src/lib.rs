@@ -7,7 +7,8 @@
 //! | pictures as linear light | [`LightPicture`] |
 //! | response curves, declared and measured | [`Response`], [`Curve`] |
 //! | between pixels and cells | [`Lattice`] |
-//! | numbers as colours, lines and words | [`ColourScale`], [`chart`], [`canvas`], [`numbers`] |
+//! | numbers as colours, lines and words | [`ColourScale`], [`chart`], [`numbers`] |
+//! | pictures and letters on one picture | [`ContactSheet`], [`canvas`] |
 //! | medians and quantiles | [`statistics`] |
 //! | HTML pages | [`html`] |
 //! | files and folders that are there whole or not at all | [`WholeFile`], [`WholeFolder`] |
@@ -16,6 +17,7 @@
 pub mod canvas;
 pub mod chart;
 mod colour_scale;
+mod contact_sheet;
 mod curve;
 pub mod html;
 mod lattice;
@@ -30,6 +32,7 @@ pub mod whole_file;
 mod whole_folder;
 
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
+pub use contact_sheet::{ContactSheet, Tile};
 pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use lattice::Lattice;
 pub use light_picture::LightPicture;

@@ -1,6 +1,6 @@
 //! Linear light of a picture: it adds up, which codes do not.
 
-use crate::{Picture, ProjectorResponse, Response, Samples};
+use crate::{Picture, ProjectorResponse, Response, Samples, statistics::quantile};
 use iltm_runtime::FrameSize;
 
 /// Linear light (or linear projector input) of one or three channels.
@@ -52,20 +52,24 @@ impl LightPicture {
             let value = Response::Srgb.value(f64::from(light));
             (value * f64::from(u8::MAX)).round() as u8
         };
-        let pixels = 0..self.size.pixels();
-        let samples = pixels.flat_map(|at| self.planes.iter().map(move |plane| code(plane[at])));
-        picture(self.size, samples.collect())
+        Picture::of_codes(self.size, self.planes.len(), |pixel, channel| {
+            code(self.planes[channel][pixel])
+        })
     }
 
-    /// Red, green and blue light of every pixel, row by row.
-    pub fn of_pixels(size: FrameSize, light: impl FnMut(usize) -> [f32; 3]) -> Self {
-        let mut planes = vec![Vec::new(); 3];
-        for pixel in (0..size.pixels()).map(light) {
-            for (plane, light) in planes.iter_mut().zip(pixel) {
-                plane.push(light);
-            }
+    /// A picture of 1 or 3 channels, the light of each from its channel and its pixel, row
+    /// by row.
+    ///
+    /// # Panics
+    /// If it has another number of channels.
+    #[must_use]
+    pub fn from_fn(size: FrameSize, channels: usize, light: impl Fn(usize, usize) -> f32) -> Self {
+        assert!(matches!(channels, 1 | 3), "{channels} channels");
+        let plane = |channel| (0..size.pixels()).map(|at| light(channel, at)).collect();
+        Self {
+            size,
+            planes: (0..channels).map(plane).collect(),
         }
-        Self { size, planes }
     }
 
     /// The picture with other planes, each made from its channel's number and its light.
@@ -88,6 +92,13 @@ impl LightPicture {
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         self.with_planes(|_, plane| plane.iter().map(|light| light * factor as f32).collect())
+    }
+
+    /// The light that this share (0 to 1) of all pixels and channels stays below.
+    #[must_use]
+    pub fn quantile(&self, share: f64) -> f64 {
+        let mut values: Vec<f32> = self.planes.iter().flatten().copied().collect();
+        quantile(&mut values, share).map_or(0.0, f64::from)
     }
 
     /// The mean of every 2 x 2 pixels; an odd last row or column is left out. A
@@ -126,18 +137,6 @@ impl LightPicture {
     }
 }
 
-/// A picture of 8-bit samples.
-///
-/// # Panics
-/// If there are not one or three for each pixel: whoever calls this has counted
-/// them.
-pub(crate) fn picture(size: FrameSize, samples: Vec<u8>) -> Picture {
-    match Picture::new(size, Samples::Eight(samples)) {
-        Some(picture) => picture,
-        None => unreachable!("samples were made pixel by pixel"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -148,7 +147,7 @@ mod tests {
         let codes: Vec<u8> = (0..=u8::MAX)
             .flat_map(|code| [code, 255 - code, code / 2])
             .collect();
-        let given = picture(size, codes);
+        let given = Picture::new(size, Samples::Eight(codes)).unwrap();
         let light = LightPicture::decode(&given, Response::Srgb);
         assert_eq!(light.planes().len(), 3);
         assert_eq!(light.for_display(), given);

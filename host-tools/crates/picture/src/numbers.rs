@@ -1,4 +1,7 @@
-//! Numbers as people read them, and round numbers for the ticks of an axis.
+//! Number words: numbers as people read them, in plain letters for terminals and
+//! pictures; and round numbers for the ticks of an axis.
+//!
+//! [`html`](crate::html) has the same words for pages.
 
 /// Multiples of 1, 2 or 5 times a power of ten in a range, at most `most + 1`.
 #[must_use]
@@ -25,52 +28,84 @@ pub fn decades(low: f64, high: f64) -> Vec<f64> {
     (first..=last).map(|power| 10_f64.powi(power)).collect()
 }
 
-/// A number of about three digits, without zeros at its end.
+/// Three significant digits without zeros at their end: `0.0123`, `87.7`, `1234`, `1.5e-5`;
+/// `-` of what is no number.
 #[must_use]
 pub fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "-".to_owned();
+    }
     if value == 0.0 {
         return "0".to_owned();
     }
+    let short = |digits: &str| match digits.split_once('.') {
+        Some(_) => digits
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned(),
+        None => digits.to_owned(),
+    };
     let magnitude = value.abs().log10().floor() as i32;
-    if magnitude < -4 {
-        return format!("{value:.0e}").replace('-', "\u{2212}");
+    if (-4..6).contains(&magnitude) {
+        let places = (2 - magnitude).max(0) as usize;
+        return short(&format!("{value:.places$}"));
     }
-    let places = (2 - magnitude).max(0) as usize;
-    let text = format!("{value:.places$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
+    let text = format!("{value:.2e}");
+    let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+    format!("{}e{power}", short(digits))
 }
 
-/// A share as a percentage: tenths from 10 up, hundredths from 1 up, two digits
-/// below.
+/// A share as a percentage: `12.3 %`.
 #[must_use]
 pub fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    let places = match percent {
-        10.0.. => 1,
-        1.0.. => 2,
-        _ if percent > 0.0 => 1 - percent.log10().floor() as i32,
-        _ => 0,
-    };
-    format!("{percent:.0$}\u{202f}%", places.clamp(0, 6) as usize)
+    format!("{} %", number(100.0 * share))
 }
 
-/// A whole number with its thousands apart.
+/// A whole number with its thousands apart: `1,234,567`.
 #[must_use]
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
-    let first = digits.len() % 3;
-    let mut groups: Vec<&str> = Vec::new();
-    if first > 0 {
-        groups.push(&digits[..first]);
+    let groups: Vec<&[u8]> = digits.as_bytes().rchunks(3).rev().collect();
+    String::from_utf8_lossy(&groups.join(&b',')).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_three_digits_that_count() {
+        let shown = [
+            0.0,
+            0.012_34,
+            0.5,
+            99.96,
+            1234.4,
+            -0.000_2,
+            0.000_012_34,
+            2.5e9,
+            f64::INFINITY,
+        ];
+        assert_eq!(
+            shown.map(number),
+            [
+                "0", "0.0123", "0.5", "100", "1234", "-0.0002", "1.23e-5", "2.5e9", "-"
+            ]
+        );
     }
-    groups.extend(
-        (first..digits.len())
-            .step_by(3)
-            .map(|start| &digits[start..start + 3]),
-    );
-    groups.join("\u{202f}")
+
+    #[test]
+    fn shares_keep_their_digits() {
+        let shown = [0.8766, 0.0123, 0.000_051, 0.0, -0.000_002];
+        assert_eq!(
+            shown.map(percent),
+            ["87.7 %", "1.23 %", "0.0051 %", "0 %", "-0.0002 %"]
+        );
+    }
+
+    #[test]
+    fn large_counts_have_commas() {
+        let shown = [0, 12, 123, 1_234, 1_234_567];
+        assert_eq!(shown.map(grouped), ["0", "12", "123", "1,234", "1,234,567"]);
+    }
 }

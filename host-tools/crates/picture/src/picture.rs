@@ -55,13 +55,13 @@ impl Picture {
         })
     }
 
-    /// A picture of three channels, `3 * size.pixels()` samples.
+    /// A picture of three channels with 8-bit samples, `3 * size.pixels()` of them.
     #[must_use]
-    pub const fn of_colours(size: FrameSize, samples: Samples) -> Self {
+    pub const fn of_colours(size: FrameSize, samples: Vec<u8>) -> Self {
         Self {
             size,
             channels: 3,
-            samples,
+            samples: Samples::Eight(samples),
         }
     }
 
@@ -79,6 +79,45 @@ impl Picture {
             size,
             channels: N,
             samples: Samples::Eight(pixels.flat_map(|(x, y)| pixel(x, y)).collect()),
+        }
+    }
+
+    /// A picture of 1 or 3 channels with 8-bit samples, each from its pixel, row by row,
+    /// and its channel.
+    ///
+    /// # Panics
+    /// If it has another number of channels.
+    #[must_use]
+    pub fn of_codes(size: FrameSize, channels: usize, code: impl Fn(usize, usize) -> u8) -> Self {
+        assert!(matches!(channels, 1 | 3), "{channels} channels");
+        let samples = 0..size.pixels() * channels;
+        let samples = samples.map(|at| code(at / channels, at % channels));
+        Self {
+            size,
+            channels,
+            samples: Samples::Eight(samples.collect()),
+        }
+    }
+
+    /// Each pixel as a square of `factor` x `factor`; the picture as it is where that would
+    /// be larger than a frame.
+    #[must_use]
+    pub fn enlarged(&self, factor: usize) -> Self {
+        let (width, height) = (self.size.width(), self.size.height());
+        let side = |length: usize| u16::try_from(length * factor).ok();
+        let size = side(width).zip(side(height));
+        let Some(size) = size.and_then(|(width, height)| FrameSize::new(width, height)) else {
+            return self.clone();
+        };
+        let row = width * self.channels;
+        let samples = match &self.samples {
+            Samples::Eight(codes) => Samples::Eight(squares(codes, row, self.channels, factor)),
+            Samples::Sixteen(codes) => Samples::Sixteen(squares(codes, row, self.channels, factor)),
+        };
+        Self {
+            size,
+            channels: self.channels,
+            samples,
         }
     }
 
@@ -103,5 +142,31 @@ impl Picture {
     /// Its samples, to be changed in place.
     pub fn samples_mut(&mut self) -> &mut Samples {
         &mut self.samples
+    }
+}
+
+/// Samples with each pixel `factor` times in its row, and each row as often.
+fn squares<T: Copy>(samples: &[T], row: usize, channels: usize, factor: usize) -> Vec<T> {
+    let line = |row: &[T]| -> Vec<T> {
+        let pixels = row.chunks(channels);
+        pixels.flat_map(|pixel| pixel.repeat(factor)).collect()
+    };
+    let rows = samples.chunks(row);
+    rows.flat_map(|row| line(row).repeat(factor)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enlarged_pixels_are_squares() {
+        let size = FrameSize::new(2, 1).unwrap();
+        let picture = Picture::of_codes(size, 3, |pixel, channel| (10 * pixel + channel) as u8);
+        let large = picture.enlarged(2);
+        assert_eq!(large.size(), FrameSize::new(4, 2).unwrap());
+        let row = [0, 1, 2, 0, 1, 2, 10, 11, 12, 10, 11, 12];
+        assert_eq!(large.samples(), &Samples::Eight([row, row].concat()));
+        assert_eq!(picture.enlarged(usize::from(u16::MAX)), picture);
     }
 }

@@ -8,6 +8,7 @@
 use crate::{MAX_PIXELS, Picture, Samples};
 use iltm_runtime::FrameSize;
 use png::{BitDepth, ColorType, Decoder, Encoder, Transformations};
+use std::collections::BTreeSet;
 use std::io::{Cursor, Read, Write};
 
 /// First bytes of every PNG file.
@@ -166,5 +167,45 @@ pub fn encode(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Writing to memory does not fail.
     let _ = write(&mut bytes, picture);
+    bytes
+}
+
+/// The bytes of a PNG file, with a palette where that holds all colours of a picture, which
+/// makes it a fraction as large.
+#[must_use]
+pub fn encode_small(picture: &Picture) -> Vec<u8> {
+    let (3, Samples::Eight(samples)) = (picture.channels(), picture.samples()) else {
+        return encode(picture);
+    };
+    let (pixels, _) = samples.as_chunks::<3>();
+    let colours: BTreeSet<&[u8; 3]> = pixels.iter().collect();
+    if colours.len() > 256 {
+        return encode(picture);
+    }
+    let palette: Vec<&[u8; 3]> = colours.into_iter().collect();
+    let index = |pixel| palette.partition_point(|colour| *colour < pixel) as u8;
+    let indices: Vec<u8> = pixels.iter().map(index).collect();
+    let palette = palette.into_iter().flatten().copied().collect();
+    encode_indexed(picture.size(), palette, &indices)
+}
+
+/// The bytes of a PNG file with a palette, three codes a colour, and an index into it for
+/// each pixel.
+#[must_use]
+pub fn encode_indexed(size: FrameSize, palette: Vec<u8>, indices: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, size.width() as u32, size.height() as u32);
+    encoder.set_color(ColorType::Indexed);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    // Indices are no light that neighbours predict.
+    encoder.set_filter(png::Filter::NoFilter);
+    encoder.set_palette(palette);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(indices)?;
+        writer.finish()
+    });
+    // Writing to memory does not fail.
+    let _ = written;
     bytes
 }

@@ -1,8 +1,8 @@
-//! The operator in the Haar domain, as a picture.
+//! Haar coefficients of the operator, as a picture.
 
 use iltm_picture::{ColourScale, Palette, Picture};
 use iltm_runtime::FrameSize;
-use iltm_solve::{Basis, Haar, InverseTransport};
+use iltm_solve::{Haar, InverseTransport};
 use nalgebra::DMatrix;
 
 /// Powers of ten below the largest coefficient that have colours of their own.
@@ -40,7 +40,7 @@ impl CoefficientMap {
     /// Draws the operator that all channels share.
     #[must_use]
     pub fn new(inverse: &InverseTransport) -> Self {
-        let haar = Haar::new(inverse.grid, Basis::QuadTree);
+        let haar = Haar::new(inverse.grid);
         let magnitudes = haar.analyse_operator(&inverse.shared).abs();
         let largest = magnitudes.amax();
         let scale = ColourScale::logarithmic(Palette::Viridis, 1.0, DECADES);
@@ -96,30 +96,14 @@ fn levels(fineness: &[f64]) -> Vec<Level> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_scene::inverse;
     use iltm_picture::Samples;
     use iltm_runtime::Grid;
-    use iltm_solve::ChannelInverse;
-
-    /// An inverse with this shared operator and nothing else of interest.
-    fn inverse(grid: Grid, shared: DMatrix<f64>) -> InverseTransport {
-        let cells = grid.cells();
-        InverseTransport {
-            grid,
-            live: vec![true; cells],
-            shared,
-            channels: vec![ChannelInverse {
-                gain: vec![1.0; cells],
-                scale: 1.0,
-                deviation: None,
-                ambient: vec![0.0; cells],
-            }],
-        }
-    }
 
     #[test]
     fn an_operator_that_only_sees_the_mean_fills_the_top_left_corner() {
         let grid = Grid::new(4, 4).unwrap();
-        let map = CoefficientMap::new(&inverse(grid, DMatrix::from_element(16, 16, 0.1)));
+        let map = CoefficientMap::new(&inverse(grid, 1, |_, _| 1.0, |_, _| 0.1));
         assert_eq!(map.coefficients, 256);
         let Samples::Eight(samples) = map.picture.samples() else {
             panic!("8 bits");
@@ -135,7 +119,7 @@ mod tests {
     #[test]
     fn four_by_four_cells_have_two_levels() {
         let grid = Grid::new(4, 4).unwrap();
-        let map = CoefficientMap::new(&inverse(grid, DMatrix::zeros(16, 16)));
+        let map = CoefficientMap::new(&inverse(grid, 1, |_, _| 1.0, |_, _| 0.0));
         let sides: Vec<_> = map
             .levels
             .iter()

@@ -1,4 +1,4 @@
-//! How far a photograph is from the wanted image.
+//! Error of a photograph: how far it is from the wanted image, brightness aside.
 
 use iltm_picture::LightPicture;
 

@@ -1,4 +1,4 @@
-//! One wanted image, and what becomes of it on the wall.
+//! Wanted image: how it is treated, and what is predicted of each treatment on the wall.
 
 use super::{Comparison, Projection};
 use iltm_picture::{LightPicture, Picture, ProjectorResponse, Response};
@@ -56,7 +56,7 @@ impl Treatment {
 
 /// A treated image and the photograph that it is predicted to give.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct TreatedImage {
     /// What was done.
     pub treatment: Treatment,
     /// Projector input, codes for the projector.
@@ -75,7 +75,7 @@ pub struct Example {
     /// The image.
     pub wanted: Wanted,
     /// In the order of [`Treatment::ALL`].
-    pub shown: Vec<Shown>,
+    pub shown: Vec<TreatedImage>,
     /// Light that the compensated photograph would have too much of without the
     /// operator: what arrives by way of other cells.
     pub bounced: LightPicture,
@@ -114,7 +114,7 @@ impl Example {
             let drive = LightPicture::decode(&input, projector.clone());
             let photograph = projection.photograph(&drive);
             let comparison = Comparison::new(&photograph, &light);
-            shown.push(Shown {
+            shown.push(TreatedImage {
                 treatment,
                 input,
                 clipped,
@@ -134,8 +134,7 @@ impl Example {
     /// number.
     #[must_use]
     pub fn brightening(&self) -> f64 {
-        let planes = self.bounced.planes().iter().flatten();
-        let brightest = super::quantile(planes.map(|light| f64::from(*light)).collect(), 0.995);
+        let brightest = self.bounced.quantile(0.995);
         if brightest > 0.0 {
             (1.0 / brightest).floor().clamp(1.0, 100.0)
         } else {

@@ -1,15 +1,18 @@
-//! What a capture and its solve say about themselves, line by line.
+//! Table of facts: what a capture and its solve say about themselves, line by line.
 
 use iltm_capture::{Measurements, NoiseSource, RegistrationMethod};
-use iltm_compile::learn::Learned;
-use iltm_picture::numbers::{grouped, number, percent};
+use iltm_compile::build_table::BuiltTable;
+use iltm_picture::{
+    html::{grouped, number, percent},
+    statistics::median,
+};
 
 /// One line: its name and what there is to say.
 pub(super) type Fact = (&'static str, String);
 
 /// All facts. `seconds` is wall-clock time by what it was spent on, beside the
 /// solve's own.
-pub(super) fn facts(learned: &Learned, seconds: &[(String, f64)]) -> Vec<Fact> {
+pub(super) fn facts(learned: &BuiltTable, seconds: &[(String, f64)]) -> Vec<Fact> {
     let mut facts = of_photographs(learned);
     facts.extend(of_the_solve(learned));
     let own = learned.report.seconds;
@@ -26,7 +29,7 @@ pub(super) fn facts(learned: &Learned, seconds: &[(String, f64)]) -> Vec<Fact> {
     facts
 }
 
-fn of_photographs(learned: &Learned) -> Vec<Fact> {
+fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
     let report = &learned.report;
     let diagnostics = &learned.measurements.diagnostics;
     let (counts, pixels) = (report.photographs, diagnostics.pixels);
@@ -81,7 +84,7 @@ fn of_photographs(learned: &Learned) -> Vec<Fact> {
     facts
 }
 
-fn of_the_solve(learned: &Learned) -> [Fact; 6] {
+fn of_the_solve(learned: &BuiltTable) -> [Fact; 6] {
     let report = &learned.report;
     let ended = if report.convergence.converged {
         "converged"
@@ -92,9 +95,9 @@ fn of_the_solve(learned: &Learned) -> [Fact; 6] {
         "{} (largest to smallest singular value of the transport)",
         number(report.condition)
     );
-    let white = number(learned.compiled.white.light);
+    let white = number(learned.compiled.white);
     [
-        ("method", report.method.name().to_owned()),
+        ("method", report.method.to_string()),
         ("weight of sparsity", number(report.lambda)),
         ("coefficients", grouped(report.coefficients as u64)),
         ("iterations", format!("{}, {ended}", report.iterations)),
@@ -118,7 +121,7 @@ fn listed<'s>(seconds: impl IntoIterator<Item = (&'s str, f64)>) -> String {
 
 /// Median over cells and channels of the noise of one observation under white,
 /// relative to it.
-fn noise(learned: &Learned) -> f64 {
+fn noise(learned: &BuiltTable) -> f64 {
     let channels = learned.measurements.channels.iter();
     let ratios = channels.flat_map(|channel| {
         let white = channel.observations.column(Measurements::WHITE);
@@ -126,7 +129,7 @@ fn noise(learned: &Learned) -> f64 {
         let lit = cells.filter(|(_, light)| **light > 0.0);
         lit.map(|(noise, light)| noise / light).collect::<Vec<_>>()
     });
-    super::quantile(ratios.collect(), 0.5)
+    median(ratios.collect()).unwrap_or(0.0)
 }
 
 fn noise_source(source: NoiseSource) -> String {

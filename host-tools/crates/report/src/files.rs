@@ -1,10 +1,11 @@
-//! The report's pictures as PNG files.
+//! PNG files of a report's pictures.
 
 use super::{CoefficientMap, Example, summary};
 use color_quant::NeuQuant;
 use iltm_picture::{
     ColourScale, Picture, Samples,
     html::{PictureFile, picture_file},
+    png,
 };
 use rayon::prelude::*;
 
@@ -71,7 +72,7 @@ fn with_palette(picture: &Picture) -> Option<Vec<u8>> {
     let opaque = |[red, green, blue]: &[u8; 3]| [*red, *green, *blue, u8::MAX];
     let rgba: Vec<u8> = pixels.iter().flat_map(opaque).collect();
     let quantised = NeuQuant::new(SAMPLING, COLOURS, &rgba);
-    let (width, height) = (picture.size().width(), picture.size().height());
+    let width = picture.size().width();
     let index = |(at, pixel): (usize, &[u8; 3])| {
         let threshold = BAYER[at / width % 4][at % width % 4];
         let offset = (threshold * DITHER - 15 * DITHER / 2) / 16;
@@ -81,22 +82,13 @@ fn with_palette(picture: &Picture) -> Option<Vec<u8>> {
         quantised.index_of(&opaque(if even { pixel } else { &dithered })) as u8
     };
     let indices: Vec<u8> = pixels.par_iter().enumerate().map(index).collect();
-    let mut bytes = Vec::new();
-    let mut encoder = ::png::Encoder::new(&mut bytes, width as u32, height as u32);
-    encoder.set_color(::png::ColorType::Indexed);
-    encoder.set_depth(::png::BitDepth::Eight);
-    encoder.set_compression(::png::Compression::High);
-    encoder.set_palette(quantised.color_map_rgb());
-    let mut writer = encoder.write_header().ok()?;
-    writer.write_image_data(&indices).ok()?;
-    writer.finish().ok()?;
-    Some(bytes)
+    let palette = quantised.color_map_rgb();
+    Some(png::encode_indexed(picture.size(), palette, &indices))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use iltm_picture::png;
     use iltm_runtime::FrameSize;
 
     #[test]

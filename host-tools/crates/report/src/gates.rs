@@ -1,22 +1,18 @@
-//! What the gates say of a capture, as a page: a card for each, what explains others
+//! Gates page: what the gates say of a capture, a card for each, what explains others
 //! first, with what its number was taken from.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use iltm_capture::{Evidence, Gate, Verdict};
-use iltm_picture::{ColourScale, Palette, html::document, numbers::number, png};
+use iltm_picture::{
+    ColourScale, Palette,
+    canvas::{Canvas, QUIET},
+    chart::{Axis, Chart, PALETTE, Series},
+    html::{capitalised, colour_bar, document, img},
+    png,
+};
 use iltm_runtime::FrameSize;
 use maud::{Markup, html};
-use std::ops::RangeInclusive;
 
 const STYLE: &str = include_str!("gates.css");
-
-/// Size of a chart, and room around it for its numbers.
-const WIDTH: f64 = 560.0;
-const HEIGHT: f64 = 190.0;
-const LEFT: f64 = 56.0;
-const BELOW: f64 = 26.0;
-const ABOVE: f64 = 10.0;
 
 /// The page; `name` is the capture's.
 #[must_use]
@@ -71,12 +67,6 @@ fn card(gate: &Gate) -> Markup {
     }
 }
 
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|first| first.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
-}
-
 fn picture(evidence: &Evidence) -> Markup {
     match evidence {
         Evidence::None => html! {},
@@ -101,7 +91,7 @@ fn picture(evidence: &Evidence) -> Markup {
 }
 
 /// Smallest range of all numbers, with 0 in it; never empty.
-fn range(values: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (mut low, mut high) = (0.0_f64, 0.0_f64);
     for value in values.filter(|value| value.is_finite()) {
         (low, high) = (low.min(value), high.max(value));
@@ -109,7 +99,7 @@ fn range(values: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
     if high - low < 1e-9 {
         high = low + 1.0;
     }
-    low..=high
+    (low, high)
 }
 
 /// Points over two axes, with a line at the limit.
@@ -117,46 +107,29 @@ fn chart(x: &str, y: &str, points: &[(f64, f64)], limit: Option<f64>, joined: bo
     if points.is_empty() {
         return html! {};
     }
-    let across = range(points.iter().map(|p| p.0));
-    let up = range(points.iter().map(|p| p.1).chain(limit));
-    let place = |range: &RangeInclusive<f64>, value: f64| {
-        (value - range.start()) / (range.end() - range.start())
+    let chart = Chart {
+        title: y,
+        size: (560.0, 220.0),
+        x: Axis {
+            range: Some(range(points.iter().map(|p| p.0))),
+            ..Axis::linear(x)
+        },
+        y: Axis {
+            range: Some(range(points.iter().map(|p| p.1).chain(limit))),
+            ..Axis::default()
+        },
+        limit: limit.map(|limit| (limit, "limit")),
+        series: vec![Series {
+            points: points.to_vec(),
+            colour: PALETTE[0],
+            line: if joined { 1.5 } else { 0.0 },
+            dot: 2.4,
+            ..Series::default()
+        }],
+        ..Chart::default()
     };
-    let at = |(px, py): (f64, f64)| {
-        let right = LEFT + place(&across, px) * (WIDTH - LEFT - 12.0);
-        let down = ABOVE + (1.0 - place(&up, py)) * (HEIGHT - ABOVE - BELOW);
-        (right, down)
-    };
-    let level = |value: f64| at((*across.start(), value)).1;
-    let places: Vec<(f64, f64)> = points.iter().map(|&point| at(point)).collect();
-    let line: Vec<String> = places
-        .iter()
-        .map(|(x, y)| format!("{x:.1},{y:.1}"))
-        .collect();
-    let mut labels = vec![*up.start(), *up.end()];
-    if *up.start() < 0.0 && *up.end() > 0.0 {
-        labels.push(0.0);
-    }
     html! {
-        figure.chart {
-            svg viewBox=(format!("0 0 {WIDTH} {HEIGHT}")) role="img" aria-label=(y) {
-                @for label in &labels {
-                    line.axis x1=(LEFT) x2=(WIDTH - 12.0) y1=(level(*label)) y2=(level(*label)) {}
-                    text.left x=(LEFT - 6.0) y=(level(*label) + 4.0) { (number(*label)) }
-                }
-                @if let Some(limit) = limit {
-                    line.limit x1=(LEFT) x2=(WIDTH - 12.0) y1=(level(limit)) y2=(level(limit)) {}
-                }
-                @if joined { polyline points=(line.join(" ")) {} }
-                @for (x, y) in &places {
-                    circle cx=(format!("{x:.1}")) cy=(format!("{y:.1}")) r="2.4" {}
-                }
-                text x=(LEFT) y=(HEIGHT - 8.0) { (number(*across.start())) }
-                text.left x=(WIDTH - 12.0) y=(HEIGHT - 8.0) { (number(*across.end())) }
-                text.middle x=(0.5 * (LEFT + WIDTH)) y=(HEIGHT - 8.0) { (x) }
-            }
-            figcaption { (capitalised(y)) }
-        }
+        figure { (chart.render()) figcaption { (capitalised(y)) } }
     }
 }
 
@@ -173,28 +146,14 @@ fn map(what: &str, rows: usize, cols: usize, values: &[f64]) -> Markup {
         .fold(0.0, f64::max)
         .max(1e-6);
     let scale = ColourScale::linear(Palette::Viridis, high);
-    let mut canvas = iltm_picture::canvas::Canvas::new(size, iltm_picture::canvas::QUIET);
+    let mut canvas = Canvas::new(size, QUIET);
     for (at, value) in sizes().enumerate().filter(|(_, value)| value.is_finite()) {
         canvas.set(at % cols, at / cols, scale.colour(value));
     }
-    let mut bytes = Vec::new();
-    // Writing to memory does not fail.
-    let _ = png::write(&mut bytes, &canvas.finish());
-    let stops: Vec<String> = (0..=8)
-        .map(|k| {
-            let [red, green, blue] = scale.colour_at(f64::from(k) / 8.0);
-            format!("rgb({red},{green},{blue})")
-        })
-        .collect();
     html! {
         figure.map {
-            img style=(format!("aspect-ratio: {cols} / {rows}"))
-                src=(format!("data:image/png;base64,{}", STANDARD.encode(&bytes))) alt=(what);
-            div.scale {
-                span { "0" }
-                div style=(format!("background: linear-gradient(to right, {})", stops.join(", "))) {}
-                span { (number(high)) }
-            }
+            (img(&png::encode(&canvas.finish()), what))
+            (colour_bar(&scale, false))
             figcaption { (capitalised(what)) ", a square for each cell" }
         }
     }
@@ -241,6 +200,6 @@ mod tests {
         };
         let page = page("c", &[gate(Verdict::Pass, evidence)]);
         assert!(page.contains("data:image/png;base64,"));
-        assert!(page.contains("<span>4</span>"), "{page}");
+        assert!(page.contains(">4</span>"), "{page}");
     }
 }

@@ -1,4 +1,5 @@
-//! What was learned of a scene, as a page that a browser shows without network.
+//! Report pages: what was learned of a scene, in files that a browser shows without
+//! network.
 //!
 //! | what | file |
 //! |---|---|
@@ -6,12 +7,15 @@
 //! | how far it is from what was wanted | `comparison.rs` |
 //! | a wanted image with and without compensation | `example.rs` |
 //! | the operator in the Haar domain | `coefficient_map.rs` |
-//! | what each tier costs | `ladder.rs`, `timing.rs` |
+//! | what each tier costs | `ladder.rs` |
 //! | one picture of it all | `summary.rs` |
 //! | pictures as PNG files, one of a few colours | `files.rs` |
 //! | what the solve says about itself | `facts.rs` |
 //! | what the gates say, a page of its own | `gates.rs`, `gates.css` |
 //! | the page | `page.rs` |
+//! | pages of a solve and of its trade-off, with more | [`solve_page`], [`tradeoff`] |
+//! | a photograph bounce by bounce | [`bounces`] |
+//! | test images | [`stills`] |
 
 pub mod bounces;
 mod coefficient_map;
@@ -23,24 +27,25 @@ pub mod gates;
 mod ladder;
 pub(crate) mod page;
 mod predict;
-pub mod solved;
+pub mod solve_page;
 pub mod stills;
 mod summary;
-mod timing;
+#[cfg(test)]
+mod test_scene;
 pub mod tradeoff;
 
 pub use coefficient_map::{CoefficientMap, Level};
 pub use comparison::Comparison;
-pub use example::{Example, Shown, Treatment, Wanted};
-pub use ladder::{Rung, Step, ladder, steps};
+pub use example::{Example, TreatedImage, Treatment, Wanted};
+pub use ladder::{TierCost, TimedTier, ladder, microseconds, microseconds_at, tier_costs};
 pub use page::{Command, Words};
 pub use predict::Projection;
 pub use summary::summary;
-pub use timing::{microseconds, microseconds_at};
 
-use iltm_compile::learn::Learned;
+use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
     ColourScale, LightPicture, Palette, Picture, html::PictureFile, progress::Progress,
+    statistics::quantile,
 };
 use iltm_runtime::{
     FrameSize,
@@ -89,7 +94,7 @@ pub enum ReportError {
 #[derive(Debug)]
 pub struct Report<'a> {
     /// What was learned.
-    pub learned: &'a Learned,
+    pub learned: &'a BuiltTable,
     /// The wanted images.
     pub examples: Vec<Example>,
     /// Colours of all error maps.
@@ -97,7 +102,7 @@ pub struct Report<'a> {
     /// The operator.
     pub coefficients: CoefficientMap,
     /// The tiers, gain only first.
-    pub ladder: Vec<Rung>,
+    pub ladder: Vec<TimedTier>,
     /// All pictures: those of the page, and the summary.
     pub files: Vec<PictureFile>,
 }
@@ -109,13 +114,13 @@ impl<'a> Report<'a> {
     /// [`ReportError`] if a wanted image is smaller than the grid or has another
     /// number of channels than the table.
     pub fn new(
-        learned: &'a Learned,
+        learned: &'a BuiltTable,
         wanted: Vec<Wanted>,
         progress: &dyn Progress,
     ) -> Result<Self, ReportError> {
         let table = Table::check(&learned.compiled.image).map_err(ReportError::Table)?;
         let projector = &learned.measurements.devices.projector;
-        let white = learned.compiled.white.light;
+        let white = learned.compiled.white;
         progress.begin("predicting photographs", wanted.len() as u64);
         let mut examples = Vec::new();
         for wanted in wanted {
@@ -150,14 +155,13 @@ impl<'a> Report<'a> {
 
 /// The flood photograph, black subtracted, as bright as a screen can show it;
 /// `None` of a camera whose sides a frame's do not reach.
-fn flood(learned: &Learned) -> Option<Picture> {
+fn flood(learned: &BuiltTable) -> Option<Picture> {
     let (width, height) = learned.measurements.registration.camera;
-    let size = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
-    let planes = learned.measurements.flood.clone();
-    let all = planes.iter().flatten().map(|light| f64::from(*light));
-    let white = quantile(all.collect(), 1.0 - GLINTS);
+    let size = frame_size(width, height)?;
+    let flood = LightPicture::new(size, learned.measurements.flood.clone())?;
+    let white = flood.quantile(1.0 - GLINTS);
     let scale = if white > 0.0 { 1.0 / white } else { 0.0 };
-    Some(LightPicture::new(size, planes)?.scaled(scale).for_display())
+    Some(flood.scaled(scale).for_display())
 }
 
 /// A round number that nearly all errors stay below once each pixel has its gain.
@@ -166,20 +170,19 @@ fn flood(learned: &Learned) -> Option<Picture> {
 fn largest_error(examples: &[Example]) -> f64 {
     let shown = examples.iter().flat_map(|example| &example.shown);
     let shown = shown.filter(|shown| shown.treatment == Treatment::GainOnly);
-    let errors = shown.flat_map(|shown| shown.comparison.map.iter().map(|error| f64::from(*error)));
-    let high = quantile(errors.collect(), 1.0 - BEYOND_SCALE).max(1e-3);
+    let mut errors: Vec<f32> = shown
+        .flat_map(|shown| &shown.comparison.map)
+        .copied()
+        .collect();
+    let high = quantile(&mut errors, 1.0 - BEYOND_SCALE).map_or(0.0, f64::from);
+    let high = high.max(1e-3);
     let power = 10_f64.powf(high.log10().floor());
     // Ends that a tick falls on.
     let ends = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0].map(|digit| digit * power);
     ends.into_iter().find(|end| *end >= high).unwrap_or(high)
 }
 
-/// The value that a share of all values stays below; 0 of none.
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    values
-        .get((share * last as f64) as usize)
-        .copied()
-        .unwrap_or(0.0)
+/// `None` of more than 65,535 pixels a side.
+fn frame_size(width: usize, height: usize) -> Option<FrameSize> {
+    FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)
 }

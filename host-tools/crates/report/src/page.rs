@@ -1,11 +1,10 @@
-//! The page: one HTML file with everything inside.
+//! HTML page of a report: one file with everything inside.
 
 use super::facts::facts;
-use super::{Example, Report, Rung, Shown, Treatment};
+use super::{Example, Report, TimedTier, TreatedImage, Treatment};
 use iltm_picture::{
-    chart::{Axis, Chart, Point},
-    html::{colour_bar, document, embedded},
-    numbers::{grouped, number, percent},
+    chart::{Axis, Chart, Series},
+    html::{colour_bar, document, grouped, img_named, number, percent},
 };
 use iltm_solve::{Compensation, Prediction};
 use maud::{Markup, html};
@@ -32,6 +31,17 @@ pub struct Command {
     pub what: String,
     /// The line.
     pub line: String,
+}
+
+impl Command {
+    /// A line and what it does.
+    #[must_use]
+    pub fn new(what: &str, line: String) -> Self {
+        Self {
+            what: what.to_owned(),
+            line,
+        }
+    }
 }
 
 impl Report<'_> {
@@ -205,7 +215,8 @@ impl Report<'_> {
     fn operator(&self) -> Markup {
         let map = &self.coefficients;
         let all = map.coefficients as u64;
-        let entries = |rung: Option<&Rung>| u64::from(rung.map_or(0, |rung| rung.step.entries));
+        let entries =
+            |rung: Option<&TimedTier>| u64::from(rung.map_or(0, |rung| rung.cost.entries));
         let (first, last) = (entries(self.ladder.get(1)), entries(self.ladder.last()));
         html! {
             section .half {
@@ -262,32 +273,29 @@ impl Report<'_> {
 
     /// A picture inside of the page, by the name of its file.
     fn image(&self, name: &str, alt: &str) -> Markup {
-        let file = self.files.iter().find(|file| file.name == name);
-        html! {
-            @if let Some(file) = file { (embedded(file, alt)) }
-        }
+        img_named(&self.files, name, alt)
     }
 
     fn accuracy(&self) -> Markup {
         let own = self.learned.report.predicted_error();
-        let point = |(tier, rung): (usize, &Rung)| Point {
-            x: rung.microseconds,
-            y: rung.step.left_out,
-            label: format!("tier {tier}"),
+        let tiers = self.ladder.iter();
+        let series = Series {
+            points: tiers
+                .map(|rung| (rung.microseconds, rung.cost.left_out))
+                .collect(),
+            labels: (0..self.ladder.len())
+                .map(|tier| format!("tier {tier}"))
+                .collect(),
+            line: 1.8,
+            ..Series::default()
         };
         let chart = Chart {
             title: "What each tier leaves out against the time it takes",
-            x: Axis {
-                label: "microseconds a frame, one core of this machine",
-                logarithmic: false,
-            },
-            y: Axis {
-                label: "left out (relative error)",
-                logarithmic: true,
-            },
-            points: self.ladder.iter().enumerate().map(point).collect(),
-            marked: None,
-            level: Some((own, "error of the inverse itself")),
+            x: Axis::linear("microseconds a frame, one core of this machine"),
+            y: Axis::logarithmic("left out (relative error)"),
+            limit: Some((own, "error of the inverse itself")),
+            series: vec![series],
+            ..Chart::default()
         };
         html! {
             section {
@@ -303,9 +311,9 @@ impl Report<'_> {
                             th { "tier" } th { "left out" } th { "error in all" } th { "entries" } th { "multipli\u{ad}cations" } th { "bytes" } th { "\u{b5}s" }
                         } }
                         tbody { @for (tier, rung) in self.ladder.iter().enumerate() { tr {
-                            td { (tier) } td { (percent(rung.step.left_out)) } td { (percent(rung.step.total)) }
-                            td { (grouped(rung.step.entries.into())) } td { (grouped(rung.step.multiplications.into())) }
-                            td { (grouped(rung.step.bytes)) } td { (format!("{:.0}", rung.microseconds)) }
+                            td { (tier) } td { (percent(rung.cost.left_out)) } td { (percent(rung.cost.total)) }
+                            td { (grouped(rung.cost.entries.into())) } td { (grouped(rung.cost.multiplications.into())) }
+                            td { (grouped(rung.cost.bytes)) } td { (format!("{:.0}", rung.microseconds)) }
                         } } }
                     } }
                     (chart.render())
@@ -323,28 +331,24 @@ impl Report<'_> {
 
     fn solve(&self, words: &Words) -> Markup {
         let report = &self.learned.report;
-        let misfit = |trial: &iltm_solve::LambdaTrial| Point {
-            x: trial.lambda,
-            y: 100.0 * trial.misfit,
-            label: String::new(),
+        let path = report.lambda_path.iter();
+        let is_best =
+            |trial: &iltm_solve::LambdaTrial| trial.lambda.total_cmp(&report.lambda).is_eq();
+        let series = Series {
+            points: path
+                .clone()
+                .map(|trial| (trial.lambda, 100.0 * trial.misfit))
+                .collect(),
+            marked: path.clone().position(is_best),
+            line: 1.8,
+            ..Series::default()
         };
-        let best = report
-            .lambda_path
-            .iter()
-            .position(|trial| trial.lambda.total_cmp(&report.lambda).is_eq());
         let chart = Chart {
             title: "Misfit of held-out photographs by the weight of sparsity",
-            x: Axis {
-                label: "weight of sparsity \u{3bb}",
-                logarithmic: true,
-            },
-            y: Axis {
-                label: "misfit of held-out photographs, %",
-                logarithmic: false,
-            },
-            points: report.lambda_path.iter().map(misfit).collect(),
-            marked: best,
-            level: None,
+            x: Axis::logarithmic("weight of sparsity \u{3bb}"),
+            y: Axis::linear("misfit of held-out photographs, %"),
+            series: vec![series],
+            ..Chart::default()
         };
         html! {
             section {
@@ -395,11 +399,11 @@ fn headline(error: f64, what: &str, class: &str) -> Markup {
 }
 
 /// The treatment's name, for screens too narrow for four columns.
-fn phone(shown: &Shown) -> Markup {
+fn phone(shown: &TreatedImage) -> Markup {
     html! { span .phone { (shown.treatment.title()) } }
 }
 
-fn clipping(shown: &Shown) -> String {
+fn clipping(shown: &TreatedImage) -> String {
     match shown.treatment {
         Treatment::None => "The wanted image".to_owned(),
         _ if shown.clipped == 0.0 => "Nothing clipped".to_owned(),

@@ -1,4 +1,4 @@
-//! What a photograph of a projection would show.
+//! Photograph prediction: what the camera would see of a projection.
 //!
 //! The model is the pipeline's own, read backwards. The pipeline makes
 //! `p(x) = g(x) d'(x) - (U K A d')(x)` of the wanted light `d' = d - a`; the light
@@ -192,6 +192,7 @@ fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_scene;
     use iltm_compile::{CompileOptions, FineGains, compile};
     use iltm_picture::{Picture, Response, Samples};
     use iltm_runtime::Grid;
@@ -201,7 +202,6 @@ mod tests {
     /// A textured scene whose cells light each other the more the nearer they are.
     fn scene(channels: usize) -> InverseTransport {
         let grid = Grid::new(5, 8).unwrap();
-        let cells = grid.cells();
         let kernel = |i: usize, j: usize| {
             let rows = (i / 8).abs_diff(j / 8) as f64;
             let cols = (i % 8).abs_diff(j % 8) as f64;
@@ -213,18 +213,12 @@ mod tests {
         };
         let texture =
             |cell: usize, channel: usize| 6.0 + 2.0 * ((cell * (channel + 3)) as f64).sin();
-        let channel = |channel: usize| ChannelInverse {
-            gain: (0..cells).map(|cell| texture(cell, channel)).collect(),
-            scale: 1.0 - 0.2 * channel as f64,
-            deviation: None,
-            ambient: vec![0.004; cells],
-        };
-        InverseTransport {
-            grid,
-            live: vec![true; cells],
-            shared: DMatrix::from_fn(cells, cells, kernel),
-            channels: (0..channels).map(channel).collect(),
+        let mut inverse = test_scene::inverse(grid, channels, texture, kernel);
+        for (index, channel) in inverse.channels.iter_mut().enumerate() {
+            channel.scale = 1.0 - 0.2 * index as f64;
+            channel.ambient.fill(0.004);
         }
+        inverse
     }
 
     /// Gains twice as fine as the cells, with texture inside of them.
@@ -274,7 +268,7 @@ mod tests {
             for fine in [None, Some(fine(&inverse))] {
                 let compiled = compile(&inverse, fine.as_ref(), &options).unwrap();
                 // A tenth darker, since fine gains reach above those of the cells.
-                let white = 0.9 * compiled.white.light;
+                let white = 0.9 * compiled.white;
                 let options = CompileOptions {
                     reference_white: Some(white),
                     ..options.clone()
@@ -321,8 +315,8 @@ mod tests {
         let compiled = compile(&inverse, None, &CompileOptions::default()).unwrap();
         let table = Table::check(&compiled.image).unwrap();
         let size = FrameSize::of_grid(inverse.grid);
-        let projection = Projection::new(&table, &inverse, compiled.white.light, size).unwrap();
-        let ambient = 0.004 / compiled.white.light;
+        let projection = Projection::new(&table, &inverse, compiled.white, size).unwrap();
+        let ambient = 0.004 / compiled.white;
         let grey = LightPicture::new(size, vec![vec![0.5; size.pixels()]]).unwrap();
         let bounced = projection.bounced(&grey);
         // At the grid's own size U and A do nothing: the sum of a row of K, over g.

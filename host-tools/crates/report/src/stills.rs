@@ -6,17 +6,16 @@
 use crate::Wanted;
 use iltm_picture::{
     LightPicture, Picture,
-    canvas::{Canvas, Type},
+    canvas::{Canvas, FontWeight, RasterHeight, Type},
 };
 use iltm_runtime::FrameSize;
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 use std::f64::consts::TAU;
 
 /// Samples along each side of a pixel.
 const SAMPLES: usize = 3;
 
 /// Linear red, green and blue, 0 to 1.
-type Colour = [f64; 3];
+type LinearColour = [f64; 3];
 
 /// Bright panels beside dark ones: what scatters from the bright shows on the dark.
 #[must_use]
@@ -39,7 +38,7 @@ pub fn bright_and_dark(size: FrameSize) -> Wanted {
 }
 
 /// Grey with darker and lighter discs.
-fn disc_pattern(along: f64, y: f64) -> Colour {
+fn disc_pattern(along: f64, y: f64) -> LinearColour {
     let (u, v) = (along * 3.0, y * 8.0);
     let (du, dv) = (u.fract() - 0.5, v.fract() - 0.5);
     let inside = du * du + dv * dv < 0.09;
@@ -61,12 +60,12 @@ pub fn test_card(size: FrameSize) -> Wanted {
         remark: "Saturated colours, fine lines, a ramp and lettering: colour bleeds where panels face each other, \
                  and edges show whether detail survives."
             .to_owned(),
-        picture: lettered(picture),
+        picture: lettered(&picture),
     }
 }
 
-fn card(x: f64, y: f64) -> Colour {
-    const BARS: [Colour; 8] = [
+fn card(x: f64, y: f64) -> LinearColour {
+    const BARS: [LinearColour; 8] = [
         [0.75, 0.75, 0.75],
         [0.75, 0.75, 0.14],
         [0.14, 0.75, 0.75],
@@ -106,7 +105,7 @@ fn card(x: f64, y: f64) -> Colour {
 }
 
 /// What lies in the card's circle.
-fn inner_card(x: f64, y: f64, radius: f64, angle: f64) -> Colour {
+fn inner_card(x: f64, y: f64, radius: f64, angle: f64) -> LinearColour {
     if y < 0.30 {
         return [0.85; 3];
     }
@@ -133,7 +132,7 @@ fn inner_card(x: f64, y: f64, radius: f64, angle: f64) -> Colour {
 }
 
 /// The card with a name on the dark band across its circle.
-fn lettered(picture: Picture) -> Picture {
+fn lettered(picture: &Picture) -> Picture {
     let letters = Type {
         height: if picture.size().height() > 300 {
             RasterHeight::Size32
@@ -144,9 +143,8 @@ fn lettered(picture: Picture) -> Picture {
         colour: [230; 3],
     };
     let (width, height) = (picture.size().width(), picture.size().height());
-    let Some(mut canvas) = Canvas::over(&picture) else {
-        return picture;
-    };
+    let mut canvas = Canvas::new(picture.size(), [0; 3]);
+    canvas.place(0, 0, picture);
     let text = "LIGHT TRANSPORT";
     let left = width.saturating_sub(letters.width(text)) / 2;
     let top = (height / 2).saturating_sub(letters.height.val() / 2);
@@ -155,23 +153,20 @@ fn lettered(picture: Picture) -> Picture {
 }
 
 /// Draws a picture from the light at each place, both axes 0 to 1.
-fn paint(size: FrameSize, light: impl Fn(f64, f64) -> Colour) -> Picture {
+fn paint(size: FrameSize, light: impl Fn(f64, f64) -> LinearColour) -> Picture {
     let place = |pixel: usize, sample: usize, length: usize| {
         (pixel as f64 + (sample as f64 + 0.5) / SAMPLES as f64) / length as f64
     };
-    let pixel = |at: usize| {
-        let (col, row) = (at % size.width(), at / size.width());
-        let mut sums = [0.0; 3];
-        for sample in 0..SAMPLES * SAMPLES {
+    LightPicture::from_fn(size, 3, |channel, pixel| {
+        let (col, row) = (pixel % size.width(), pixel / size.width());
+        let samples = (0..SAMPLES * SAMPLES).map(|sample| {
             let x = place(col, sample % SAMPLES, size.width());
             let y = place(row, sample / SAMPLES, size.height());
-            for (sum, light) in sums.iter_mut().zip(light(x, y)) {
-                *sum += light / (SAMPLES * SAMPLES) as f64;
-            }
-        }
-        sums.map(|sum| sum as f32)
-    };
-    LightPicture::of_pixels(size, pixel).for_display()
+            light(x, y)[channel] / (SAMPLES * SAMPLES) as f64
+        });
+        samples.sum::<f64>() as f32
+    })
+    .for_display()
 }
 
 #[cfg(test)]

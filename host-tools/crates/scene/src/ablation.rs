@@ -1,4 +1,4 @@
-//! What each effect contributes: photographs with it and without it, compared.
+//! Ablation: what each effect contributes, from photographs with it and without it.
 
 use super::description::Scene;
 use super::effects::Effect;
@@ -38,7 +38,7 @@ pub fn ablate(
     options: &SimulationOptions,
     progress: &dyn Progress,
 ) -> Result<Vec<Ablated>, SimulationError> {
-    let decided = Taken::new(scene, options, progress)?;
+    let decided = Photographed::new(scene, options, progress)?;
     let mut ablated = Vec::new();
     let choices = decided.decisions.iter().filter(|d| d.possible);
     for decision in choices {
@@ -48,11 +48,9 @@ pub fn ablate(
             // The threshold of the scene as it was decided, not as it is turned.
             threshold: Some(decided.threshold),
         };
-        let other = Taken::new(scene, &turned, progress)?;
-        let sensor = matches!(
-            effect,
-            Effect::Noise | Effect::Quantisation | Effect::Response
-        );
+        let other = Photographed::new(scene, &turned, progress)?;
+        let of_sensor = [Effect::Noise, Effect::Quantisation, Effect::Response];
+        let sensor = of_sensor.contains(&effect);
         let (error, largest) = decided.difference(&other, sensor);
         let longer = decided.seconds - other.seconds;
         ablated.push(Ablated {
@@ -67,7 +65,7 @@ pub fn ablate(
 }
 
 /// Photographs of one simulation.
-struct Taken {
+struct Photographed {
     decisions: Vec<super::Decision>,
     threshold: f64,
     /// Light by photograph and channel.
@@ -79,7 +77,7 @@ struct Taken {
     seconds: f64,
 }
 
-impl Taken {
+impl Photographed {
     fn new(
         scene: &Scene,
         options: &SimulationOptions,
@@ -115,16 +113,13 @@ impl Taken {
     /// Root mean square and largest difference as shares of white: of light, or of
     /// what the `sensor` makes of it.
     fn difference(&self, other: &Self, sensor: bool) -> (f64, f64) {
-        let of = |taken: &'_ Self| {
-            if sensor {
-                taken.values.clone()
-            } else {
-                taken.light.clone()
-            }
+        let (mine, theirs) = if sensor {
+            (&self.values, &other.values)
+        } else {
+            (&self.light, &other.light)
         };
-        let (mine, theirs) = (of(self), of(other));
         let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0_usize);
-        for (mine, theirs) in mine.iter().zip(&theirs) {
+        for (mine, theirs) in mine.iter().zip(theirs) {
             // A grey photograph has the same light in every channel.
             for channel in 0..mine.len().max(theirs.len()) {
                 let mine = &mine[channel.min(mine.len() - 1)];

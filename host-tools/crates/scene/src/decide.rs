@@ -1,11 +1,15 @@
-//! Looks at a scene and decides which effects it calls for.
+//! Effect decisions: which effects a scene calls for, and why.
 
 use super::description::{Albedo, Camera, Projector, Scene};
 use super::effects::{Decisions, Effect};
 use super::estimate::{self, Estimate};
 use super::facets::Facets;
+use super::patches::PatchExtent;
 use super::sensor::Sensor;
-use iltm_picture::Response;
+use iltm_picture::{
+    Response,
+    numbers::{number, percent},
+};
 
 /// Effects that change a photograph by less than this share of white are left out,
 /// where the camera has no noise that would hide more.
@@ -24,128 +28,83 @@ pub(super) fn threshold(scene: &Scene) -> f64 {
     (OF_NOISE * noise / pixels.max(1.0).sqrt()).max(THRESHOLD)
 }
 
+/// Pixels by which a lens may displace something unnoticed.
+const UNNOTICED_PIXELS: f64 = 0.02;
+
 /// Effects that need nothing but the scene's own words.
 pub(super) fn named(facets: &Facets<'_>, threshold: f64, decisions: &mut Decisions) {
     let scene = facets.scene();
     colour(scene, threshold, decisions);
     gloss(scene, threshold, decisions);
-    let projector = &scene.projector;
-    let blurred = scene.projector.blur / (2.0 * std::f64::consts::PI).sqrt();
-    if projector.blur > 0.0 {
-        let reason = format!(
-            "{} cells: {} of a cell's light on each side of a border",
-            number(projector.blur),
-            percent(blurred)
-        );
-        decisions.decide(Effect::Blur, blurred >= threshold, reason);
-    } else {
-        decisions.rule_out(Effect::Blur, "the projector is in focus");
-    }
-    let share = |effect, value: f64, what: &str, nothing: &str, decisions: &mut Decisions| {
-        if value > 0.0 {
-            let reason = format!("{} {what}", percent(value));
-            decisions.decide(effect, value >= threshold, reason);
-        } else {
-            decisions.rule_out(effect, nothing);
-        }
-    };
-    share(
-        Effect::Vignetting,
-        projector.vignetting,
-        "of the light is lost in the frame's corners",
-        "the projector's frame is even",
-        decisions,
-    );
-    share(
-        Effect::Black,
-        projector.black,
-        "of white is left in black",
-        "the projector's black is dark",
-        decisions,
-    );
-    share(
-        Effect::Drift,
-        projector.drift,
-        "of the lamp's light is lost from the first photograph to the last",
-        "the lamp is steady",
-        decisions,
-    );
-    mixing(projector, threshold, decisions);
-    distortion(&scene.camera, decisions);
+    projector(&scene.projector, threshold, decisions);
     let ambient = scene.ambient.into_iter().fold(0.0, f64::max) / estimate::level(facets);
-    share(
-        Effect::Ambient,
-        ambient,
-        "of white comes from all around",
-        "no light comes from all around",
-        decisions,
-    );
-    sensor(scene, decisions);
+    let what = "of white comes from all around";
+    let found = share(ambient, threshold, what);
+    decisions.weigh(Effect::Ambient, found, "no light comes from all around");
+    camera(&scene.camera, decisions);
 }
 
-/// Pixels by which a lens may displace something unnoticed.
-const UNNOTICED_PIXELS: f64 = 0.02;
+/// A share of the light: whether it shows, and in words; `None` if there is nothing.
+fn share(value: f64, threshold: f64, what: &str) -> Option<(bool, String)> {
+    (value > 0.0).then(|| (value >= threshold, format!("{} {what}", percent(value))))
+}
 
-fn mixing(projector: &Projector, threshold: f64, decisions: &mut Decisions) {
+fn projector(projector: &Projector, threshold: f64, decisions: &mut Decisions) {
+    let blurred = projector.blur / (2.0 * std::f64::consts::PI).sqrt();
+    let cells = number(projector.blur);
+    let what = "of a cell's light on each side of a border";
+    let found = share(blurred, threshold, what);
+    let found = found.map(|(on, words)| (on, format!("{cells} cells: {words}")));
+    decisions.weigh(Effect::Blur, found, "the projector is in focus");
+    let what = "of the light is lost in the frame's corners";
+    let found = share(projector.vignetting, threshold, what);
+    decisions.weigh(Effect::Vignetting, found, "the projector's frame is even");
+    let found = share(projector.black, threshold, "of white is left in black");
+    decisions.weigh(Effect::Black, found, "the projector's black is dark");
+    let what = "of the lamp's light is lost from the first photograph to the last";
+    let found = share(projector.drift, threshold, what);
+    decisions.weigh(Effect::Drift, found, "the lamp is steady");
     let mixed = projector.foreign_light();
-    if projector.mixing == Projector::UNMIXED {
-        decisions.rule_out(
-            Effect::Mixing,
-            "each channel of the camera sees one of the projector's",
-        );
-    } else {
+    let found = (projector.mixing != Projector::UNMIXED).then(|| {
         let reason = format!(
             "a channel of the camera has up to {} of its light from another of the projector's",
             percent(mixed)
         );
-        decisions.decide(Effect::Mixing, mixed >= threshold, reason);
-    }
+        (mixed >= threshold, reason)
+    });
+    let nothing = "each channel of the camera sees one of the projector's";
+    decisions.weigh(Effect::Mixing, found, nothing);
 }
 
-fn distortion(camera: &Camera, decisions: &mut Decisions) {
-    if camera.distorts() {
+/// What the camera makes of light: on wherever the scene names it, but for a lens whose
+/// distortion nobody would see.
+fn camera(camera: &Camera, decisions: &mut Decisions) {
+    let found = camera.distorts().then(|| {
         let pixels = camera.most_displaced();
         let reason = format!("the lens displaces by up to {} pixels", number(pixels));
-        decisions.decide(Effect::Distortion, pixels >= UNNOTICED_PIXELS, reason);
-    } else {
-        decisions.rule_out(
-            Effect::Distortion,
-            "the lens leaves straight lines straight",
-        );
-    }
-}
-
-/// What the camera makes of light: on wherever the scene names it.
-fn sensor(scene: &Scene, decisions: &mut Decisions) {
-    let camera = &scene.camera;
-    match camera.full_well {
-        Some(full_well) => {
-            let noise = Sensor::noise_at_white(camera);
-            let reason = format!(
-                "a full well of {full_well} electrons: {} of white in a pixel",
-                percent(noise)
-            );
-            decisions.decide(Effect::Noise, true, reason);
-        }
-        None => decisions.rule_out(Effect::Noise, "the camera has no `full_well`"),
-    }
-    match camera.bits {
-        Some(bits) => {
-            let step = 1.0 / f64::from((1_u32 << bits) - 1);
-            let reason = format!("{bits} bits: steps of {} of full scale", percent(step));
-            decisions.decide(Effect::Quantisation, true, reason);
-        }
-        None => decisions.rule_out(
-            Effect::Quantisation,
-            "the camera has no `bits`; files have 16",
-        ),
-    }
-    if camera.response == Response::Linear {
-        decisions.rule_out(Effect::Response, "the camera is linear");
-    } else {
-        let reason = format!("the camera's values follow {}", camera.response);
-        decisions.decide(Effect::Response, true, reason);
-    }
+        (pixels >= UNNOTICED_PIXELS, reason)
+    });
+    let nothing = "the lens leaves straight lines straight";
+    decisions.weigh(Effect::Distortion, found, nothing);
+    let found = camera.full_well.map(|full_well| {
+        let noise = percent(Sensor::noise_at_white(camera));
+        let reason = format!("a full well of {full_well} electrons: {noise} of white in a pixel");
+        (true, reason)
+    });
+    decisions.weigh(Effect::Noise, found, "the camera has no `full_well`");
+    let found = camera.bits.map(|bits| {
+        let step = percent(1.0 / f64::from((1_u32 << bits) - 1));
+        (true, format!("{bits} bits: steps of {step} of full scale"))
+    });
+    let nothing = "the camera has no `bits`; files have 16";
+    decisions.weigh(Effect::Quantisation, found, nothing);
+    let found = (camera.response != Response::Linear).then(|| {
+        (
+            true,
+            format!("the camera's values follow {}", camera.response),
+        )
+    });
+    decisions.weigh(Effect::Response, found, "the camera is linear");
 }
 
 fn colour(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
@@ -154,23 +113,21 @@ fn colour(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
         largest - channels.into_iter().fold(f64::INFINITY, f64::min)
     };
     let mut widest = (spread(scene.ambient), "the ambient light".to_owned());
+    let mut widen = |of: f64, whose: &dyn Fn() -> String| {
+        if of > widest.0 {
+            widest = (of, whose());
+        }
+    };
     for panel in &scene.panels {
         let of_panel = match &panel.albedo {
             Albedo::Uniform(channels) => spread(*channels),
             Albedo::Texture(texture) => texture.widest_spread(),
         };
-        if of_panel > widest.0 {
-            widest = (of_panel, format!("`{}`", panel.name));
-        }
+        widen(of_panel, &|| format!("`{}`", panel.name));
     }
     if scene.projector.mixing != Projector::UNMIXED {
-        let mixed = scene.projector.foreign_light();
-        if mixed > widest.0 {
-            widest = (
-                mixed,
-                "what the camera sees of the projector's light".to_owned(),
-            );
-        }
+        let whose = || "what the camera sees of the projector's light".to_owned();
+        widen(scene.projector.foreign_light(), &whose);
     }
     let (spread, whose) = widest;
     let reason = if spread > 0.0 {
@@ -187,30 +144,23 @@ fn gloss(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
         .iter()
         .filter_map(|panel| Some((panel, panel.gloss?)))
         .max_by(|a, b| a.1.reflectance.total_cmp(&b.1.reflectance));
-    match glossy {
-        Some((panel, gloss)) => {
-            let reason = format!(
-                "`{}` sends {} into a lobe of {:.0} degrees",
-                panel.name,
-                percent(gloss.reflectance),
-                (2.0 / (gloss.exponent + 1.0)).sqrt().to_degrees()
-            );
-            decisions.decide(Effect::Gloss, gloss.reflectance >= threshold, reason);
-        }
-        None => decisions.rule_out(Effect::Gloss, "no panel is glossy"),
-    }
-    let mirror = scene
-        .panels
-        .iter()
-        .filter(|panel| panel.mirror > 0.0)
-        .max_by(|a, b| a.mirror.total_cmp(&b.mirror));
-    match mirror {
-        Some(panel) => {
-            let reason = format!("`{}` mirrors {}", panel.name, percent(panel.mirror));
-            decisions.decide(Effect::Mirrors, panel.mirror >= threshold, reason);
-        }
-        None => decisions.rule_out(Effect::Mirrors, "no panel is a mirror"),
-    }
+    let found = glossy.map(|(panel, gloss)| {
+        let reason = format!(
+            "`{}` sends {} into a lobe of {:.0} degrees",
+            panel.name,
+            percent(gloss.reflectance),
+            (2.0 / (gloss.exponent + 1.0)).sqrt().to_degrees()
+        );
+        (gloss.reflectance >= threshold, reason)
+    });
+    decisions.weigh(Effect::Gloss, found, "no panel is glossy");
+    let mirrors = scene.panels.iter().filter(|panel| panel.mirror > 0.0);
+    let mirror = mirrors.max_by(|a, b| a.mirror.total_cmp(&b.mirror));
+    let found = mirror.map(|panel| {
+        let reason = format!("`{}` mirrors {}", panel.name, percent(panel.mirror));
+        (panel.mirror >= threshold, reason)
+    });
+    decisions.weigh(Effect::Mirrors, found, "no panel is a mirror");
 }
 
 /// Whether surfaces throw shadows in the projector's light.
@@ -220,36 +170,27 @@ pub(super) fn shadows(facets: &Facets<'_>, decisions: &mut Decisions) -> bool {
         Some((facet, *by.first()?))
     });
     let shaded: Vec<_> = shaded.collect();
-    let Some((facet, by)) = shaded.first() else {
-        let reason = "from the projector, no panel is in front of another";
-        decisions.rule_out(Effect::Shadows, reason);
-        return false;
-    };
-    let reason = format!(
-        "{} of {} surfaces may be shaded, `{}` by `{}` first",
-        shaded.len(),
-        facets.count(),
-        facets.name(*facet),
-        facets.name(*by)
-    );
-    decisions.decide(Effect::Shadows, true, reason)
+    let found = shaded.first().map(|(facet, by)| {
+        let reason = format!(
+            "{} of {} surfaces may be shaded, `{}` by `{}` first",
+            shaded.len(),
+            facets.count(),
+            facets.name(*facet),
+            facets.name(*by)
+        );
+        (true, reason)
+    });
+    let nothing = "from the projector, no panel is in front of another";
+    decisions.weigh(Effect::Shadows, found, nothing)
 }
 
-/// Which surfaces take part in interreflection: what is in the frame, beside it,
-/// behind.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Taking {
-    pub(super) interreflection: bool,
-    pub(super) surroundings: bool,
-    pub(super) backs: bool,
-}
-
-/// Decides about light between surfaces.
+/// Decides about light between surfaces: whether there is any, and which surfaces take part
+/// beside those in the frame.
 pub(super) fn between_surfaces(
     facets: &Facets<'_>,
     threshold: f64,
     decisions: &mut Decisions,
-) -> Taking {
+) -> (bool, PatchExtent) {
     let scene = facets.scene();
     let ambient = if decisions.on(Effect::Ambient) {
         scene.ambient.into_iter().fold(0.0, f64::max)
@@ -257,7 +198,7 @@ pub(super) fn between_surfaces(
         0.0
     };
     let estimate = Estimate::new(facets, ambient);
-    let interreflection = if let Some(pair) = estimate.bounce {
+    let found = estimate.bounce.map(|pair| {
         let (facing, pairs) = estimate.facing;
         let reason = format!(
             "{facing} of {pairs} pairs of surfaces face each other; `{}` sends on up to {} of white, most of it from `{}`",
@@ -265,22 +206,16 @@ pub(super) fn between_surfaces(
             percent(pair.light),
             facets.name(pair.from)
         );
-        decisions.decide(Effect::Interreflection, pair.light >= threshold, reason)
-    } else {
-        let reason = "no two surfaces face each other";
-        decisions.rule_out(Effect::Interreflection, reason);
-        false
-    };
+        (pair.light >= threshold, reason)
+    });
+    let nothing = "no two surfaces face each other";
+    let interreflection = decisions.weigh(Effect::Interreflection, found, nothing);
     let mut side = |effect, light: Option<f64>, what: &str, nothing: &str| {
-        let Some(light) = light else {
-            decisions.rule_out(effect, nothing);
-            return false;
-        };
-        let reason = format!("{what} send back up to {} of white", percent(light));
-        decisions.decide(effect, light >= threshold, reason)
+        let words = |light| format!("{what} send back up to {} of white", percent(light));
+        let found = light.map(|light| (light >= threshold, words(light)));
+        decisions.weigh(effect, found, nothing)
     };
-    Taking {
-        interreflection,
+    let extent = PatchExtent {
         surroundings: side(
             Effect::Surroundings,
             estimate.surroundings,
@@ -293,29 +228,6 @@ pub(super) fn between_surfaces(
             "back sides",
             "no back side gets light and is seen",
         ),
-    }
-}
-
-/// A share for people.
-#[must_use]
-pub fn percent(share: f64) -> String {
-    format!("{} %", number(100.0 * share))
-}
-
-/// Two significant digits, plain where that is short.
-pub(super) fn number(value: f64) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if size >= 10.0 {
-        format!("{value:.0}")
-    } else if size >= 1.0 {
-        format!("{value:.1}")
-    } else if size >= 1e-4 {
-        let digits = 1 - size.log10().floor() as i32;
-        let text = format!("{value:.*}", digits.max(0) as usize);
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        format!("{value:.1e}")
-    }
+    };
+    (interreflection, extent)
 }

@@ -1,11 +1,26 @@
-//! The effects that a simulation can have, and what was decided about each.
+//! Simulated effects: which there are, and what was decided about each.
 
-use std::fmt;
-use std::str::FromStr;
+use strum::{Display, EnumIter, EnumString, VariantNames};
 use thiserror::Error;
 
-/// Something that light does, or that a camera makes of it.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+/// Something that light does, or that a camera makes of it, in the order in which it is
+/// decided about. Its name on the command line is its own in small letters.
+#[derive(
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Debug,
+    Display,
+    EnumIter,
+    EnumString,
+    VariantNames,
+)]
+#[strum(serialize_all = "kebab-case")]
+#[strum(parse_err_ty = UnknownEffect, parse_err_fn = UnknownEffect::new)]
 pub enum Effect {
     /// Red, green and blue are different.
     Colour,
@@ -47,78 +62,17 @@ pub enum Effect {
     Response,
 }
 
-impl Effect {
-    /// Every effect, in the order in which it is decided about.
-    pub const ALL: [Self; 19] = [
-        Self::Colour,
-        Self::Shadows,
-        Self::Interreflection,
-        Self::Occlusion,
-        Self::Surroundings,
-        Self::Backs,
-        Self::Detail,
-        Self::Gloss,
-        Self::Mirrors,
-        Self::Blur,
-        Self::Vignetting,
-        Self::Black,
-        Self::Drift,
-        Self::Mixing,
-        Self::Ambient,
-        Self::Distortion,
-        Self::Noise,
-        Self::Quantisation,
-        Self::Response,
-    ];
-
-    /// Its name on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Colour => "colour",
-            Self::Shadows => "shadows",
-            Self::Interreflection => "interreflection",
-            Self::Occlusion => "occlusion",
-            Self::Surroundings => "surroundings",
-            Self::Backs => "backs",
-            Self::Detail => "detail",
-            Self::Gloss => "gloss",
-            Self::Mirrors => "mirrors",
-            Self::Blur => "blur",
-            Self::Vignetting => "vignetting",
-            Self::Black => "black",
-            Self::Drift => "drift",
-            Self::Mixing => "mixing",
-            Self::Ambient => "ambient",
-            Self::Distortion => "distortion",
-            Self::Noise => "noise",
-            Self::Quantisation => "quantisation",
-            Self::Response => "response",
-        }
-    }
-}
-
-impl fmt::Display for Effect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
 /// A name that no [`Effect`] has.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
-#[error("there is no effect `{name}`; there are {}", Effect::ALL.map(Effect::name).join(", "))]
+#[error("there is no effect `{name}`; there are {}", Effect::VARIANTS.join(", "))]
 pub struct UnknownEffect {
     name: String,
 }
 
-impl FromStr for Effect {
-    type Err = UnknownEffect;
-
-    fn from_str(name: &str) -> Result<Self, UnknownEffect> {
-        let found = Self::ALL.into_iter().find(|effect| effect.name() == name);
-        found.ok_or_else(|| UnknownEffect {
-            name: name.to_owned(),
-        })
+impl UnknownEffect {
+    fn new(name: &str) -> Self {
+        let name = name.to_owned();
+        Self { name }
     }
 }
 
@@ -141,40 +95,33 @@ pub struct Decision {
 
 /// Effects that are wanted or unwanted whatever the scene says.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Forced {
-    on: Vec<Effect>,
-    off: Vec<Effect>,
-}
+pub struct Forced(Vec<(Effect, bool)>);
 
 impl Forced {
     /// Wants `effect` on or off.
     #[must_use]
     pub fn with(mut self, effect: Effect, on: bool) -> Self {
-        self.on.retain(|e| *e != effect);
-        self.off.retain(|e| *e != effect);
-        if on { &mut self.on } else { &mut self.off }.push(effect);
+        self.0.retain(|(e, _)| *e != effect);
+        self.0.push((effect, on));
         self
     }
 
     fn wanted(&self, effect: Effect) -> Option<bool> {
-        if self.on.contains(&effect) {
-            return Some(true);
-        }
-        self.off.contains(&effect).then_some(false)
+        let found = self.0.iter().find(|(e, _)| *e == effect);
+        found.map(|(_, on)| *on)
     }
 }
 
 /// The decisions of one simulation, as they are made.
 #[derive(Clone, Debug)]
-pub struct Decisions {
+pub(crate) struct Decisions {
     forced: Forced,
     made: Vec<Decision>,
 }
 
 impl Decisions {
     /// None yet.
-    #[must_use]
-    pub fn new(forced: Forced) -> Self {
+    pub(crate) fn new(forced: Forced) -> Self {
         Self {
             forced,
             made: Vec::new(),
@@ -182,14 +129,13 @@ impl Decisions {
     }
 
     /// What somebody asked for about an effect.
-    #[must_use]
-    pub fn forced(&self, effect: Effect) -> Option<bool> {
+    pub(crate) fn forced(&self, effect: Effect) -> Option<bool> {
         self.forced.wanted(effect)
     }
 
     /// Decides about an effect: `on` is what the scene says, `reason` why. Returns
     /// whether to simulate it.
-    pub fn decide(&mut self, effect: Effect, on: bool, reason: impl Into<String>) -> bool {
+    pub(crate) fn decide(&mut self, effect: Effect, on: bool, reason: impl Into<String>) -> bool {
         let wanted = self.forced.wanted(effect);
         let forced = wanted.is_some_and(|wanted| wanted != on);
         let on = wanted.unwrap_or(on);
@@ -206,7 +152,7 @@ impl Decisions {
 
     /// An effect that the scene leaves no room for: it cannot be forced either.
     /// Where somebody asked for it, the reason says so.
-    pub fn rule_out(&mut self, effect: Effect, reason: &str) {
+    pub(crate) fn rule_out(&mut self, effect: Effect, reason: &str) {
         let asked = self.forced(effect) == Some(true);
         let reason = if asked {
             format!("asked for, but {reason}")
@@ -223,15 +169,30 @@ impl Decisions {
         });
     }
 
+    /// Decides about an effect that was `found`, if it shows and why, or rules it out because
+    /// there is `nothing`. Returns whether to simulate it.
+    pub(crate) fn weigh(
+        &mut self,
+        effect: Effect,
+        found: Option<(bool, String)>,
+        nothing: &str,
+    ) -> bool {
+        if let Some((on, reason)) = found {
+            return self.decide(effect, on, reason);
+        }
+        self.rule_out(effect, nothing);
+        false
+    }
+
     /// Adds to an effect's time.
-    pub fn took(&mut self, effect: Effect, seconds: f64) {
+    pub(crate) fn took(&mut self, effect: Effect, seconds: f64) {
         if let Some(decision) = self.made.iter_mut().find(|d| d.effect == effect) {
             decision.seconds += seconds;
         }
     }
 
     /// Adds to an effect's reason what was found while simulating it.
-    pub fn found(&mut self, effect: Effect, what: &str) {
+    pub(crate) fn found(&mut self, effect: Effect, what: &str) {
         if let Some(decision) = self.made.iter_mut().find(|d| d.effect == effect) {
             decision.reason.push_str("; ");
             decision.reason.push_str(what);
@@ -239,14 +200,12 @@ impl Decisions {
     }
 
     /// Whether an effect is simulated.
-    #[must_use]
-    pub fn on(&self, effect: Effect) -> bool {
+    pub(crate) fn on(&self, effect: Effect) -> bool {
         self.made.iter().any(|d| d.effect == effect && d.on)
     }
 
-    /// All of them, in the order of [`Effect::ALL`].
-    #[must_use]
-    pub fn all(&self) -> Vec<Decision> {
+    /// All of them, in the order of [`Effect`].
+    pub(crate) fn all(&self) -> Vec<Decision> {
         let mut all = self.made.clone();
         all.sort_by_key(|decision| decision.effect);
         all

@@ -1,5 +1,5 @@
-//! How much an effect could change a photograph, from the scene alone: what
-//! decisions are made by.
+//! Effect estimates: how much an effect could change a photograph, from the scene alone. They
+//! are what decisions are made by.
 //!
 //! Every estimate is a share of the light that the projector's white makes on the
 //! surfaces, their mean, and is meant to be too large rather than too small.
@@ -8,7 +8,7 @@ use super::facets::Facets;
 use super::form_factor::{facing, from_point};
 use super::geometry::{Obstacles, Polygon};
 use super::patches::split_by_frame;
-use super::view::View;
+use super::pinhole::Pinhole;
 use nalgebra::Vector3;
 
 /// Facets above which pairs are no longer looked at one by one.
@@ -19,7 +19,7 @@ const MOST_FACETS: usize = 400;
 pub(super) struct Estimate {
     /// Largest light that a surface sends on of what others send it, which one, and
     /// which of them sends most. `None` if no two surfaces face each other.
-    pub(super) bounce: Option<Pair>,
+    pub(super) bounce: Option<StrongestBounce>,
     /// Largest light on what is beside the frame.
     pub(super) surroundings: Option<f64>,
     /// Largest light that back sides send to the camera or to front sides.
@@ -30,7 +30,7 @@ pub(super) struct Estimate {
 
 /// Light that one facet sends on, most of it from another.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Pair {
+pub(super) struct StrongestBounce {
     pub(super) light: f64,
     pub(super) from: usize,
     pub(super) to: usize,
@@ -59,20 +59,15 @@ impl Estimate {
             reflectance: reflectance(facets, facet),
             lit: (lit + ambient) / level,
         };
+        let lit = |f| irradiance(facets.polygon(f), projector);
         let fronts: Vec<_> = (0..count)
-            .map(|f| {
-                side(
-                    f,
-                    facets.polygon(f),
-                    irradiance(facets.polygon(f), projector),
-                )
-            })
+            .map(|f| side(f, facets.polygon(f), lit(f)))
             .collect();
         if count > MOST_FACETS {
             // A mesh of many facets is one that bends: it lights itself.
             let reflectance = fronts.iter().map(|f| f.reflectance).fold(0.0, f64::max);
             return Self {
-                bounce: Some(Pair {
+                bounce: Some(StrongestBounce {
                     light: reflectance,
                     from: 0,
                     to: 0,
@@ -83,51 +78,20 @@ impl Estimate {
             };
         }
         let flipped: Vec<_> = (0..count).map(|f| facets.polygon(f).flipped()).collect();
-        let backs: Vec<_> = flipped
-            .iter()
-            .enumerate()
-            .map(|(f, p)| side(f, p, 0.0))
-            .collect();
+        let backs = flipped.iter().enumerate().map(|(f, p)| side(f, p, 0.0));
         // A back side matters if the camera sees it, or a front side.
         let camera = facets.scene().camera.view.position();
         let matters = |back: &Side<'_>| {
             back.polygon.plane().distance(&camera) > 0.0
                 || fronts.iter().any(|to| faces(back, to, facets.obstacles()))
         };
-        let seen: Vec<_> = backs.into_iter().filter(matters).collect();
+        let seen: Vec<_> = backs.filter(matters).collect();
+        let outside = |f| split_by_frame(facets.polygon(f), projector).1.into_iter();
         let beside: Vec<_> = (0..count)
-            .flat_map(|f| {
-                split_by_frame(facets.polygon(f), projector)
-                    .1
-                    .into_iter()
-                    .map(move |p| (f, p))
-            })
+            .flat_map(|f| outside(f).map(move |p| (f, p)))
             .collect();
         let beside: Vec<_> = beside.iter().map(|(f, p)| side(*f, p, 0.0)).collect();
-        let mut facing = 0;
-        let mut bounce: Option<Pair> = None;
-        for to in &fronts {
-            let mut all = 0.0;
-            let mut most = (0.0, to.facet);
-            for from in &fronts {
-                let Some(arriving) = bounced(from, to, facets.obstacles()) else {
-                    continue;
-                };
-                facing += 1;
-                all += arriving;
-                if arriving > most.0 {
-                    most = (arriving, from.facet);
-                }
-            }
-            let light = all * to.reflectance;
-            if all > 0.0 && bounce.is_none_or(|pair| light > pair.light) {
-                bounce = Some(Pair {
-                    light,
-                    from: most.1,
-                    to: to.facet,
-                });
-            }
-        }
+        let (bounce, facing) = strongest_bounce(&fronts, facets.obstacles());
         Self {
             bounce,
             surroundings: largest_on(&beside, &fronts, facets.obstacles()),
@@ -135,6 +99,39 @@ impl Estimate {
             facing: (facing / 2, pairs),
         }
     }
+}
+
+/// The front that sends on most of what other fronts send it, if any does, and how many
+/// fronts face another, counted from both sides.
+fn strongest_bounce(
+    fronts: &[Side<'_>],
+    obstacles: &Obstacles,
+) -> (Option<StrongestBounce>, usize) {
+    let mut facing = 0;
+    let mut bounce: Option<StrongestBounce> = None;
+    for to in fronts {
+        let mut all = 0.0;
+        let mut most = (0.0, to.facet);
+        for from in fronts {
+            let Some(arriving) = bounced(from, to, obstacles) else {
+                continue;
+            };
+            facing += 1;
+            all += arriving;
+            if arriving > most.0 {
+                most = (arriving, from.facet);
+            }
+        }
+        let light = all * to.reflectance;
+        if all > 0.0 && bounce.is_none_or(|pair| light > pair.light) {
+            bounce = Some(StrongestBounce {
+                light,
+                from: most.1,
+                to: to.facet,
+            });
+        }
+    }
+    (bounce, facing)
 }
 
 /// Largest light that any of `sides` gets from `fronts` or from elsewhere and sends
@@ -196,7 +193,7 @@ fn reflectance(facets: &Facets<'_>, facet: usize) -> f64 {
 }
 
 /// Largest irradiance by the projector's white on the part of a polygon in its frame.
-fn irradiance(polygon: &Polygon, view: &View) -> f64 {
+fn irradiance(polygon: &Polygon, view: &Pinhole) -> f64 {
     let Some(part) = split_by_frame(polygon, view).0 else {
         return 0.0;
     };
@@ -227,7 +224,7 @@ pub(super) fn level(facets: &Facets<'_>) -> f64 {
 }
 
 /// Irradiance of a point by the projector's white.
-fn irradiance_at(world: &Vector3<f64>, normal: &Vector3<f64>, view: &View) -> f64 {
+fn irradiance_at(world: &Vector3<f64>, normal: &Vector3<f64>, view: &Pinhole) -> f64 {
     let way = world - view.position();
     let depth = way.dot(&view.forward());
     (-normal.dot(&way) * view.focus().powi(2) / depth.powi(3)).max(0.0)

@@ -1,8 +1,8 @@
-//! Light in the scene while the projector shows patterns, and what the camera's pixels
+//! Exposure: light in the scene while the projector shows patterns, and what the camera's pixels
 //! see of it.
 
 use super::effects::Effect;
-use super::exchange::{Exchange, Stop, radiosity};
+use super::radiosity::{FormFactorMatrix, StopRule, radiosity};
 use super::simulation::{Simulation, SimulationError};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -77,7 +77,7 @@ impl Simulation<'_> {
             };
             let albedo: Vec<f64> = self.patches.iter().map(|p| p.albedo[channel]).collect();
             // It comes from where no other surface is in the way.
-            let open = self.exchange.as_ref().map(Exchange::row_sums);
+            let open = self.exchange.as_ref().map(FormFactorMatrix::row_sums);
             let direct = of_channel(&direct, channel);
             let mut indirect = DMatrix::from_fn(direct.nrows(), direct.ncols(), |patch, _| {
                 ambient * (1.0 - open.as_ref().map_or(0.0, |sums| sums[patch]))
@@ -145,7 +145,7 @@ impl Simulation<'_> {
             }
             light
         };
-        let stop = Stop::Share(OF_THRESHOLD * self.threshold);
+        let stop = StopRule::Share(OF_THRESHOLD * self.threshold);
         let arriving = direct + &*indirect;
         let mut leaving = reflected(&arriving);
         // What mirrors and lobes add is bounced in turn, until little is added.

@@ -1,19 +1,19 @@
-//! The scene's flat parts as light sees them: turned to the projector, and which of
+//! Facets: the scene's flat parts as light sees them, turned to the projector, and which of
 //! them may throw a shadow onto which.
 
 use super::description::{Facet, Scene};
 use super::geometry::{Obstacles, Polygon};
-use super::view::View;
+use super::pinhole::Pinhole;
 use nalgebra::Vector2;
 
 /// Metres in front of the projector where its light begins.
-const NEAREST: f64 = 1e-3;
+pub(super) const NEAREST: f64 = 1e-3;
 /// Overlap in the frame that still counts as touching: panels share edges.
 const TOUCHING: f64 = 1e-9;
 
 /// Every facet of a scene, in the order of its panels.
 #[derive(Clone, Debug)]
-pub struct Facets<'s> {
+pub(crate) struct Facets<'s> {
     scene: &'s Scene,
     described: Vec<(usize, &'s Facet)>,
     obstacles: Obstacles,
@@ -23,8 +23,7 @@ pub struct Facets<'s> {
 
 impl<'s> Facets<'s> {
     /// Turns every facet's normal to the projector's side.
-    #[must_use]
-    pub fn new(scene: &'s Scene) -> Self {
+    pub(crate) fn new(scene: &'s Scene) -> Self {
         let projector = &scene.projector.view;
         let turned = |facet: &Facet| {
             if facet.polygon.plane().distance(&projector.position()) < 0.0 {
@@ -44,57 +43,49 @@ impl<'s> Facets<'s> {
     }
 
     /// The scene they are of.
-    #[must_use]
-    pub fn scene(&self) -> &'s Scene {
+    pub(crate) fn scene(&self) -> &'s Scene {
         self.scene
     }
 
     /// All of them as obstacles; each faces the projector.
-    #[must_use]
-    pub fn obstacles(&self) -> &Obstacles {
+    pub(crate) fn obstacles(&self) -> &Obstacles {
         &self.obstacles
     }
 
     /// How many there are.
-    #[must_use]
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.described.len()
     }
 
     /// One of them, turned to the projector.
-    #[must_use]
-    pub fn polygon(&self, facet: usize) -> &Polygon {
+    pub(crate) fn polygon(&self, facet: usize) -> &Polygon {
         &self.obstacles.facets()[facet]
     }
 
     /// One of them as it is described.
-    #[must_use]
-    pub fn described(&self, facet: usize) -> &'s Facet {
+    pub(crate) fn described(&self, facet: usize) -> &'s Facet {
         self.described[facet].1
     }
 
     /// Index of the panel that it is part of.
-    #[must_use]
-    pub fn panel(&self, facet: usize) -> usize {
+    pub(crate) fn panel(&self, facet: usize) -> usize {
         self.described[facet].0
     }
 
     /// The panel's name.
-    #[must_use]
-    pub fn name(&self, facet: usize) -> &'s str {
+    pub(crate) fn name(&self, facet: usize) -> &'s str {
         &self.scene.panels[self.panel(facet)].name
     }
 
     /// Facets that may stand in the projector's light to this one.
-    #[must_use]
-    pub fn shaded_by(&self, facet: usize) -> &[usize] {
+    pub(crate) fn shaded_by(&self, facet: usize) -> &[usize] {
         &self.shaded_by[facet]
     }
 }
 
 /// For each facet, those that overlap it in the projector's frame and have a part on
 /// the projector's side of its plane.
-fn shaded_by(polygons: &[Polygon], projector: &View) -> Vec<Vec<usize>> {
+fn shaded_by(polygons: &[Polygon], projector: &Pinhole) -> Vec<Vec<usize>> {
     let near = projector.depth_plane(NEAREST);
     let outlines: Vec<Option<Outline>> = polygons
         .iter()
@@ -131,7 +122,7 @@ struct Outline {
 }
 
 impl Outline {
-    fn of(polygon: &Polygon, view: &View) -> Option<Self> {
+    fn of(polygon: &Polygon, view: &Pinhole) -> Option<Self> {
         let in_frame = |corner| {
             let place = view.place(corner)?;
             Some(Vector2::new(place.across, place.down))

@@ -1,8 +1,8 @@
-//! Writes the photographs of a simulated scene as a capture folder.
+//! Simulated capture folder: the photographs of a described scene, as `iltm solve` reads them.
 
 use super::description::Scene;
-use super::shooting::{Shooting, Slide, png};
 use super::simulation::{Simulation, SimulationError};
+use super::virtual_camera::{ProjectedFrame, VirtualCamera, png};
 use iltm_capture::{
     CameraSettings, MANIFEST_FILE, Manifest, Pattern, ProjectorSettings, Role, SETTINGS_FILE,
     SceneSettings, Settings, numbered,
@@ -26,7 +26,7 @@ pub enum CaptureFolderError {
 
 /// What was written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Written {
+pub struct SimulatedCapture {
     /// Photographs.
     pub photographs: usize,
     /// Most bounces that any pattern's light was followed over.
@@ -39,11 +39,11 @@ pub struct Written {
 /// # Errors
 /// [`CaptureFolderError`] if something is in its place or it cannot be written.
 pub fn write(
-    shooting: &Shooting<'_>,
+    camera: &VirtualCamera<'_>,
     patterns: &[(Role, Pattern)],
     out: &Path,
     progress: &dyn Progress,
-) -> Result<Written, CaptureFolderError> {
+) -> Result<SimulatedCapture, CaptureFolderError> {
     let folder = WholeFolder::create(out)?;
     folder.folder("patterns")?;
     folder.folder("photos")?;
@@ -54,10 +54,10 @@ pub fn write(
         folder.file(numbered("patterns", index as u32), picture)?;
     }
     progress.begin("taking photographs", patterns.len() as u64);
-    let slides: Vec<Slide> = patterns.iter().map(|(_, pattern)| pattern.into()).collect();
-    let all: Vec<usize> = (0..slides.len()).collect();
+    let frames: Vec<ProjectedFrame> = patterns.iter().map(|(_, pattern)| pattern.into()).collect();
+    let all: Vec<usize> = (0..frames.len()).collect();
     let taken = AtomicUsize::new(0);
-    let bounces = shooting.take(&slides, &all, |place, photograph| {
+    let bounces = camera.take(&frames, &all, |place, photograph| {
         if let Some(photograph) = photograph {
             let picture = photograph.png().map_err(FolderError::io(out))?;
             folder.file(numbered("photos", place as u32), picture)?;
@@ -69,10 +69,10 @@ pub fn write(
     let roles = (0..).zip(patterns.iter().map(|(role, _)| *role));
     let manifest = Manifest::numbered("patterns", roles);
     folder.file(MANIFEST_FILE, manifest.to_csv())?;
-    folder.file(SETTINGS_FILE, settings(shooting.scene, shooting.simulation))?;
+    folder.file(SETTINGS_FILE, settings(camera.scene, camera.simulation))?;
     folder.finish()?;
     progress.end();
-    Ok(Written {
+    Ok(SimulatedCapture {
         photographs: taken.into_inner(),
         bounces,
     })

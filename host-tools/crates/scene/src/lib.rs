@@ -1,23 +1,23 @@
-//! From a described scene to the photographs that a camera would take of it.
+//! A described scene's light, and photographs of it as a camera would take them.
 //!
 //! ```text
-//! description   scene.toml: panels, projector, camera, ambient light
-//! facets        flat parts, turned to the projector      geometry, view
-//! decide        which effects the scene calls for        effects, estimate
-//! patches       facets cut along the projector's cells
-//! projector_light   straight light on patches and points
-//! exchange      light between patches                    form_factor
-//! near          what differs within a patch
-//! specular      light over mirrors and lobes
-//! sight         what each camera pixel sees              sparse
-//! simulation    all of it, ready for patterns            between
-//! exposure      light under patterns, what pixels see of it
-//! sensor        exposure, noise, bits, response
-//! shooting      one photograph after another, drift   fault
-//! folder        the photographs as a capture
-//! retake        the photographs that a folder of patterns calls for
-//! ablation      what each effect contributes
-//! coaxial       scenes whose transport is known exactly, cell by cell
+//! description        scene.toml: panels, projector, camera, ambient light
+//! facets             flat parts, turned to the projector      geometry, pinhole
+//! decide             which effects the scene calls for        effects, estimate
+//! patches            facets cut along the projector's cells
+//! projector_light    straight light on patches and points
+//! radiosity          light between patches                    form_factor
+//! near_field         what differs within a patch
+//! specular           light over mirrors and lobes
+//! camera_sampling    what each camera pixel sees              sparse
+//! simulation         all of it, ready for patterns            interreflection
+//! exposure           light under patterns, what pixels see of it
+//! sensor             exposure, noise, bits, response
+//! virtual_camera     one photograph after another, drift      injected_fault
+//! folder             the photographs as a capture
+//! fill_capture       the photographs that a folder of patterns calls for
+//! ablation           what each effect contributes
+//! coaxial            scenes whose transport is known exactly, cell by cell
 //! ```
 //!
 //! Surfaces are Lambertian unless they say otherwise; each patch has one radiosity
@@ -26,43 +26,36 @@
 //! interaction of light between diffuse surfaces*, 1984).
 
 pub mod ablation;
-mod between;
+mod camera_sampling;
 pub mod coaxial;
 mod decide;
 pub mod description;
 mod effects;
 mod estimate;
-pub mod exchange;
 mod exposure;
 mod facets;
-mod fault;
+pub mod fill_capture;
 pub mod folder;
 pub mod form_factor;
 pub mod geometry;
-mod near;
+mod injected_fault;
+mod interreflection;
+mod near_field;
 mod patches;
+mod pinhole;
 mod projector_light;
-pub mod retake;
+pub mod radiosity;
 mod sensor;
-mod shooting;
-mod sight;
 mod simulation;
 mod sparse;
 mod specular;
-mod view;
+mod virtual_camera;
 
-pub use decide::percent;
-pub use effects::{Decision, Decisions, Effect, Forced, UnknownEffect};
+pub use effects::{Decision, Effect, Forced, UnknownEffect};
 pub use exposure::Exposed;
-pub use facets::Facets;
-pub use fault::{Fault, Mishap, UnknownFault};
-pub use near::NearLight;
-pub use patches::{Cut, Patch, Patches};
-pub use projector_light::{Beam, ProjectorLight};
-pub use sensor::{Readout, Sensor};
-pub use shooting::{Photograph, Shooting, Slide};
-pub use sight::{Looks, Sight};
+pub use injected_fault::{CaptureFault, InjectedFault, UnknownFault};
+pub use pinhole::{FramePlace, Pinhole};
+pub use sensor::Sensor;
 pub use simulation::{Simulation, SimulationError, SimulationOptions, Work};
-pub use sparse::Rows;
-pub use specular::{Specular, Surfaces, TooGlossy};
-pub use view::{FramePlace, View};
+pub use specular::TooGlossy;
+pub use virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};

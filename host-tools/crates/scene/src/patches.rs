@@ -1,18 +1,16 @@
-//! The pieces that surfaces are cut into: one radiosity each.
+//! Patches: the pieces that surfaces are cut into, of one radiosity each.
 //!
 //! What the projector lights is cut along the borders of its cells, so that a patch
 //! gets light from one cell only (while nothing is blurred). What lies beside the
 //! frame, and the sides that are turned away from the projector, are cut into pieces
 //! of about a cell's size.
 
-use super::facets::Facets;
+use super::facets::{Facets, NEAREST};
 use super::geometry::{Plane, Polygon};
-use super::view::View;
+use super::pinhole::Pinhole;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Metres in front of the projector where its light begins.
-const NEAREST: f64 = 1e-3;
 /// Side of a piece that no cell lights, in sides of a mean patch in the frame.
 const COARSE: f64 = 2.0;
 /// Samples along each side of a patch that its albedo is averaged over.
@@ -20,7 +18,7 @@ const ALBEDO_SAMPLES: usize = 8;
 
 /// A flat piece of a surface.
 #[derive(Clone, Debug)]
-pub struct Patch {
+pub(crate) struct Patch {
     /// Where it is; its normal is on the side that reflects.
     pub polygon: Polygon,
     /// Which facet it is part of.
@@ -36,7 +34,7 @@ pub struct Patch {
 
 /// What is to be cut.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cut {
+pub(crate) struct PatchExtent {
     /// Whether what lies beside the frame is cut as well.
     pub surroundings: bool,
     /// Whether back sides are.
@@ -45,8 +43,7 @@ pub struct Cut {
 
 /// All patches of a scene.
 #[derive(Clone, Debug)]
-pub struct Patches {
-    cut: Cut,
+pub(crate) struct Patches {
     rows: usize,
     cols: usize,
     all: Vec<Patch>,
@@ -58,11 +55,9 @@ pub struct Patches {
 
 impl Patches {
     /// Cuts all facets.
-    #[must_use]
-    pub fn new(facets: &Facets<'_>, cut: Cut) -> Self {
+    pub(crate) fn new(facets: &Facets<'_>, cut: PatchExtent) -> Self {
         let projector = &facets.scene().projector;
         let mut patches = Self {
-            cut,
             rows: projector.grid.rows(),
             cols: projector.grid.cols(),
             all: Vec::new(),
@@ -100,20 +95,18 @@ impl Patches {
     }
 
     /// The patches.
-    #[must_use]
-    pub fn all(&self) -> &[Patch] {
+    pub(crate) fn all(&self) -> &[Patch] {
         &self.all
     }
 
-    /// How they were cut.
-    #[must_use]
-    pub fn cut(&self) -> Cut {
-        self.cut
-    }
-
     /// The patch at a point of a facet; `None` where nothing was cut.
-    #[must_use]
-    pub fn at(&self, view: &View, facet: usize, back: bool, world: &Vector3<f64>) -> Option<usize> {
+    pub(crate) fn at(
+        &self,
+        view: &Pinhole,
+        facet: usize,
+        back: bool,
+        world: &Vector3<f64>,
+    ) -> Option<usize> {
         if !back && let Some(patch) = self.in_cell(view, facet, world) {
             return Some(patch);
         }
@@ -130,7 +123,7 @@ impl Patches {
         found.copied()
     }
 
-    fn in_cell(&self, view: &View, facet: usize, world: &Vector3<f64>) -> Option<usize> {
+    fn in_cell(&self, view: &Pinhole, facet: usize, world: &Vector3<f64>) -> Option<usize> {
         let place = view.place(world)?;
         let inside = |x: f64| (0.0..1.0).contains(&x);
         if !inside(place.across) || !inside(place.down) {
@@ -199,7 +192,7 @@ impl Patches {
 }
 
 /// The part of a facet in the projector's frame, and what is beside it.
-pub(super) fn split_by_frame(polygon: &Polygon, view: &View) -> (Option<Polygon>, Vec<Polygon>) {
+pub(super) fn split_by_frame(polygon: &Polygon, view: &Pinhole) -> (Option<Polygon>, Vec<Polygon>) {
     let borders = [
         view.depth_plane(NEAREST),
         view.column_plane(0.0),

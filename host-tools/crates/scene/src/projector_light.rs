@@ -1,11 +1,11 @@
-//! The light that the projector throws on a surface: shape of the beam, vignetting,
+//! Projector light on a surface: shape of the beam, vignetting,
 //! blur and shadows.
 
 use super::description::Projector;
 use super::facets::Facets;
 use super::patches::{Patch, samples};
-use super::sparse::Rows;
-use super::view::FramePlace;
+use super::pinhole::FramePlace;
+use super::sparse::{SparseRows, merge};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -17,7 +17,7 @@ const SAMPLES: usize = 6;
 
 /// What is simulated of the projector's light.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Beam {
+pub(crate) struct Beam {
     /// Whether light falls off to the corners.
     pub vignetting: bool,
     /// Whether cells run into each other.
@@ -31,15 +31,14 @@ pub struct Beam {
 /// It is a point with a flat frame that it lights evenly: a plane that faces it has
 /// the same irradiance everywhere, 1 at the distance of the place looked at.
 #[derive(Clone, Debug)]
-pub struct ProjectorLight<'f> {
+pub(crate) struct ProjectorLight<'f> {
     facets: &'f Facets<'f>,
     beam: Beam,
 }
 
 impl<'f> ProjectorLight<'f> {
     /// The light of the scene's projector, as much of it as `beam` says.
-    #[must_use]
-    pub fn new(facets: &'f Facets<'f>, beam: Beam) -> Self {
+    pub(crate) fn new(facets: &'f Facets<'f>, beam: Beam) -> Self {
         Self { facets, beam }
     }
 
@@ -48,8 +47,7 @@ impl<'f> ProjectorLight<'f> {
     }
 
     /// Irradiance by white of a point with this normal, blur and shadows aside.
-    #[must_use]
-    pub fn irradiance(
+    pub(crate) fn irradiance(
         &self,
         place: FramePlace,
         world: &Vector3<f64>,
@@ -63,8 +61,7 @@ impl<'f> ProjectorLight<'f> {
     }
 
     /// Share of the light that the frame has at a place.
-    #[must_use]
-    pub fn vignette(&self, place: FramePlace) -> f64 {
+    pub(crate) fn vignette(&self, place: FramePlace) -> f64 {
         if !self.beam.vignetting {
             return 1.0;
         }
@@ -73,8 +70,7 @@ impl<'f> ProjectorLight<'f> {
     }
 
     /// Whether a surface stands between the projector and a point of a facet.
-    #[must_use]
-    pub fn shaded(&self, facet: usize, world: &Vector3<f64>) -> bool {
+    pub(crate) fn shaded(&self, facet: usize, world: &Vector3<f64>) -> bool {
         if !self.beam.shadows || self.facets.shaded_by(facet).is_empty() {
             return false;
         }
@@ -83,7 +79,7 @@ impl<'f> ProjectorLight<'f> {
     }
 
     /// Calls `each` with every cell that lights a place of the frame and its share.
-    pub fn cells(&self, place: FramePlace, mut each: impl FnMut(u32, f64)) {
+    pub(crate) fn cells(&self, place: FramePlace, mut each: impl FnMut(u32, f64)) {
         let grid = self.projector().grid;
         let sizes = (grid.cols() as f64, grid.rows() as f64);
         let (x, y) = (place.across * sizes.0, place.down * sizes.1);
@@ -107,13 +103,12 @@ impl<'f> ProjectorLight<'f> {
     }
 
     /// Mean irradiance of each patch by each cell: `P`, patches x cells.
-    #[must_use]
-    pub fn on_patches(&self, patches: &[Patch]) -> Rows {
+    pub(crate) fn on_patches(&self, patches: &[Patch]) -> SparseRows {
         let rows: Vec<_> = patches
             .par_iter()
             .map(|patch| self.on_patch(patch))
             .collect();
-        Rows::from_rows(rows)
+        SparseRows::from_rows(rows)
     }
 
     fn on_patch(&self, patch: &Patch) -> Vec<(u32, f64)> {
@@ -144,7 +139,15 @@ impl<'f> ProjectorLight<'f> {
                 _ => self.cells(place, |cell, share| cells.push((cell, share * even))),
             }
         }
-        merged(cells, white / total)
+        let scale = white / total;
+        if !scale.is_finite() {
+            return Vec::new();
+        }
+        for (_, light) in &mut cells {
+            *light *= scale;
+        }
+        merge(&mut cells, |sum, more| *sum += more);
+        cells
     }
 
     /// Mean irradiance by white where nothing is in the way: the flux through the
@@ -167,22 +170,6 @@ impl<'f> ProjectorLight<'f> {
         let in_frame = doubled.abs() / 2.0 * view.frame_area();
         in_frame * view.focus().powi(2) / patch.polygon.area()
     }
-}
-
-/// Adds up entries of the same cell and scales them.
-fn merged(mut cells: Vec<(u32, f64)>, scale: f64) -> Vec<(u32, f64)> {
-    if !scale.is_finite() {
-        return Vec::new();
-    }
-    cells.sort_by_key(|(cell, _)| *cell);
-    let mut sums: Vec<(u32, f64)> = Vec::new();
-    for (cell, light) in cells {
-        match sums.last_mut() {
-            Some((last, sum)) if *last == cell => *sum += scale * light,
-            _ => sums.push((cell, scale * light)),
-        }
-    }
-    sums
 }
 
 /// Rows or columns that light a place.

@@ -1,4 +1,5 @@
-//! From light to the values in a photograph: exposure, noise, converter, response.
+//! Camera sensor: from light to the values in a photograph, by exposure, noise, converter and
+//! response.
 
 use super::description::Camera;
 use iltm_picture::Response;
@@ -139,12 +140,12 @@ fn normal(mean: f64, deviation: f64, random: &mut Pcg64Mcg) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::View;
+    use crate::Pinhole;
     use nalgebra::Vector3;
 
     fn camera() -> Camera {
         Camera {
-            view: View::new(Vector3::zeros(), Vector3::x(), Vector3::y(), 40.0, 1.0).unwrap(),
+            view: Pinhole::new(Vector3::zeros(), Vector3::x(), Vector3::y(), 40.0, 1.0).unwrap(),
             size: (1, 1),
             distortion: [0.0; 2],
             white: 0.8,

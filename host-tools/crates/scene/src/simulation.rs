@@ -1,20 +1,20 @@
-//! A scene ready to be photographed: every effect decided, everything that does not
+//! Simulation of a scene, ready to be photographed: every effect decided, everything that does not
 //! depend on the pattern computed once.
 
-use super::between;
-use super::decide::{self, percent};
+use super::camera_sampling::{CameraSampling, SamplingOptions};
+use super::decide;
 use super::description::Scene;
 use super::effects::{Decision, Decisions, Effect, Forced};
-use super::exchange::{Exchange, ExchangeError, RadiosityError};
 use super::facets::Facets;
-use super::near::NearLight;
-use super::patches::{Cut, Patch, Patches};
+use super::interreflection;
+use super::near_field::NearField;
+use super::patches::{Patch, Patches};
 use super::projector_light::{Beam, ProjectorLight};
+use super::radiosity::{FormFactorError, FormFactorMatrix, RadiosityError};
 use super::sensor::{Readout, Sensor};
-use super::sight::{Looks, Sight};
-use super::sparse::Rows;
+use super::sparse::SparseRows;
 use super::specular::{Specular, Surfaces, TooGlossy};
-use iltm_picture::progress::Progress;
+use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use std::time::Instant;
@@ -39,7 +39,7 @@ pub enum SimulationError {
     NothingLit,
     /// The light between surfaces cannot be computed.
     #[error(transparent)]
-    Exchange(#[from] ExchangeError),
+    FormFactorMatrix(#[from] FormFactorError),
     /// There is no end to the bounces.
     #[error(transparent)]
     Radiosity(#[from] RadiosityError),
@@ -59,7 +59,7 @@ impl SimulationError {
             Self::Radiosity(_) => {
                 "Lower the albedo of the panels, or leave more of the scene open."
             }
-            Self::Exchange(_) | Self::TooGlossy(_) => "Use fewer cells or a coarser mesh.",
+            Self::FormFactorMatrix(_) | Self::TooGlossy(_) => "Use fewer cells or a coarser mesh.",
         }
     }
 }
@@ -73,10 +73,10 @@ pub struct Simulation<'s> {
     pub(super) threshold: f64,
     pub(super) patches: Vec<Patch>,
     /// Irradiance of patches by cells.
-    pub(super) on_patches: Rows,
-    pub(super) exchange: Option<Exchange>,
+    pub(super) on_patches: SparseRows,
+    pub(super) exchange: Option<FormFactorMatrix>,
     pub(super) specular: Option<Specular>,
-    pub(super) sight: Sight,
+    pub(super) sight: CameraSampling,
     /// Seconds that following the camera's rays took.
     rays: f64,
 }
@@ -113,13 +113,9 @@ impl<'s> Simulation<'s> {
             shadows: decide::shadows(&facets, &mut decisions),
         };
         let clock = Instant::now();
-        let taking = decide::between_surfaces(&facets, threshold, &mut decisions);
+        let (bounces, extent) = decide::between_surfaces(&facets, threshold, &mut decisions);
         decisions.took(Effect::Interreflection, clock.elapsed().as_secs_f64());
-        let cut = Cut {
-            surroundings: taking.surroundings,
-            backs: taking.backs,
-        };
-        let patches = Patches::new(&facets, cut);
+        let patches = Patches::new(&facets, extent);
         let light = ProjectorLight::new(&facets, beam);
         let clock = Instant::now();
         let on_patches = light.on_patches(patches.all());
@@ -129,13 +125,10 @@ impl<'s> Simulation<'s> {
         if beam.shadows {
             decisions.took(Effect::Shadows, clock.elapsed().as_secs_f64());
         }
-        let exchange = if taking.interreflection {
-            Some(between::exchange(
-                &facets,
-                patches.all(),
-                &mut decisions,
-                progress,
-            )?)
+        let exchange = if bounces {
+            let all = patches.all();
+            let found = interreflection::exchange(&facets, all, &mut decisions, progress);
+            Some(found?)
         } else {
             decisions.rule_out(Effect::Occlusion, "no light goes between surfaces");
             None
@@ -149,7 +142,7 @@ impl<'s> Simulation<'s> {
             on_patches,
             exchange,
             specular: None,
-            sight: Sight::blind(),
+            sight: CameraSampling::default(),
             rays: 0.0,
         };
         let surfaces = Surfaces {
@@ -159,24 +152,25 @@ impl<'s> Simulation<'s> {
             on_patches: &simulation.on_patches,
         };
         let lobes = simulation.exchange.as_ref();
-        simulation.specular = between::specular(surfaces, lobes, &mut simulation.decisions)?;
+        simulation.specular =
+            interreflection::specular(surfaces, lobes, &mut simulation.decisions)?;
         let near = simulation.detail(&facets)?;
         let clock = Instant::now();
         progress.begin("following the camera's rays", 0);
-        let looks = Looks {
+        let sampling = SamplingOptions {
             channels,
             gloss: simulation.decisions.on(Effect::Gloss),
             mirrors: simulation.decisions.on(Effect::Mirrors),
             distortion: simulation.decisions.on(Effect::Distortion),
         };
-        simulation.sight = Sight::new(&facets, &patches, &light, near.as_ref(), looks);
+        simulation.sight = CameraSampling::new(&facets, &patches, &light, near.as_ref(), sampling);
         progress.end();
         simulation.rays = clock.elapsed().as_secs_f64();
         Ok(simulation)
     }
 
     /// Decides whether bounced light differs within patches so much that it shows.
-    fn detail(&mut self, facets: &Facets<'_>) -> Result<Option<NearLight>, SimulationError> {
+    fn detail(&mut self, facets: &Facets<'_>) -> Result<Option<NearField>, SimulationError> {
         let Some(exchange) = &self.exchange else {
             self.decisions
                 .rule_out(Effect::Detail, "no light is bounced");
@@ -186,7 +180,7 @@ impl<'s> Simulation<'s> {
         let hidden = exchange.report().occludable > 0 && self.decisions.on(Effect::Occlusion);
         let obstacles = hidden.then_some(facets.obstacles());
         let (width, height) = self.scene.camera.size;
-        let near = NearLight::new(&self.patches, obstacles, (width * height) as usize);
+        let near = NearField::new(&self.patches, obstacles, (width * height) as usize);
         let white = DMatrix::from_element(self.scene.projector.grid.cells(), 1, 1.0);
         let flood = self.expose(&white)?;
         let level = self.level();
@@ -196,17 +190,14 @@ impl<'s> Simulation<'s> {
             .map(|leaving| near.largest(&self.patches, leaving.as_slice()))
             .fold(0.0, f64::max)
             / level;
-        let on = self.decisions.decide(
-            Effect::Detail,
-            largest >= self.threshold,
-            format!(
-                "bounced light differs within a patch by up to {} of white, from {} neighbours",
-                percent(largest),
-                near.pairs()
-            ),
+        let reason = format!(
+            "bounced light differs within a patch by up to {} of white, from {} neighbours",
+            percent(largest),
+            near.pairs()
         );
-        self.decisions
-            .took(Effect::Detail, clock.elapsed().as_secs_f64());
+        let (decisions, shows) = (&mut self.decisions, largest >= self.threshold);
+        let on = decisions.decide(Effect::Detail, shows, reason);
+        decisions.took(Effect::Detail, clock.elapsed().as_secs_f64());
         Ok(on.then_some(near))
     }
 

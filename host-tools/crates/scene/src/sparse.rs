@@ -1,20 +1,19 @@
-//! A sparse matrix by rows: what each pixel or patch gets from a few of many.
+//! Sparse matrix by rows: what each pixel or patch gets from a few of many.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// A sparse matrix whose rows list their entries.
-#[derive(Clone, Debug)]
-pub struct Rows {
-    /// Where each row begins in `entries`, one more than rows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SparseRows {
+    /// Where each row begins in `entries`, one more than rows, if there are any.
     begin: Vec<usize>,
     entries: Vec<(u32, f32)>,
 }
 
-impl Rows {
+impl SparseRows {
     /// From the entries of each row: column and value.
-    #[must_use]
-    pub fn from_rows(rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
+    pub(crate) fn from_rows(rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
         let (mut begin, mut entries) = (vec![0], Vec::new());
         for row in rows {
             entries.extend(
@@ -27,25 +26,22 @@ impl Rows {
     }
 
     /// Number of rows.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.begin.len() - 1
+    pub(crate) fn count(&self) -> usize {
+        self.begin.len().saturating_sub(1)
     }
 
     /// Number of entries.
-    #[must_use]
-    pub fn entries(&self) -> usize {
+    pub(crate) fn entries(&self) -> usize {
         self.entries.len()
     }
 
     /// The entries of a row: column and value.
-    #[must_use]
-    pub fn row(&self, row: usize) -> &[(u32, f32)] {
+    pub(crate) fn row(&self, row: usize) -> &[(u32, f32)] {
         &self.entries[self.begin[row]..self.begin[row + 1]]
     }
 
     /// The product with a vector that is given by its elements.
-    pub fn times(&self, row: usize, vector: impl Fn(usize) -> f64) -> f64 {
+    pub(crate) fn times(&self, row: usize, vector: impl Fn(usize) -> f64) -> f64 {
         let entries = self.row(row).iter();
         entries
             .map(|(column, value)| f64::from(*value) * vector(*column as usize))
@@ -53,8 +49,7 @@ impl Rows {
     }
 
     /// The product with a matrix of as many rows as this one has columns.
-    #[must_use]
-    pub fn product(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn product(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         let mut result = DMatrix::zeros(self.count(), right.ncols());
         if self.count() == 0 {
             return result;
@@ -68,4 +63,16 @@ impl Rows {
         });
         result
     }
+}
+
+/// Adds up entries of the same index, in their order, and sorts them by it.
+pub(super) fn merge<V: Copy>(entries: &mut Vec<(u32, V)>, add: impl Fn(&mut V, V)) {
+    entries.sort_by_key(|(index, _)| *index);
+    entries.dedup_by(|next, kept| {
+        let same = next.0 == kept.0;
+        if same {
+            add(&mut kept.1, next.1);
+        }
+        same
+    });
 }

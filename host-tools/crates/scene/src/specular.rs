@@ -1,16 +1,16 @@
-//! Light that mirrors and glossy lobes bring from one patch to another.
+//! Specular reflection: light that mirrors and glossy lobes bring from one patch to another.
 //!
 //! Between two diffuse reflections light is followed over any number of mirrors, or
 //! over one lobe. Light over two lobes in a row, or over a lobe and a mirror, is left
 //! out: it is the product of two reflectances, spread out.
 
 use super::description::Gloss;
-use super::exchange::Exchange;
 use super::facets::Facets;
 use super::form_factor::facing;
 use super::patches::{Patch, Patches, samples};
 use super::projector_light::ProjectorLight;
-use super::sparse::Rows;
+use super::radiosity::FormFactorMatrix;
+use super::sparse::{SparseRows, merge};
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -31,11 +31,11 @@ type Entries = Vec<Vec<(u32, f64)>>;
 
 /// Light by mirrors and lobes.
 #[derive(Clone, Debug)]
-pub struct Specular {
+pub(crate) struct Specular {
     /// Irradiance of patches by light that leaves patches, patches x patches.
-    pub from_patches: Rows,
+    pub from_patches: SparseRows,
     /// Irradiance of patches by the projector, patches x cells.
-    pub from_cells: Rows,
+    pub from_cells: SparseRows,
 }
 
 /// More glossy patches than can be simulated.
@@ -54,7 +54,7 @@ pub struct TooGlossy {
 
 /// The scene as the computation needs it.
 #[derive(Clone, Copy, Debug)]
-pub struct Surfaces<'s> {
+pub(crate) struct Surfaces<'s> {
     /// Its facets.
     pub facets: &'s Facets<'s>,
     /// Its patches.
@@ -62,7 +62,7 @@ pub struct Surfaces<'s> {
     /// The projector's light.
     pub light: &'s ProjectorLight<'s>,
     /// Irradiance of patches by cells, straight.
-    pub on_patches: &'s Rows,
+    pub on_patches: &'s SparseRows,
 }
 
 impl Specular {
@@ -71,10 +71,10 @@ impl Specular {
     ///
     /// # Errors
     /// [`TooGlossy`] if it would take too long.
-    pub fn new(
+    pub(crate) fn new(
         surfaces: Surfaces<'_>,
         mirrors: bool,
-        lobes: Option<&Exchange>,
+        lobes: Option<&FormFactorMatrix>,
     ) -> Result<Self, TooGlossy> {
         let count = surfaces.patches.all().len();
         let mut by_patches = vec![Vec::new(); count];
@@ -93,8 +93,8 @@ impl Specular {
             }
         }
         Ok(Self {
-            from_patches: Rows::from_rows(by_patches.into_iter().map(merged)),
-            from_cells: Rows::from_rows(by_cells.into_iter().map(merged)),
+            from_patches: SparseRows::from_rows(by_patches.into_iter().map(merged)),
+            from_cells: SparseRows::from_rows(by_cells.into_iter().map(merged)),
         })
     }
 }
@@ -149,11 +149,8 @@ impl Surfaces<'_> {
         for ray in 0..rays.0 * rays.1 {
             let (across, down) = (along(ray % rays.0, rays.0), along(ray / rays.0, rays.1));
             let way = view.ray(across, down);
-            let Some(hit) = self
-                .facets
-                .obstacles()
-                .first_hit(&view.position(), &way, 0.0)
-            else {
+            let obstacles = self.facets.obstacles();
+            let Some(hit) = obstacles.first_hit(&view.position(), &way, 0.0) else {
                 continue;
             };
             let on_mirror = view.position() + hit.along * way;
@@ -190,10 +187,8 @@ impl Surfaces<'_> {
             kept *= self.mirror(mirror);
             let normal = self.facets.polygon(mirror).normal();
             way -= 2.0 * way.dot(&normal) * normal;
-            let hit = self
-                .facets
-                .obstacles()
-                .first_hit(&origin, &way, 1e-9 / way.norm())?;
+            let obstacles = self.facets.obstacles();
+            let hit = obstacles.first_hit(&origin, &way, 1e-9 / way.norm())?;
             origin += hit.along * way;
             let back = self.facets.polygon(hit.facet).normal().dot(&way) > 0.0;
             if back || self.mirror(hit.facet) == 0.0 {
@@ -206,7 +201,7 @@ impl Surfaces<'_> {
     }
 
     /// What each patch gets from others, and from cells, over one lobe.
-    fn over_lobes(&self, exchange: &Exchange) -> Result<(Entries, Entries), TooGlossy> {
+    fn over_lobes(&self, exchange: &FormFactorMatrix) -> Result<(Entries, Entries), TooGlossy> {
         let patches = self.patches.all();
         let glossy: Vec<(usize, Gloss)> = patches
             .iter()
@@ -310,16 +305,9 @@ impl Lobe {
     }
 }
 
-/// Adds up entries of the same index.
+/// Adds up entries of the same index, without those that are not worth one.
 fn merged(mut entries: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
-    entries.sort_by_key(|(index, _)| *index);
-    entries.dedup_by(|next, kept| {
-        let same = next.0 == kept.0;
-        if same {
-            kept.1 += next.1;
-        }
-        same
-    });
+    merge(&mut entries, |sum, more| *sum += more);
     entries.retain(|(_, share)| *share > LEAST);
     entries
 }

@@ -1,7 +1,7 @@
-//! What takes a photograph: a command, or a person whose camera fills a folder.
+//! Cameras: a command that takes a photograph, or a person whose camera fills a folder.
 
 use super::SessionError;
-use super::list::{Planned, endings};
+use super::plan::{Planned, endings};
 use super::shell::{self, Ran};
 use iltm_capture::FileFormat;
 use std::collections::HashMap;

@@ -1,4 +1,4 @@
-//! Why a folder of pictures to show could not be made, or not be photographed.
+//! Errors of making a folder of pictures to show, and of photographing them.
 
 use iltm_capture::CaptureError;
 use iltm_picture::{FolderError, MAX_PIXELS};

@@ -1,4 +1,4 @@
-//! Writes a capture folder that waits for its photographs.
+//! Capture folder: writes one that waits for its photographs.
 
 use super::{Layout, PatternsError, Purpose, Slide};
 use iltm_capture::{

@@ -1,4 +1,4 @@
-//! How long a change of the picture takes to be seen in a photograph.
+//! Latency: how long a change of the picture takes to be seen in a photograph.
 //!
 //! Two things delay it. The projector shows a picture some frames after it got it:
 //! waiting helps. A camera that streams hands out pictures that it took earlier, so

@@ -1,4 +1,4 @@
-//! Where the cells lie on the projector's pixels.
+//! Layout of the cells on the projector's pixels.
 
 use super::PatternsError;
 use iltm_picture::{MAX_PIXELS, Picture, Samples};

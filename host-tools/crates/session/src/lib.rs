@@ -1,14 +1,14 @@
-//! A session at the wall: from a grid and a projector's size to a folder of
+//! Session at the wall: from a grid and a projector's size to a folder of
 //! pictures to show, and from there to a photograph of each.
 //!
 //! ```text
 //! order    what is shown, in which order: white, black, ramps, probes, stripes, chance
-//! ramp     even light of many levels; probe: a few lit cells, far from each other
+//! calibration_pictures   even light of many levels; a few lit cells, far from each other
 //! layout   one pixel a cell -> the projector's own pixels
 //! folder   the capture folder with its lists, pictures, settings and rules
 //!
-//! list     what is to be photographed, what is missing
-//! screen   shows a slide: by a command, or on a display (window)
+//! plan     what is to be photographed, what is missing
+//! screen   shows a slide: by a command, or in a window on a display
 //! camera   takes a photograph: by a command, or from a folder that fills
 //! latency  how long a change takes to be seen
 //! shoot    all of it, slide by slide
@@ -17,32 +17,28 @@
 //! The folder is what passes from one step to the next: whoever stops in the middle
 //! goes on with what is there, and a solve can be repeated without a new photograph.
 
+mod calibration_pictures;
 mod camera;
 mod error;
 mod folder;
 mod latency;
 mod layout;
-mod list;
 mod order;
-mod probe;
-mod ramp;
+mod plan;
 mod screen;
 mod shell;
 mod shoot;
 #[cfg(all(test, unix))]
 mod tests;
 pub mod verify;
-mod window;
 
+pub use calibration_pictures::ramp_levels;
 pub use camera::{Camera, CommandCamera, WatchedFolder};
 pub use error::{PatternsError, SessionError};
 pub use folder::{Made, SLIDES_FOLDER, slide_name, write};
 pub use latency::{Latency, measure};
 pub use layout::Layout;
-pub use list::{Planned, State, planned, ranges, states};
-
 pub use order::{OrderOptions, Purpose, Slide, order};
-pub use ramp::ramp_levels;
-pub use screen::{CommandScreen, Screen};
+pub use plan::{Planned, State, planned, ranges, states};
+pub use screen::{CommandScreen, Screen, with_window};
 pub use shoot::{Event, Session, SessionOptions, Summary};
-pub use window::with_window;

@@ -1,6 +1,6 @@
-//! What is shown, and in which order.
+//! Order of showing: which pictures, and one after the other.
 
-use super::{probe, ramp};
+use super::calibration_pictures::{even, probes, ramp_roles};
 use iltm_capture::{CalibrationRole, Role, pattern_set};
 use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid};
@@ -84,15 +84,15 @@ pub fn order(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
 
 /// Ramps and probes.
 fn calibration(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
-    let ramps = ramp::roles(options.ramp).into_iter().filter_map(|role| {
+    let ramps = ramp_roles(options.ramp).into_iter().filter_map(|role| {
         let CalibrationRole::Ramp { channel, level } = role else {
             return None;
         };
-        let cells = ramp::even(grid, channel.input(level));
+        let cells = even(grid, channel.input(level));
         slide(Purpose::Calibration(role), cells)
     });
-    let probes = if options.probe {
-        probe::probes(grid)
+    let probing = if options.probe {
+        probes(grid)
     } else {
         Vec::new()
     };
@@ -100,7 +100,7 @@ fn calibration(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
         let role = CalibrationRole::Probe;
         slide(Purpose::Calibration(role), binary(grid, &lit))
     };
-    ramps.chain(probes.into_iter().filter_map(probe)).collect()
+    ramps.chain(probing.into_iter().filter_map(probe)).collect()
 }
 
 fn slide(purpose: Purpose, cells: Option<Picture>) -> Option<Slide> {

@@ -1,6 +1,6 @@
-//! Commands that a user gives, run by the shell.
+//! Shell commands that a user gives, and words quoted for them.
 
-use super::list::Planned;
+use super::plan::Planned;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -60,8 +60,7 @@ pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> String {
 /// A word for the shell.
 #[cfg(unix)]
 fn quoted(word: &str) -> String {
-    // A word with a zero byte, which is refused, is no file's name anyway.
-    shlex::try_quote(word).unwrap_or_default().into_owned()
+    iltm_report::solve_page::quoted(Path::new(word))
 }
 
 /// A word for the shell. Captures' names have no quotes and no percent signs.

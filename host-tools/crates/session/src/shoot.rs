@@ -1,7 +1,7 @@
 //! A session: slide by slide, shown, waited for, photographed, looked at.
 
 use super::latency::{Flash, Rig};
-use super::list::{self, Planned, State, endings, unlike};
+use super::plan::{self, Planned, State, endings, unlike};
 use super::shell;
 use super::{Camera, Latency, Screen, SessionError, measure, states};
 use iltm_capture::{PhotoStats, Role};
@@ -82,9 +82,9 @@ impl Session {
     /// Opens a capture folder and looks at the photographs that are there.
     ///
     /// # Errors
-    /// As [`list::planned`].
+    /// As [`plan::planned`].
     pub fn open(folder: &Path, progress: &dyn Progress) -> Result<Self, SessionError> {
-        let list = list::planned(folder)?;
+        let list = plan::planned(folder)?;
         let states = states(&list, progress);
         Ok(Self {
             folder: folder.to_owned(),

@@ -20,8 +20,7 @@
 use super::column_block::ColumnBlock;
 use super::convergence::{Convergence, Residuals, Stop};
 use super::data_term::{DataTerm, Factor};
-use super::haar::Haar;
-use super::lane::LANES;
+use super::haar::{Haar, LANES};
 use super::row_block::RowBlock;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -108,7 +107,7 @@ impl<'h> Consensus<'h> {
         self.lambda = lambda;
         self.rows
             .par_iter_mut()
-            .for_each(|block| block.load_slack(data.slack.as_ref()));
+            .for_each(|block| block.load_residual(data.weighted.as_ref()));
         self.take(&factor);
         let norm = self.floor_norm + GAIN_PART * GAIN_PART * data.squared_gains();
         let mut end = Convergence::none();
@@ -228,7 +227,6 @@ fn row_ranges(cells: usize) -> Vec<(usize, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::haar::Basis;
     use super::super::test_linear_program::least_penalty;
     use super::super::test_reference::Problem;
     use super::super::test_scene::{Corner, Random, add_noise, patterns};
@@ -242,8 +240,8 @@ mod tests {
         iterations: 20_000,
     };
 
-    fn haar(rows: u16, cols: u16, basis: Basis) -> (Haar, Vec<f64>) {
-        let haar = Haar::new(Grid::new(rows, cols).unwrap(), basis);
+    fn haar(rows: u16, cols: u16) -> (Haar, Vec<f64>) {
+        let haar = Haar::new(Grid::new(rows, cols).unwrap());
         let weights = haar
             .fineness()
             .iter()
@@ -255,13 +253,8 @@ mod tests {
     #[test]
     fn the_blocks_agree_with_the_plain_reference() {
         let (rows, cols) = (4, 5);
-        for (basis, channels, weighted) in [
-            (Basis::QuadTree, 1, false),
-            (Basis::Tensor, 1, true),
-            (Basis::QuadTree, 3, false),
-            (Basis::QuadTree, 3, true),
-        ] {
-            let (haar, coefficient_weights) = haar(rows, cols, basis);
+        let (haar, coefficient_weights) = haar(rows, cols);
+        for (channels, weighted) in [(1, false), (1, true), (3, false), (3, true)] {
             let patterns = patterns(20, 12);
             let light: Vec<_> = (0..channels)
                 .map(|channel| {
@@ -294,13 +287,13 @@ mod tests {
             let end = consensus.run(&data, lambda, TIGHT, &|| {});
             assert!(end.converged, "{end:?}");
             let error = (consensus.operator() - &wanted).norm() / wanted.norm();
-            assert!(error < 1e-3, "{basis:?} {channels} {weighted}: {error}");
+            assert!(error < 1e-3, "{channels} {weighted}: {error}");
         }
     }
 
     #[test]
     fn a_vanishing_lambda_gives_the_linear_programs_optimum() {
-        let (haar, weights) = haar(2, 3, Basis::QuadTree);
+        let (haar, weights) = haar(2, 3);
         let patterns = patterns(6, 3);
         let light = Corner::new(2, 3, |cell| 0.5 + 0.05 * cell as f64).photograph(&patterns);
         let least = least_penalty(&haar, &weights, &light, &patterns);

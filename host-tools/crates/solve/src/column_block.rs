@@ -1,8 +1,7 @@
 //! Columns of `K^ = W^T K W` during the iterations: the l1 block.
 
 use super::convergence::Residuals;
-use super::haar::Haar;
-use super::lane::{LANES, Pack, transpose};
+use super::haar::{Haar, LANES, Pack, transpose};
 use super::row_block::RowBlock;
 
 /// [`LANES`] columns, side by side; a column has a coefficient of `K` for each

@@ -20,8 +20,8 @@
 //!
 //! Weights of the squared residuals differ from row to row, which would take one
 //! `M` a row. They are majorised instead: with `w` the largest weight, all
-//! residuals get weight `w`, and the part `1 - weight / w` of each one's last
-//! value, its slack, is added to its target (Hunter, Lange, *A Tutorial on MM
+//! residuals get weight `w`, and the share `1 - weight / w` of each one's last
+//! value is added to its target (Hunter, Lange, *A Tutorial on MM
 //! Algorithms*, 2004). Scaling `C` and `L` by `sqrt w` leaves the equations as
 //! they are.
 
@@ -45,16 +45,16 @@ pub(super) struct DataTerm {
     /// `C_c^T U`, `m x r`.
     seen: Vec<DMatrix<f64>>,
     /// What the iterations need for the weights; `None` if all are equal.
-    pub(super) slack: Option<Slack>,
+    pub(super) weighted: Option<WeightedResidual>,
     /// The largest weight.
     weight: f64,
 }
 
 /// [`DataTerm`] as the weights need it in every iteration.
 #[derive(Debug)]
-pub(super) struct Slack {
+pub(super) struct WeightedResidual {
     /// `1 - weight / w`, `N x m`.
-    pub(super) part: DMatrix<f64>,
+    pub(super) share: DMatrix<f64>,
     /// `C_c`, `N x m`.
     pub(super) light: Vec<DMatrix<f32>>,
     /// `C_c^T`, `m x N`.
@@ -107,8 +107,8 @@ impl DataTerm {
         }
         let (vectors, values) = eigenvectors(&light);
         let seen = light.iter().map(|c| c.tr_mul(&vectors)).collect();
-        let slack = (weights.min() < weight).then(|| Slack {
-            part: weights.map(|own| 1.0 - own / weight),
+        let weighted = (weights.min() < weight).then(|| WeightedResidual {
+            share: weights.map(|own| 1.0 - own / weight),
             light: light.iter().map(|c| c.map(|v| v as f32)).collect(),
             transposed: light
                 .iter()
@@ -122,7 +122,7 @@ impl DataTerm {
             vectors,
             values,
             seen,
-            slack,
+            weighted,
             weight,
         }
     }

@@ -1,4 +1,6 @@
-//! Why a solve gives no inverse.
+//! Errors of a solve: why it gives no inverse.
+
+use super::options::Method;
 
 /// What is wrong with the measurements or with what came of them.
 ///
@@ -84,7 +86,7 @@ pub enum SolveError {
     )]
     TooFewPhotographs {
         /// The method asked for.
-        method: &'static str,
+        method: Method,
         /// Photographs it can use.
         given: usize,
         /// Photographs it needs.
@@ -96,7 +98,7 @@ pub enum SolveError {
     )]
     Dependent {
         /// The method asked for.
-        method: &'static str,
+        method: Method,
         /// Independent patterns.
         rank: usize,
         /// Cells lit.

@@ -1,26 +1,12 @@
-//! A table without an operator: each cell's brightness corrected, nothing else.
+//! Gain only: the inverse without an operator, which corrects each cell's brightness.
 
 use super::held_out;
-use super::inverse::{ChannelInverse, InverseTransport};
 use super::observed::Observed;
+use super::options::GainOnly;
 use super::prepare::Prepared;
+use super::solution::{ChannelInverse, InverseTransport};
 use super::{SolveError, SolveReport};
 use nalgebra::{DMatrix, DVector};
-
-/// How gains are found when there is no operator.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum GainOnly {
-    /// From light under white, bounced light included: right for even images.
-    Flood,
-    /// By least squares over all photographs: less noise, and right where no
-    /// light bounces.
-    Fitted,
-}
-
-impl GainOnly {
-    /// Both.
-    pub(super) const ALL: [Self; 2] = [Self::Flood, Self::Fitted];
-}
 
 /// The inverse without an operator that `report` found best, from the same
 /// observations.

@@ -1,7 +1,7 @@
 //! The orthonormal Haar basis of a grid of any size, in floating point.
 //!
-//! `W` is `N x N` with one basis function a column, `W^T W = I`. The quad-tree
-//! basis is the runtime's integer one with each function scaled to unit norm,
+//! `W` is `N x N` with one basis function a column, `W^T W = I`. It merges rows and
+//! columns in turn, level by level (a quad-tree, the non-standard basis): it is the runtime's integer one with each function scaled to unit norm,
 //! numbered in the same order (`iltm_runtime::haar`): finest level first, node
 //! by node along the rows, in a node the split of the columns, of the rows and
 //! of both, the constant last.
@@ -10,24 +10,14 @@
 //! into `(sqrt(a) x + sqrt(b) y, sqrt(b) x - sqrt(a) y) / sqrt(a + b)`: a plane
 //! rotation with a reflection, hence its own inverse. A basis is a list of
 //! those; it needs no padding, so a 13 x 21 grid has 273 coefficients.
+//!
+//! The iterations transform every row and every column of an `N x N` matrix. Done
+//! sixteen at a time (a [`Pack`]), each rotation is a handful of vector instructions
+//! and its two indices are read once for sixteen numbers.
 
-use super::lane::Lane;
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-
-/// How a two-dimensional basis is made from the one-dimensional merge.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
-pub enum Basis {
-    /// Rows and columns merge in turn, level by level (the non-standard basis).
-    /// The runtime's.
-    #[default]
-    QuadTree,
-    /// All levels along the rows, then all along the columns (the standard
-    /// basis). Coefficients are numbered row by row of the products, finest
-    /// function of each axis first.
-    Tensor,
-}
 
 /// One merge of two values in place: the sum replaces the first, the detail the
 /// second.
@@ -35,8 +25,8 @@ pub enum Basis {
 pub(super) struct Rotation {
     first: u32,
     second: u32,
-    pub(super) cos: f64,
-    pub(super) sin: f64,
+    cos: f64,
+    sin: f64,
 }
 
 /// The orthonormal Haar basis of one grid.
@@ -53,17 +43,14 @@ pub struct Haar {
 impl Haar {
     /// The basis of `grid`.
     #[must_use]
-    pub fn new(grid: Grid, basis: Basis) -> Self {
+    pub fn new(grid: Grid) -> Self {
         let mut haar = Self {
             grid,
             rotations: Vec::new(),
             places: Vec::with_capacity(grid.cells()),
             fineness: Vec::with_capacity(grid.cells()),
         };
-        match basis {
-            Basis::QuadTree => haar.build_quad_tree(),
-            Basis::Tensor => haar.build_tensor(),
-        }
+        haar.build_quad_tree();
         haar
     }
 
@@ -74,7 +61,7 @@ impl Haar {
     }
 
     /// How many merges finer than the coarsest detail each coefficient is,
-    /// length `N`; 0 for the constant. In the tensor basis the mean of both axes.
+    /// length `N`; 0 for the constant.
     #[must_use]
     pub fn fineness(&self) -> &[f64] {
         &self.fineness
@@ -234,30 +221,6 @@ impl Haar {
         }
     }
 
-    fn build_tensor(&mut self) {
-        let (rows, cols) = (self.grid.rows(), self.grid.cols());
-        let (row_axis, col_axis) = (Axis::new(rows), Axis::new(cols));
-        for row in 0..rows {
-            for (first, second) in &col_axis.merges {
-                let place = |node: &Node| (row * cols + node.start) as u32;
-                self.rotation(place(first), place(second), first.cells, second.cells);
-            }
-        }
-        for col in 0..cols {
-            for (first, second) in &row_axis.merges {
-                let place = |node: &Node| (node.start * cols + col) as u32;
-                self.rotation(place(first), place(second), first.cells, second.cells);
-            }
-        }
-        for (row, row_fineness) in &row_axis.functions {
-            for (col, col_fineness) in &col_axis.functions {
-                self.places.push((row * cols + col) as u32);
-                self.fineness
-                    .push(f64::midpoint(*row_fineness, *col_fineness));
-            }
-        }
-    }
-
     fn rotation(&mut self, first: u32, second: u32, first_cells: usize, second_cells: usize) {
         let cells = (first_cells + second_cells) as f64;
         self.rotations.push(Rotation {
@@ -282,6 +245,56 @@ fn rotate<T: Lane>(image: &mut [T], by: &Rotation) {
     image[second] = detail;
 }
 
+/// Images that a [`Pack`] holds.
+pub(super) const LANES: usize = 16;
+
+/// One pixel of [`LANES`] images: a cache line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub(super) struct Pack(pub(super) [f32; LANES]);
+
+impl Pack {
+    pub(super) const ZERO: Self = Self([0.0; LANES]);
+}
+
+/// A value that a plane rotation can be applied to.
+pub(super) trait Lane: Copy {
+    /// `(cos a + sin b, sin a - cos b)`; its own inverse.
+    fn rotate(a: Self, b: Self, by: &Rotation) -> (Self, Self);
+}
+
+impl Lane for f64 {
+    #[inline]
+    fn rotate(a: Self, b: Self, by: &Rotation) -> (Self, Self) {
+        (by.cos * a + by.sin * b, by.sin * a - by.cos * b)
+    }
+}
+
+impl Lane for Pack {
+    #[inline]
+    fn rotate(a: Self, b: Self, by: &Rotation) -> (Self, Self) {
+        let (cos, sin) = (by.cos as f32, by.sin as f32);
+        let (mut sum, mut detail) = (a, b);
+        for lane in 0..LANES {
+            sum.0[lane] = cos * a.0[lane] + sin * b.0[lane];
+            detail.0[lane] = sin * a.0[lane] - cos * b.0[lane];
+        }
+        (sum, detail)
+    }
+}
+
+/// Exchanges images and pixels of a square tile.
+#[inline]
+pub(super) fn transpose(tile: &[Pack; LANES]) -> [Pack; LANES] {
+    let mut turned = [Pack::ZERO; LANES];
+    for (row, pack) in tile.iter().enumerate() {
+        for (col, value) in pack.0.iter().enumerate() {
+            turned[col].0[row] = *value;
+        }
+    }
+    turned
+}
+
 /// Adjacent cells of one axis, merged; its sum stands in its first cell.
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -299,35 +312,6 @@ fn merged(nodes: &[Node]) -> Vec<Node> {
         cells: pair.iter().map(|node| node.cells).sum(),
     };
     nodes.chunks(2).map(merge).collect()
-}
-
-/// The one-dimensional basis along one axis.
-struct Axis {
-    merges: Vec<(Node, Node)>,
-    /// Place and fineness of each function, finest first, the constant last.
-    functions: Vec<(usize, f64)>,
-}
-
-impl Axis {
-    fn new(cells: usize) -> Self {
-        let (mut merges, mut functions) = (Vec::new(), Vec::new());
-        let (mut level_nodes, mut levels) = (nodes(cells), 0);
-        while level_nodes.len() > 1 {
-            for pair in level_nodes.chunks(2) {
-                if let [first, second] = pair {
-                    merges.push((*first, *second));
-                    functions.push((second.start, f64::from(levels)));
-                }
-            }
-            level_nodes = merged(&level_nodes);
-            levels += 1;
-        }
-        functions.push((0, f64::from(levels - 1)));
-        for (_, fineness) in &mut functions {
-            *fineness = f64::from(levels - 1) - *fineness;
-        }
-        Self { merges, functions }
-    }
 }
 
 #[cfg(test)]
@@ -348,7 +332,7 @@ mod tests {
 
     #[test]
     fn a_row_of_three_merges_two_cells_and_then_the_odd_one() {
-        let w = matrix(&Haar::new(grid(1, 3), Basis::QuadTree));
+        let w = matrix(&Haar::new(grid(1, 3)));
         let (half, sixth, third) = (
             0.5_f64.sqrt(),
             (1.0_f64 / 6.0).sqrt(),
@@ -374,7 +358,7 @@ mod tests {
 
     #[test]
     fn a_node_emits_columns_then_rows_then_both() {
-        let w = matrix(&Haar::new(grid(2, 2), Basis::QuadTree)) * 2.0;
+        let w = matrix(&Haar::new(grid(2, 2))) * 2.0;
         let expected = DMatrix::from_row_slice(
             4,
             4,
@@ -390,16 +374,14 @@ mod tests {
 
     #[test]
     fn a_single_cell_is_its_own_coefficient() {
-        for basis in [Basis::QuadTree, Basis::Tensor] {
-            let haar = Haar::new(grid(1, 1), basis);
-            assert_eq!(haar.analyse(&DVector::from_element(1, 0.3))[0], 0.3);
-            assert_eq!(haar.fineness(), [0.0]);
-        }
+        let haar = Haar::new(grid(1, 1));
+        assert_eq!(haar.analyse(&DVector::from_element(1, 0.3))[0], 0.3);
+        assert_eq!(haar.fineness(), [0.0]);
     }
 
     #[test]
     fn thirteen_by_twenty_one_has_five_levels() {
-        let haar = Haar::new(grid(13, 21), Basis::QuadTree);
+        let haar = Haar::new(grid(13, 21));
         let count = |level: f64| haar.fineness().iter().filter(|l| **l == level).count();
         // 13 x 21 -> 7 x 11 -> 4 x 6 -> 2 x 3 -> 1 x 2 -> 1 x 1.
         assert_eq!([4.0, 3.0, 2.0, 1.0, 0.0].map(count), [196, 53, 18, 4, 2]);
@@ -407,7 +389,7 @@ mod tests {
 
     #[test]
     fn an_operator_survives_both_transforms() {
-        let haar = Haar::new(grid(3, 5), Basis::Tensor);
+        let haar = Haar::new(grid(3, 5));
         let operator = DMatrix::from_fn(15, 15, |i, j| ((i * 31 + j * 17) % 23) as f64);
         let w = matrix(&haar);
         let coefficients = haar.analyse_operator(&operator);
@@ -419,17 +401,15 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
         #[test]
-        fn every_grid_has_an_orthonormal_basis(rows in 1_u16..=16, cols in 1_u16..=16, tensor: bool) {
-            let basis = if tensor { Basis::Tensor } else { Basis::QuadTree };
-            let w = matrix(&Haar::new(grid(rows, cols), basis));
+        fn every_grid_has_an_orthonormal_basis(rows in 1_u16..=16, cols in 1_u16..=16) {
+            let w = matrix(&Haar::new(grid(rows, cols)));
             let n = w.ncols();
             prop_assert!((w.transpose() * &w - DMatrix::identity(n, n)).amax() < 1e-13);
         }
 
         #[test]
-        fn synthesis_undoes_analysis_up_to_64_x_64(rows in 1_u16..=64, cols in 1_u16..=64, tensor: bool, seed: u32) {
-            let basis = if tensor { Basis::Tensor } else { Basis::QuadTree };
-            let haar = Haar::new(grid(rows, cols), basis);
+        fn synthesis_undoes_analysis_up_to_64_x_64(rows in 1_u16..=64, cols in 1_u16..=64, seed: u32) {
+            let haar = Haar::new(grid(rows, cols));
             let mut state = u64::from(seed);
             let image = DVector::from_fn(haar.grid().cells(), |_, _| {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -442,7 +422,7 @@ mod tests {
 
         #[test]
         fn only_the_constant_sees_a_uniform_image(rows in 1_u16..=64, cols in 1_u16..=64) {
-            let haar = Haar::new(grid(rows, cols), Basis::QuadTree);
+            let haar = Haar::new(grid(rows, cols));
             let n = haar.grid().cells();
             let coefficients = haar.analyse(&DVector::from_element(n, 1.0));
             prop_assert!(coefficients.rows(0, n - 1).amax() < 1e-12);

@@ -1,4 +1,4 @@
-//! Photographs that a solve does not see, to judge it by.
+//! Held-out photographs: those that a solve does not see, to judge it by.
 //!
 //! The misfit is in observed light: how far the photograph that an inverse
 //! predicts, `T p`, is from the one taken. Misfit in projected light would weigh
@@ -9,7 +9,8 @@
 //! each has been. A pattern and its complement, or the same pattern taken twice,
 //! are held out together: the one would tell the other.
 
-use super::gain_only::{GainOnly, gains};
+use super::gain_only::gains;
+use super::options::GainOnly;
 use super::prepare::Prepared;
 use super::report::Prediction;
 use super::solution::Candidate;

@@ -97,7 +97,7 @@ impl<'p> Solver<'p> {
         progress: &dyn Progress,
     ) -> Choice<'s> {
         progress.begin("choosing lambda", 0);
-        let mut folds: Vec<Fold<'_, 's>> = Vec::new();
+        let mut folds: Vec<Fold<'p, 's>> = Vec::new();
         for split in splits {
             let photographs = self.photographs(&split.solved);
             if folds.is_empty() {
@@ -131,20 +131,11 @@ impl<'p> Solver<'p> {
         };
         let mut least = f64::INFINITY;
         for lambda in path {
-            let mut squared = 0.0;
-            let mut found = Vec::new();
-            for fold in &mut folds {
-                std::mem::swap(&mut fold.consensus, &mut self.consensus);
-                self.run(&fold.data, lambda, TRIAL, progress);
-                let solution = self.found(&fold.photographs);
-                std::mem::swap(&mut fold.consensus, &mut self.consensus);
-                squared += squared_misfit(
-                    self.prepared,
-                    &solution.candidates(&self.prepared.live),
-                    &fold.split.held_out,
-                );
-                found.push(solution);
-            }
+            let tried: Vec<(Solution, f64)> = folds
+                .iter_mut()
+                .map(|fold| self.try_on(fold, lambda, progress))
+                .collect();
+            let squared: f64 = tried.iter().map(|(_, squared)| squared).sum();
             // Without light to predict, or without forward transport, nothing is told.
             let misfit = Some((squared / total).sqrt()).filter(|misfit| misfit.is_finite());
             let misfit = misfit.unwrap_or(f64::INFINITY);
@@ -152,7 +143,7 @@ impl<'p> Solver<'p> {
             if misfit < least || choice.trials.len() == 1 {
                 least = misfit;
                 choice.lambda = lambda;
-                for (fold, solution) in folds.iter_mut().zip(found) {
+                for (fold, (solution, _)) in folds.iter_mut().zip(tried) {
                     fold.best = Some(solution);
                 }
             } else if misfit > ENOUGH * least {
@@ -174,6 +165,22 @@ impl<'p> Solver<'p> {
         }
         progress.end();
         choice
+    }
+
+    /// Solves one fold for a `lambda`; with the squared misfit of what it held out.
+    fn try_on(
+        &mut self,
+        fold: &mut Fold<'p, '_>,
+        lambda: f64,
+        progress: &dyn Progress,
+    ) -> (Solution, f64) {
+        std::mem::swap(&mut fold.consensus, &mut self.consensus);
+        self.run(&fold.data, lambda, TRIAL, progress);
+        let solution = self.found(&fold.photographs);
+        std::mem::swap(&mut fold.consensus, &mut self.consensus);
+        let candidates = solution.candidates(&self.prepared.live);
+        let squared = squared_misfit(self.prepared, &candidates, &fold.split.held_out);
+        (solution, squared)
     }
 
     /// Iterations of all solves so far.

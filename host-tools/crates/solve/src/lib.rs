@@ -1,4 +1,4 @@
-//! From [`Measurements`] to [`InverseTransport`].
+//! Inverse light transport: from [`Measurements`] to [`InverseTransport`].
 //!
 //! The inverse of a scene's light transport is `T^-1 = diag(g) - K`: texture is
 //! in the gains `g` alone, and `K` is geometry, one bounce, smooth and
@@ -9,18 +9,17 @@
 //!
 //! ```text
 //! observed, prepare     what is solved from, checked and scaled
-//! own_light             which cells can be solved for
+//! observability         which cells can be solved for
 //! blur                  where a projector out of focus throws its light
-//! haar, lane            the sparse basis, sixteen images at a time
+//! haar                  the sparse basis, sixteen images at a time
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
-//! direct                the paper's method, over basis_pursuit
-//! two_stage, brute_force    forward transport first, then its inverse
+//! by_rows               the paper's method and others, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
-//! content_loop          what clipping makes of natural images
+//! clipped_projection    what clipping makes of natural images
 //! flux                  what of a gain is the projector's, where reciprocity tells
-//! sharpen               undoes the projector's blur as well
-//! recovery              whether the paper's theorem promises anything here
+//! deblur                undoes the projector's blur as well
+//! restricted_isometry   whether the paper's theorem promises anything here
 //! gain_only             what it is judged against, and what remains if it loses
 //! ```
 //!
@@ -33,30 +32,27 @@
 mod admm;
 mod basis_pursuit;
 mod blur;
-mod brute_force;
+mod by_rows;
+mod clipped_projection;
 mod column_block;
-pub mod content;
-mod content_loop;
 mod convergence;
 mod data_term;
-mod direct;
+mod deblur;
 mod error;
 mod flux;
 mod forward;
 mod gain_only;
 mod haar;
 mod held_out;
-mod inverse;
 mod joint;
-mod lane;
+mod natural_images;
+mod observability;
 mod observed;
 mod options;
-mod own_light;
 mod prepare;
-pub mod recovery;
 mod report;
+pub mod restricted_isometry;
 mod row_block;
-mod sharpen;
 mod solution;
 #[cfg(test)]
 mod test_linear_program;
@@ -67,33 +63,34 @@ mod test_reference;
 mod test_scene;
 #[cfg(test)]
 mod tests;
-mod two_stage;
 
 pub use blur::blur;
+pub use by_rows::inverted;
 pub use convergence::Convergence;
 pub use error::SolveError;
 pub use flux::Flux;
 pub use forward::Inverse;
-pub use gain_only::{GainOnly, gain_only};
-pub use haar::{Basis, Haar};
-pub use inverse::{ChannelInverse, InverseTransport};
+pub use gain_only::gain_only;
+pub use haar::Haar;
+pub use natural_images::{DARKEST_SHOWN, DARKEST_WANTED, IMAGES, natural_images, wanted_images};
+pub use observability::{LeftOut, WhyLeftOut};
 pub use observed::{CellNoise, Observed, ObservedChannel};
-pub use options::{Method, SolveOptions, UnknownMethod};
-pub use own_light::{LeftOut, WhyLeftOut};
-pub use recovery::Recovery;
+pub use options::{GainOnly, Method, SolveOptions, UnknownMethod};
 pub use report::{
     Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };
-pub use two_stage::inverted;
+pub use restricted_isometry::Recovery;
+pub use solution::{ChannelInverse, InverseTransport};
 
-use content_loop::ContentLoop;
+use clipped_projection::ClippedProjection;
 use convergence::Stop;
+use deblur::{Deblurred, deblur};
 use held_out::{Judged, Split, predict};
 use iltm_capture::{Measurements, Role};
 use iltm_picture::progress::Progress;
+use iltm_runtime::Grid;
 use joint::Solver;
 use prepare::Prepared;
-use sharpen::sharpen;
 use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
 
@@ -140,7 +137,7 @@ pub fn solve_observed(
     options.check()?;
     let prepared = Prepared::new(observed)?;
     check_count(&prepared, options.method)?;
-    let haar = Haar::new(observed.grid, options.basis);
+    let haar = Haar::new(observed.grid);
     let splits = Split::all(&prepared);
     let mut seconds = Seconds {
         prepare: clock.lap(),
@@ -170,26 +167,7 @@ pub fn solve_observed(
     let condition = candidates.iter().map(condition).fold(1.0, f64::max);
     let prediction = predict(&prepared, &outcome.judged);
     check_prediction(&prediction)?;
-    let blur = prepared.blur.clone().map(|mut blur| {
-        drop_dead(&mut blur, &prepared.live);
-        blur
-    });
-    let content = ContentLoop::new(observed.grid, &prepared, &candidates, blur.as_ref());
-    let sharpened = blur
-        .as_ref()
-        .and_then(|blur| sharpen(blur, &prepared.live, &candidates, &content));
-    let with_operator = sharpened.as_ref().map_or_else(
-        || {
-            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
-            content.operator(&inverses).0
-        },
-        |sharpened| sharpened.error,
-    );
-    let clipped = Clipped {
-        uncompensated: content.nothing(),
-        gain_only: content.gain_only(&prediction),
-        compensated: with_operator,
-    };
+    let (clipped, deblurred) = clip(observed.grid, &prepared, &candidates, &prediction);
     seconds.finish = clock.lap();
     let recovery = recovery(&prepared, &haar, &candidates);
     seconds.recovery = clock.lap();
@@ -214,12 +192,43 @@ pub fn solve_observed(
     Ok((
         outcome
             .solution
-            .in_camera_units(observed, &prepared, sharpened.map(|s| s.parts)),
+            .in_camera_units(observed, &prepared, deblurred.map(|s| s.parts)),
         report,
     ))
 }
 
-/// What both methods need.
+/// What clipping makes of natural images, and the inverse that undoes the projector's blur
+/// as well where there is one.
+fn clip(
+    grid: Grid,
+    prepared: &Prepared,
+    candidates: &[Candidate],
+    prediction: &Prediction,
+) -> (Clipped, Option<Deblurred>) {
+    let blur = prepared.blur.clone().map(|mut blur| {
+        drop_dead(&mut blur, &prepared.live);
+        blur
+    });
+    let content = ClippedProjection::new(grid, prepared, candidates, blur.as_ref());
+    let deblurred = blur
+        .as_ref()
+        .and_then(|blur| deblur(blur, &prepared.live, candidates, &content));
+    let with_operator = deblurred.as_ref().map_or_else(
+        || {
+            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
+            content.operator(&inverses).0
+        },
+        |deblurred| deblurred.error,
+    );
+    let clipped = Clipped {
+        uncompensated: content.nothing(),
+        gain_only: content.gain_only(prediction),
+        compensated: with_operator,
+    };
+    (clipped, deblurred)
+}
+
+/// What all methods need.
 struct Task<'t> {
     prepared: &'t Prepared,
     haar: &'t Haar,
@@ -309,10 +318,10 @@ impl<'t> Task<'t> {
             self.progress.begin(what, 0);
             let (prepared, haar, stop) = (self.prepared, self.haar, self.stop);
             let found = match method {
-                Method::TwoStage => two_stage::solve(prepared, haar, chosen, stop, self.progress),
-                Method::BruteForce => brute_force::solve(prepared, chosen),
+                Method::TwoStage => by_rows::two_stage(prepared, haar, chosen, stop, self.progress),
+                Method::BruteForce => by_rows::brute_force(prepared, chosen),
                 Method::Direct | Method::Joint => {
-                    Ok(direct::solve(prepared, haar, chosen, stop, self.progress))
+                    Ok(by_rows::direct(prepared, haar, chosen, stop, self.progress))
                 }
             };
             self.progress.end();
@@ -359,7 +368,7 @@ fn check_count(prepared: &Prepared, method: Method) -> Result<(), SolveError> {
     let least = (prepared.live_cells() + 1).min(LEAST_PHOTOGRAPHS);
     if given < least {
         return Err(SolveError::TooFewPhotographs {
-            method: method.name(),
+            method,
             given,
             least,
         });
@@ -414,7 +423,7 @@ fn recovery(prepared: &Prepared, haar: &Haar, candidates: &[Candidate]) -> Optio
         .select_columns(&prepared.with_role(|role| uses(Method::Direct, role)));
     let inverses: Vec<&Inverse> = candidates.iter().map(|c| &c.inverse).collect();
     let flood = prepared.patterns.column(white).into_owned();
-    recovery::of_direct(&inverses, haar, &patterns, &flood)
+    restricted_isometry::of_direct(&inverses, haar, &patterns, &flood)
 }
 
 fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCounts {

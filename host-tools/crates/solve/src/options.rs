@@ -1,12 +1,11 @@
-//! What a solve can be told.
+//! Options of a solve: the method, and the settings that it has.
 
 use super::error::SolveError;
-use super::haar::Basis;
-use std::fmt;
-use std::str::FromStr;
+use strum::{Display, EnumString, VariantArray};
 
-/// How the inverse is found.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+/// How the inverse is found; the name on the command line and in reports is in kebab case.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash, Display, EnumString, VariantArray)]
+#[strum(serialize_all = "kebab-case", parse_err_ty = UnknownMethod, parse_err_fn = unknown)]
 pub enum Method {
     /// Gains and one operator for all channels together, from every photograph:
     /// sparse in the Haar basis, non-negative off the diagonal.
@@ -26,43 +25,29 @@ pub enum Method {
     BruteForce,
 }
 
-impl Method {
-    /// Every method, the default first.
-    pub const ALL: [Self; 4] = [Self::Joint, Self::Direct, Self::TwoStage, Self::BruteForce];
-
-    /// Its name on the command line and in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Joint => "joint",
-            Self::Direct => "direct",
-            Self::TwoStage => "two-stage",
-            Self::BruteForce => "brute-force",
-        }
-    }
-}
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Method {
-    type Err = UnknownMethod;
-
-    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::ALL
-            .into_iter()
-            .find(|method| method.name() == name)
-            .ok_or_else(|| UnknownMethod(name.to_owned()))
-    }
-}
-
 /// A name that no [`Method`] has.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("there is no method `{0}`; there are `joint`, `direct`, `two-stage` and `brute-force`")]
 pub struct UnknownMethod(String);
+
+fn unknown(name: &str) -> UnknownMethod {
+    UnknownMethod(name.to_owned())
+}
+
+/// How gains are found when there is no operator.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum GainOnly {
+    /// From light under white, bounced light included: right for even images.
+    Flood,
+    /// By least squares over all photographs: less noise, and right where no
+    /// light bounces.
+    Fitted,
+}
+
+impl GainOnly {
+    /// Both.
+    pub(super) const ALL: [Self; 2] = [Self::Flood, Self::Fitted];
+}
 
 /// Settings of [`solve`](super::solve). The defaults are the recipe that was
 /// measured best; nothing needs to be set.
@@ -70,9 +55,6 @@ pub struct UnknownMethod(String);
 pub struct SolveOptions {
     /// How the inverse is found.
     pub method: Method,
-    /// Basis in which the operator is sparse. The runtime codes a table in
-    /// [`Basis::QuadTree`] whatever this is.
-    pub basis: Basis,
     /// Weight of the l1 term of [`Method::Joint`] once light is scaled so that a
     /// mean flood photograph is 1; `None` chooses it by held-out photographs.
     pub lambda: Option<f64>,
@@ -86,7 +68,6 @@ impl Default for SolveOptions {
     fn default() -> Self {
         Self {
             method: Method::default(),
-            basis: Basis::default(),
             lambda: None,
             tolerance: 5e-4,
             iterations: 2000,

@@ -3,8 +3,8 @@
 use super::blur::blur;
 use super::error::SolveError;
 use super::forward::product;
+use super::observability::{self, LeftOut};
 use super::observed::{CellNoise, Observed, is_lit};
-use super::own_light::{self, LeftOut};
 use iltm_capture::Role;
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -69,7 +69,7 @@ impl Prepared {
             Some(blur) => product(blur, observed.patterns),
             None => observed.patterns.clone(),
         };
-        let left_out = own_light::left_out(observed, &landed);
+        let left_out = observability::left_out(observed, &landed);
         let mut live = vec![true; observed.grid.cells()];
         for out in &left_out {
             live[out.cell] = false;

@@ -1,10 +1,9 @@
-//! What a solve did, for people and for the table's provenance.
+//! Report of a solve: what it did, for people and for the table's provenance.
 
 use super::convergence::Convergence;
-use super::gain_only::GainOnly;
-use super::options::Method;
-use super::own_light::LeftOut;
-use super::recovery::Recovery;
+use super::observability::LeftOut;
+use super::options::{GainOnly, Method};
+use super::restricted_isometry::Recovery;
 
 /// How an inverse came about and how good it is.
 ///
@@ -146,8 +145,9 @@ pub struct Clipped {
     pub compensated: f64,
 }
 
-/// A way to project.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+/// A way to project; its name in reports is in kebab case.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, strum::Display)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Compensation {
     /// With the whole inverse.
     Operator,
@@ -155,18 +155,6 @@ pub enum Compensation {
     GainOnly,
     /// As it is.
     Nothing,
-}
-
-impl Compensation {
-    /// Its name in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Operator => "operator",
-            Self::GainOnly => "gain-only",
-            Self::Nothing => "nothing",
-        }
-    }
 }
 
 impl SolveReport {

@@ -12,7 +12,7 @@
 //! Places are in units of the picture's height: `u` to the right from the middle, `v` up
 //! from the middle. Light is linear red, green and blue, 1 is white.
 
-use iltm_picture::{Picture, Samples};
+use iltm_picture::Picture;
 use iltm_runtime::{FrameSize, pipeline::srgb};
 use rayon::prelude::*;
 
@@ -99,7 +99,7 @@ impl TestScene {
                 *codes = light.map(|light| self.codes.partition_point(|most| *most < light) as u8);
             }
         });
-        Picture::of_colours(self.size, Samples::Eight(samples))
+        Picture::of_colours(self.size, samples)
     }
 }
 
@@ -189,6 +189,7 @@ const fn unit(number: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use iltm_picture::Samples;
 
     /// A frame at 30 a second.
     fn samples((width, height): (u16, u16), number: u64) -> Vec<u8> {

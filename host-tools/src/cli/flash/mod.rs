@@ -13,9 +13,9 @@ use super::active::{Active, Asked, Lost};
 use super::args::Flash;
 use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
+use super::interrupt;
 use super::output::{Output, read_file};
-use super::slots::letter;
-use super::{interrupt, trial};
+use super::words::{self, letter, table_name};
 use crate::device::DeviceError;
 use crate::device::upload::{Parcel, Upload, UploadError, UploadPlan, UploadSummary};
 use crate::user::{Folders, begin_transcript};
@@ -84,7 +84,7 @@ fn flash(
     interrupt::catch();
     let plan = UploadPlan::make(&mut connection.client, &parcel, interrupt::stopped);
     let mut lost = Lost {
-        before: super::slots::in_use(&slots),
+        before: words::in_use(&slots),
         asked: Asked::Transfer,
     };
     let plan = plan.map_err(|error| failed(connection, &error, lost))?;
@@ -100,9 +100,27 @@ fn flash(
         );
         return Ok(());
     }
-    let mut show = Show::new(output);
-    let in_use = loop {
-        let mut upload = Upload::new(&mut connection.client, &parcel);
+    let in_use = bring(connection, &parcel, &plan, &mut ending, &mut lost)?;
+    lost.asked = Asked::Confirmation;
+    let ended = ending.end(connection, in_use, "is in use");
+    ended.map_err(|failure| match failure.active {
+        Some(Active::Unknown) => failure.with(Active::Lost(lost)),
+        _ => failure,
+    })
+}
+
+/// Sends what differs and starts the trial, at lower speeds where the line falls silent.
+fn bring(
+    connection: &mut Connection,
+    parcel: &Parcel<'_>,
+    plan: &UploadPlan,
+    ending: &mut Ending<'_>,
+    lost: &mut Lost,
+) -> Result<InUse, Failure> {
+    let mut show = Show::new(ending.output);
+    let trial = Duration::from_secs(ending.arguments.trial.into());
+    loop {
+        let mut upload = Upload::new(&mut connection.client, parcel);
         let result = upload.run(&mut show).and_then(|summary| {
             ending.summary = summary;
             let text = format!("slot {} holds the table", letter(plan.slots.target));
@@ -116,10 +134,13 @@ fn flash(
                 }),
             );
             lost.asked = Asked::Trial;
-            upload.activate(Duration::from_secs(arguments.trial.into()), &mut show)
+            upload.activate(trial, &mut show)
         });
         match result {
-            Ok(in_use) => break in_use,
+            Ok(in_use) => {
+                show.end();
+                return Ok(in_use);
+            }
             Err(error) if is_silence(&error) && connection.slow_down() => {
                 let baud = connection.baud;
                 let data = json!({ "event": "slower", "baud": baud });
@@ -130,17 +151,10 @@ fn flash(
             }
             Err(error) => {
                 show.stop();
-                return Err(failed(connection, &error, lost));
+                return Err(failed(connection, &error, *lost));
             }
         }
-    };
-    show.end();
-    lost.asked = Asked::Confirmation;
-    let ended = ending.end(connection, in_use, "is in use");
-    ended.map_err(|failure| match failure.active {
-        Some(Active::Unknown) => failure.with(Active::Lost(lost)),
-        _ => failure,
-    })
+    }
 }
 
 /// Asks a device with a table on trial for the trial of this file, which changes
@@ -181,7 +195,7 @@ fn failed(connection: &mut Connection, error: &UploadError, lost: Lost) -> Failu
 
 fn active(slots: &iltm_runtime::link::Slots) -> Active {
     Active::Known {
-        table: super::slots::in_use(slots),
+        table: words::in_use(slots),
         trial_ms: slots.trial_ms,
     }
 }
@@ -196,7 +210,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
         "port": connection.port,
         "baud": connection.baud,
         "board": connection.client.device().board.as_str(),
-        "table": super::status::table_name(Some(table.name)),
+        "table": table_name(Some(table.name)),
         "bytes": table.bytes,
         "slot": slot.to_string(),
         "sectors": sectors,
@@ -225,7 +239,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
         table.signer(),
         connection.client.device().board,
         connection.port,
-        match super::slots::in_use(&plan.slots) {
+        match words::in_use(&plan.slots) {
             Some(used) => format!("table {used}"),
             None => "no table: frames pass unchanged".to_owned(),
         },
@@ -273,7 +287,8 @@ impl Ending<'_> {
                 .event(&json!({ "event": "trial", "seconds": trial_ms.div_ceil(1_000) }));
         }
         if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
-            trial::keep(connection, name)?;
+            let kept = connection.client.confirm(name.id);
+            kept.map_err(|error| connection.failed_with_table(&error))?;
             trial_ms = 0;
         }
         let mut text = match (trial_ms, self.arguments.confirm && in_use.trial_ms > 0) {

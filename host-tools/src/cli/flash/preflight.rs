@@ -1,8 +1,8 @@
 //! Preflight: checks of a table against a device before anything is sent.
 
 use super::super::failure::{Failure, Kind};
-use super::super::inspect::check_sealed;
-use super::super::slots::{key_id, uses};
+use super::super::tables::check_sealed;
+use super::super::words::{key_id, uses};
 use crate::device::rejection_next_step;
 use iltm_runtime::{
     image::{Seal, layout::FORMAT_VERSION},

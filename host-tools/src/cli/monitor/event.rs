@@ -1,6 +1,6 @@
 //! Events of a monitored device, in words for people and as data for programs.
 
-use super::super::status;
+use super::super::words;
 use crate::device::logs::LogMessage;
 use iltm_runtime::link::{Event, Hello, TableReason, TierReason};
 use serde_json::{Value, json};
@@ -75,7 +75,7 @@ impl MonitorEvent {
     pub(super) fn data(&self) -> Value {
         match self {
             Self::Connected(device) => {
-                let mut data = status::identity(device);
+                let mut data = words::identity(device);
                 data["event"] = json!("connected");
                 data
             }
@@ -99,7 +99,7 @@ impl MonitorEvent {
 fn from_device(event: &Event) -> Value {
     match event {
         Event::Status(status) => {
-            let mut data = status::data(status);
+            let mut data = words::status_data(status);
             data["event"] = json!("status");
             data
         }
@@ -126,7 +126,7 @@ fn from_device(event: &Event) -> Value {
             frame,
         } => json!({
             "event": "table",
-            "table": status::table_name(*table),
+            "table": words::table_name(*table),
             "reason": match reason {
                 TableReason::Trial => "trial",
                 TableReason::Confirmed => "confirmed",

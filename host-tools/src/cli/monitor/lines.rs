@@ -1,6 +1,6 @@
 //! Lines on standard output, one for each event, as text or JSON.
 
-use super::super::status;
+use super::super::words;
 use super::Show;
 use super::event::MonitorEvent;
 use super::view::Rates;
@@ -34,14 +34,14 @@ impl Show for Plain {
                 line(&format!(
                     "{} {}, tier {} of {}, {}, \
                      {:.1} of {:.1} ms, {:.2} % clipped, {} late, {} dropped, {} broken",
-                    status::duration(status.uptime_ms),
+                    words::duration(status.uptime_ms),
                     status.mode,
                     status.tier,
                     status.top_tier,
                     self.rates.words(),
                     f64::from(time.mean_us) / 1000.0,
                     f64::from(time.budget_us) / 1000.0,
-                    100.0 * status::clipped_share(status),
+                    100.0 * words::clipped_share(status),
                     status.frames.late,
                     status.frames.dropped,
                     status.frames.broken,

@@ -23,7 +23,6 @@ use crate::device::{Client, DeviceError, Incoming, Patience, Port};
 use event::MonitorEvent;
 use iltm_runtime::link::{Channel, Refusal};
 use std::io;
-use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -45,7 +44,7 @@ trait Show {
 }
 
 pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
-    let logs = arguments.firmware.as_deref().map(words).transpose()?;
+    let logs = arguments.firmware.as_deref().map(Logs::read).transpose()?;
     let period = Duration::from_millis(arguments.period.into());
     // A first failure ends the command; later ones are the device's business.
     let mut connection = connect(&arguments.line, output)?;
@@ -75,14 +74,6 @@ pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
             Err(Failure::new(Kind::Write, message, next_step))
         }
     }
-}
-
-/// Reads the words of a firmware's log messages.
-pub(super) fn words(firmware: &Path) -> Result<Logs, Failure> {
-    Logs::read(firmware).map_err(|error| {
-        let next_step = "Give the ELF file that the device's firmware was flashed from.";
-        Failure::new(Kind::Read, error, next_step)
-    })
 }
 
 /// Where the device was found.

@@ -1,10 +1,10 @@
 //! View of a monitored device, as lines of a given width.
 
-use super::super::status;
+use super::super::words;
 use super::event::MonitorEvent;
+use chrono::Local;
 use console::{StyledObject, style, truncate_str};
 use iltm_runtime::link::{Event, Hello, Mode, Status};
-use jiff::Zoned;
 use std::collections::VecDeque;
 
 /// Events and log lines that are kept: more than any terminal has rows.
@@ -114,7 +114,7 @@ impl View {
     }
 
     fn event(&mut self, event: &MonitorEvent) {
-        let time = Zoned::now().strftime("%H:%M:%S").to_string();
+        let time = Local::now().format("%H:%M:%S").to_string();
         let words = style(event.words().unwrap_or_default());
         let words = match event {
             MonitorEvent::Device(Event::Fault(_)) | MonitorEvent::Lost(_) => words.red(),
@@ -178,23 +178,15 @@ impl View {
             Mode::Compensating => style(status.mode.to_string()).green(),
             Mode::PassThrough(_) => style(status.mode.to_string()).yellow(),
         };
-        format!("{mode}, up {}", status::duration(status.uptime_ms))
+        format!("{mode}, up {}", words::duration(status.uptime_ms))
     }
 
     fn figures(&self, status: &Status) -> Vec<String> {
         let frames = &status.frames;
         let time = &status.frame_time;
         let share = |us: u32| f64::from(us) / f64::from(time.budget_us.max(1));
-        let clipped = status::clipped_share(status);
+        let clipped = words::clipped_share(status);
         let stack = f64::from(status.stack.used) / f64::from(status.stack.size.max(1));
-        let count = |count: u32, what: &str| {
-            let text = format!("{count} {what}");
-            if count == 0 {
-                style(text).dim()
-            } else {
-                style(text).yellow()
-            }
-        };
         let line = |name: &str, value: String| format!("{name:<11}{value}");
         vec![
             line(
@@ -202,9 +194,9 @@ impl View {
                 format!(
                     "{}   {}   {}   {}",
                     self.rates.words(),
-                    count(frames.late, "late"),
-                    count(frames.dropped, "dropped"),
-                    count(frames.broken, "broken")
+                    fault_count(frames.late, "late"),
+                    fault_count(frames.dropped, "dropped"),
+                    fault_count(frames.broken, "broken")
                 ),
             ),
             line(
@@ -213,16 +205,16 @@ impl View {
                     "{} {:>6.1} % of {}",
                     gauge(share(time.mean_us), Some(share(time.worst_us))),
                     100.0 * share(time.mean_us),
-                    status::milliseconds(time.budget_us)
+                    words::milliseconds(time.budget_us)
                 ),
             ),
             line(
                 "",
                 style(format!(
                     "last {}, mean {}, worst {}",
-                    status::milliseconds(time.last_us),
-                    status::milliseconds(time.mean_us),
-                    status::milliseconds(time.worst_us)
+                    words::milliseconds(time.last_us),
+                    words::milliseconds(time.mean_us),
+                    words::milliseconds(time.worst_us)
                 ))
                 .dim()
                 .to_string(),
@@ -249,19 +241,29 @@ impl View {
                 "table",
                 format!(
                     "{}   slots {}",
-                    status::table(status),
-                    status::slots(status)
+                    words::table_in_use(status),
+                    words::slot_states(status)
                 ),
             ),
             line(
                 "line",
                 format!(
                     "{}; watchdog {}",
-                    status::serial(status),
-                    status::watchdog(status)
+                    words::serial(status),
+                    words::watchdog(status)
                 ),
             ),
         ]
+    }
+}
+
+/// Dim while there are none.
+fn fault_count(count: u32, what: &str) -> StyledObject<String> {
+    let text = style(format!("{count} {what}"));
+    if count == 0 {
+        text.dim()
+    } else {
+        text.yellow()
     }
 }
 

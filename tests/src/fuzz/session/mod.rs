@@ -1,4 +1,4 @@
-//! The device session against a model of it.
+//! Session fuzzer: the device session against a model of it.
 //!
 //! ```text
 //! bytes -> Op, Op, ... -> frames -> Session -> Updater -> NOR simulator
@@ -51,7 +51,6 @@ pub fn session(bytes: &[u8]) {
 }
 
 /// What is in the bytes of an execution, for people.
-#[must_use]
 pub fn described(bytes: &[u8]) -> String {
     let Some((kind, ops)) = bytes.split_first() else {
         return String::new();
@@ -436,7 +435,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
     }
 
     /// What weak bits in a slot read as differs from one time to the next; that they
-    /// do no harm is for `tests/tests/power_cuts.rs`. Here only records have them.
+    /// do no harm is for `tests/tests/device/power_cuts.rs`. Here only records have them.
     fn may_cut(&self, held: &[Held]) -> bool {
         let [held] = held else {
             return false;

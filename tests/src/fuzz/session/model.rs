@@ -1,4 +1,4 @@
-//! What a device may do, as plainly as it can be said.
+//! Model of a device: what it may do, as plainly as it can be said.
 //!
 //! Written from the protocol and the store's promises, not from the store: flash is
 //! two vectors of bytes, the records are one `Option`, and which files may run is

@@ -1,4 +1,4 @@
-//! What happens to a device, decoded from any bytes.
+//! Session operations: what happens to a device, decoded from any bytes.
 
 use crate::fuzz::files::{DEVICES, GOOD, files, keys};
 

@@ -1,4 +1,4 @@
-//! A simulated device at the end of a line in memory, and the host's end of it.
+//! Wire: a simulated device at the end of a line in memory, and the host's end of it.
 
 use crate::slots::SimDevice;
 use iltm_runtime::link::{Channel, Decoder, Event, MAX_PAYLOAD, Response, Session};

@@ -1,10 +1,10 @@
-//! Cells that no light reaches, that reflect none, that the camera does not see,
+//! Coverage: cells that no light reaches, that reflect none, that the camera does not see,
 //! or that the surface covers in part.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid};
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use iltm::solve::WhyLeftOut;
 
 pub(super) const CASES: [Case; 7] = [
@@ -52,9 +52,9 @@ pub(super) const CASES: [Case; 7] = [
     },
 ];
 
-fn textured() -> Scene {
+fn textured() -> CoaxialScene {
     let grid = grid(GRID);
-    Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 2)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 2)
 }
 
 /// Ten cells, spread out.
@@ -82,7 +82,7 @@ fn unlit(seeds: u64) -> Outcome {
 
 /// The closed loop over the other cells, and whether all of `wanted` and no
 /// others are left out for the right reason.
-fn named(scene: &Scene, seeds: u64, wanted: fn(usize) -> bool, why: WhyLeftOut) -> Outcome {
+fn named(scene: &CoaxialScene, seeds: u64, wanted: fn(usize) -> bool, why: WhyLeftOut) -> Outcome {
     let demand = Demand {
         noise: 1e-3,
         ..Demand::default()
@@ -116,14 +116,14 @@ fn unseen(seeds: u64) -> Outcome {
     })
 }
 
-fn partly_covered() -> Scene {
+fn partly_covered() -> CoaxialScene {
     let grid = grid(GRID);
     let panels = Panels {
         folds: vec![1.7, 6.1, 10.6, 15.2, 19.4],
         rows: (0.4, 11.6),
         wedge: 75.0,
     };
-    Scene::new(grid, &panels, 0.7).textured(0.4, 0.9, 2)
+    CoaxialScene::new(grid, &panels, 0.7).textured(0.4, 0.9, 2)
 }
 
 /// Judged in the first channel.

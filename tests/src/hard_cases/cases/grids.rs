@@ -3,7 +3,7 @@
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::grid;
 use super::super::observations::Capture;
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 
 const THEORY: &str = "Haar functions exist on any grid: the bound of any other scene";
 
@@ -48,7 +48,7 @@ pub(super) const CASES: [Case; 6] = [
 
 fn wedge(seeds: u64, size: (u16, u16), bernoulli: usize) -> Outcome {
     let grid = grid(size);
-    let scene = Scene::new(grid, &Panels::corner(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
+    let scene = CoaxialScene::new(grid, &Panels::corner(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
     let demand = Demand {
         noise: 1e-3,
         ..Demand::default()
@@ -60,7 +60,7 @@ fn wedge(seeds: u64, size: (u16, u16), bernoulli: usize) -> Outcome {
 
 fn one_cell(_: u64) -> Outcome {
     let grid = grid((1, 1));
-    let scene = Scene::new(
+    let scene = CoaxialScene::new(
         grid,
         &Panels {
             folds: vec![0.0, 1.0],
@@ -76,7 +76,7 @@ fn one_cell(_: u64) -> Outcome {
             Outcome::new(
                 right,
                 "gain 2, no operator",
-                format!("gain {gain:.6}, {}", report.compensation.name()),
+                format!("gain {gain:.6}, {}", report.compensation),
             )
         }
         Err(error) => Outcome::new(false, "an inverse", error.to_string()),
@@ -90,7 +90,7 @@ fn column(seeds: u64) -> Outcome {
         rows: (0.0, 33.0),
         wedge: 90.0,
     };
-    let scene = Scene::new(grid, &panels, 0.5).textured(0.3, 0.9, 1);
+    let scene = CoaxialScene::new(grid, &panels, 0.5).textured(0.3, 0.9, 1);
     closed_loop(
         &scene,
         seeds,

@@ -1,4 +1,4 @@
-//! All hard cases, by what is hard.
+//! Table of the hard cases: all of them, by what is hard.
 
 mod coverage;
 mod grids;
@@ -11,7 +11,6 @@ mod transport;
 use super::case::Case;
 
 /// Every case with the heading it belongs under.
-#[must_use]
 pub fn all() -> Vec<(&'static str, Vec<Case>)> {
     vec![
         ("Strong and singular transport", transport::CASES.to_vec()),

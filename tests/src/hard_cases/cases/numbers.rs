@@ -1,4 +1,4 @@
-//! Not a number, infinity and denormals wherever a number may come in.
+//! NaN: not a number, infinity and denormals wherever a number may come in.
 
 use super::super::case::{Case, Outcome};
 use super::super::grid;
@@ -6,7 +6,7 @@ use super::super::observations::Capture;
 use iltm::capture::Settings;
 use iltm::compile::{CompileOptions, compile};
 use iltm::progress::Silent;
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use iltm::solve::{InverseTransport, SolveOptions, solve_observed};
 use std::path::Path;
 
@@ -53,7 +53,7 @@ pub(super) const CASES: [Case; 6] = [
 
 fn capture() -> Capture {
     let grid = grid((5, 8));
-    let scene = Scene::new(grid, &Panels::corner(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
+    let scene = CoaxialScene::new(grid, &Panels::corner(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
     Capture::new(&scene, 30, 1)
 }
 

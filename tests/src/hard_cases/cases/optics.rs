@@ -1,9 +1,9 @@
-//! What projector, camera and surface do to light besides Lambert's law.
+//! Optics: what projector, camera and surface do to light besides Lambert's law.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::observations::{Capture, out_of_focus};
 use super::super::{GRID, grid};
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use nalgebra::DMatrix;
 
 const REACHABLE: &str = "T0^-1 as sharp; wanted are images that a blurred projector can make";
@@ -84,12 +84,12 @@ pub(super) const CASES: [Case; 10] = [
     },
 ];
 
-fn uniform() -> Scene {
+fn uniform() -> CoaxialScene {
     let grid = grid(GRID);
-    Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7)
 }
 
-fn noiseless(scene: &Scene, seeds: u64, required: Option<f64>) -> Outcome {
+fn noiseless(scene: &CoaxialScene, seeds: u64, required: Option<f64>) -> Outcome {
     let demand = Demand {
         required,
         ..Demand::default()
@@ -97,7 +97,7 @@ fn noiseless(scene: &Scene, seeds: u64, required: Option<f64>) -> Outcome {
     closed_loop(scene, seeds, demand, |seed| Capture::new(scene, 60, seed))
 }
 
-fn no_harm(scene: &Scene, seeds: u64) -> Outcome {
+fn no_harm(scene: &CoaxialScene, seeds: u64) -> Outcome {
     let demand = Demand {
         no_harm_only: true,
         ..Demand::default()
@@ -120,7 +120,7 @@ fn blurred(seeds: u64, deviation: f64, required: Option<f64>) -> Outcome {
 }
 
 /// Each cell shows `part` of the cell that stands opposite in the same valley.
-fn mirrored(part: f64) -> Scene {
+fn mirrored(part: f64) -> CoaxialScene {
     let mut scene = uniform();
     let cells = scene.grid.cells();
     let mut mirror = DMatrix::zeros(cells, cells);

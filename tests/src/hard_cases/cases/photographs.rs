@@ -1,14 +1,14 @@
-//! Whole captures, as files: what the camera does to the light.
+//! Capture files: what the camera does to the light of whole captures.
 
 use super::super::case::{Case, Outcome};
 use super::super::closed_loop::errors;
 use super::super::grid;
 use super::super::observations::out_of_focus;
 use super::super::photographs::Camera;
+use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::CaptureOptions;
-use iltm::learn::{Learned, learn};
 use iltm::progress::Silent;
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use iltm::solve::{InverseTransport, SolveOptions};
 
 pub(super) const CASES: [Case; 8] = [
@@ -105,9 +105,9 @@ pub(super) const CASES: [Case; 8] = [
     },
 ];
 
-fn scene() -> Scene {
+fn scene() -> CoaxialScene {
     let grid = grid((9, 14));
-    Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.3, 0.9, 1)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.3, 0.9, 1)
 }
 
 fn flat() -> Outcome {
@@ -117,7 +117,7 @@ fn flat() -> Outcome {
     match table(&scene, Camera::default(), "") {
         Ok(learned) => {
             let entries = learned.compiled.ladder.entries.len();
-            let chosen = learned.report.compensation.name();
+            let chosen = learned.report.compensation;
             Outcome::new(
                 entries == 0,
                 bound,
@@ -131,12 +131,12 @@ fn flat() -> Outcome {
     }
 }
 
-fn table(scene: &Scene, camera: Camera, settings: &str) -> Result<Learned, String> {
+fn table(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<BuiltTable, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     camera
         .write(scene, folder.path(), settings)
         .map_err(|error| error.to_string())?;
-    let learned = learn(
+    let learned = build_table(
         folder.path(),
         &CaptureOptions::default(),
         &SolveOptions::default(),
@@ -148,7 +148,7 @@ fn table(scene: &Scene, camera: Camera, settings: &str) -> Result<Learned, Strin
 }
 
 /// Error of the closed loop of what was learned, or why nothing was.
-fn learned(scene: &Scene, camera: Camera, settings: &str) -> Result<(f64, f64), String> {
+fn learned(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<(f64, f64), String> {
     let learned = table(scene, camera, settings)?;
     let flood = scene.transport().column_sum().max();
     let errors = errors(
@@ -175,7 +175,7 @@ fn exact(camera: Camera, settings: &str, bound: f64) -> Outcome {
     of_scene(&scene(), camera, settings, bound)
 }
 
-fn of_scene(scene: &Scene, camera: Camera, settings: &str, bound: f64) -> Outcome {
+fn of_scene(scene: &CoaxialScene, camera: Camera, settings: &str, bound: f64) -> Outcome {
     match learned(scene, camera, settings) {
         Ok((error, gain_only)) => Outcome::new(
             error <= bound.min(gain_only),

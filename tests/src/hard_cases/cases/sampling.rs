@@ -3,7 +3,7 @@
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid};
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use nalgebra::DMatrix;
 
 const LASSO: &str = "cond sigma sqrt(s ln N / m) and the tail of K";
@@ -78,9 +78,9 @@ pub(super) const CASES: [Case; 11] = [
     },
 ];
 
-fn scene() -> Scene {
+fn scene() -> CoaxialScene {
     let grid = grid(GRID);
-    Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.25, 0.95, 1)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.25, 0.95, 1)
 }
 
 fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> Outcome {
@@ -95,7 +95,7 @@ fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> Outcome {
     })
 }
 
-fn no_harm(seeds: u64, make: impl Fn(&Scene, u64) -> Capture) -> Outcome {
+fn no_harm(seeds: u64, make: impl Fn(&CoaxialScene, u64) -> Capture) -> Outcome {
     let scene = scene();
     let demand = Demand {
         no_harm_only: true,
@@ -132,7 +132,7 @@ fn five(_: u64) -> Outcome {
 
 /// Photographs of other patterns, without noise.
 fn taken(
-    scene: &Scene,
+    scene: &CoaxialScene,
     seed: u64,
     bernoulli: usize,
     change: impl Fn(&mut DMatrix<f64>),

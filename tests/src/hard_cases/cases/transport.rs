@@ -1,9 +1,9 @@
-//! Transport that is strong, ill-conditioned or singular.
+//! Light transport that is strong, ill-conditioned or singular.
 
 use super::super::case::{Case, Demand, Outcome, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid, theory};
-use iltm::scene::coaxial::{Panels, Scene};
+use iltm::scene::coaxial::{CoaxialScene, Panels};
 use iltm::solve::Compensation;
 
 pub(super) const CASES: [Case; 7] = [
@@ -53,7 +53,7 @@ pub(super) const CASES: [Case; 7] = [
 
 fn white_wedge(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99);
+    let scene = CoaxialScene::new(grid, &Panels::corner(grid, 30.0), 0.99);
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
         Capture::new(&scene, 100, seed)
     });
@@ -62,7 +62,7 @@ fn white_wedge(seeds: u64) -> Outcome {
 
 fn dim_wedge(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let scene = Scene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.02);
+    let scene = CoaxialScene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.02);
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
         Capture::new(&scene, 100, seed)
     });
@@ -71,7 +71,7 @@ fn dim_wedge(seeds: u64) -> Outcome {
 
 fn sphere(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let mut scene = Scene::new(grid, &Panels::corner(grid, 90.0), 0.995);
+    let mut scene = CoaxialScene::new(grid, &Panels::corner(grid, 90.0), 0.995);
     scene.form_factors.fill(1.0 / grid.cells() as f64);
     // In focus; but light is so even there that only images it can make are fair.
     scene.blur = Some(nalgebra::DMatrix::identity(grid.cells(), grid.cells()));
@@ -90,7 +90,7 @@ fn sphere(seeds: u64) -> Outcome {
     outcome
 }
 
-fn with_condition(scene: &Scene, least: f64, mut outcome: Outcome) -> Outcome {
+fn with_condition(scene: &CoaxialScene, least: f64, mut outcome: Outcome) -> Outcome {
     let condition = theory::condition(&scene.transport(), &scene.covered());
     outcome.holds &= condition > least;
     outcome.measured = format!("condition {condition:.0}: {}", outcome.measured);
@@ -99,7 +99,8 @@ fn with_condition(scene: &Scene, least: f64, mut outcome: Outcome) -> Outcome {
 
 fn doubled_light(seeds: u64) -> Outcome {
     let grid = grid(GRID);
-    let mut scene = Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
+    let mut scene =
+        CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
     let cells = grid.cells();
     let mut merge = nalgebra::DMatrix::identity(cells, cells);
     for cell in [30, 101, 200] {
@@ -135,7 +136,8 @@ fn even(seeds: u64) -> Outcome {
 /// What is chosen for a flat scene with albedos from `least` to .95, at 40 dB.
 fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
     let grid = grid(GRID);
-    let mut scene = Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(least, 0.95, 1);
+    let mut scene =
+        CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(least, 0.95, 1);
     scene.form_factors.fill(0.0);
     let mut names = Vec::new();
     let mut errors = String::new();
@@ -146,7 +148,7 @@ fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
                 let prediction = report.prediction;
                 errors = format!(
                     "{} (operator {:.4}, gain alone {:.4}, nothing {:.4} predicted)",
-                    report.compensation.name(),
+                    report.compensation,
                     prediction.compensated,
                     prediction.gain_only,
                     prediction.uncompensated
@@ -156,12 +158,12 @@ fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
         }
     }
     let all = names.len() as u64 == seeds && names.iter().all(|name| *name == wanted);
-    Outcome::new(all, format!("{} chosen", wanted.name()), errors)
+    Outcome::new(all, format!("{wanted} chosen"), errors)
 }
 
 fn shifted(_: u64) -> Outcome {
     let grid = grid(GRID);
-    let scene = Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7);
+    let scene = CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7);
     let mut capture = Capture::new(&scene, 60, 1);
     let shown = capture.patterns.clone();
     for k in 1..shown.ncols() {

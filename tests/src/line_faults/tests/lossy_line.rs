@@ -1,3 +1,5 @@
+//! Tests of the lossy line.
+
 use super::*;
 use crate::line_faults::{FaultCounts, FaultRates, Faults, LossyLine, PacedLine};
 use fastrand::Rng;

@@ -1,4 +1,4 @@
-//! Devices that the simulated lines are tested with.
+//! Tests of the simulated lines, and a device for them.
 
 mod lossy_line;
 mod paced_line;

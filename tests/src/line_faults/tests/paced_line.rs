@@ -1,3 +1,5 @@
+//! Tests of the paced line.
+
 use super::*;
 use crate::line_faults::PacedLine;
 use iltm::device::Line;

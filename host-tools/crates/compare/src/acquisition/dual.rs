@@ -1,8 +1,7 @@
-//! Adaptive multi-resolution dual photography: blocks of lights, divided where they are seen.
+//! Dual photography, adaptive and multi-resolution: blocks of lights, divided where they are seen.
 
 use super::Acquisition;
-use crate::{Found, Rig, Source, Unfit};
-use iltm_picture::progress::Progress;
+use crate::{Acquired, Citation, Description, Rig, Unfit};
 use nalgebra::DMatrix;
 
 /// Starts with the whole frame and divides blocks in four.
@@ -39,43 +38,39 @@ impl Default for DualPhotography {
 }
 
 impl Acquisition for DualPhotography {
-    fn name(&self) -> String {
-        "adaptive dual photography".to_owned()
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Sen, Chen, Garg, Marschner, Horowitz, Levoy, Lensch",
-            title: "Dual Photography",
-            venue: "ACM Transactions on Graphics (SIGGRAPH)",
-            year: 2005,
+    fn description(&self) -> Description {
+        Description {
+            name: "adaptive dual photography".to_owned(),
+            source: Citation {
+                authors: "Sen, Chen, Garg, Marschner, Horowitz, Levoy, Lensch",
+                title: "Dual Photography",
+                venue: "ACM Transactions on Graphics (SIGGRAPH)",
+                year: 2005,
+            },
+            how: "Blocks of cells, divided in four as long as somebody sees them; blocks that no \
+                camera cell sees both of are lit together. Needs the photographs so far to choose \
+                the next, and light that stays local: where every surface lights every other, all \
+                blocks conflict.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "Blocks of cells, divided in four as long as somebody sees them; blocks that no camera \
-         cell sees both of are lit together. Needs the photographs so far to choose the next, \
-         and light that stays local: where every surface lights every other, all blocks conflict."
-    }
-
-    fn acquire(&self, rig: &mut Rig, _progress: &dyn Progress) -> Result<Found, Unfit> {
+    fn acquire(&self, rig: &mut Rig) -> Result<Acquired, Unfit> {
         let cells = rig.grid().cells();
         let mut transport = DMatrix::zeros(cells, cells);
-        let everyone = rig.live().to_vec();
-        let mut blocks: Vec<Block> = whole(rig)
+        let grid = rig.grid();
+        let whole = CellRectangle::new(rig, (0, grid.rows()), (0, grid.cols()));
+        let followers = rig.live().to_vec();
+        let mut blocks: Vec<LightBlock> = whole
+            .map(|area| LightBlock { area, followers })
             .into_iter()
-            .map(|area| Block {
-                area,
-                followers: everyone.clone(),
-            })
             .collect();
         while !blocks.is_empty() {
             let mut next = Vec::new();
             for together in compatible(&blocks) {
-                let lit: Vec<&Block> = together.iter().map(|block| &blocks[*block]).collect();
+                let lit: Vec<&LightBlock> = together.iter().map(|block| &blocks[*block]).collect();
                 for (block, followers) in self.light(rig, &lit, &mut transport) {
                     for area in block.area.quarters(rig) {
-                        next.push(Block {
+                        next.push(LightBlock {
                             area,
                             followers: followers.clone(),
                         });
@@ -84,13 +79,13 @@ impl Acquisition for DualPhotography {
             }
             blocks = next;
         }
-        Ok(Found::Forward(transport))
+        Ok(Acquired::Forward(transport))
     }
 }
 
 /// Lights to be lit, and who looks.
-struct Block {
-    area: Area,
+struct LightBlock {
+    area: CellRectangle,
     /// Camera cells that answered to the block this one is part of, length `N`.
     followers: Vec<bool>,
 }
@@ -101,9 +96,9 @@ impl DualPhotography {
     fn light<'b>(
         self,
         rig: &mut Rig,
-        blocks: &[&'b Block],
+        blocks: &[&'b LightBlock],
         transport: &mut DMatrix<f64>,
-    ) -> Vec<(&'b Block, Vec<bool>)> {
+    ) -> Vec<(&'b LightBlock, Vec<bool>)> {
         let cells = rig.grid().cells();
         let mut pattern = DMatrix::zeros(cells, 1);
         for cell in blocks.iter().flat_map(|block| &block.area.live) {
@@ -112,7 +107,7 @@ impl DualPhotography {
         let light = rig.photograph(&pattern);
         // What followers of one block are known to get from the others.
         let known = &*transport * &pattern;
-        let follow = |block: &&'b Block| {
+        let follow = |block: &&'b LightBlock| {
             let mut followers = vec![false; cells];
             let size = block.area.live.len() as f64;
             for seen in (0..cells).filter(|seen| block.followers[*seen]) {
@@ -137,7 +132,7 @@ impl DualPhotography {
 
 /// A rectangle of cells.
 #[derive(Clone)]
-struct Area {
+struct CellRectangle {
     /// First and one past the last.
     rows: (usize, usize),
     cols: (usize, usize),
@@ -145,12 +140,7 @@ struct Area {
     live: Vec<usize>,
 }
 
-/// The frame, unless nothing of it is live.
-fn whole(rig: &Rig) -> Option<Area> {
-    Area::new(rig, (0, rig.grid().rows()), (0, rig.grid().cols()))
-}
-
-impl Area {
+impl CellRectangle {
     fn new(rig: &Rig, rows: (usize, usize), cols: (usize, usize)) -> Option<Self> {
         let cells = (rows.0..rows.1)
             .flat_map(|row| (cols.0..cols.1).map(move |col| row * rig.grid().cols() + col));
@@ -180,7 +170,7 @@ impl Area {
 ///
 /// Greedy colouring of the graph of conflicts, blocks in order; followers of a group are
 /// followers of exactly one of its blocks.
-fn compatible(blocks: &[Block]) -> Vec<Vec<usize>> {
+fn compatible(blocks: &[LightBlock]) -> Vec<Vec<usize>> {
     let mut groups: Vec<(Vec<usize>, Vec<bool>)> = Vec::new();
     for (index, block) in blocks.iter().enumerate() {
         if !block.followers.contains(&true) {
@@ -206,10 +196,11 @@ fn compatible(blocks: &[Block]) -> Vec<Vec<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scenes::{forward, m_scene, rig};
     use super::*;
+    use crate::test_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
+    use nalgebra::DVector;
 
     #[test]
     fn without_noise_it_ends_where_one_light_at_a_time_does() {
@@ -227,13 +218,8 @@ mod tests {
     #[test]
     fn a_flat_wall_takes_four_photographs_for_each_halving() {
         let grid = Grid::new(8, 8).unwrap();
-        let transport = DMatrix::from_fn(
-            64,
-            64,
-            |i, j| {
-                if i == j { 0.3 + i as f64 / 100.0 } else { 0.0 }
-            },
-        );
+        let own = DVector::from_fn(64, |i, _| 0.3 + i as f64 / 100.0);
+        let transport = DMatrix::from_diagonal(&own);
         let mut rig = rig(grid, &transport, &[true; 64], NoiseModel::default());
         let found = forward(&DualPhotography::default(), &mut rig);
         assert!((found - &transport).amax() < 1e-14);

@@ -23,14 +23,14 @@ const MOST_SUPPORT: f64 = 0.6;
 
 /// Columns of `A` and how much of each.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub(super) struct Estimate {
+pub(super) struct SparseEstimate {
     /// Distinct.
     pub(super) support: Vec<usize>,
     /// Length of `support`.
     pub(super) values: Vec<f64>,
 }
 
-impl Estimate {
+impl SparseEstimate {
     /// `A x` of a matrix whose columns the support counts.
     pub(super) fn applied(&self, matrix: &DMatrix<f64>) -> DVector<f64> {
         let mut sum = DVector::zeros(matrix.nrows());
@@ -78,7 +78,7 @@ impl Greedy {
         first: &[usize],
         at_once: usize,
         radius: f64,
-    ) -> Vec<Estimate> {
+    ) -> Vec<SparseEstimate> {
         let radius = radius.max(ROUNDING * right.norm());
         let most = (MOST_SUPPORT * right.len() as f64) as usize;
         let mut support: Vec<usize> = first.iter().copied().take(most).collect();
@@ -132,7 +132,7 @@ impl Greedy {
     }
 
     /// Least squares on a support; `None` if its columns depend on each other.
-    pub(super) fn fit(&self, support: &[usize], right: &DVector<f64>) -> Option<Estimate> {
+    pub(super) fn fit(&self, support: &[usize], right: &DVector<f64>) -> Option<SparseEstimate> {
         let size = support.len();
         // Unit columns: the factorisation sees dependence only.
         let gram = DMatrix::from_fn(size, size, |i, j| {
@@ -145,7 +145,7 @@ impl Greedy {
                 self.matrix.column(support[i]).dot(vector) * self.scale[support[i]]
             })
         };
-        let scaled = |values: &DVector<f64>| Estimate {
+        let scaled = |values: &DVector<f64>| SparseEstimate {
             support: support.to_vec(),
             values: values
                 .iter()
@@ -220,9 +220,9 @@ mod tests {
     fn nothing_to_explain_is_explained_by_nothing() {
         let greedy = Greedy::new(signs(10, 20));
         let answers = greedy.pursue(&DVector::zeros(10), &[], 2, 0.0);
-        assert_eq!(answers, [Estimate::default()]);
+        assert_eq!(answers, [SparseEstimate::default()]);
         let silent = Greedy::new(DMatrix::zeros(10, 20));
         let answers = silent.pursue(&DVector::from_element(10, 1.0), &[], 2, 0.0);
-        assert_eq!(answers, [Estimate::default()]);
+        assert_eq!(answers, [SparseEstimate::default()]);
     }
 }

@@ -1,59 +1,51 @@
-//! Ways to photograph a scene's transport.
+//! Acquisition: ways to photograph a scene's transport.
 //!
 //! Each takes as many photographs as it needs from a [`Rig`] and ends with the forward
 //! transport or with its inverse.
 //!
 //! ```text
-//! brute_force          one light at a time
-//! hadamard             half of the lights at a time
-//! stripes              rows and columns
-//! dual                 blocks, divided where they are seen
-//! nystrom              clusters of columns and rows, of low rank
-//! compressive_sensing  random patterns, decoded coarse to fine    } sensing, greedy:
-//! compressive_dual     random patterns, decoded row by row        } what they share
-//! sparse               random patterns, the project's own solver: two-stage, direct, iltm
+//! multiplexing   one light at a time, and half of the lights at a time
+//! stripes        rows and columns
+//! dual           blocks, divided where they are seen
+//! nystrom        clusters of columns and rows, of low rank
+//! compressive    random patterns, decoded row by row or coarse to fine    sensing, greedy
+//! sparse         random patterns, the project's own solver: two-stage, direct, iltm
 //! ```
 
-mod brute_force;
-mod compressive_dual;
-mod compressive_sensing;
+mod compressive;
 mod dual;
 mod greedy;
-mod hadamard;
+mod multiplexing;
 mod nystrom;
 mod sensing;
 mod sparse;
 mod stripes;
 #[cfg(test)]
-mod test_scenes;
-#[cfg(test)]
 mod tests;
 
-use super::{Found, Rig, Source, Unfit};
-pub use brute_force::BruteForce;
-pub use compressive_dual::CompressiveDual;
-pub use compressive_sensing::CompressiveSensing;
+use super::{Acquired, Description, Rig, Unfit};
+pub use compressive::{CompressiveDual, CompressiveSensing};
 pub use dual::DualPhotography;
-pub use hadamard::Hadamard;
-use iltm_picture::progress::Progress;
 use iltm_solve::Method;
+pub use multiplexing::{BruteForce, Hadamard};
 pub use nystrom::Nystrom;
 pub use sparse::Sparse;
-pub use stripes::Stripes;
+pub(crate) use sparse::{patterns, solved};
+pub use stripes::StripeScanning;
 
 /// A way to photograph a scene.
 pub trait Acquisition {
+    /// What is said of it in tables.
+    fn description(&self) -> Description;
     /// Its name in tables.
-    fn name(&self) -> String;
-    /// Where it comes from.
-    fn source(&self) -> Source;
-    /// What it does, a sentence or two, with what it needs that others do not.
-    fn how(&self) -> &'static str;
+    fn name(&self) -> String {
+        self.description().name
+    }
     /// Takes photographs and works out the transport.
     ///
     /// # Errors
     /// [`Unfit`] if the scene or the grid is none for the method.
-    fn acquire(&self, rig: &mut Rig, progress: &dyn Progress) -> Result<Found, Unfit>;
+    fn acquire(&self, rig: &mut Rig) -> Result<Acquired, Unfit>;
 }
 
 /// Every way, with `photographs` for those that take as many as one likes, and
@@ -64,7 +56,7 @@ pub fn all(photographs: usize, seed: u64) -> Vec<Box<dyn Acquisition>> {
     vec![
         Box::new(BruteForce),
         Box::new(Hadamard),
-        Box::new(Stripes),
+        Box::new(StripeScanning),
         Box::new(DualPhotography::default()),
         Box::new(Nystrom::new(photographs, false)),
         Box::new(Nystrom::new(photographs, true)),

@@ -1,4 +1,4 @@
-//! White and Bernoulli photographs as equations for the doubly transformed transport.
+//! Haar-domain sensing: white and Bernoulli photographs as equations for the doubly transformed transport.
 //!
 //! With patterns `P` the camera sees `T P = C`, and `T^ = W^T T W`, coded in Haar on both
 //! sides, obeys `(P^T W) T^^T = (W^T C)^T`: one sparse unknown, the response to the
@@ -14,10 +14,12 @@
 //! eight is held out, each row stops where it predicts them best, and is fitted to all
 //! photographs once the support is chosen.
 
-use super::greedy::{Estimate, Greedy};
+use super::greedy::{Greedy, SparseEstimate};
+use super::patterns;
+use crate::rig::clear_dead;
 use crate::{Rig, Unfit};
-use iltm_capture::{Role, columns, pattern_set};
-use iltm_solve::{Basis, Haar};
+use iltm_capture::columns;
+use iltm_solve::{Haar, Method};
 use nalgebra::{DMatrix, DVector};
 
 /// One photograph of so many is held out.
@@ -28,7 +30,7 @@ const FEW: usize = 2 * HELD_OUT;
 const AT_ONCE: [usize; 4] = [64, 32, 16, 8];
 
 /// What was photographed, transformed.
-pub(super) struct Sensing {
+pub(super) struct HaarSensing {
     pub(super) haar: Haar,
     /// All equations in signs, `m x N`.
     signs: DMatrix<f64>,
@@ -46,7 +48,7 @@ pub(super) struct Sensing {
     noise: Vec<f64>,
 }
 
-impl Sensing {
+impl HaarSensing {
     /// Takes white and `photographs - 1` Bernoulli patterns by `seed`.
     ///
     /// # Errors
@@ -57,16 +59,13 @@ impl Sensing {
                 "{photographs} photographs leave none for Bernoulli patterns"
             )));
         }
-        let shown: Vec<_> = pattern_set(rig.grid(), photographs - 1, seed)
-            .into_iter()
-            .filter(|(role, _)| matches!(role, Role::White | Role::Bernoulli))
-            .collect();
+        let shown = patterns(Method::Direct, rig.grid(), photographs, seed);
         let mut patterns = columns(&shown);
         for (mut lights, live) in patterns.row_iter_mut().zip(rig.live()) {
             lights *= f64::from(u8::from(*live));
         }
         let light = rig.photograph(&patterns);
-        let haar = Haar::new(rig.grid(), Basis::QuadTree);
+        let haar = Haar::new(rig.grid());
         let matrix = haar.analyse_columns(&signs(&patterns)).transpose();
         // The first is white's.
         let (held_out, kept): (Vec<_>, Vec<_>) =
@@ -85,7 +84,7 @@ impl Sensing {
     }
 
     /// The response of one camera coefficient, `predicted` being where to look first.
-    pub(super) fn decode(&self, coefficient: usize, predicted: &[usize]) -> Estimate {
+    pub(super) fn decode(&self, coefficient: usize, predicted: &[usize]) -> SparseEstimate {
         let right = self.answers.column(coefficient).into_owned();
         let kept = right.select_rows(&self.kept);
         let radius = self.noise[coefficient] * (kept.len() as f64).sqrt();
@@ -95,7 +94,7 @@ impl Sensing {
             .copied()
             .filter(|column| *column != constant);
         let first: Vec<usize> = [constant].into_iter().chain(others).collect();
-        let mut best = (f64::INFINITY, Estimate::default());
+        let mut best = (f64::INFINITY, SparseEstimate::default());
         for part in AT_ONCE {
             let at_once = (kept.len() / part).max(1);
             for answer in self.search.pursue(&kept, &first, at_once, radius) {
@@ -111,7 +110,7 @@ impl Sensing {
     }
 
     /// Squared residual in the photographs held out, or in all if none is.
-    fn misfit(&self, answer: &Estimate, right: &DVector<f64>) -> f64 {
+    fn misfit(&self, answer: &SparseEstimate, right: &DVector<f64>) -> f64 {
         let left = right - answer.applied(&self.signs);
         if self.held_out.is_empty() {
             left.norm_squared()
@@ -122,7 +121,7 @@ impl Sensing {
 
     /// `T`, `N x N`, of responses by camera coefficient; rows and columns of cells that
     /// are not live are zero.
-    pub(super) fn transport(&self, responses: &[Estimate], live: &[bool]) -> DMatrix<f64> {
+    pub(super) fn transport(&self, responses: &[SparseEstimate], live: &[bool]) -> DMatrix<f64> {
         let cells = live.len();
         let mut coded = DMatrix::zeros(cells, cells);
         for (row, response) in responses.iter().enumerate() {
@@ -131,10 +130,7 @@ impl Sensing {
             }
         }
         let mut transport = self.haar.synthesise_operator(&coded);
-        for (cell, _) in live.iter().enumerate().filter(|(_, live)| !**live) {
-            transport.row_mut(cell).fill(0.0);
-            transport.column_mut(cell).fill(0.0);
-        }
+        clear_dead(&mut transport, live);
         transport
     }
 }
@@ -165,13 +161,12 @@ fn coefficient_noise(rig: &Rig, haar: &Haar, light: &DMatrix<f64>) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scenes::{forward, rig};
     use super::super::{Acquisition, CompressiveDual, CompressiveSensing};
     use crate::Unfit;
+    use crate::test_scene::{forward, rig};
     use iltm_capture::NoiseModel;
-    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
-    use iltm_solve::{Basis, Haar};
+    use iltm_solve::Haar;
     use nalgebra::DMatrix;
 
     /// Coded on both sides, each row has its parent's three coefficients: the constant,
@@ -185,7 +180,7 @@ mod tests {
             _ if column == row / 4 => -0.3,
             _ => 0.0,
         });
-        let transport = Haar::new(grid, Basis::QuadTree).synthesise_operator(&coded);
+        let transport = Haar::new(grid).synthesise_operator(&coded);
         let methods: [Box<dyn Acquisition>; 2] = [
             Box::new(CompressiveDual::new(40, 1)),
             Box::new(CompressiveSensing::new(40, 1)),
@@ -208,7 +203,7 @@ mod tests {
             &[true; 4],
             NoiseModel::default(),
         );
-        let refused = CompressiveDual::new(1, 1).acquire(&mut rig, &Silent);
+        let refused = CompressiveDual::new(1, 1).acquire(&mut rig);
         assert!(matches!(refused, Err(Unfit::Condition(_))));
     }
 }

@@ -1,11 +1,15 @@
-//! Bernoulli patterns and sparsity: the project's own solver, by any of its methods.
+//! Sparse recovery from Bernoulli patterns: the project's own solver, by any of its methods.
 
 use super::Acquisition;
-use super::compressive_dual::SEN_DARABI;
-use crate::{Found, Rig, Source, Unfit};
-use iltm_capture::{Role, columns, pattern_set};
-use iltm_picture::progress::Progress;
-use iltm_solve::{CellNoise, Method, Observed, ObservedChannel, SolveOptions, solve_observed};
+use super::compressive::SEN_DARABI;
+use crate::{Acquired, Citation, Description, Rig, Unfit};
+use iltm_capture::{Pattern, Role, columns, pattern_set};
+use iltm_picture::progress::Silent;
+use iltm_runtime::Grid;
+use iltm_solve::{
+    CellNoise, InverseTransport, Method, Observed, ObservedChannel, SolveError, SolveOptions,
+    SolveReport, solve_observed,
+};
 use nalgebra::DMatrix;
 
 /// [`solve_observed`] on photographs of a rig.
@@ -32,115 +36,101 @@ impl Sparse {
 }
 
 impl Acquisition for Sparse {
-    fn name(&self) -> String {
-        let Self {
-            method,
-            photographs,
-            ..
-        } = self;
-        match method {
-            Method::Joint => format!("iltm, {photographs}"),
-            Method::Direct => format!("the paper's direct method, {photographs}"),
-            Method::TwoStage => {
-                format!("compressive dual photography by l1 (two-stage), {photographs}")
-            }
-            Method::BruteForce => format!("least squares, {photographs}"),
+    fn description(&self) -> Description {
+        let photographs = self.photographs;
+        Description {
+            name: match self.method {
+                Method::Joint => format!("iltm, {photographs}"),
+                Method::Direct => format!("the paper's direct method, {photographs}"),
+                Method::TwoStage => {
+                    format!("compressive dual photography by l1 (two-stage), {photographs}")
+                }
+                Method::BruteForce => format!("least squares, {photographs}"),
+            },
+            source: match self.method {
+                Method::TwoStage | Method::BruteForce => SEN_DARABI,
+                Method::Joint | Method::Direct => Citation::THE_PAPER,
+            },
+            how: match self.method {
+                Method::Joint => {
+                    "White, Gray code and Bernoulli photographs; gains apart from a non-negative \
+                     operator that is sparse in Haar; sparsity chosen by photographs held out."
+                }
+                Method::Direct => {
+                    "White and Bernoulli photographs; each row of the inverse, Haar-coded on both \
+                     sides, has the least l1 norm that explains them within their noise (P4)."
+                }
+                _ => {
+                    "The direct method's photographs; each row of the transport, Haar-coded on \
+                     both sides, has the least l1 norm that explains them within their noise; then \
+                     the transport is inverted."
+                }
+            },
         }
     }
 
-    fn source(&self) -> Source {
-        match self.method {
-            Method::TwoStage | Method::BruteForce => SEN_DARABI,
-            Method::Joint | Method::Direct => Source::THE_PAPER,
-        }
-    }
-
-    fn how(&self) -> &'static str {
-        match self.method {
-            Method::Joint => {
-                "White, Gray code and Bernoulli photographs; gains apart from a non-negative \
-                 operator that is sparse in Haar; sparsity chosen by photographs held out."
-            }
-            Method::Direct => {
-                "White and Bernoulli photographs; each row of the inverse, Haar-coded on both \
-                 sides, has the least l1 norm that explains them within their noise (P4)."
-            }
-            _ => {
-                "The direct method's photographs; each row of the transport, Haar-coded on both \
-                 sides, has the least l1 norm that explains them within their noise; then the \
-                 transport is inverted."
-            }
-        }
-    }
-
-    fn acquire(&self, rig: &mut Rig, progress: &dyn Progress) -> Result<Found, Unfit> {
-        let taken = self.take(rig)?;
-        let options = SolveOptions {
-            method: self.method,
-            ..SolveOptions::default()
-        };
-        let (inverse, _) = solve_observed(&taken.observed(rig), &options, progress)?;
-        Ok(Found::Inverse(inverse.channel(0).dense()))
-    }
-}
-
-/// Photographs of a rig, as the solver wants them.
-struct Taken {
-    patterns: DMatrix<f64>,
-    roles: Vec<Role>,
-    light: DMatrix<f64>,
-    ambient: Vec<f64>,
-    noise: Vec<CellNoise>,
-}
-
-impl Sparse {
-    fn take(&self, rig: &mut Rig) -> Result<Taken, Unfit> {
-        let shown: Vec<_> = pattern_set(rig.grid(), self.photographs, self.seed)
-            .into_iter()
-            .filter(|(role, _)| match role {
-                Role::Black => false,
-                Role::White | Role::Bernoulli => true,
-                Role::Column { .. } | Role::Row { .. } => self.method == Method::Joint,
-            })
-            .take(self.photographs)
-            .collect();
+    fn acquire(&self, rig: &mut Rig) -> Result<Acquired, Unfit> {
+        let shown = patterns(self.method, rig.grid(), self.photographs, self.seed);
         if !shown.iter().any(|(role, _)| *role == Role::Bernoulli) {
             return Err(Unfit::Condition(format!(
                 "{} photographs leave none for Bernoulli patterns",
                 self.photographs
             )));
         }
-        let roles = shown.iter().map(|(role, _)| *role).collect();
-        let patterns = columns(&shown);
-        let light = rig.photograph(&patterns);
-        let noise = (0..patterns.nrows())
-            .map(|cell| cell_noise(rig, &patterns, &light, cell))
-            .collect();
-        Ok(Taken {
-            ambient: vec![0.0; patterns.nrows()],
-            patterns,
-            roles,
-            light,
-            noise,
-        })
+        let lit = columns(&shown);
+        let light = rig.photograph(&lit);
+        let noise = (0..lit.nrows()).map(|cell| cell_noise(rig, &lit, &light, cell));
+        let channel = (&light, noise.collect());
+        let (inverse, _) = solved(self.method, (rig.grid(), rig.live()), &shown, channel)?;
+        Ok(Acquired::Inverse(inverse.channel(0).dense()))
     }
 }
 
-impl Taken {
-    fn observed<'t>(&'t self, rig: &'t Rig) -> Observed<'t> {
-        Observed {
-            grid: rig.grid(),
-            patterns: &self.patterns,
-            roles: &self.roles,
-            live: rig.live(),
-            channels: vec![ObservedChannel {
-                light: &self.light,
-                ambient: &self.ambient,
-                noise: self.noise.clone(),
-            }],
-            blur: 0.0,
-        }
-    }
+/// The patterns that a method is photographed with, white first: so many of white, Gray code
+/// (for [`Method::Joint`]) and Bernoulli patterns by `seed`.
+pub(crate) fn patterns(
+    method: Method,
+    grid: Grid,
+    photographs: usize,
+    seed: u64,
+) -> Vec<(Role, Pattern)> {
+    let wanted = |role: Role| match role {
+        Role::Black => false,
+        Role::White | Role::Bernoulli => true,
+        Role::Column { .. } | Role::Row { .. } => method == Method::Joint,
+    };
+    let shown = pattern_set(grid, photographs, seed).into_iter();
+    let shown = shown.filter(|(role, _)| wanted(*role));
+    shown.take(photographs).collect()
+}
+
+/// Solves by a method from the light of each cell under patterns, `N x m`, and its noise,
+/// without ambient light or blur.
+pub(crate) fn solved(
+    method: Method,
+    (grid, live): (Grid, &[bool]),
+    shown: &[(Role, Pattern)],
+    (light, noise): (&DMatrix<f64>, Vec<CellNoise>),
+) -> Result<(InverseTransport, SolveReport), SolveError> {
+    let roles: Vec<Role> = shown.iter().map(|(role, _)| *role).collect();
+    let ambient = vec![0.0; grid.cells()];
+    let observed = Observed {
+        grid,
+        patterns: &columns(shown),
+        roles: &roles,
+        live,
+        channels: vec![ObservedChannel {
+            light,
+            ambient: &ambient,
+            noise,
+        }],
+        blur: 0.0,
+    };
+    let options = SolveOptions {
+        method,
+        ..SolveOptions::default()
+    };
+    solve_observed(&observed, &options, &Silent)
 }
 
 /// Root mean square noise of a cell where it is lit and where it is not.

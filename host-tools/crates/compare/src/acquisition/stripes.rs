@@ -1,8 +1,7 @@
-//! Every row and every column of the projector, lit alone.
+//! Stripe scanning: every row and every column of the projector, lit alone.
 
 use super::Acquisition;
-use crate::{Found, Rig, Source, Unfit};
-use iltm_picture::progress::Progress;
+use crate::{Acquired, Citation, Description, Rig, Unfit};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
@@ -18,29 +17,25 @@ const BRIGHT: f64 = 3.0;
 /// Noise of rows and of columns is independent, so that its product has no bias; nothing
 /// is clipped for that reason.
 #[derive(Clone, Copy, Debug)]
-pub struct Stripes;
+pub struct StripeScanning;
 
-impl Acquisition for Stripes {
-    fn name(&self) -> String {
-        "stripe scanning".to_owned()
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Ding, Xiao, Tan, Yu",
-            title: "Catadioptric Projectors",
-            venue: "CVPR",
-            year: 2009,
+impl Acquisition for StripeScanning {
+    fn description(&self) -> Description {
+        Description {
+            name: "stripe scanning".to_owned(),
+            source: Citation {
+                authors: "Ding, Xiao, Tan, Yu",
+                title: "Catadioptric Projectors",
+                venue: "CVPR",
+                year: 2009,
+            },
+            how: "White, every row and every column alone: a cell's response is the product of its \
+                responses to rows and to columns. Needs responses that are separable, as blur is; \
+                light between surfaces is not and ends up in a cross around each cell.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "White, every row and every column alone: a cell's response is the product of its \
-         responses to rows and to columns. Needs responses that are separable, as blur is; \
-         light between surfaces is not and ends up in a cross around each cell."
-    }
-
-    fn acquire(&self, rig: &mut Rig, _progress: &dyn Progress) -> Result<Found, Unfit> {
+    fn acquire(&self, rig: &mut Rig) -> Result<Acquired, Unfit> {
         let grid = rig.grid();
         let (rows, cols) = (grid.rows(), grid.cols());
         let light = rig.photograph(&stripes(grid));
@@ -61,7 +56,7 @@ impl Acquisition for Stripes {
                 transport[(seen, lit)] = light[(seen, row)] * light[(seen, rows + col)] / flood;
             }
         }
-        Ok(Found::Forward(transport))
+        Ok(Acquired::Forward(transport))
     }
 }
 
@@ -80,10 +75,9 @@ fn stripes(grid: Grid) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scenes::{forward, m_scene, rig};
     use super::*;
+    use crate::test_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
-    use iltm_picture::progress::Silent;
 
     #[test]
     fn a_separable_response_is_found_exactly() {
@@ -103,7 +97,7 @@ mod tests {
             spread * (1 + seen) as f64 / 100.0
         });
         let mut rig = rig(grid, &transport, &[true; 20], NoiseModel::default());
-        assert!((forward(&Stripes, &mut rig) - &transport).amax() < 1e-14);
+        assert!((forward(&StripeScanning, &mut rig) - &transport).amax() < 1e-14);
         assert_eq!(rig.photographs(), 4 + 5 + 1);
     }
 
@@ -112,7 +106,7 @@ mod tests {
         let grid = Grid::new(6, 8).unwrap();
         let (transport, live) = m_scene(grid);
         let found = forward(
-            &Stripes,
+            &StripeScanning,
             &mut rig(grid, &transport, &live, NoiseModel::default()),
         );
         // What cell (2, 1) gets from column 3 of the other panel seems to come from its own
@@ -132,7 +126,7 @@ mod tests {
         transport[(2, 2)] = 0.0;
         let grid = Grid::new(2, 2).unwrap();
         let mut rig = rig(grid, &transport, &[true; 4], NoiseModel::default());
-        let refused = Stripes.acquire(&mut rig, &Silent).unwrap_err();
+        let refused = StripeScanning.acquire(&mut rig).unwrap_err();
         assert!(refused.to_string().contains("cell 2"), "{refused}");
     }
 }

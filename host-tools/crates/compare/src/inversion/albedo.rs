@@ -1,4 +1,4 @@
-//! The albedo that the gains of an inverse imply.
+//! Albedo from the gains of an inverse (inverse global illumination).
 //!
 //! Inverse global illumination (Yu, Debevec, Malik, Hawkins, *Inverse Global
 //! Illumination: Recovering Reflectance Models of Real Scenes from Photographs*,
@@ -13,9 +13,8 @@
 
 use super::gain_only::diagonal;
 use super::live::LiveTransport;
-use super::{Inversion, Inverted, Known};
-use crate::{Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Unfit};
 use iltm_solve::inverted;
 use nalgebra::{DMatrix, DVector};
 
@@ -90,26 +89,23 @@ pub fn albedo(inverse: &DMatrix<f64>, irradiance: Option<&DVector<f64>>) -> Albe
 pub struct AlbedoAlone;
 
 impl Inversion for AlbedoAlone {
-    fn name(&self) -> String {
-        "albedo alone, d / (rho E)".to_owned()
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Yu, Debevec, Malik, Hawkins",
-            title: "Inverse Global Illumination: Recovering Reflectance Models of Real Scenes \
+    fn description(&self) -> Description {
+        Description {
+            name: "albedo alone, d / (rho E)".to_owned(),
+            source: Citation {
+                authors: "Yu, Debevec, Malik, Hawkins",
+                title: "Inverse Global Illumination: Recovering Reflectance Models of Real Scenes \
                     from Photographs",
-            venue: "SIGGRAPH",
-            year: 1999,
+                venue: "SIGGRAPH",
+                year: 1999,
+            },
+            how: "The diagonal of the inverse holds each cell's albedo with all bounces removed, \
+                up to the projector's brightness. Not a way to compensate: shown with the gains \
+                alone.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "The diagonal of the inverse holds each cell's albedo with all bounces removed, up \
-         to the projector's brightness. Not a way to compensate: shown with the gains alone."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let inverse = inverted(known.transport, known.live).ok_or(Unfit::Singular)?;
         let found = albedo(&inverse, None);
@@ -133,18 +129,18 @@ impl Inversion for AlbedoAlone {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
     use iltm_runtime::Grid;
-    use iltm_scene::coaxial::{Panels, Scene};
+    use iltm_scene::coaxial::{CoaxialScene, Panels};
 
-    fn scene() -> Scene {
+    fn scene() -> CoaxialScene {
         let grid = Grid::new(6, 8).unwrap();
-        Scene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.25, 0.95, 1)
+        CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.25, 0.95, 1)
     }
 
-    fn found(scene: &Scene, irradiance: Option<&DVector<f64>>) -> Albedo {
-        let before = Before::scene(scene);
+    fn found(scene: &CoaxialScene, irradiance: Option<&DVector<f64>>) -> Albedo {
+        let before = TestScene::scene(scene);
         albedo(
             &inverted(&before.transport, &before.live).unwrap(),
             irradiance,
@@ -179,7 +175,7 @@ mod tests {
 
     #[test]
     fn without_light_between_cells_only_one_bound_is_left() {
-        let before = Before::flat(3, 4);
+        let before = TestScene::flat(3, 4);
         let inverse = inverted(&before.transport, &before.live).unwrap();
         let found = albedo(&inverse, None);
         assert!(found.most.is_infinite());

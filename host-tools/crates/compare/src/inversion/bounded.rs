@@ -1,10 +1,9 @@
 //! Bounded least squares, frame by frame: as accurate as any input within range can be.
 
 use super::live::LiveTransport;
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Project, Source, Unfit};
-use iltm_picture::progress::Progress;
-use iltm_solve::content::wanted_images;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Answer, Citation, Description, Unfit};
+use iltm_solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of one frame at most.
@@ -19,29 +18,25 @@ const SAMPLES: usize = 4;
 pub struct Bounded;
 
 impl Inversion for Bounded {
-    fn name(&self) -> String {
-        "bounded least squares".to_owned()
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Sheng, Yapo, Cutler",
-            title: "Global Illumination Compensation for Spatially Augmented Reality",
-            venue: "Computer Graphics Forum (Eurographics)",
-            year: 2010,
+    fn description(&self) -> Description {
+        Description {
+            name: "bounded least squares".to_owned(),
+            source: Citation {
+                authors: "Sheng, Yapo, Cutler",
+                title: "Global Illumination Compensation for Spatially Augmented Reality",
+                venue: "Computer Graphics Forum (Eurographics)",
+                year: 2010,
+            },
+            how: "Minimises ||T p - d|| over inputs of 0 to 1 for every frame, by accelerated \
+                projected gradients (Beck, Teboulle 2009; restarted as by O'Donoghue, Candes \
+                2015): where the inverse would be clipped, the neighbours make up for it. The \
+                ceiling of accuracy.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "Minimises ||T p - d|| over inputs of 0 to 1 for every frame, by accelerated \
-         projected gradients (Beck, Teboulle 2009; restarted as by O'Donoghue, Candes 2015): \
-         where the inverse would be clipped, the neighbours make up for it. The ceiling of \
-         accuracy."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let frames = Frames::new(&live, known.live.len());
+        let frames = BoundedFrames::new(&live, known.live.len());
         let images = wanted_images(known.grid).select_rows(&live.chosen);
         let white = frames.flood.mean();
         let mut steps = 0;
@@ -55,7 +50,7 @@ impl Inversion for Bounded {
         let n = live.len() as f64;
         let mean = steps as f64 / SAMPLES.min(images.ncols()) as f64;
         Ok(Inverted {
-            answer: Answer::Frames(Box::new(frames)),
+            answer: Answer::Frames(Box::new(move |wanted| frames.project(wanted))),
             // One product with T^T for the frame, one with T^T T for a step.
             multiplications: Some((mean + 1.0) * n * n),
             photographs: 0,
@@ -64,14 +59,14 @@ impl Inversion for Bounded {
     }
 }
 
-struct Frames {
+struct BoundedFrames {
     chosen: Vec<usize>,
     cells: usize,
     flood: DVector<f64>,
     problem: Problem,
 }
 
-impl Frames {
+impl BoundedFrames {
     fn new(live: &LiveTransport, cells: usize) -> Self {
         Self {
             chosen: live.chosen.clone(),
@@ -88,9 +83,7 @@ impl Frames {
             if input.is_finite() { input } else { 0.0 }
         })
     }
-}
 
-impl Project for Frames {
     fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
         let part = DVector::from_fn(self.chosen.len(), |place, _| wanted[self.chosen[place]]);
         let solved = self.problem.solve(&part, &self.start(&part));
@@ -111,7 +104,7 @@ struct Problem {
     curvature: f64,
 }
 
-struct Solved {
+struct BoundedInput {
     input: DVector<f64>,
     steps: usize,
     /// Relative to `|T^T d|`.
@@ -130,13 +123,13 @@ impl Problem {
         }
     }
 
-    fn solve(&self, wanted: &DVector<f64>, start: &DVector<f64>) -> Solved {
+    fn solve(&self, wanted: &DVector<f64>, start: &DVector<f64>) -> BoundedInput {
         let towards = self.transport.tr_mul(wanted);
         let scale = towards.norm();
         let mut input = start.map(|p| p.clamp(0.0, 1.0));
         if self.curvature == 0.0 || scale == 0.0 {
             input.fill(0.0);
-            return Solved {
+            return BoundedInput {
                 input,
                 steps: 0,
                 residual: 0.0,
@@ -151,7 +144,7 @@ impl Problem {
             // How far a plain step from `ahead` moves is the KKT residual there.
             residual = (&next - &ahead).norm() * self.curvature / scale;
             if residual <= TOLERANCE {
-                return Solved {
+                return BoundedInput {
                     input: next,
                     steps: step,
                     residual,
@@ -167,7 +160,7 @@ impl Problem {
             momentum = faster;
             input = next;
         }
-        Solved {
+        BoundedInput {
             input,
             steps: MOST_STEPS,
             residual,
@@ -177,8 +170,8 @@ impl Problem {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
     use iltm_solve::inverted;
 
     /// Least squares with every choice of cells at 0, at 1 and free, the feasible best.
@@ -210,7 +203,7 @@ mod tests {
 
     #[test]
     fn tiny_frames_are_as_an_exhaustive_search_finds_them() {
-        let before = Before::textured(2, 3);
+        let before = TestScene::textured(2, 3);
         let mut random = fastrand::Rng::with_seed(3);
         for _ in 0..20 {
             // Brighter than white here, darker than black there.
@@ -223,7 +216,7 @@ mod tests {
 
     #[test]
     fn within_range_it_is_the_inverse() {
-        let before = Before::textured(5, 8);
+        let before = TestScene::textured(5, 8);
         let input = DVector::from_fn(40, |cell, _| 0.1 + 0.1 * ((cell * 5) % 9) as f64);
         let wanted = &before.transport * &input;
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
@@ -233,7 +226,7 @@ mod tests {
 
     #[test]
     fn no_clipped_inverse_shows_images_better() {
-        let before = Before::textured(8, 12);
+        let before = TestScene::textured(8, 12);
         let truth = before.truth();
         let bounded = truth.judge(&before.answer(&Bounded)).compensation;
         let clipped = truth.judge(&Answer::Inverse(truth.inverse.clone()));

@@ -1,9 +1,8 @@
 //! Clustered inverses: cells that light each other most are inverted together.
 
 use super::live::LiveTransport;
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Unfit};
 use nalgebra::DMatrix;
 
 /// Blocks of limited size, inverted one by one.
@@ -17,31 +16,27 @@ pub struct Clustered {
 }
 
 impl Inversion for Clustered {
-    fn name(&self) -> String {
+    fn description(&self) -> Description {
         let lumped = if self.lumped {
             ", other clusters' light as a cell's own"
         } else {
             ""
         };
-        format!("clustered inverse, {} cells{lumped}", self.limit)
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Wetzstein, Bimber",
-            title: "Radiometric Compensation through Inverse Light Transport",
-            venue: "Pacific Graphics",
-            year: 2007,
+        Description {
+            name: format!("clustered inverse, {} cells{lumped}", self.limit),
+            source: Citation {
+                authors: "Wetzstein, Bimber",
+                title: "Radiometric Compensation through Inverse Light Transport",
+                venue: "Pacific Graphics",
+                year: 2007,
+            },
+            how: "Cells that light each other most are joined into clusters of limited size, and \
+                each cluster's transport is inverted for itself. Light between clusters is \
+                ignored, or taken for the cell's own, which is right for what white shows.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "Cells that light each other most are joined into clusters of limited size, and each \
-         cluster's transport is inverted for itself. Light between clusters is ignored, or \
-         taken for the cell's own, which is right for what white shows."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let clusters = clusters(&live.transport, self.limit);
         let mut matrix = DMatrix::zeros(live.len(), live.len());
@@ -64,16 +59,15 @@ impl Inversion for Clustered {
             }
         }
         let outside = 1.0 - inside / live.transport.sum();
-        Ok(Inverted {
-            answer: Answer::Inverse(live.whole(&super::live::finite(matrix)?)),
-            multiplications: Some(multiplications),
-            photographs: 0,
-            remark: format!(
+        Ok(Inverted::matrix(
+            live.whole(&super::live::finite(matrix)?),
+            multiplications,
+            format!(
                 "{} clusters; {:.1} % of white's light passes between them",
                 clusters.len(),
                 100.0 * outside
             ),
-        })
+        ))
     }
 }
 
@@ -122,12 +116,12 @@ fn strongest(members: &[Vec<usize>], light: &DMatrix<f64>, limit: usize) -> Opti
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn every_cell_is_in_one_cluster_and_none_is_too_large() {
-        let before = Before::textured(6, 9);
+        let before = TestScene::textured(6, 9);
         for limit in [1, 7, 54] {
             let clusters = clusters(&before.transport, limit);
             assert!(clusters.iter().all(|cluster| cluster.len() <= limit));
@@ -140,7 +134,7 @@ mod tests {
     /// The valleys of an M do not see each other: half of the cells is enough.
     #[test]
     fn valleys_that_do_not_see_each_other_are_two_exact_clusters() {
-        let before = Before::panels(5, 8);
+        let before = TestScene::panels(5, 8);
         for lumped in [false, true] {
             assert!(before.error(&Clustered { limit: 20, lumped }) < 1e-12);
             assert!(before.error(&Clustered { limit: 10, lumped }) > 1e-3);
@@ -150,7 +144,7 @@ mod tests {
     /// `T 1` is what white shows.
     #[test]
     fn with_other_light_as_a_cells_own_what_white_shows_needs_white() {
-        let before = Before::textured(5, 8);
+        let before = TestScene::textured(5, 8);
         let white = before.transport.column_sum();
         let off = |lumped| {
             let drive = before.drive(&Clustered { limit: 6, lumped }, &white);

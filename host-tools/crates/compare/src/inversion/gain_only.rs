@@ -1,9 +1,8 @@
-//! Compensation without interreflection, and none at all: what every method should beat.
+//! Gains alone: compensation without interreflection, and none at all, what every method should beat.
 
 use super::live::LiveTransport;
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Unfit};
 use nalgebra::{DMatrix, DVector};
 
 /// `p = d / flood`: each cell and channel for itself, from one photograph of white.
@@ -14,7 +13,7 @@ pub struct FloodGain;
 #[derive(Clone, Copy, Debug)]
 pub struct Uncompensated;
 
-const SOURCE: Source = Source {
+const SOURCE: Citation = Citation {
     authors: "Nayar, Peri, Grossberg, Belhumeur",
     title: "A Projection System with Radiometric Compensation for Screen Imperfections",
     venue: "PROCAMS",
@@ -22,21 +21,17 @@ const SOURCE: Source = Source {
 };
 
 impl Inversion for FloodGain {
-    fn name(&self) -> String {
-        "gain of each cell, d / flood".to_owned()
+    fn description(&self) -> Description {
+        Description {
+            name: "gain of each cell, d / flood".to_owned(),
+            source: SOURCE,
+            how: "Divides by the light in one photograph of white, cell by cell, as if no cell lit \
+                another: right for what white shows, wrong for all else. The floor for methods \
+                that know about light between cells.",
+        }
     }
 
-    fn source(&self) -> Source {
-        SOURCE
-    }
-
-    fn how(&self) -> &'static str {
-        "Divides by the light in one photograph of white, cell by cell, as if no cell lit \
-         another: right for what white shows, wrong for all else. The floor for methods that \
-         know about light between cells."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let flood = flood(&known, &live)?;
         let remark = "one photograph of white in all".to_owned();
@@ -45,19 +40,16 @@ impl Inversion for FloodGain {
 }
 
 impl Inversion for Uncompensated {
-    fn name(&self) -> String {
-        "no compensation".to_owned()
+    fn description(&self) -> Description {
+        Description {
+            name: "no compensation".to_owned(),
+            source: SOURCE,
+            how: "Shows the picture as it is; one factor takes the camera's unit to the \
+                projector's.",
+        }
     }
 
-    fn source(&self) -> Source {
-        SOURCE
-    }
-
-    fn how(&self) -> &'static str {
-        "Shows the picture as it is; one factor takes the camera's unit to the projector's."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let flood = live.transport.column_sum();
         // Least squares of s * flood against even light.
@@ -75,39 +67,34 @@ impl Inversion for Uncompensated {
 ///
 /// # Errors
 /// [`Unfit::Condition`] if some cell shows none.
-pub(super) fn flood(known: &Known<'_>, live: &LiveTransport) -> Result<DVector<f64>, Unfit> {
+pub(super) fn flood(
+    known: &KnownTransport<'_>,
+    live: &LiveTransport,
+) -> Result<DVector<f64>, Unfit> {
     let white = DMatrix::from_element(known.live.len(), 1, 1.0);
     let white = known.rig.clone().photograph(&white);
     let flood = white.column(0).select_rows(&live.chosen);
-    let dark = |light: &f64| !light.is_normal() || *light < 0.0;
-    match flood.iter().position(dark) {
-        None => Ok(flood),
-        Some(at) => Err(Unfit::Condition(format!(
-            "cell {} shows {:.3} under white, nothing to divide by",
-            live.chosen[at], flood[at]
-        ))),
-    }
+    live.positive(flood, "under white")
 }
 
 /// The answer `p_i = gain_i d_i`.
 pub(super) fn diagonal(live: &LiveTransport, gain: &DVector<f64>, remark: String) -> Inverted {
-    Inverted {
-        answer: Answer::Inverse(live.whole(&DMatrix::from_diagonal(gain))),
-        multiplications: Some(live.len() as f64),
-        photographs: 0,
+    Inverted::matrix(
+        live.whole(&DMatrix::from_diagonal(gain)),
+        live.len() as f64,
         remark,
-    }
+    )
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
 
     /// Even light on a sphere needs `(1 - r) / r` whatever the method.
     #[test]
     fn even_light_is_right_without_knowing_of_interreflection() {
-        let before = Before::sphere(3, 4, 0.6);
+        let before = TestScene::sphere(3, 4, 0.6);
         let even = DVector::from_element(12, 0.9);
         for drive in [
             before.drive(&FloodGain, &even),

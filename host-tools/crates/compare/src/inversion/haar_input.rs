@@ -1,12 +1,12 @@
-//! Few multiplications a frame in Haar: the frame's own largest coefficients, or the
+//! Haar-domain pruning, for few multiplications a frame: the frame's own largest coefficients, or the
 //! operator's most useful elements.
 
 use super::live::LiveTransport;
 use super::wavelet_inverse::haar_multiplications;
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Project, Source, Unfit};
-use iltm_picture::progress::Progress;
-use iltm_solve::{Basis, Haar, content::natural_images, inverted};
+use super::{Inversion, Inverted, KnownTransport};
+use crate::rig::clear_dead;
+use crate::{Answer, Citation, Description, Unfit};
+use iltm_solve::{Haar, inverted, natural_images};
 use nalgebra::{DMatrix, DVector};
 
 /// The largest Haar coefficients of each frame go through the operator's columns.
@@ -33,10 +33,10 @@ struct Coded {
 }
 
 impl Coded {
-    fn new(known: &Known<'_>) -> Result<Self, Unfit> {
+    fn new(known: &KnownTransport<'_>) -> Result<Self, Unfit> {
         let inverse = inverted(known.transport, known.live).ok_or(Unfit::Singular)?;
         let gain = inverse.diagonal();
-        let haar = Haar::new(known.grid, Basis::QuadTree);
+        let haar = Haar::new(known.grid);
         let operator = haar.analyse_operator(&(DMatrix::from_diagonal(&gain) - inverse));
         Ok(Self {
             gain,
@@ -56,88 +56,67 @@ impl Coded {
         let cells = self.gain.len();
         (count.min(cells) * self.stored()).div_ceil(cells)
     }
+
+    /// The input for `wanted` light by its `count` largest coefficients.
+    fn project(&self, wanted: &DVector<f64>, count: usize) -> DVector<f64> {
+        let coefficients = self.haar.analyse(wanted);
+        let mut order: Vec<usize> = (0..coefficients.len()).collect();
+        let size = |k: usize| coefficients[k].abs();
+        order.sort_by(|a, b| size(*b).total_cmp(&size(*a)));
+        let mut light = DVector::zeros(coefficients.len());
+        for k in &order[..count] {
+            light.axpy(coefficients[*k], &self.operator.column(*k), 1.0);
+        }
+        self.gain.component_mul(wanted) - self.haar.synthesise(&light)
+    }
 }
 
 impl Inversion for LargestInputs {
-    fn name(&self) -> String {
-        format!("largest {} Haar coefficients of the frame", self.count)
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Ng, Ramamoorthi, Hanrahan",
-            title: "All-Frequency Shadows Using Non-Linear Wavelet Lighting Approximation",
-            venue: "ACM Transactions on Graphics (SIGGRAPH)",
-            year: 2003,
+    fn description(&self) -> Description {
+        Description {
+            name: format!("largest {} Haar coefficients of the frame", self.count),
+            source: Citation {
+                authors: "Ng, Ramamoorthi, Hanrahan",
+                title: "All-Frequency Shadows Using Non-Linear Wavelet Lighting Approximation",
+                venue: "ACM Transactions on Graphics (SIGGRAPH)",
+                year: 2003,
+            },
+            how: "Gains for each cell; only the frame's largest Haar coefficients go through the \
+                operator, each with its whole column. The operator is stored whole, and the \
+                largest have to be looked for in every frame.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "Gains for each cell; only the frame's largest Haar coefficients go through the \
-         operator, each with its whole column. The operator is stored whole, and the largest \
-         have to be looked for in every frame."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let coded = Coded::new(&known)?;
         let cells = known.live.len();
         let fixed = live.len() as f64 + haar_multiplications(cells);
+        let count = self.count.min(cells);
+        let lit = DVector::from_fn(cells, |cell, _| f64::from(u8::from(known.live[cell])));
         Ok(Inverted {
             multiplications: Some(fixed + coded.columns(self.count) as f64),
             photographs: 0,
             remark: format!("{} elements stored", coded.stored()),
-            answer: Answer::Frames(Box::new(Frames {
-                live: DVector::from_fn(cells, |cell, _| f64::from(u8::from(known.live[cell]))),
-                count: self.count.min(cells),
-                coded,
+            answer: Answer::Frames(Box::new(move |wanted| {
+                coded.project(wanted, count).component_mul(&lit)
             })),
         })
     }
 }
 
-struct Frames {
-    coded: Coded,
-    count: usize,
-    /// 1 where live.
-    live: DVector<f64>,
-}
-
-impl Project for Frames {
-    fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
-        let Coded {
-            gain,
-            operator,
-            haar,
-        } = &self.coded;
-        let coefficients = haar.analyse(wanted);
-        let mut order: Vec<usize> = (0..coefficients.len()).collect();
-        let size = |k: usize| coefficients[k].abs();
-        order.sort_by(|a, b| size(*b).total_cmp(&size(*a)));
-        let mut light = DVector::zeros(coefficients.len());
-        for k in &order[..self.count] {
-            light.axpy(coefficients[*k], &operator.column(*k), 1.0);
-        }
-        (gain.component_mul(wanted) - haar.synthesise(&light)).component_mul(&self.live)
-    }
-}
-
 impl Inversion for StoredElements {
-    fn name(&self) -> String {
-        format!("stored elements, as many as {} columns", self.columns)
+    fn description(&self) -> Description {
+        Description {
+            name: format!("stored elements, as many as {} columns", self.columns),
+            source: Citation::THE_PAPER,
+            how: "Gains for each cell; of the operator in Haar only the elements that matter most \
+                in natural images are stored (this project's tables). Which they are is settled \
+                before the show, so that a frame is one sparse product.",
+        }
     }
 
-    fn source(&self) -> Source {
-        Source::THE_PAPER
-    }
-
-    fn how(&self) -> &'static str {
-        "Gains for each cell; of the operator in Haar only the elements that matter most in \
-         natural images are stored (this project's tables). Which they are is settled before \
-         the show, so that a frame is one sparse product."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let coded = Coded::new(&known)?;
         let kept = coded.columns(self.columns);
@@ -160,29 +139,24 @@ impl Inversion for StoredElements {
             stored[(place % cells, place / cells)] = value(*place);
         }
         let mut matrix = DMatrix::from_diagonal(&gain) - haar.synthesise_operator(&stored);
-        for cell in (0..cells).filter(|cell| !known.live[*cell]) {
-            matrix.row_mut(cell).fill(0.0);
-            matrix.column_mut(cell).fill(0.0);
-        }
+        clear_dead(&mut matrix, known.live);
         let fixed = live.len() as f64 + haar_multiplications(cells);
-        Ok(Inverted {
-            answer: Answer::Inverse(matrix),
-            multiplications: Some(fixed + places.len() as f64),
-            photographs: 0,
-            remark: format!("{} elements stored", places.len()),
-        })
+        Ok(Inverted::matrix(
+            matrix,
+            fixed + places.len() as f64,
+            format!("{} elements stored", places.len()),
+        ))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
-    use iltm_picture::progress::Silent;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn with_everything_kept_both_are_the_inverse() {
-        let before = Before::textured(5, 7);
+        let before = TestScene::textured(5, 7);
         assert!(before.error(&StoredElements { columns: 35 }) < 1e-12);
         let wanted = DVector::from_fn(35, |cell, _| 0.2 + 0.1 * ((cell * 7) % 5) as f64);
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
@@ -193,7 +167,7 @@ mod tests {
     /// An even picture is one coefficient.
     #[test]
     fn one_coefficient_is_enough_for_an_even_picture() {
-        let before = Before::panels(5, 7);
+        let before = TestScene::panels(5, 7);
         let even = DVector::from_element(35, 0.4);
         let drive = before.drive(&LargestInputs { count: 1 }, &even);
         assert!((&before.transport * drive - &even).norm() < 1e-12);
@@ -201,7 +175,7 @@ mod tests {
 
     #[test]
     fn more_elements_show_natural_images_better() {
-        let before = Before::panels(8, 12);
+        let before = TestScene::panels(8, 12);
         let truth = before.truth();
         let error = |method: &dyn Inversion| truth.judge(&before.answer(method)).compensation;
         assert!(error(&StoredElements { columns: 16 }) < error(&StoredElements { columns: 0 }));
@@ -211,10 +185,10 @@ mod tests {
     /// What is known of images beforehand is worth more than what one image shows.
     #[test]
     fn at_equal_multiplications_stored_elements_show_natural_images_better() {
-        let before = Before::panels(8, 12);
+        let before = TestScene::panels(8, 12);
         let truth = before.truth();
         let cost = |method: &dyn Inversion| {
-            let found = method.invert(before.known(), &Silent).unwrap();
+            let found = method.invert(before.known()).unwrap();
             let error = truth.judge(&found.answer).compensation;
             (found.multiplications, error)
         };

@@ -1,8 +1,7 @@
-//! Krylov methods with photographs as the matrix.
+//! Krylov methods (optical GMRES) with photographs as the matrix.
 
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Project, Rig, Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Answer, Citation, Description, Rig, Unfit};
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 
@@ -21,28 +20,24 @@ pub struct Optical {
 }
 
 impl Inversion for Optical {
-    fn name(&self) -> String {
+    fn description(&self) -> Description {
         let scaled = if self.scaled { ", scaled by flood" } else { "" };
-        format!("optical GMRES, steps {}{scaled}", self.steps)
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "O'Toole, Kutulakos",
-            title: "Optical Computing for Fast Light Transport Analysis",
-            venue: "ACM Transactions on Graphics (SIGGRAPH Asia)",
-            year: 2010,
+        Description {
+            name: format!("optical GMRES, steps {}{scaled}", self.steps),
+            source: Citation {
+                authors: "O'Toole, Kutulakos",
+                title: "Optical Computing for Fast Light Transport Analysis",
+                venue: "ACM Transactions on Graphics (SIGGRAPH Asia)",
+                year: 2010,
+            },
+            how: "The scene itself multiplies: each step projects a pattern (its positive and its \
+                negative part, scaled to the projector's range) and photographs it; the input is \
+                the combination of patterns whose light comes nearest. Needs a still picture and \
+                new photographs for each.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "The scene itself multiplies: each step projects a pattern (its positive and its \
-         negative part, scaled to the projector's range) and photographs it; the input is \
-         the combination of patterns whose light comes nearest. Needs a still picture and \
-         new photographs for each."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = super::live::LiveTransport::new(&known)?;
         let mut rig = known.rig.clone();
         let scale = if self.scaled {
@@ -52,45 +47,24 @@ impl Inversion for Optical {
         } else {
             DVector::from_element(known.live.len(), 1.0)
         };
-        let scale = scale.zip_map(&DVector::from_column_slice(&mask(known.live)), |a, b| a * b);
+        let lit = known.live.iter().map(|live| f64::from(u8::from(*live)));
+        let lit = DVector::from_iterator(known.live.len(), lit);
+        let scale = scale.component_mul(&lit);
         let steps = self.steps.min(live.len());
+        let rig = RefCell::new(rig);
         Ok(Inverted {
-            answer: Answer::Frames(Box::new(Frames {
-                rig: RefCell::new(rig),
-                live: mask(known.live),
-                scale,
-                steps,
+            answer: Answer::Frames(Box::new(move |wanted| {
+                let mut rig = rig.borrow_mut();
+                let apply = |x: &DVector<f64>| {
+                    product(&mut rig, &x.component_mul(&scale)).component_mul(&lit)
+                };
+                gmres(apply, &wanted.component_mul(&lit), steps).component_mul(&scale)
             })),
             multiplications: None,
             // The first pattern, wanted light, has no negative part.
             photographs: 2 * steps - 1,
             remark: String::new(),
         })
-    }
-}
-
-fn mask(live: &[bool]) -> Vec<f64> {
-    live.iter().map(|live| f64::from(u8::from(*live))).collect()
-}
-
-struct Frames {
-    rig: RefCell<Rig>,
-    /// 1 where live.
-    live: Vec<f64>,
-    scale: DVector<f64>,
-    steps: usize,
-}
-
-impl Project for Frames {
-    fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
-        let mut rig = self.rig.borrow_mut();
-        let live = DVector::from_column_slice(&self.live);
-        let wanted = wanted.component_mul(&live);
-        let product = |x: &DVector<f64>| {
-            let light = product(&mut rig, &x.component_mul(&self.scale));
-            light.component_mul(&live)
-        };
-        gmres(product, &wanted, self.steps).component_mul(&self.scale)
     }
 }
 
@@ -163,9 +137,8 @@ fn gmres(
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
-    use iltm_picture::progress::Silent;
+    use crate::test_scene::TestScene;
     use iltm_solve::inverted;
 
     fn wanted(cells: usize) -> DVector<f64> {
@@ -175,7 +148,7 @@ mod tests {
     /// A Krylov space of `N` dimensions holds every answer.
     #[test]
     fn without_noise_as_many_steps_as_cells_are_exact() {
-        let before = Before::textured(4, 6);
+        let before = TestScene::textured(4, 6);
         let wanted = wanted(24);
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
         for scaled in [false, true] {
@@ -187,24 +160,20 @@ mod tests {
     /// A sphere's transport has two eigenvalues: two steps are enough.
     #[test]
     fn two_steps_are_exact_on_a_sphere() {
-        let before = Before::sphere(3, 4, 0.8);
+        let before = TestScene::sphere(3, 4, 0.8);
         let wanted = wanted(12);
-        let optical = Optical {
-            steps: 2,
-            scaled: false,
-        };
+        let (steps, scaled) = (2, false);
+        let optical = Optical { steps, scaled };
         let drive = before.drive(&optical, &wanted);
         assert!((&before.transport * drive - &wanted).norm() < 1e-12);
     }
 
     #[test]
     fn photographs_of_a_frame_are_those_that_are_counted() {
-        let before = Before::textured(4, 6);
-        let optical = Optical {
-            steps: 3,
-            scaled: false,
-        };
-        let counted = optical.invert(before.known(), &Silent).unwrap().photographs;
+        let before = TestScene::textured(4, 6);
+        let (steps, scaled) = (3, false);
+        let optical = Optical { steps, scaled };
+        let counted = optical.invert(before.known()).unwrap().photographs;
         let mut rig = before.rig.clone();
         gmres(|x| product(&mut rig, x), &wanted(24), 3);
         assert_eq!(rig.photographs(), counted);
@@ -213,13 +182,11 @@ mod tests {
     #[test]
     fn noise_is_in_every_product() {
         let wanted = wanted(24);
-        let optical = Optical {
-            steps: 8,
-            scaled: true,
-        };
-        let quiet = Before::panels(4, 6);
-        let noisy = Before::panels(4, 6).noisy(1e-4);
-        let error = |before: &Before| {
+        let (steps, scaled) = (8, true);
+        let optical = Optical { steps, scaled };
+        let quiet = TestScene::panels(4, 6);
+        let noisy = TestScene::panels(4, 6).noisy(1e-4);
+        let error = |before: &TestScene| {
             let light = &before.transport * before.drive(&optical, &wanted);
             (light - &wanted).norm() / wanted.norm()
         };

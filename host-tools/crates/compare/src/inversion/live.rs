@@ -1,7 +1,8 @@
-//! Transport between live cells alone, and what several methods ask of it.
+//! Live transport: the transport between live cells alone, and what several methods ask of it.
 
-use super::Known;
+use super::KnownTransport;
 use crate::Unfit;
+use crate::rig::live_cells;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of a power iteration before growth is watched, and while it is.
@@ -19,10 +20,8 @@ pub(super) struct LiveTransport {
 impl LiveTransport {
     /// # Errors
     /// [`Unfit::Condition`] if no cell is live.
-    pub(super) fn new(known: &Known<'_>) -> Result<Self, Unfit> {
-        let chosen: Vec<usize> = (0..known.live.len())
-            .filter(|cell| known.live[*cell])
-            .collect();
+    pub(super) fn new(known: &KnownTransport<'_>) -> Result<Self, Unfit> {
+        let chosen = live_cells(known.live);
         if chosen.is_empty() {
             return Err(Unfit::Condition("no cell is live".to_owned()));
         }
@@ -39,23 +38,21 @@ impl LiveTransport {
         self.chosen.len()
     }
 
-    /// The diagonal of `T`: what a cell shows of its own light.
-    ///
-    /// # Errors
-    /// [`Unfit::Condition`] if some cell shows none.
+    /// The diagonal of `T`: what a cell shows of its own light; an error if it shows none.
     pub(super) fn own_light(&self) -> Result<DVector<f64>, Unfit> {
         self.positive(self.transport.diagonal(), "of its own light")
     }
 
-    /// Light of each cell under white.
-    ///
-    /// # Errors
-    /// [`Unfit::Condition`] if some cell shows none.
+    /// Light of each cell under white; an error if it shows none.
     pub(super) fn flood(&self) -> Result<DVector<f64>, Unfit> {
         self.positive(self.transport.column_sum(), "under white")
     }
 
-    fn positive(&self, light: DVector<f64>, which: &str) -> Result<DVector<f64>, Unfit> {
+    /// Light to divide by.
+    ///
+    /// # Errors
+    /// [`Unfit::Condition`] if some cell shows none.
+    pub(super) fn positive(&self, light: DVector<f64>, which: &str) -> Result<DVector<f64>, Unfit> {
         let dark = light
             .iter()
             .position(|light| !light.recip().is_finite() || *light <= 0.0);

@@ -1,11 +1,11 @@
-//! Light of low frequency: every method behind a projector that is out of focus.
+//! Out-of-focus projection, light of low frequency: every method behind a projector that is out of focus.
 
 use super::live::LiveTransport;
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Project, Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::rig::clear_dead;
+use crate::{Answer, Description, Unfit};
 use iltm_solve::blur;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// A method that is given the transport `T B` of a projector out of focus, photographed
 /// one light at a time with the rig's noise. A cell then gets more light from its
@@ -18,42 +18,35 @@ pub struct OutOfFocus {
 }
 
 impl Inversion for OutOfFocus {
-    fn name(&self) -> String {
-        format!("out of focus by {}: {}", self.deviation, self.method.name())
-    }
-
-    fn source(&self) -> Source {
-        self.method.source()
-    }
-
-    fn how(&self) -> &'static str {
-        "The same through a projector out of focus: light of low frequency, with a transport \
-         that is not diagonally dominant. Inputs are clipped before the blur, so that no \
-         method gets more contrast than the lens lets through."
-    }
-
-    fn invert(&self, known: Known<'_>, progress: &dyn Progress) -> Result<Inverted, Unfit> {
-        let mut spread = blur(known.grid, self.deviation);
-        for cell in (0..known.live.len()).filter(|cell| !known.live[*cell]) {
-            spread.row_mut(cell).fill(0.0);
-            spread.column_mut(cell).fill(0.0);
+    fn description(&self) -> Description {
+        let method = self.method.description();
+        Description {
+            name: format!("out of focus by {}: {}", self.deviation, method.name),
+            source: method.source,
+            how: "The same through a projector out of focus: light of low frequency, with a \
+                transport that is not diagonally dominant. Inputs are clipped before the blur, so \
+                that no method gets more contrast than the lens lets through.",
         }
+    }
+
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
+        let mut spread = blur(known.grid, self.deviation);
+        clear_dead(&mut spread, known.live);
         let rig = known.rig.behind(&spread);
         let each = DMatrix::identity(spread.nrows(), spread.nrows());
         let transport = rig.clone().photograph(&each);
-        let blurred = Known {
+        let blurred = KnownTransport {
             transport: &transport,
             rig: &rig,
             ..known
         };
         let live = LiveTransport::new(&blurred)?;
         let others = strongest_others(&live.transport);
-        let inverted = self.method.invert(blurred, progress)?;
+        let inverted = self.method.invert(blurred)?;
+        let answer = inverted.answer;
         Ok(Inverted {
-            answer: Answer::Frames(Box::new(Frames {
-                answer: inverted.answer,
-                spread,
-            })),
+            // What a sharp projector would have to show for the same light.
+            answer: Answer::Frames(Box::new(move |wanted| &spread * answer.shown(wanted))),
             remark: [
                 &format!("up to {others:.1} times a cell's own light from others"),
                 inverted.remark.as_str(),
@@ -75,24 +68,12 @@ fn strongest_others(transport: &DMatrix<f64>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-struct Frames {
-    answer: Answer,
-    spread: DMatrix<f64>,
-}
-
-impl Project for Frames {
-    /// What a sharp projector would have to show for the same light.
-    fn project(&self, wanted: &DVector<f64>) -> DVector<f64> {
-        &self.spread * self.answer.shown(wanted)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::super::{Bounded, Exact, Neumann, Tikhonov};
     use super::*;
-    use iltm_picture::progress::Silent;
+    use crate::test_scene::TestScene;
+    use nalgebra::DVector;
 
     fn through(method: impl Inversion + 'static) -> OutOfFocus {
         OutOfFocus {
@@ -105,7 +86,7 @@ mod tests {
     /// border, where light falls beside the frame.
     #[test]
     fn light_that_the_lens_lets_through_is_shown_exactly() {
-        let before = Before::panels(9, 12);
+        let before = TestScene::panels(9, 12);
         let input = DVector::from_fn(108, |cell, _| 0.5 + 0.2 * ((cell % 12) as f64 / 4.0).sin());
         let wanted = &before.transport * blur(before.grid, 0.7) * &input;
         let light = &before.transport * before.drive(&through(Exact), &wanted);
@@ -114,10 +95,10 @@ mod tests {
 
     #[test]
     fn the_series_diverges_and_bounds_beat_regularisation_beats_clipping() {
-        let before = Before::panels(9, 12);
+        let before = TestScene::panels(9, 12);
         let truth = before.truth();
         let error = |method: OutOfFocus| {
-            let inverted = method.invert(before.known(), &Silent).unwrap();
+            let inverted = method.invert(before.known()).unwrap();
             let errors = truth.judge(&inverted.answer);
             (errors.compensation, inverted.remark)
         };

@@ -1,10 +1,9 @@
-//! The diagonal of the inverse from a few solves.
+//! Probing: the diagonal of the inverse from a few solves.
 
 use super::gain_only::diagonal;
 use super::live::LiveTransport;
-use super::{Inversion, Inverted, Known};
-use crate::{Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Unfit};
 use nalgebra::{DMatrix, DVector};
 
 /// Gains `g = diag(T^-1)` by probing: cells that light each other get different colours,
@@ -16,26 +15,23 @@ pub struct Probing {
 }
 
 impl Inversion for Probing {
-    fn name(&self) -> String {
-        format!("gains by probing, colours {}", self.colours)
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Tang, Saad",
-            title: "A Probing Method for Computing the Diagonal of a Matrix Inverse",
-            venue: "Numerical Linear Algebra with Applications",
-            year: 2012,
+    fn description(&self) -> Description {
+        Description {
+            name: format!("gains by probing, colours {}", self.colours),
+            source: Citation {
+                authors: "Tang, Saad",
+                title: "A Probing Method for Computing the Diagonal of a Matrix Inverse",
+                venue: "Numerical Linear Algebra with Applications",
+                year: 2012,
+            },
+            how: "Cells that light each other most get different colours; one solve for each \
+                colour gives the gains g of all its cells, less what cells of one colour throw at \
+                each other. Shown with the gains alone, p = g d, which takes no interreflection \
+                away.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "Cells that light each other most get different colours; one solve for each colour \
-         gives the gains g of all its cells, less what cells of one colour throw at each \
-         other. Shown with the gains alone, p = g d, which takes no interreflection away."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let colours = colouring(&live.transport, self.colours);
         let used = colours.iter().max().map_or(0, |last| last + 1);
@@ -121,11 +117,11 @@ fn greedy(exchange: &DMatrix<f64>, least: f64) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
     use iltm_solve::inverted;
 
-    fn error(before: &Before, colours: usize) -> f64 {
+    fn error(before: &TestScene, colours: usize) -> f64 {
         let gains = before.matrix(&Probing { colours }).diagonal();
         let exact = inverted(&before.transport, &before.live)
             .unwrap()
@@ -135,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_colour_for_each_cell_is_exact_and_more_colours_are_nearer() {
-        let before = Before::panels(6, 8);
+        let before = TestScene::panels(6, 8);
         assert!(error(&before, 48) < 1e-12);
         assert!(error(&before, 24) < error(&before, 8));
         assert!(error(&before, 8) < error(&before, 1));
@@ -144,14 +140,14 @@ mod tests {
     /// `T^-1 = (I - r 11^T / N) / r`: with one colour each cell loses what all throw.
     #[test]
     fn with_one_colour_a_spheres_gains_are_those_of_even_light() {
-        let before = Before::sphere(3, 4, 0.6);
+        let before = TestScene::sphere(3, 4, 0.6);
         let gains = before.matrix(&Probing { colours: 1 }).diagonal();
         assert!(gains.iter().all(|gain| (gain - 0.4 / 0.6).abs() < 1e-12));
     }
 
     #[test]
     fn colours_keep_the_strongest_exchanges_apart_and_are_not_more_than_allowed() {
-        let before = Before::textured(6, 8);
+        let before = TestScene::textured(6, 8);
         for limit in [1, 3, 10, 48] {
             let colours = colouring(&before.transport, limit);
             assert!(colours.iter().all(|colour| *colour < limit));

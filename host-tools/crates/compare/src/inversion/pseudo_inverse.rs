@@ -1,9 +1,8 @@
-//! Unequal numbers of lights and camera cells.
+//! Pseudo-inverse, for unequal numbers of lights and camera cells.
 
 use super::live::{LiveTransport, finite};
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Unfit};
 use nalgebra::{DMatrix, DVector};
 
 /// Regularisation that only keeps rounding from deciding, of the mean eigenvalue.
@@ -28,37 +27,33 @@ pub struct PseudoInverse {
 }
 
 impl Inversion for PseudoInverse {
-    fn name(&self) -> String {
-        match self.fewer {
-            Fewer::Lights => "pseudo-inverse, half as many lights",
-            Fewer::CameraCells => "pseudo-inverse, half as many camera cells",
-        }
-        .to_owned()
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Golub, Van Loan",
-            title: "Matrix Computations, sections 5.5 and 6.1",
-            venue: "Johns Hopkins University Press",
-            year: 2013,
-        }
-    }
-
-    fn how(&self) -> &'static str {
-        match self.fewer {
-            Fewer::Lights => {
-                "The camera sees more cells than the projector lights: least squares, T^+ = \
-                 (T^T T + mu^2 I)^-1 T^T. Detail finer than a light cannot be shown."
+    fn description(&self) -> Description {
+        Description {
+            name: match self.fewer {
+                Fewer::Lights => "pseudo-inverse, half as many lights",
+                Fewer::CameraCells => "pseudo-inverse, half as many camera cells",
             }
-            Fewer::CameraCells => {
-                "The projector lights more cells than the camera tells apart: of all inputs \
-                 that the camera sees as wanted, the one nearest to d / flood."
-            }
+            .to_owned(),
+            source: Citation {
+                authors: "Golub, Van Loan",
+                title: "Matrix Computations, sections 5.5 and 6.1",
+                venue: "Johns Hopkins University Press",
+                year: 2013,
+            },
+            how: match self.fewer {
+                Fewer::Lights => {
+                    "The camera sees more cells than the projector lights: least squares, T^+ = \
+                     (T^T T + mu^2 I)^-1 T^T. Detail finer than a light cannot be shown."
+                }
+                Fewer::CameraCells => {
+                    "The projector lights more cells than the camera tells apart: of all inputs \
+                     that the camera sees as wanted, the one nearest to d / flood."
+                }
+            },
         }
     }
 
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         let groups = groups(&live.chosen, known.grid.cols());
         let members = membership(&groups, live.len());
@@ -72,12 +67,11 @@ impl Inversion for PseudoInverse {
             // d / flood, and what the camera would see of it, first.
             Fewer::CameraCells => stored + live.len() as f64 + groups.len() as f64,
         };
-        Ok(Inverted {
-            answer: Answer::Inverse(live.whole(&finite(matrix)?)),
-            multiplications: Some(stored + extra),
-            photographs: 0,
-            remark: format!("{} of {} cells; mu {mu:.1e}", groups.len(), live.len()),
-        })
+        Ok(Inverted::matrix(
+            live.whole(&finite(matrix)?),
+            stored + extra,
+            format!("{} of {} cells; mu {mu:.1e}", groups.len(), live.len()),
+        ))
     }
 }
 
@@ -162,8 +156,8 @@ pub(super) fn regularised(gram: &DMatrix<f64>, mu: f64) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn odd_rows_and_dead_cells_leave_cells_of_their_own() {
@@ -176,7 +170,7 @@ mod tests {
     /// light.
     #[test]
     fn with_fewer_lights_what_is_left_over_is_orthogonal_to_every_light() {
-        let before = Before::textured(4, 7);
+        let before = TestScene::textured(4, 7);
         let method = PseudoInverse {
             fewer: Fewer::Lights,
         };
@@ -194,7 +188,7 @@ mod tests {
 
     #[test]
     fn with_fewer_camera_cells_the_camera_sees_what_is_wanted() {
-        let before = Before::textured(4, 7);
+        let before = TestScene::textured(4, 7);
         let method = PseudoInverse {
             fewer: Fewer::CameraCells,
         };

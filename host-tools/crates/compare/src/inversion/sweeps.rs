@@ -1,14 +1,13 @@
 //! Jacobi and Gauss-Seidel sweeps, the inverse counterparts of gathering radiosity.
 
 use super::live::{LiveTransport, convergence, finite, spectral_radius};
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Source, Unfit};
-use iltm_picture::progress::Progress;
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Unfit};
 use nalgebra::{DMatrix, DVector};
 
 /// Which values of the other cells a sweep uses.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Order {
+pub enum SweepOrder {
     /// Those of the sweep before.
     Jacobi,
     /// The newest.
@@ -20,76 +19,71 @@ pub enum Order {
 #[derive(Clone, Copy, Debug)]
 pub struct Sweeps {
     /// Which values a sweep uses.
-    pub order: Order,
+    pub order: SweepOrder,
     /// How many there are.
     pub count: usize,
 }
 
 impl Inversion for Sweeps {
-    fn name(&self) -> String {
+    fn description(&self) -> Description {
         let name = match self.order {
-            Order::Jacobi => "Jacobi",
-            Order::GaussSeidel => "Gauss-Seidel",
+            SweepOrder::Jacobi => "Jacobi",
+            SweepOrder::GaussSeidel => "Gauss-Seidel",
         };
-        format!("{name}, sweeps {}", self.count)
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Bai, Chandraker, Ng, Ramamoorthi",
-            title: "A Dual Theory of Inverse and Forward Light Transport",
-            venue: "ECCV",
-            year: 2010,
+        Description {
+            name: format!("{name}, sweeps {}", self.count),
+            source: Citation {
+                authors: "Bai, Chandraker, Ng, Ramamoorthi",
+                title: "A Dual Theory of Inverse and Forward Light Transport",
+                venue: "ECCV",
+                year: 2010,
+            },
+            how: match self.order {
+                SweepOrder::Jacobi => {
+                    "Every cell corrects its input for the light that all others threw at it in \
+                     the sweep before; starts from d / flood. From nothing it would be the Neumann \
+                     series."
+                }
+                SweepOrder::GaussSeidel => {
+                    "The same cell after cell, each with the newest inputs of the others; starts \
+                     from d / flood."
+                }
+            },
         }
     }
 
-    fn how(&self) -> &'static str {
-        match self.order {
-            Order::Jacobi => {
-                "Every cell corrects its input for the light that all others threw at it in \
-                 the sweep before; starts from d / flood. From nothing it would be the \
-                 Neumann series."
-            }
-            Order::GaussSeidel => {
-                "The same cell after cell, each with the newest inputs of the others; starts \
-                 from d / flood."
-            }
-        }
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
         live.own_light()?;
         let start = DMatrix::from_diagonal(&live.flood()?.map(f64::recip));
-        let sweep = Sweep::new(&live.transport, self.order);
+        let sweep = SweepSplit::new(&live.transport, self.order);
         let mut matrix = start;
         for _ in 0..self.count {
             matrix = sweep.next(&matrix)?;
         }
         let n = live.len() as f64;
-        Ok(Inverted {
-            answer: Answer::Inverse(live.whole(&finite(matrix)?)),
-            // With the reciprocals of the diagonal at hand.
-            multiplications: Some(n + self.count as f64 * n * n),
-            photographs: 0,
-            remark: convergence(sweep.radius()),
-        })
+        // With the reciprocals of the diagonal at hand.
+        Ok(Inverted::matrix(
+            live.whole(&finite(matrix)?),
+            n + self.count as f64 * n * n,
+            convergence(sweep.radius()),
+        ))
     }
 }
 
 /// `T` split into what is solved for and what is moved to the other side.
-struct Sweep {
+struct SweepSplit {
     /// `D` or `D + L`.
     solved: DMatrix<f64>,
     /// `L + U` or `U`.
     moved: DMatrix<f64>,
 }
 
-impl Sweep {
-    fn new(transport: &DMatrix<f64>, order: Order) -> Self {
+impl SweepSplit {
+    fn new(transport: &DMatrix<f64>, order: SweepOrder) -> Self {
         let solved = match order {
-            Order::Jacobi => DMatrix::from_diagonal(&transport.diagonal()),
-            Order::GaussSeidel => transport.lower_triangle(),
+            SweepOrder::Jacobi => DMatrix::from_diagonal(&transport.diagonal()),
+            SweepOrder::GaussSeidel => transport.lower_triangle(),
         };
         Self {
             moved: transport - &solved,
@@ -119,31 +113,31 @@ impl Sweep {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn sweeps_converge_to_the_inverse_and_gauss_seidel_does_sooner() {
-        let before = Before::textured(6, 8);
+        let before = TestScene::textured(6, 8);
         let error = |order, count| before.error(&Sweeps { order, count });
         for count in [1, 3, 8] {
             let (jacobi, newest) = (
-                error(Order::Jacobi, count),
-                error(Order::GaussSeidel, count),
+                error(SweepOrder::Jacobi, count),
+                error(SweepOrder::GaussSeidel, count),
             );
             assert!(newest < jacobi, "{count} sweeps: {newest} against {jacobi}");
         }
-        assert!(error(Order::GaussSeidel, 60) < 1e-9);
-        assert!(error(Order::Jacobi, 200) < 1e-6);
+        assert!(error(SweepOrder::GaussSeidel, 60) < 1e-9);
+        assert!(error(SweepOrder::Jacobi, 200) < 1e-6);
     }
 
     /// A symmetric positive definite system: Gauss-Seidel always converges (Golub, Van
     /// Loan, *Matrix Computations*, theorem 11.2.3), Jacobi only up to an albedo of 1/2.
     #[test]
     fn gauss_seidel_converges_on_a_sphere_where_jacobi_does_not() {
-        let before = Before::sphere(4, 5, 0.7);
-        let radius = |order| Sweep::new(&before.transport, order).radius();
-        assert!(radius(Order::Jacobi) > 1.0);
-        assert!(radius(Order::GaussSeidel) < 1.0);
+        let before = TestScene::sphere(4, 5, 0.7);
+        let radius = |order| SweepSplit::new(&before.transport, order).radius();
+        assert!(radius(SweepOrder::Jacobi) > 1.0);
+        assert!(radius(SweepOrder::GaussSeidel) < 1.0);
     }
 }

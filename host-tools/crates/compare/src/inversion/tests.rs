@@ -1,20 +1,17 @@
 //! What every way to invert has to stand.
 
-use super::test_scene::Before;
-use super::{Cancellation, Clustered, Exact, Inversion, Known, StoredElements, all};
-use crate::contest::invert;
-use crate::{Answer, Rig, Unfit};
-use iltm_capture::NoiseModel;
-use iltm_picture::progress::Silent;
-use iltm_runtime::Grid;
+use super::{Cancellation, Clustered, Exact, Inversion, KnownTransport, StoredElements, all};
+use crate::Unfit;
+use crate::benchmark::invert;
+use crate::test_scene::TestScene;
 use iltm_solve::inverted;
 use nalgebra::{DMatrix, DVector};
 
 /// `T^-1 = (I - r 11^T / N) / r` inside of a sphere.
 #[test]
 fn ways_that_are_exact_find_a_spheres_inverse() {
-    let before = Before::sphere(4, 5, 0.7);
-    let wanted = Before::sphere_inverse(20, 0.7);
+    let before = TestScene::sphere(4, 5, 0.7);
+    let wanted = TestScene::sphere_inverse(20, 0.7);
     let exact: [&dyn Inversion; 4] = [
         &Exact,
         &Cancellation,
@@ -46,7 +43,7 @@ const NOT_EXACT: [&str; 5] = [
 
 #[test]
 fn cells_that_do_not_light_each_other_are_divided_by_their_light() {
-    let before = Before::flat(3, 5);
+    let before = TestScene::flat(3, 5);
     let exact = inverted(&before.transport, &before.live).unwrap();
     let wanted = DVector::from_fn(15, |cell, _| {
         if before.live[cell] {
@@ -69,7 +66,7 @@ fn cells_that_do_not_light_each_other_are_divided_by_their_light() {
 
 #[test]
 fn a_single_cell_is_a_division() {
-    let before = Before::new(1, 1, DMatrix::from_element(1, 1, 0.5), vec![true]);
+    let before = TestScene::new(1, 1, DMatrix::from_element(1, 1, 0.5), vec![true]);
     for method in all() {
         if method.name().starts_with("out of focus") {
             continue;
@@ -84,7 +81,7 @@ fn a_single_cell_is_a_division() {
 fn dead_cells_stay_dark_on_every_grid() {
     for (rows, cols) in [(1, 7), (3, 5), (5, 2)] {
         let cells = usize::from(rows) * usize::from(cols);
-        let full = Before::panels(rows, cols).transport;
+        let full = TestScene::panels(rows, cols).transport;
         let live: Vec<bool> = (0..cells)
             .map(|cell| cell != 1 && cell != cells - 1)
             .collect();
@@ -96,7 +93,7 @@ fn dead_cells_stay_dark_on_every_grid() {
             }
         };
         let transport = DMatrix::from_fn(cells, cells, seen);
-        let before = Before::new(rows, cols, transport, live.clone());
+        let before = TestScene::new(rows, cols, transport, live.clone());
         let wanted = DVector::from_element(cells, 0.3);
         for method in all() {
             let drive = before.drive(method.as_ref(), &wanted);
@@ -111,10 +108,9 @@ fn dead_cells_stay_dark_on_every_grid() {
 /// and the largest numbers: an answer or a reason, never a panic.
 #[test]
 fn transports_that_have_no_inverse_are_answered_or_refused() {
-    let grid = Grid::new(2, 3).unwrap();
-    let mut unseen = Before::panels(2, 3).transport;
+    let mut unseen = TestScene::panels(2, 3).transport;
     unseen.row_mut(2).fill(0.0);
-    let mut alike = Before::panels(2, 3).transport;
+    let mut alike = TestScene::panels(2, 3).transport;
     let copy = alike.row(0).into_owned();
     alike.set_row(3, &copy);
     let hard = [
@@ -122,38 +118,24 @@ fn transports_that_have_no_inverse_are_answered_or_refused() {
         DMatrix::from_element(6, 6, 0.1),
         DMatrix::from_element(6, 6, f64::MAX),
         DMatrix::from_element(6, 6, f64::MIN_POSITIVE),
-        -Before::panels(2, 3).transport,
+        -TestScene::panels(2, 3).transport,
         unseen,
         alike,
     ];
-    let live = vec![true; 6];
     let wanted = DVector::from_element(6, 0.2);
     for transport in hard {
-        let rig = Rig::new(
-            grid,
-            transport.clone(),
-            live.clone(),
-            NoiseModel::default(),
-            1,
-        );
-        let known = Known {
-            grid,
-            live: &live,
-            transport: &transport,
-            rig: &rig,
-        };
+        let scene = TestScene::new(2, 3, transport, vec![true; 6]);
+        let known = scene.known();
         for method in all() {
-            match method.invert(known, &Silent) {
+            match method.invert(known) {
                 Ok(found) => {
-                    if let Answer::Frames(frames) = found.answer {
-                        assert_eq!(frames.project(&wanted).len(), 6);
-                    }
+                    assert_eq!(found.answer.input(&wanted).len(), 6);
                 }
                 Err(why) => assert!(matches!(why, Unfit::Singular | Unfit::Condition(_))),
             }
         }
         let dead = vec![false; 6];
-        let none = Known {
+        let none = KnownTransport {
             live: &dead,
             ..known
         };
@@ -161,7 +143,7 @@ fn transports_that_have_no_inverse_are_answered_or_refused() {
             .into_iter()
             .filter(|method| method.name() != "exact inverse")
         {
-            assert!(method.invert(none, &Silent).is_err(), "{}", method.name());
+            assert!(method.invert(none).is_err(), "{}", method.name());
         }
     }
 }
@@ -170,17 +152,11 @@ fn transports_that_have_no_inverse_are_answered_or_refused() {
 /// light between cells, as long as his series converges.
 #[test]
 fn on_a_moderate_scene_every_method_is_between_floor_and_ceiling() {
-    let before = Before::panels(8, 12);
+    let before = TestScene::panels(8, 12);
     let truth = before.truth();
     let compensation = |name: &str| {
         let method = all().into_iter().find(|method| method.name() == name);
-        let row = invert(
-            method.unwrap().as_ref(),
-            before.known(),
-            &truth,
-            None,
-            &Silent,
-        );
+        let row = invert(method.unwrap().as_ref(), before.known(), &truth, None);
         row.result.unwrap().errors.compensation
     };
     let floor = compensation("gain of each cell, d / flood");

@@ -1,13 +1,12 @@
-//! The regularised inverse of a transport that is noisy or hard to invert.
+//! Tikhonov regularisation: the inverse of a transport that is noisy or hard to invert.
 
 use super::gain_only::flood;
 use super::live::{LiveTransport, finite};
 use super::pseudo_inverse::regularised;
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Rig, Source, Unfit};
+use super::{Inversion, Inverted, KnownTransport};
+use crate::{Citation, Description, Rig, Unfit};
 use iltm_capture::NoiseModel;
-use iltm_picture::progress::Progress;
-use iltm_solve::content::wanted_images;
+use iltm_solve::wanted_images;
 use nalgebra::{DMatrix, DVector};
 
 /// Weights that are tried, each twice the one before.
@@ -24,28 +23,24 @@ const LEAST: f64 = 1e-4;
 pub struct Tikhonov;
 
 impl Inversion for Tikhonov {
-    fn name(&self) -> String {
-        "Tikhonov inverse".to_owned()
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Tikhonov",
-            title: "Solution of Incorrectly Formulated Problems and the Regularization Method",
-            venue: "Soviet Mathematics Doklady",
-            year: 1963,
+    fn description(&self) -> Description {
+        Description {
+            name: "Tikhonov inverse".to_owned(),
+            source: Citation {
+                authors: "Tikhonov",
+                title: "Solution of Incorrectly Formulated Problems and the Regularization Method",
+                venue: "Soviet Mathematics Doklady",
+                year: 1963,
+            },
+            how: "Least squares with a price on leaving d / flood: what noise hides, or the lens \
+                does not let through, is given up instead of driving inputs out of range. The \
+                price is the one that serves natural images best.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "Least squares with a price on leaving d / flood: what noise hides, or the lens does \
-         not let through, is given up instead of driving inputs out of range. The price is \
-         the one that serves natural images best."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let seen = Seen::new(&live.transport, flood(&known, &live)?);
+        let seen = NoisyTransport::new(&live.transport, flood(&known, &live)?);
         let again = again(&known, &live, &seen);
         let images = wanted(&known, &live, &seen);
         let mean = (seen.transport.norm_squared() / live.len() as f64).sqrt();
@@ -61,22 +56,21 @@ impl Inversion for Tikhonov {
         }
         let (error, mu) = best.ok_or(Unfit::Singular)?;
         let n = live.len() as f64;
-        Ok(Inverted {
-            answer: Answer::Inverse(live.whole(&finite(seen.inverse(mu)?)?)),
-            multiplications: Some(n * n),
-            photographs: 0,
-            remark: format!("mu {mu:.4}, which promises an error of {error:.4}"),
-        })
+        Ok(Inverted::matrix(
+            live.whole(&finite(seen.inverse(mu)?)?),
+            n * n,
+            format!("mu {mu:.4}, which promises an error of {error:.4}"),
+        ))
     }
 }
 
 /// What is known of the light between live cells.
-struct Seen {
+struct NoisyTransport {
     transport: DMatrix<f64>,
     flood: DVector<f64>,
 }
 
-impl Seen {
+impl NoisyTransport {
     /// Shares out what a photograph of white corrects in the sum of all columns: the
     /// least change of the transport that agrees with it.
     fn new(transport: &DMatrix<f64>, flood: DVector<f64>) -> Self {
@@ -109,7 +103,11 @@ impl Seen {
 }
 
 /// What would be seen if the transport were as it was `seen`.
-fn again(known: &Known<'_>, live: &LiveTransport, seen: &Seen) -> Seen {
+fn again(
+    known: &KnownTransport<'_>,
+    live: &LiveTransport,
+    seen: &NoisyTransport,
+) -> NoisyTransport {
     let noise = NoiseModel {
         shot: 0.0,
         floor: live.noise().powi(2),
@@ -122,12 +120,12 @@ fn again(known: &Known<'_>, live: &LiveTransport, seen: &Seen) -> Seen {
         .select_rows(&live.chosen)
         .select_columns(&live.chosen);
     // The photograph of white is as good as it was, so none is taken again.
-    Seen::new(&columns, seen.flood.clone())
+    NoisyTransport::new(&columns, seen.flood.clone())
 }
 
 /// Natural images in camera units between live cells, white as bright as flood light in
 /// the darkest tenth of the cells.
-fn wanted(known: &Known<'_>, live: &LiveTransport, seen: &Seen) -> DMatrix<f64> {
+fn wanted(known: &KnownTransport<'_>, live: &LiveTransport, seen: &NoisyTransport) -> DMatrix<f64> {
     let mut flood: Vec<f64> = seen.flood.iter().copied().collect();
     flood.sort_by(f64::total_cmp);
     let white = flood[flood.len() / 10];
@@ -136,17 +134,16 @@ fn wanted(known: &Known<'_>, live: &LiveTransport, seen: &Seen) -> DMatrix<f64> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::super::{Exact, FloodGain};
     use super::*;
-    use crate::Truth;
-    use iltm_picture::progress::Silent;
+    use crate::test_scene::TestScene;
+    use crate::{Answer, GroundTruth};
     use iltm_runtime::Grid;
-    use iltm_scene::coaxial::{Panels, Scene};
+    use iltm_scene::coaxial::{CoaxialScene, Panels};
 
     #[test]
     fn where_nothing_is_hard_next_to_nothing_is_given_up() {
-        let before = Before::panels(5, 8);
+        let before = TestScene::panels(5, 8);
         assert!(
             before.error(&Tikhonov) < 1e-3,
             "{}",
@@ -158,17 +155,17 @@ mod tests {
     /// is mostly noise is worth little, but never less than that photograph.
     #[test]
     fn with_noise_it_is_better_than_the_inverse_and_no_worse_than_gains() {
-        let before = Before::panels(8, 12);
+        let before = TestScene::panels(8, 12);
         let truth = before.truth();
         let noisy = before.noisy(1e-4);
         let each = DMatrix::identity(96, 96);
         let transport = noisy.rig.clone().photograph(&each);
-        let known = Known {
+        let known = KnownTransport {
             transport: &transport,
             ..noisy.known()
         };
         let error = |method: &dyn Inversion| {
-            let found = method.invert(known, &Silent).unwrap();
+            let found = method.invert(known).unwrap();
             truth.judge(&found.answer).compensation
         };
         assert!(error(&Tikhonov) < 0.8 * error(&Exact));
@@ -179,15 +176,16 @@ mod tests {
     fn behind_a_blur_it_shows_images_better_than_the_inverse() {
         let grid = Grid::new(9, 12).unwrap();
         let panels = Panels::m_shape(grid, 75.0);
-        let sharp = Before::scene(&Scene::new(grid, &panels, 0.7));
-        let blurred =
-            Before::scene(&Scene::new(grid, &panels, 0.7).blurred(iltm_solve::blur(grid, 0.7)));
+        let sharp = TestScene::scene(&CoaxialScene::new(grid, &panels, 0.7));
+        let blurred = TestScene::scene(
+            &CoaxialScene::new(grid, &panels, 0.7).blurred(iltm_solve::blur(grid, 0.7)),
+        );
         let images = sharp.truth().images;
-        let truth = Truth {
+        let truth = GroundTruth {
             images,
             ..blurred.truth()
         };
-        let found = Tikhonov.invert(blurred.known(), &Silent).unwrap();
+        let found = Tikhonov.invert(blurred.known()).unwrap();
         let exact = Answer::Inverse(truth.inverse.clone());
         let (ours, theirs) = (truth.judge(&found.answer), truth.judge(&exact));
         assert!(

@@ -5,10 +5,10 @@
 //! Inverse Preconditioners*, SIAM Journal on Scientific Computing 2000.
 
 use super::live::{LiveTransport, finite};
-use super::{Inversion, Inverted, Known};
-use crate::{Answer, Source, Unfit};
-use iltm_picture::progress::Progress;
-use iltm_solve::{Basis, Haar};
+use super::{Inversion, Inverted, KnownTransport};
+use crate::rig::clear_dead;
+use crate::{Citation, Description, Unfit};
+use iltm_solve::Haar;
 use nalgebra::{DMatrix, DVector};
 
 /// The sparse matrix `M` in Haar that brings `T^ M` nearest to the identity, column by
@@ -20,51 +20,43 @@ pub struct WaveletInverse {
 }
 
 impl Inversion for WaveletInverse {
-    fn name(&self) -> String {
-        format!(
-            "wavelet sparse approximate inverse, {} a cell",
-            self.entries
-        )
-    }
-
-    fn source(&self) -> Source {
-        Source {
-            authors: "Chan, Tang, Wan; Chow (A Priori Sparsity Patterns, SISC 2000)",
-            title: "Wavelet Sparse Approximate Inverse Preconditioners",
-            venue: "BIT Numerical Mathematics",
-            year: 1997,
+    fn description(&self) -> Description {
+        Description {
+            name: format!(
+                "wavelet sparse approximate inverse, {} a cell",
+                self.entries
+            ),
+            source: Citation {
+                authors: "Chan, Tang, Wan; Chow (A Priori Sparsity Patterns, SISC 2000)",
+                title: "Wavelet Sparse Approximate Inverse Preconditioners",
+                venue: "BIT Numerical Mathematics",
+                year: 1997,
+            },
+            how: "The transport is transformed to Haar; where its largest elements are, those of \
+                the inverse are looked for, each column by least squares. Texture spreads elements \
+                over all of the transform, so that it costs accuracy.",
         }
     }
 
-    fn how(&self) -> &'static str {
-        "The transport is transformed to Haar; where its largest elements are, those of the \
-         inverse are looked for, each column by least squares. Texture spreads elements over \
-         all of the transform, so that it costs accuracy."
-    }
-
-    fn invert(&self, known: Known<'_>, _progress: &dyn Progress) -> Result<Inverted, Unfit> {
+    fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
         let live = LiveTransport::new(&known)?;
-        let haar = Haar::new(known.grid, Basis::QuadTree);
+        let haar = Haar::new(known.grid);
         let transformed = haar.analyse_operator(&filled(&known, &live));
         let patterns = patterns(&transformed, self.entries);
         let stored: usize = patterns.iter().map(Vec::len).sum();
         let sparse = fitted(&transformed, &patterns)?;
         let off = &transformed * &sparse - DMatrix::identity(sparse.nrows(), sparse.ncols());
         let mut inverse = haar.synthesise_operator(&sparse);
-        for cell in (0..known.live.len()).filter(|cell| !known.live[*cell]) {
-            inverse.row_mut(cell).fill(0.0);
-            inverse.column_mut(cell).fill(0.0);
-        }
-        Ok(Inverted {
-            answer: Answer::Inverse(finite(inverse)?),
-            multiplications: Some(stored as f64 + haar_multiplications(known.live.len())),
-            photographs: 0,
-            remark: format!(
+        clear_dead(&mut inverse, known.live);
+        Ok(Inverted::matrix(
+            finite(inverse)?,
+            stored as f64 + haar_multiplications(known.live.len()),
+            format!(
                 "{:.1} elements a cell; |T M - I| {:.3} a cell",
                 stored as f64 / live.len() as f64,
                 off.norm() / (off.nrows() as f64).sqrt()
             ),
-        })
+        ))
     }
 }
 
@@ -76,7 +68,7 @@ pub(super) fn haar_multiplications(cells: usize) -> f64 {
 
 /// `T` with the mean of its diagonal for cells that are not live, so that it can be
 /// inverted.
-fn filled(known: &Known<'_>, live: &LiveTransport) -> DMatrix<f64> {
+fn filled(known: &KnownTransport<'_>, live: &LiveTransport) -> DMatrix<f64> {
     let mean = live.transport.trace() / live.len() as f64;
     let mut transport = live.whole(&live.transport);
     for cell in (0..known.live.len()).filter(|cell| !known.live[*cell]) {
@@ -122,18 +114,18 @@ fn fitted(transformed: &DMatrix<f64>, patterns: &[Vec<usize>]) -> Result<DMatrix
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scene::Before;
     use super::*;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn a_full_pattern_is_the_inverse() {
-        let before = Before::textured(4, 8);
+        let before = TestScene::textured(4, 8);
         assert!(before.error(&WaveletInverse { entries: 31 }) < 1e-9);
     }
 
     #[test]
     fn more_elements_bring_it_nearer() {
-        let before = Before::panels(7, 9);
+        let before = TestScene::panels(7, 9);
         let errors = [0, 4, 16, 62].map(|entries| before.error(&WaveletInverse { entries }));
         assert!(
             errors.windows(2).all(|pair| pair[1] < pair[0]),
@@ -144,7 +136,7 @@ mod tests {
     /// In Haar a sphere's transport is diagonal: only the constant image differs.
     #[test]
     fn a_spheres_transport_needs_the_diagonal_alone() {
-        let before = Before::sphere(4, 8, 0.8);
+        let before = TestScene::sphere(4, 8, 0.8);
         assert!(before.error(&WaveletInverse { entries: 0 }) < 1e-12);
     }
 }

@@ -1,14 +1,14 @@
-//! The paper's claims, and this project's, judged draw by draw.
+//! Claims of the paper, and this project's, judged draw by draw.
 
 use super::scenes::Condition;
 use super::sections::find;
-use super::seeds::{Mean, SEEDS, Sample};
+use super::seeds::{DrawErrors, Mean, SEEDS};
 use crate::table;
 use iltm_solve::Method;
 use std::fmt::Write;
 
 /// The paper's claims, and whether they hold.
-pub(super) fn claims(text: &mut String, samples: &[Sample]) {
+pub(super) fn claims(text: &mut String, samples: &[DrawErrors]) {
     let _ = writeln!(text, "\n## The paper's claim\n");
     let _ = writeln!(
         text,
@@ -29,10 +29,9 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
             let _ = writeln!(
                 text,
                 "- {}, {photographs} photographs: **{}**. Direct is better in {wins} of {all} \
-                 draws; two-stage errs {} as much on average.",
+                 draws; two-stage errs {ratio:.2} times as much on average.",
                 condition.name(),
                 verdict(wins, all),
-                times(ratio),
             );
         }
     }
@@ -47,7 +46,7 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
             continue;
         };
         let (wins, all) = own.wins(direct);
-        let means = |sample: &Sample| {
+        let means = |sample: &DrawErrors| {
             let compensation = Mean::of(&sample.compensation());
             let second = Mean::of(&sample.second_bounce());
             (table::error(second.mean), table::error(compensation.mean))
@@ -70,7 +69,7 @@ pub(super) fn claims(text: &mut String, samples: &[Sample]) {
 }
 
 /// With how many photographs this project's second bounce is better than another's.
-fn fewest(samples: &[Sample], condition: Condition, other: &Sample) -> String {
+fn fewest(samples: &[DrawErrors], condition: Condition, other: &DrawErrors) -> String {
     let own = samples
         .iter()
         .filter(|s| s.condition == condition && s.method == Method::Joint);
@@ -99,10 +98,6 @@ fn verdict(wins: usize, all: usize) -> &'static str {
     } else {
         "a tie"
     }
-}
-
-fn times(ratio: f64) -> String {
-    format!("{ratio:.2} times")
 }
 
 #[cfg(test)]

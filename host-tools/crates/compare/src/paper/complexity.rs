@@ -1,12 +1,11 @@
-//! Time against cells and photographs, and the exponents that fit it.
+//! Complexity: time against cells and photographs, and the exponents that fit it.
 
 use super::scenes::{grid, panels};
-use iltm_capture::{Role, columns, pattern_set};
-use iltm_picture::progress::{Progress, Silent};
+use crate::acquisition::{patterns, solved};
+use iltm_capture::columns;
+use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
-use iltm_solve::{
-    CellNoise, Method, Observed, ObservedChannel, SolveOptions, inverted, solve_observed,
-};
+use iltm_solve::{CellNoise, Method, inverted};
 use std::time::Instant;
 
 /// Grids whose time is taken, with [`PHOTOGRAPHS`].
@@ -72,41 +71,16 @@ pub(super) fn run(progress: &dyn Progress) -> Vec<Timed> {
 fn time(method: Method, grid: Grid, photographs: usize) -> Option<Timed> {
     let scene = panels(grid);
     let transport = scene.transport();
-    let taken: Vec<_> = pattern_set(grid, photographs, 1)
-        .into_iter()
-        .filter(|(role, _)| *role != Role::Black)
-        .filter(|(role, _)| {
-            method == Method::Joint || matches!(role, Role::White | Role::Bernoulli)
-        })
-        .take(photographs)
-        .collect();
-    let patterns = columns(&taken);
-    let roles: Vec<Role> = taken.iter().map(|(role, _)| *role).collect();
-    let (light, live) = (&transport * &patterns, scene.covered());
-    let ambient = vec![0.0; grid.cells()];
+    let taken = patterns(method, grid, photographs, 1);
+    let (light, live) = (&transport * columns(&taken), scene.covered());
     let none = CellNoise {
         lit: 0.0,
         unlit: 0.0,
     };
-    let observed = Observed {
-        grid,
-        patterns: &patterns,
-        roles: &roles,
-        live: &live,
-        channels: vec![ObservedChannel {
-            light: &light,
-            ambient: &ambient,
-            noise: vec![none; grid.cells()],
-        }],
-        blur: 0.0,
-    };
-    let options = SolveOptions {
-        method,
-        ..SolveOptions::default()
-    };
     let mut best: Option<Timed> = None;
     for _ in 0..RUNS {
-        let (_, report) = solve_observed(&observed, &options, &Silent).ok()?;
+        let channel = (&light, vec![none; grid.cells()]);
+        let (_, report) = solved(method, (grid, &live), &taken, channel).ok()?;
         let start = Instant::now();
         inverted(&transport, &live)?;
         let inversion = start.elapsed().as_secs_f64();
@@ -116,7 +90,7 @@ fn time(method: Method, grid: Grid, photographs: usize) -> Option<Timed> {
         best = Some(Timed {
             method,
             cells: grid.cells(),
-            photographs: roles.len(),
+            photographs: taken.len(),
             seconds,
             iterations: report.convergence.iterations.max(1),
             inversion,

@@ -1,4 +1,4 @@
-//! The paper's experiments again, with intervals, and what came of its claims.
+//! Reproduction of the paper's experiments, with intervals, and what came of its claims.
 //!
 //! Chu, Ng, Pahwa, Quek, Huang, *Compressive Inverse Light Transport* (BMVC 2011).
 //!
@@ -9,7 +9,6 @@
 //! second_bounce Figs. 3 and 4: pictures
 //! seeds         Fig. 4's comparison over many patterns, with intervals
 //! complexity    time against cells and photographs
-//! sample        what accuracy costs in time, and bounces, of the carried photographs
 //! results       the page that shows all of it                    claims, sections
 //! ```
 
@@ -17,7 +16,6 @@ mod claims;
 mod complexity;
 mod feasible;
 mod results;
-mod sample;
 mod scenes;
 mod second_bounce;
 mod sections;
@@ -34,4 +32,14 @@ pub struct File {
     pub name: String,
     /// Contents.
     pub bytes: Vec<u8>,
+}
+
+impl File {
+    /// A file of this name and with these contents.
+    pub fn new(name: &str, contents: impl Into<Vec<u8>>) -> Self {
+        Self {
+            name: name.to_owned(),
+            bytes: contents.into(),
+        }
+    }
 }

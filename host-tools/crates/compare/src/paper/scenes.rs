@@ -1,9 +1,9 @@
-//! The scene of the paper's simulations: M-shaped panels on 13 x 21 cells.
+//! M-shaped panels, the scene of the paper's simulations: M-shaped panels on 13 x 21 cells.
 
-use crate::{Rig, Truth};
+use crate::{GroundTruth, Rig};
 use iltm_capture::NoiseModel;
 use iltm_runtime::Grid;
-use iltm_scene::coaxial::{Panels, Scene};
+use iltm_scene::coaxial::{CoaxialScene, Panels};
 
 /// Rows and columns of the paper's grid.
 const GRID: (u16, u16) = (13, 21);
@@ -51,7 +51,7 @@ impl Condition {
     }
 
     /// The scene with a texture by `seed`.
-    pub(super) fn scene(self, seed: u64) -> Scene {
+    pub(super) fn scene(self, seed: u64) -> CoaxialScene {
         let scene = panels(grid(GRID));
         if self.textured {
             scene.textured(TEXTURE.0, TEXTURE.1, seed)
@@ -63,10 +63,10 @@ impl Condition {
     /// What answers are judged by and photographed with, by `seed`; `None` if the scene
     /// has no inverse, which none of these lacks.
     #[must_use]
-    pub fn world(self, seed: u64) -> Option<(Truth, Rig)> {
+    pub fn world(self, seed: u64) -> Option<(GroundTruth, Rig)> {
         let scene = self.scene(seed);
         let live = scene.covered();
-        let truth = Truth::new(scene.grid, scene.transport(), live.clone())?;
+        let truth = GroundTruth::new(scene.grid, scene.transport(), live.clone())?;
         let mut noise = NoiseModel::default();
         if self.noisy {
             let flood = truth.flood();
@@ -84,8 +84,8 @@ pub(super) const fn surface(textured: bool) -> &'static str {
 }
 
 /// The panels in cells of `grid`.
-pub(super) fn panels(grid: Grid) -> Scene {
-    Scene::new(grid, &Panels::m_shape(grid, WEDGE), ALBEDO)
+pub(super) fn panels(grid: Grid) -> CoaxialScene {
+    CoaxialScene::new(grid, &Panels::m_shape(grid, WEDGE), ALBEDO)
 }
 
 /// A grid of these rows and columns.

@@ -2,11 +2,10 @@
 
 use super::scenes::Condition;
 use crate::acquisition::{Acquisition, Sparse};
-use crate::sheet::{Tile, sheet};
-use crate::{Found, Rig, Truth};
-use iltm_picture::{ColourScale, Palette, Picture, progress::Silent};
+use crate::{GroundTruth, Rig};
+use iltm_picture::{ColourScale, ContactSheet, Palette, Picture, Tile};
 use iltm_runtime::FrameSize;
-use iltm_solve::{Method, inverted};
+use iltm_solve::Method;
 use nalgebra::{DMatrix, DVector};
 
 /// Photographs of Fig. 3.
@@ -33,11 +32,10 @@ pub(super) struct Lit {
 #[must_use]
 pub(super) fn panels() -> Option<(Picture, Vec<Lit>)> {
     let (truth, rig) = Condition::ALL[0].world(1)?;
+    let size = FrameSize::of_grid(truth.grid);
     let found = found(Method::Direct, PHOTOGRAPHS, &rig, &truth)?;
-    let mut lights = vec![(
-        "flood".to_owned(),
-        DVector::from_element(truth.live.len(), 1.0),
-    )];
+    let white = DVector::from_element(truth.live.len(), 1.0);
+    let mut lights = vec![("flood".to_owned(), white)];
     for panel in 0..PANELS {
         let lit = (0..truth.live.len()).map(|cell| {
             let col = cell % truth.grid.cols();
@@ -56,24 +54,17 @@ pub(super) fn panels() -> Option<(Picture, Vec<Lit>)> {
         let seen = truth.second_bounce_by(&found, &light);
         let error = (&seen - &wanted).norm() / wanted.norm();
         let bright = wanted.max();
-        let tile = |words: (&str, &str), values: &DVector<f64>| {
-            Tile::light(words, truth.grid, values.iter().copied(), bright)
-        };
-        let photograph = Tile::light(
-            (&name, "photograph"),
-            truth.grid,
-            light.iter().copied(),
-            light.max(),
-        );
-        rows[0].push(photograph);
-        rows[1].push(tile(
-            ("second bounce", &format!("found, error {error:.4}")),
-            &seen,
-        ));
-        rows[2].push(tile(("second bounce", "true"), &wanted));
+        let found = ("second bounce", &*format!("found, error {error:.4}"));
+        rows[0].push(tile((&name, "photograph"), size, &light, light.max()));
+        rows[1].push(tile(found, size, &seen, bright));
+        rows[2].push(tile(("second bounce", "true"), size, &wanted, bright));
         errors.push(Lit { name, error });
     }
-    Some((sheet(&rows, None)?, errors))
+    let sheet = ContactSheet {
+        rows,
+        ..ContactSheet::default()
+    };
+    Some((sheet.compose()?, errors))
 }
 
 /// Fig. 4: the second bounce under white by both methods, and where it errs.
@@ -84,18 +75,9 @@ pub(super) fn compared(condition: Condition) -> Option<Picture> {
     let bright = wanted.max();
     let scale = ColourScale::linear(Palette::Magma, WORST);
     let size = FrameSize::of_grid(truth.grid);
-    let mut first = vec![Tile::light(
-        ("true", "second bounce"),
-        truth.grid,
-        wanted.iter().copied(),
-        bright,
-    )];
-    let mut second = vec![Tile::light(
-        ("flood", "photograph"),
-        truth.grid,
-        truth.flood().iter().copied(),
-        truth.flood().max(),
-    )];
+    let flood = truth.flood();
+    let mut first = vec![tile(("true", "second bounce"), size, wanted, bright)];
+    let mut second = vec![tile(("flood", "photograph"), size, &flood, flood.max())];
     for (method, name, photographs) in [
         (Method::TwoStage, "two-stage", COMPARED[0]),
         (Method::Direct, "direct", COMPARED[0]),
@@ -104,34 +86,37 @@ pub(super) fn compared(condition: Condition) -> Option<Picture> {
         (Method::Joint, "iltm", 50),
     ] {
         let found = found(method, photographs, &rig, &truth)?;
-        let seen = truth.second_bounce_by(&found, &truth.flood());
+        let seen = truth.second_bounce_by(&found, &flood);
         let error = (&seen - wanted).norm() / wanted.norm();
         let title = format!("{name}, {photographs}");
         let caption = format!("error {error:.4}");
-        let values = seen.iter().copied();
-        first.push(Tile::light((&title, &caption), truth.grid, values, bright));
+        first.push(tile((&title, &caption), size, &seen, bright));
         let off = (&seen - wanted).map(|value| value.abs() / bright);
-        let values = off.iter().copied();
-        second.push(Tile::scaled(
-            (&title, "where it errs"),
-            size,
-            values,
-            &scale,
-        ));
+        let words = (&*title, "where it errs");
+        second.push(Tile::scaled(words, size, off.iter().copied(), &scale));
     }
-    sheet(
-        &[first, second],
-        Some((
+    let sheet = ContactSheet {
+        rows: vec![first, second],
+        bar: Some((
             &scale,
             "error of the second bounce, relative to its brightest cell",
         )),
-    )
+        ..ContactSheet::default()
+    };
+    sheet.compose()
 }
 
-fn found(method: Method, photographs: usize, rig: &Rig, truth: &Truth) -> Option<DMatrix<f64>> {
-    let acquired = Sparse::new(method, photographs, 1).acquire(&mut rig.clone(), &Silent);
-    match acquired.ok()? {
-        Found::Inverse(inverse) => Some(inverse),
-        Found::Forward(transport) => inverted(&transport, &truth.live),
-    }
+/// Light of each cell, white at `bright`, below its words.
+fn tile(words: (&str, &str), size: FrameSize, light: &DVector<f64>, bright: f64) -> Tile {
+    Tile::light(words, size, light.iter().copied(), bright)
+}
+
+fn found(
+    method: Method,
+    photographs: usize,
+    rig: &Rig,
+    truth: &GroundTruth,
+) -> Option<DMatrix<f64>> {
+    let acquired = Sparse::new(method, photographs, 1).acquire(&mut rig.clone());
+    acquired.ok()?.inverse(&truth.live)
 }

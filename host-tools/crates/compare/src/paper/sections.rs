@@ -1,15 +1,15 @@
-//! The words and tables of the page, each from its numbers.
+//! Sections of the experiments page: words and tables, each from its numbers.
 
 use super::complexity::{self, Timed};
-use super::feasible::Place;
-use super::sample::Sample as Pictures;
+use super::feasible::TheoremBounds;
+use super::results::CapturePictures;
 use super::scenes::{Condition, surface};
 use super::second_bounce::Lit;
-use super::seeds::{ENTRIES, Mean, SEEDS, Sample};
+use super::seeds::{DrawErrors, ENTRIES, Mean, SEEDS};
 use super::sparsity::{Counted, INVERSE_IN_HAAR, PARTS};
-use crate::contest::Row;
+use crate::benchmark::BenchmarkRow;
 use crate::table;
-use iltm_solve::{Method, recovery::LIMIT};
+use iltm_solve::{Method, restricted_isometry::LIMIT};
 use std::fmt::Write;
 
 /// What the page says of a method with so many photographs.
@@ -25,17 +25,17 @@ pub(super) fn words(method: Method, photographs: usize) -> String {
 
 /// The sample of a condition and method.
 pub(super) fn find(
-    samples: &[Sample],
+    samples: &[DrawErrors],
     condition: Condition,
     entry: (Method, usize),
-) -> Option<&Sample> {
+) -> Option<&DrawErrors> {
     samples.iter().find(|sample| {
         sample.condition == condition && (sample.method, sample.photographs) == entry
     })
 }
 
 /// Fig. 4.
-pub(super) fn fourth(text: &mut String, samples: &[Sample]) {
+pub(super) fn fourth(text: &mut String, samples: &[DrawErrors]) {
     let _ = writeln!(
         text,
         "\n## Fig. 4: the second bounce, by method\n\n\
@@ -45,16 +45,20 @@ pub(super) fn fourth(text: &mut String, samples: &[Sample]) {
          and its 95 % interval (`fig4.csv` has each):\n\n\
          ![Errors of the second bounce over the draws](fig4-seeds.svg)\n"
     );
-    let names: Vec<&str> = Condition::ALL.iter().map(|c| c.name()).collect();
-    let _ = writeln!(text, "| second bounce | {} |", names.join(" | "));
-    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
-    rows(text, samples, Sample::second_bounce);
-    let _ = writeln!(text, "\n| compensation | {} |", names.join(" | "));
-    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
-    rows(text, samples, Sample::compensation);
+    rows(text, samples, ("second bounce", DrawErrors::second_bounce));
+    text.push('\n');
+    rows(text, samples, ("compensation", DrawErrors::compensation));
 }
 
-fn rows(text: &mut String, samples: &[Sample], of: fn(&Sample) -> Vec<f64>) {
+/// Means of an error, a row a method and a column a condition.
+fn rows(
+    text: &mut String,
+    samples: &[DrawErrors],
+    (name, of): (&str, fn(&DrawErrors) -> Vec<f64>),
+) {
+    let names = Condition::ALL.map(Condition::name);
+    let _ = writeln!(text, "| {name} | {} |", names.join(" | "));
+    let _ = writeln!(text, "|---|{}", "---:|".repeat(names.len()));
     for (method, photographs) in ENTRIES {
         let cell = |condition: &Condition| {
             let Some(sample) = find(samples, *condition, (method, photographs)) else {
@@ -69,12 +73,8 @@ fn rows(text: &mut String, samples: &[Sample], of: fn(&Sample) -> Vec<f64>) {
             format!("{} \u{b1} {half}{refused}", table::error(mean.mean))
         };
         let cells: Vec<String> = Condition::ALL.iter().map(cell).collect();
-        let _ = writeln!(
-            text,
-            "| {} | {} |",
-            words(method, photographs),
-            cells.join(" | ")
-        );
+        let (words, cells) = (words(method, photographs), cells.join(" | "));
+        let _ = writeln!(text, "| {words} | {cells} |");
     }
 }
 
@@ -92,13 +92,8 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
     let _ = writeln!(text, "|---|---|{}", "---:|".repeat(parts.len()));
     for counted in counts {
         let scene = surface(counted.textured);
-        let cells = counted.counts.map(|count| count.to_string());
-        let _ = writeln!(
-            text,
-            "| {scene} | {} | {} |",
-            counted.name,
-            cells.join(" | ")
-        );
+        let cells = counted.counts.map(|count| count.to_string()).join(" | ");
+        let _ = writeln!(text, "| {scene} | {} | {cells} |", counted.name);
     }
     let _ = writeln!(
         text,
@@ -109,7 +104,7 @@ pub(super) fn sparse(text: &mut String, counts: &[Counted]) {
 }
 
 /// Fig. 2.
-pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
+pub(super) fn second(text: &mut String, places: &[TheoremBounds], counts: &[Counted]) {
     let _ = writeln!(
         text,
         "\n## Fig. 2: what the theorem promises\n\n\
@@ -134,15 +129,10 @@ pub(super) fn second(text: &mut String, places: &[Place], counts: &[Counted]) {
             place.photographs, place.k, place.kappa, place.gamma, place.product.0, place.product.1
         );
     }
-    let inside = places
-        .iter()
-        .filter(|place| place.product.1 < LIMIT)
-        .count();
-    let open = places
-        .iter()
-        .filter(|place| place.product.0 < LIMIT)
-        .count()
-        - inside;
+    let below =
+        |bound: fn(&TheoremBounds) -> f64| places.iter().filter(|p| bound(p) < LIMIT).count();
+    let inside = below(|place| place.product.1);
+    let open = below(|place| place.product.0) - inside;
     let a_row = |textured: bool| {
         let own = |c: &&Counted| c.textured == textured && c.name == INVERSE_IN_HAAR;
         let counted = counts.iter().find(own);
@@ -223,7 +213,7 @@ pub(super) fn cost(text: &mut String, timed: &[Timed]) {
 }
 
 /// What accuracy costs in time, and bounces, on photographs.
-pub(super) fn time(text: &mut String, pictures: &Pictures) {
+pub(super) fn time(text: &mut String, pictures: &CapturePictures) {
     let (direct, second) = pictures.shares;
     let _ = writeln!(
         text,
@@ -244,19 +234,16 @@ pub(super) fn time(text: &mut String, pictures: &Pictures) {
 }
 
 /// Every method on the same light.
-pub(super) fn every(text: &mut String, contests: &[(&str, Vec<Row>, Vec<Row>)]) {
+pub(super) fn every(text: &mut String, contests: &[(&str, Vec<BenchmarkRow>, Vec<BenchmarkRow>)]) {
     let _ = writeln!(text, "\n## Every method on the same light\n");
     for (scene, photographed, inverted) in contests {
-        let _ = writeln!(
-            text,
-            "### Ways to photograph, {scene}\n\n{}",
-            table::markdown(photographed)
-        );
-        let _ = writeln!(
-            text,
-            "### Ways to invert or to do without an inverse, {scene}\n\n{}",
-            table::markdown(inverted)
-        );
+        for (ways, rows) in [
+            ("photograph", photographed),
+            ("invert or to do without an inverse", inverted),
+        ] {
+            let rows = table::markdown(rows);
+            let _ = writeln!(text, "### Ways to {ways}, {scene}\n\n{rows}");
+        }
     }
     let Some((_, photographed, inverted)) = contests.first() else {
         return;
@@ -266,12 +253,14 @@ pub(super) fn every(text: &mut String, contests: &[(&str, Vec<Row>, Vec<Row>)]) 
 }
 
 /// Where methods come from; rows that differ in a parameter only stand together.
-fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r Row>) {
-    let rows: Vec<&Row> = rows.collect();
-    for alike in rows.chunk_by(|a, b| (a.source, a.how) == (b.source, b.how)) {
+fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r BenchmarkRow>) {
+    let rows: Vec<&BenchmarkRow> = rows.collect();
+    for alike in
+        rows.chunk_by(|a, b| (a.method.source, a.method.how) == (b.method.source, b.method.how))
+    {
         let names: Vec<String> = alike
             .iter()
-            .map(|row| format!("**{}**", row.name))
+            .map(|row| format!("**{}**", row.method.name))
             .collect();
         let remarks: Vec<&str> = alike
             .iter()
@@ -279,7 +268,7 @@ fn sources<'r>(text: &mut String, rows: impl Iterator<Item = &'r Row>) {
             .map(|done| done.remark.as_str())
             .filter(|remark| !remark.is_empty())
             .collect();
-        let (source, how) = (alike[0].source, alike[0].how);
+        let (source, how) = (alike[0].method.source, alike[0].method.how);
         let _ = write!(text, "- {}: {source}. {how}", names.join("; "));
         if !remarks.is_empty() {
             let _ = write!(text, " Here: {}.", remarks.join("; "));

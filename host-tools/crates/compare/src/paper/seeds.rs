@@ -1,11 +1,11 @@
-//! The paper's comparison, direct against two-stage, over many draws of patterns,
+//! Repeated draws: the paper's comparison, direct against two-stage, over many draws of patterns,
 //! noise and texture.
 
 use super::scenes::Condition;
+use crate::Answer;
 use crate::acquisition::{Acquisition, Sparse};
-use crate::{Answer, Found};
-use iltm_picture::progress::{Progress, Silent};
-use iltm_solve::{Method, inverted};
+use iltm_picture::progress::Progress;
+use iltm_solve::Method;
 
 /// Draws of everything that is random.
 pub const SEEDS: u64 = 20;
@@ -29,7 +29,7 @@ pub const ENTRIES: [(Method, usize); 9] = [
 /// Errors of one method in one condition, by seed; those that were refused are left
 /// out and counted.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Sample {
+pub struct DrawErrors {
     /// Light and camera.
     pub condition: Condition,
     /// The method.
@@ -65,7 +65,7 @@ impl Mean {
     }
 }
 
-impl Sample {
+impl DrawErrors {
     /// Second-bounce errors.
     #[must_use]
     pub fn second_bounce(&self) -> Vec<f64> {
@@ -94,13 +94,13 @@ impl Sample {
 
 /// Runs methods, with so many photographs each, in all conditions over `seeds` draws.
 #[must_use]
-pub fn run(seeds: u64, entries: &[(Method, usize)], progress: &dyn Progress) -> Vec<Sample> {
+pub fn run(seeds: u64, entries: &[(Method, usize)], progress: &dyn Progress) -> Vec<DrawErrors> {
     let total = Condition::ALL.len() as u64 * seeds;
     progress.begin("the paper's comparison", total);
-    let mut samples: Vec<Sample> = Condition::ALL
+    let mut samples: Vec<DrawErrors> = Condition::ALL
         .iter()
         .flat_map(|condition| {
-            entries.iter().map(|(method, photographs)| Sample {
+            entries.iter().map(|(method, photographs)| DrawErrors {
                 condition: *condition,
                 method: *method,
                 photographs: *photographs,
@@ -120,19 +120,14 @@ pub fn run(seeds: u64, entries: &[(Method, usize)], progress: &dyn Progress) -> 
     samples
 }
 
-fn one(condition: Condition, seed: u64, samples: &mut dyn Iterator<Item = &mut Sample>) {
+fn one(condition: Condition, seed: u64, samples: &mut dyn Iterator<Item = &mut DrawErrors>) {
     let Some((truth, rig)) = condition.world(seed) else {
         return;
     };
     for sample in samples {
         let method = Sparse::new(sample.method, sample.photographs, seed);
-        let found = method.acquire(&mut rig.clone(), &Silent);
-        let inverse = match found {
-            Ok(Found::Inverse(inverse)) => Some(inverse),
-            Ok(Found::Forward(transport)) => inverted(&transport, &truth.live),
-            Err(_) => None,
-        };
-        match inverse {
+        let found = method.acquire(&mut rig.clone());
+        match found.ok().and_then(|found| found.inverse(&truth.live)) {
             Some(inverse) => {
                 let errors = truth.judge(&Answer::Inverse(inverse));
                 let second = errors.second_bounce.unwrap_or(f64::INFINITY);
@@ -158,7 +153,7 @@ mod tests {
 
     #[test]
     fn wins_are_counted_seed_by_seed() {
-        let sample = |errors: &[(u64, f64, f64)]| Sample {
+        let sample = |errors: &[(u64, f64, f64)]| DrawErrors {
             condition: Condition::ALL[0],
             method: Method::Direct,
             photographs: 1,

@@ -1,10 +1,9 @@
 //! Fig. 1: how few coefficients hold the energy of `T` and of `T^-1`.
 
 use super::scenes::Condition;
-use crate::sheet::{Tile, sheet};
-use iltm_picture::{ColourScale, Palette, Picture};
+use iltm_picture::{ColourScale, ContactSheet, Palette, Picture, Tile};
 use iltm_runtime::FrameSize;
-use iltm_solve::{Basis, Haar};
+use iltm_solve::Haar;
 use nalgebra::DMatrix;
 
 /// Parts of the energy that are counted for.
@@ -37,7 +36,7 @@ struct Matrices {
 
 fn matrices(condition: Condition) -> Option<Matrices> {
     let (truth, _) = condition.world(1)?;
-    let haar = Haar::new(truth.grid, Basis::QuadTree);
+    let haar = Haar::new(truth.grid);
     let mut operator = truth.inverse.clone();
     operator.fill_diagonal(0.0);
     Some(Matrices {
@@ -111,14 +110,15 @@ pub(super) fn picture() -> Option<Picture> {
         };
         Some(named.into_iter().map(tile).collect())
     };
-    let rows = [row(Condition::ALL[0])?, row(Condition::ALL[2])?];
-    sheet(
-        &rows,
-        Some((
+    let sheet = ContactSheet {
+        rows: vec![row(Condition::ALL[0])?, row(Condition::ALL[2])?],
+        bar: Some((
             &scale,
             "magnitude, relative to the matrix's largest; uniform panels above, textured below",
         )),
-    )
+        ..ContactSheet::default()
+    };
+    sheet.compose()
 }
 
 #[cfg(test)]

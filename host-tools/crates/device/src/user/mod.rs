@@ -5,7 +5,7 @@
 //! |---|---|
 //! | settings: the port, and ports never to open | [`config`] |
 //! | ports of emulated boards that run now | [`emulated`] |
-//! | folders, and transcripts of the last transfers for `iltm report` | here |
+//! | folders, and transcripts of the last transfers for `iltm support-bundle` | here |
 
 pub mod config;
 pub mod emulated;
@@ -64,7 +64,7 @@ pub fn begin_transcript(folders: &Folders) -> io::Result<File> {
     for old in transcripts(folders).into_iter().skip(KEPT - 1) {
         let _ = fs::remove_file(old);
     }
-    let now = jiff::Zoned::now().strftime("%Y%m%d-%H%M%S%.3f");
+    let now = chrono::Local::now().format("%Y%m%d-%H%M%S%.3f");
     File::create(folder.join(format!("flash-{now}-{}.txt", std::process::id())))
 }
 

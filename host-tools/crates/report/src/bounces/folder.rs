@@ -12,8 +12,8 @@
 use super::Bounces;
 use super::separate::{Layer, LayerKind, Separated};
 use super::sheet::sheet;
+use crate::frame_size;
 use iltm_picture::{FolderError, Picture, Samples, WholeFolder, png};
-use iltm_runtime::FrameSize;
 use npyz::WriterBuilder;
 use rayon::prelude::*;
 use std::fmt::Write;
@@ -43,7 +43,7 @@ pub struct FileOf {
 
 /// What was written.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Written {
+pub struct WrittenBounces {
     /// The files, those for people first.
     pub files: Vec<FileOf>,
     /// Largest difference between the photograph and the sum of what the 16-bit
@@ -60,7 +60,7 @@ pub struct Written {
 ///
 /// # Errors
 /// [`FolderError`] if something is in its place or it cannot be written.
-pub fn write(bounces: &Bounces, out: &Path) -> Result<Written, FolderError> {
+pub fn write(bounces: &Bounces, out: &Path) -> Result<WrittenBounces, FolderError> {
     let made = WholeFolder::create(out)?;
     let separated = &bounces.separated;
     let mut files = Vec::new();
@@ -101,7 +101,7 @@ pub fn write(bounces: &Bounces, out: &Path) -> Result<Written, FolderError> {
         add(&name, described(layer), png::encode(&picture))?;
     }
     made.finish()?;
-    Ok(Written {
+    Ok(WrittenBounces {
         files,
         largest_gap_of_pictures: gap(&separated.photograph, &sums),
         largest_gap: separated.largest_gap(),
@@ -137,11 +137,6 @@ fn sixteen_bits(
         source: io::Error::other("a picture of this size cannot be written"),
     })?;
     Ok((picture, light))
-}
-
-/// `None` of more than 65,535 pixels a side.
-pub(super) fn frame_size(width: usize, height: usize) -> Option<FrameSize> {
-    FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)
 }
 
 /// Largest difference between planes and values with the channels side by side.

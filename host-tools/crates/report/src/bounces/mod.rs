@@ -1,5 +1,5 @@
-//! One photograph, bounce by bounce: what came straight from the projector, what
-//! came by way of one other surface, of two, and so on.
+//! Bounce separation: the light of one photograph that came straight from the projector,
+//! that came by way of one other surface, of two, and so on.
 //!
 //! With the light straight from the projector's `F1 = diag(1/g)`, the first bounce
 //! off the wall is `l1 = F1 T^-1 l` (Seitz, Matsushita, Kutulakos, *A Theory of
@@ -9,26 +9,26 @@
 //!
 //! ```text
 //! iltm_capture::LinearPhotograph -> the photograph
-//! capture, solve     -> wall        which cells light a camera pixel by way of others
-//!                       noise       what a bounce has to exceed to be seen
-//!                       separate    one bounce after the other, until the noise
-//!                       folder      pictures, numbers, and
-//!                       sheet       the one that people look at
+//! capture, solve     -> bounce_operator   which cells light a camera pixel by way of others
+//!                       noise             what a bounce has to exceed to be seen
+//!                       separate          one bounce after the other, until the noise
+//!                       folder            pictures, numbers, and
+//!                       sheet             the one that people look at
 //! ```
 
+mod bounce_operator;
 mod folder;
 mod noise;
 mod separate;
 mod sheet;
 #[cfg(test)]
 mod tests;
-mod wall;
 
-pub use folder::{FileOf, Written, write};
-pub use noise::Noise;
+pub use bounce_operator::BounceOperator;
+pub use folder::{FileOf, WrittenBounces, write};
+pub use noise::PhotographNoise;
 pub use separate::{Layer, LayerKind, MOST_BOUNCES, Separated};
-pub use sheet::{percent, sheet, times};
-pub use wall::Wall;
+pub use sheet::sheet;
 
 use iltm_capture::{CaptureError, CaptureOptions, LinearPhotograph, Measurements, Shot};
 use iltm_picture::{FolderError, progress::Progress};
@@ -95,7 +95,7 @@ pub struct Bounces {
     /// The light of each bounce.
     pub separated: Separated,
     /// The camera's noise in the photograph.
-    pub noise: Noise,
+    pub noise: PhotographNoise,
     /// Part of what the camera saw, anywhere in the picture, that was there under
     /// black too and is subtracted.
     pub ambient_share: f64,
@@ -132,7 +132,7 @@ pub fn bounces(
         return Err(BouncesError::Changed { size, channels });
     }
     progress.begin("separating the bounces", 0);
-    let wall = Wall::new(&measurements.registration, &measurements.flood, &inverse);
+    let wall = BounceOperator::new(&measurements.registration, &measurements.flood, &inverse);
     let noise = noise::noise(&wall, &measurements, &photograph);
     let separated = Separated::new(&wall, &photograph.planes, noise.cell)?;
     progress.end();

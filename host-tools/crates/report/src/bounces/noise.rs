@@ -1,7 +1,6 @@
-//! How much of a photograph is the camera's noise: what a bounce has to exceed to be
-//! seen.
+//! Camera noise of one photograph: what a bounce has to exceed to be seen.
 
-use super::wall::Wall;
+use super::bounce_operator::BounceOperator;
 use iltm_capture::{LinearPhotograph, Measurements, NoiseSource};
 
 /// Groups of pixels of similar brightness: light brings its own noise.
@@ -10,7 +9,7 @@ const GROUPS: usize = 16;
 /// The camera's noise in one photograph, black's own noise included: root mean squares
 /// over the wall and all channels, camera units.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Noise {
+pub struct PhotographNoise {
     /// Of one pixel.
     pub pixel: f64,
     /// Of the mean over a cell's pixels, which is what bounces after the first are made
@@ -22,10 +21,10 @@ pub struct Noise {
 /// nothing was photographed twice that model takes texture for noise; then the smaller
 /// of it and of [`by_curvature`], which takes less of it, counts.
 pub(super) fn noise(
-    wall: &Wall,
+    wall: &BounceOperator,
     measurements: &Measurements,
     photograph: &LinearPhotograph,
-) -> Noise {
+) -> PhotographNoise {
     let (averaged, blacks) = (photograph.averaged as f64, photograph.blacks as f64);
     let (mut pixels, mut cells) = (0.0, 0.0);
     for (channel, measured) in measurements.channels.iter().enumerate() {
@@ -41,7 +40,7 @@ pub(super) fn noise(
     }
     let channels = measurements.channels.len() as f64;
     let count = wall.pixels().count().max(1) as f64;
-    let modelled = Noise {
+    let modelled = PhotographNoise {
         pixel: (pixels / count / channels).sqrt(),
         cell: (cells / channels).sqrt(),
     };
@@ -50,7 +49,7 @@ pub(super) fn noise(
     }
     let found = by_curvature(wall, &photograph.planes).unwrap_or(modelled.pixel);
     let scale = (found / modelled.pixel).min(1.0);
-    Noise {
+    PhotographNoise {
         pixel: scale * modelled.pixel,
         cell: scale * modelled.cell,
     }
@@ -61,7 +60,7 @@ pub(super) fn noise(
 /// *Fast Noise Variance Estimation*, Computer Vision and Image Understanding 1996). The
 /// median over pixels of similar brightness keeps edges out. `None` if the wall has too
 /// few pixels with all eight neighbours.
-fn by_curvature(wall: &Wall, planes: &[Vec<f32>]) -> Option<f64> {
+fn by_curvature(wall: &BounceOperator, planes: &[Vec<f32>]) -> Option<f64> {
     /// Root of the sum of the mask's squares.
     const MASK_NORM: f64 = 6.0;
     /// Median of the magnitude of a standard normal variable.
@@ -86,7 +85,7 @@ fn by_curvature(wall: &Wall, planes: &[Vec<f32>]) -> Option<f64> {
 
 /// Mean light and magnitude of the mask's answer of each pixel whose eight neighbours
 /// are on the wall too.
-fn around(wall: &Wall, plane: &[f32]) -> Vec<(f64, f64)> {
+fn around(wall: &BounceOperator, plane: &[f32]) -> Vec<(f64, f64)> {
     let (width, height) = wall.size();
     let mut on_wall = vec![false; width * height];
     for pixel in wall.pixels() {

@@ -1,4 +1,4 @@
-//! Peels a photograph bounce by bounce until what is left is below the noise.
+//! Peeling: a photograph loses bounce after bounce until what is left is below the noise.
 //!
 //! With `S = F1 K` the bounce that follows any light, `F1 T^-1 = I - S`: the first
 //! bounce of `l` is `l - S l`, what is left is `S l`, and the first bounce of that is
@@ -7,7 +7,7 @@
 //! the inverse says.
 
 use super::BouncesError;
-use super::wall::Wall;
+use super::bounce_operator::BounceOperator;
 
 /// Bounces that are peeled at most. Where each returns three quarters of the light
 /// of the one before, a millionth is left after 48.
@@ -78,7 +78,11 @@ impl Separated {
     ///
     /// # Panics
     /// If the planes are not of the wall's size and channels.
-    pub fn new(wall: &Wall, photograph: &[Vec<f32>], noise: f64) -> Result<Self, BouncesError> {
+    pub fn new(
+        wall: &BounceOperator,
+        photograph: &[Vec<f32>],
+        noise: f64,
+    ) -> Result<Self, BouncesError> {
         let mut left: Vec<Vec<f32>> = photograph.iter().map(|p| wall.gather(p)).collect();
         let whole = rms(&left);
         let end = noise.max(LEAST_LEFT * whole);
@@ -135,7 +139,7 @@ impl Separated {
 }
 
 /// What no cell belongs to, and its root mean square there.
-fn beside(wall: &Wall, photograph: &[Vec<f32>]) -> (Vec<Vec<f32>>, f64) {
+fn beside(wall: &BounceOperator, photograph: &[Vec<f32>]) -> (Vec<Vec<f32>>, f64) {
     let mut planes = photograph.to_vec();
     for plane in &mut planes {
         for pixel in wall.pixels() {

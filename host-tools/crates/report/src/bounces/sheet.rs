@@ -1,91 +1,65 @@
-//! The picture that people look at: the photograph and its bounces, as they are and
+//! Contact sheet of the bounces: the photograph and its bounces, as they are and
 //! brightened.
 
 use super::Bounces;
-use super::folder::frame_size;
 use super::separate::LayerKind;
+use crate::frame_size;
 use iltm_picture::{
-    LightPicture, Picture,
-    canvas::{BACKGROUND, Canvas, INK, QUIET, Type},
+    ContactSheet, LightPicture, Picture, Tile,
+    numbers::{number, percent},
 };
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight};
 
-/// Pixels between pictures and around them.
-const GAP: usize = 16;
-/// Pixels that a line of letters takes.
-const LINE: usize = 22;
-/// Least width of a column: its words have to fit.
-const COLUMN: usize = 250;
 /// A picture is halved until it is no wider than this.
 const WIDEST: usize = 480;
-/// A picture is enlarged by whole factors up to this.
-const NARROWEST: usize = 200;
-/// Columns side by side.
+/// One value in two hundred is brighter than what a picture's brightness is taken from.
+const BRIGHT: f64 = 0.995;
+/// Pictures side by side.
 const ACROSS: usize = 7;
-
-const TITLE: Type = Type {
-    height: RasterHeight::Size20,
-    weight: FontWeight::Bold,
-    colour: INK,
-};
-
-const TEXT: Type = Type {
-    height: RasterHeight::Size16,
-    weight: FontWeight::Regular,
-    colour: QUIET,
-};
-
-/// One column: a picture twice, and its words.
-struct Column {
-    title: String,
-    lines: [String; 2],
-    light: LightPicture,
-    /// What its second picture is brightened by; 1 if it has none.
-    factor: f64,
-}
 
 /// Composes the sheet; `None` if it would be larger than a frame can be.
 #[must_use]
 pub fn sheet(bounces: &Bounces) -> Option<Picture> {
-    let columns = columns(bounces)?;
-    let picture = columns.first()?.light.size();
-    let wide = picture.width().max(COLUMN);
-    let across = columns.len().min(ACROSS);
-    let block = LINE * 3 + GAP + 2 * (picture.height() + LINE) + 2 * GAP;
-    let head = 2 * GAP + LINE;
-    let note = notes(bounces);
-    let longest = note.iter().map(|line| TEXT.width(line)).max().unwrap_or(0);
-    let width = (GAP + across * (wide + GAP)).max(longest + 2 * GAP);
-    let height = head + columns.len().div_ceil(ACROSS) * block + note.len() * LINE + GAP;
-    let mut canvas = Canvas::new(frame_size(width, height)?, BACKGROUND);
-    canvas.write(GAP, GAP, &heading(bounces), TITLE);
-    for (at, column) in columns.iter().enumerate() {
-        let x = GAP + at % ACROSS * (wide + GAP);
-        let y = head + at / ACROSS * block;
-        column.draw(&mut canvas, (x, y));
+    let separated = &bounces.separated;
+    let shown = |planes: &[Vec<f32>]| shown(separated.size, planes);
+    let photograph = shown(&separated.photograph)?;
+    let bright = photograph.quantile(BRIGHT);
+    let mut plain = vec![Tile::new(
+        ("Photograph", "black subtracted"),
+        &photograph.for_display(),
+    )];
+    plain[0]
+        .captions
+        .push("all pictures to one scale".to_owned());
+    let mut brightened = vec![Tile::default()];
+    for layer in &separated.layers {
+        let light = shown(&layer.planes)?;
+        let shares = format!(
+            "light {}, energy {}",
+            percent(layer.light_share),
+            percent(layer.energy_share)
+        );
+        let noise = format!("rms {} x noise", number(layer.rms / bounces.noise.cell));
+        let mut tile = Tile::new((&title(layer.kind), &shares), &light.for_display());
+        tile.captions.push(noise);
+        plain.push(tile);
+        let factor = round_factor(bright / light.quantile(BRIGHT).max(1e-9));
+        brightened.push(if factor > 1.0 {
+            let words = format!("{factor} times brighter");
+            Tile::new(("", &words), &light.scaled(factor).for_display())
+        } else {
+            Tile::default()
+        });
     }
-    let below = height - GAP - note.len() * LINE;
-    for (at, line) in note.iter().enumerate() {
-        canvas.write(GAP, below + at * LINE, line, TEXT);
-    }
-    Some(canvas.finish())
-}
-
-impl Column {
-    fn draw(&self, canvas: &mut Canvas, (x, y): (usize, usize)) {
-        canvas.write(x, y, &self.title, TITLE);
-        for (at, line) in self.lines.iter().enumerate() {
-            canvas.write(x, y + (at + 1) * LINE, line, TEXT);
-        }
-        let top = y + 3 * LINE + GAP / 2;
-        canvas.place(x, top, &self.light.for_display());
-        if self.factor > 1.0 {
-            let below = top + self.light.size().height() + GAP / 2;
-            canvas.write(x, below, &format!("{} times brighter", self.factor), TEXT);
-            let brightened = self.light.scaled(self.factor);
-            canvas.place(x, below + LINE, &brightened.for_display());
-        }
-    }
+    let rows = plain.chunks(ACROSS).zip(brightened.chunks(ACROSS));
+    let sheet = ContactSheet {
+        heading: heading(bounces),
+        rows: rows
+            .flat_map(|(plain, bright)| [plain.to_vec(), bright.to_vec()])
+            .collect(),
+        notes: notes(bounces),
+        ..ContactSheet::default()
+    };
+    sheet.compose()
 }
 
 fn heading(bounces: &Bounces) -> String {
@@ -97,39 +71,6 @@ fn heading(bounces: &Bounces) -> String {
         ),
         n => format!("Mean of {n} photographs ({}), bounce by bounce", shot.role),
     }
-}
-
-fn columns(bounces: &Bounces) -> Option<Vec<Column>> {
-    let separated = &bounces.separated;
-    let shown = |planes: &[Vec<f32>]| shown(separated.size, planes);
-    let photograph = shown(&separated.photograph)?;
-    let bright = brightness(&photograph);
-    let mut columns = vec![Column {
-        title: "Photograph".to_owned(),
-        lines: [
-            "black subtracted".to_owned(),
-            "all pictures to one scale".to_owned(),
-        ],
-        factor: 1.0,
-        light: photograph,
-    }];
-    for layer in &separated.layers {
-        let light = shown(&layer.planes)?;
-        columns.push(Column {
-            title: title(layer.kind),
-            lines: [
-                format!(
-                    "light {}, energy {}",
-                    percent(layer.light_share),
-                    percent(layer.energy_share)
-                ),
-                format!("rms {} x noise", times(layer.rms / bounces.noise.cell)),
-            ],
-            factor: round_factor(bright / brightness(&light).max(1e-9)),
-            light,
-        });
-    }
-    Some(columns)
 }
 
 fn title(kind: LayerKind) -> String {
@@ -159,58 +100,13 @@ fn notes(bounces: &Bounces) -> Vec<String> {
     ]
 }
 
-/// A share in words, three digits that count.
-#[must_use]
-pub fn percent(share: f64) -> String {
-    let percent = 100.0 * share;
-    match percent.abs() {
-        p if p >= 9.995 || p == 0.0 => format!("{percent:.1} %"),
-        p if p >= 0.1 => format!("{percent:.2} %"),
-        p if p >= 0.001 => format!("{percent:.4} %"),
-        _ => format!("{percent:.1e} %"),
-    }
-}
-
-/// How many times as large, two digits that count.
-#[must_use]
-pub fn times(ratio: f64) -> String {
-    match ratio {
-        r if !r.is_finite() => "-".to_owned(),
-        r if r >= 99_999.5 => format!("{r:.0e}"),
-        r if r >= 9.95 => format!("{r:.0}"),
-        r if r >= 0.995 => format!("{r:.1}"),
-        r => format!("{r:.2}"),
-    }
-}
-
 /// The picture at a size that suits the sheet.
 fn shown((width, height): (usize, usize), planes: &[Vec<f32>]) -> Option<LightPicture> {
     let mut light = LightPicture::new(frame_size(width, height)?, planes.to_vec())?;
     while light.size().width() > WIDEST && light.size().height() > 1 {
         light = light.halved();
     }
-    let factor = (NARROWEST / light.size().width()).clamp(1, 8);
-    if factor == 1 {
-        return Some(light);
-    }
-    let (width, height) = (light.size().width(), light.size().height());
-    let larger = |plane: &Vec<f32>| {
-        let at = |pixel: usize| {
-            let (x, y) = (pixel % (width * factor), pixel / (width * factor));
-            plane[y / factor * width + x / factor]
-        };
-        (0..width * height * factor * factor).map(at).collect()
-    };
-    let planes = light.planes().iter().map(larger).collect();
-    LightPicture::new(frame_size(width * factor, height * factor)?, planes)
-}
-
-/// What one value in two hundred is brighter than.
-fn brightness(light: &LightPicture) -> f64 {
-    let mut values: Vec<f32> = light.planes().iter().flatten().copied().collect();
-    let at = values.len() - 1 - values.len() / 200;
-    let (_, value, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-    f64::from(*value)
+    Some(light)
 }
 
 /// 1, 2, 5, 10, 20, 50 and so on, the largest that is no more than `factor`.
@@ -239,14 +135,5 @@ mod tests {
             assert!((round_factor(asked) - given).abs() < 1e-9, "{asked}");
         }
         assert!((round_factor(f64::INFINITY) - 1000.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn shares_keep_their_digits() {
-        assert_eq!(percent(0.8766), "87.7 %");
-        assert_eq!(percent(0.0123), "1.23 %");
-        assert_eq!(percent(0.000_051), "0.0051 %");
-        assert_eq!(percent(0.0), "0.0 %");
-        assert_eq!(percent(-0.000_002), "-2.0e-4 %");
     }
 }

@@ -2,16 +2,16 @@
 //! at the camera's resolution against the same scene without interreflection.
 
 use super::*;
+use crate::test_scene;
 use iltm_capture::{Registration, Role, pattern_set};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use iltm_scene::{
-    Effect, Forced, Shooting, Simulation, SimulationOptions,
-    coaxial::{Panels, Scene},
-    description::Scene as Described,
+    Effect, Forced, Simulation, SimulationOptions, VirtualCamera,
+    coaxial::{CoaxialScene, Panels},
+    description::Scene,
     folder as simulated,
 };
-use iltm_solve::ChannelInverse;
 use nalgebra::DVector;
 
 /// A camera with a pixel a cell.
@@ -29,21 +29,10 @@ fn registration(grid: Grid) -> Registration {
 }
 
 /// A wall of which every pixel is a cell of its own, without interreflection.
-pub(super) fn known_wall(rows: u16, cols: u16) -> Wall {
+pub(super) fn known_wall(rows: u16, cols: u16) -> BounceOperator {
     let grid = Grid::new(rows, cols).unwrap();
-    let cells = grid.cells();
-    let dark = InverseTransport {
-        grid,
-        live: vec![true; cells],
-        shared: DMatrix::zeros(cells, cells),
-        channels: vec![ChannelInverse {
-            gain: vec![1.0; cells],
-            scale: 1.0,
-            deviation: None,
-            ambient: vec![0.0; cells],
-        }],
-    };
-    Wall::new(&registration(grid), &[vec![1.0; cells]], &dark)
+    let dark = test_scene::inverse(grid, 1, |_, _| 1.0, |_, _| 0.0);
+    BounceOperator::new(&registration(grid), &[vec![1.0; grid.cells()]], &dark)
 }
 
 /// Standard normal (Box, Muller 1958).
@@ -53,27 +42,14 @@ pub(super) fn normal(random: &mut fastrand::Rng) -> f64 {
 }
 
 /// `T^-1 = E^-1 (R^-1 - F)`, exactly.
-fn inverse(scene: &Scene) -> InverseTransport {
-    let cells = scene.grid.cells();
-    let gain = |cell: usize| (scene.albedo[cell] * scene.irradiance[cell]).recip();
-    let operator = DMatrix::from_fn(cells, cells, |i, j| {
-        scene.form_factors[(i, j)] / scene.irradiance[i]
-    });
-    InverseTransport {
-        grid: scene.grid,
-        live: vec![true; cells],
-        shared: operator,
-        channels: vec![ChannelInverse {
-            gain: (0..cells).map(gain).collect(),
-            scale: 1.0,
-            deviation: None,
-            ambient: vec![0.0; cells],
-        }],
-    }
+fn inverse(scene: &CoaxialScene) -> InverseTransport {
+    let gain = |cell: usize, _| (scene.albedo[cell] * scene.irradiance[cell]).recip();
+    let operator = |i, j| scene.form_factors[(i, j)] / scene.irradiance[i];
+    test_scene::inverse(scene.grid, 1, gain, operator)
 }
 
 /// `(R F)^(k-1) R E p` for `k` from 1.
-fn bounces_of(scene: &Scene, pattern: &DVector<f64>, count: usize) -> Vec<DVector<f64>> {
+fn bounces_of(scene: &CoaxialScene, pattern: &DVector<f64>, count: usize) -> Vec<DVector<f64>> {
     let lit = scene.irradiance.component_mul(pattern);
     let first = scene.albedo.component_mul(&lit);
     let next = |light: &DVector<f64>| {
@@ -89,9 +65,9 @@ fn plane(light: &DVector<f64>) -> Vec<f32> {
     light.iter().map(|light| *light as f32).collect()
 }
 
-fn textured_valleys() -> Scene {
+fn textured_valleys() -> CoaxialScene {
     let grid = Grid::new(9, 14).unwrap();
-    Scene::new(grid, &Panels::m_shape(grid, 60.0), 0.8)
+    CoaxialScene::new(grid, &Panels::m_shape(grid, 60.0), 0.8)
         .textured(0.3, 0.9, 5)
         .vignetted(0.6)
 }
@@ -103,7 +79,7 @@ fn every_bounce_of_a_known_scene_is_found_with_its_exact_inverse() {
     let pattern = DVector::from_fn(cells, |cell, _| f64::from(cell % 5 == 0));
     let transport = scene.transport();
     let flood = plane(&(&transport * DVector::from_element(cells, 1.0)));
-    let wall = Wall::new(&registration(scene.grid), &[flood], &inverse(&scene));
+    let wall = BounceOperator::new(&registration(scene.grid), &[flood], &inverse(&scene));
     let photograph = plane(&(&transport * &pattern));
     let separated = Separated::new(&wall, &[photograph], 1e-5).unwrap();
     let (unseparated, layers) = separated.layers.split_last().unwrap();
@@ -158,7 +134,7 @@ fn bounces_of_a_known_scene_are_found_from_its_photographs() {
     let (inverse, _) = solved.unwrap();
     let white = DVector::from_element(cells, 1.0);
     let checkered = DVector::from_fn(cells, |cell, _| f64::from(cell / 14 % 3 == cell % 2));
-    let wall = Wall::new(
+    let wall = BounceOperator::new(
         &registration(scene.grid),
         &[plane(&(&transport * &white))],
         &inverse,
@@ -190,7 +166,7 @@ fn layers_add_up_to_the_photograph_even_with_a_wrong_inverse() {
     inverse.shared *= 0.5;
     inverse.live[17] = false;
     inverse.channels[0].gain.rotate_left(3);
-    let wall = Wall::new(
+    let wall = BounceOperator::new(
         &registration(scene.grid),
         std::slice::from_ref(&flood),
         &inverse,
@@ -216,7 +192,7 @@ fn light_that_does_not_fade_is_refused() {
     let flood = plane(&(scene.transport() * DVector::from_element(cells, 1.0)));
     let mut inverse = inverse(&scene);
     inverse.shared *= 10.0;
-    let wall = Wall::new(
+    let wall = BounceOperator::new(
         &registration(scene.grid),
         std::slice::from_ref(&flood),
         &inverse,
@@ -227,7 +203,7 @@ fn light_that_does_not_fade_is_refused() {
 
 /// The M-shaped panels as they come with the tools, and what a camera without noise
 /// sees straight from the projector under a pattern, of full scale.
-fn direct_light(scene: &Described, pattern: usize, patterns: &DMatrix<f64>) -> Vec<f32> {
+fn direct_light(scene: &Scene, pattern: usize, patterns: &DMatrix<f64>) -> Vec<f32> {
     let quiet = Forced::default()
         .with(Effect::Noise, false)
         .with(Effect::Ambient, false);
@@ -252,13 +228,13 @@ fn direct_light(scene: &Described, pattern: usize, patterns: &DMatrix<f64>) -> V
 #[test]
 fn direct_light_is_what_the_camera_sees_without_interreflection() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/m-panels.toml");
-    let scene = Described::read(Path::new(path)).unwrap();
+    let scene = Scene::read(Path::new(path)).unwrap();
     let simulation = Simulation::new(&scene, &SimulationOptions::default(), &Silent).unwrap();
     let patterns = pattern_set(simulation.grid(), 60, 3);
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
-    let shooting = Shooting::new(&scene, &simulation, 3).unwrap();
-    simulated::write(&shooting, &patterns, &capture, &Silent).unwrap();
+    let camera = VirtualCamera::new(&scene, &simulation, 3).unwrap();
+    simulated::write(&camera, &patterns, &capture, &Silent).unwrap();
     let light = DMatrix::from_fn(simulation.grid().cells(), patterns.len(), |cell, k| {
         f64::from(u8::from(patterns[k].1.lit[cell]))
     });

@@ -1,7 +1,8 @@
-//! One line of advice.
+//! Advice in one line: the cheapest tier that is good enough.
 
 use super::{Point, Sweep};
 use iltm_compile::cost::{CLOCK, RATE};
+use iltm_picture::numbers::percent;
 
 /// One step of an 8-bit code.
 const TARGET: f64 = 1.0 / 255.0;
@@ -65,7 +66,7 @@ fn tier(point: &Point) -> String {
 fn cost(point: &Point) -> String {
     format!(
         "{} of a {RATE} Hz frame on a {} MHz part",
-        share(point.share()),
+        percent(point.share()),
         CLOCK / 1_000_000
     )
 }
@@ -88,22 +89,12 @@ fn doubling(points: &[Point], chosen: &Point) -> String {
     }
 }
 
-/// A share as per cent: one digit after the point below 10.
-pub(super) fn share(share: f64) -> String {
-    let percent = 100.0 * share;
-    if percent < 9.95 {
-        format!("{percent:.1} %")
-    } else {
-        format!("{percent:.0} %")
-    }
-}
-
 /// An error as people say it: 1/131, or per cent where it is large.
 pub(super) fn fraction(error: f64) -> String {
     if error > 0.0 && error < 0.1 {
         format!("1/{:.0}", 1.0 / error)
     } else {
-        format!("{:.0} %", 100.0 * error)
+        percent(error)
     }
 }
 

@@ -1,11 +1,11 @@
-//! Coefficients of fewer bits.
+//! Quantisation: coefficients of fewer bits.
 //!
 //! The device's format has 16 bits a value and a power of two a row. Here the values of
 //! a row are rounded to fewer, so that the largest just fits; what rounds to zero is no
 //! entry any more. Such a table runs on the device in its 16 bits, so its error and its
 //! instructions are real; the bytes are those of a format that there is not.
 
-use super::operator::values;
+use super::float_table::values;
 use iltm_compile::image::{StoredRow, segment_bytes};
 use iltm_runtime::operator::{Channels, OperatorError, Segment};
 

@@ -1,4 +1,4 @@
-//! A coarser operator under the same gains: `K' = A K U`.
+//! Coarser operator under the same gains: `K' = A K U`.
 //!
 //! `A` averages cells of the original grid over those of a coarser one, `U` interpolates
 //! between their centres; both are the runtime's. A frame then takes the runtime's way
@@ -91,21 +91,13 @@ fn average_operator(operator: &DMatrix<f64>, lattice: &Lattice) -> DMatrix<f64> 
 #[allow(clippy::float_cmp)] // Small whole numbers are exact.
 mod tests {
     use super::*;
+    use crate::test_scene;
 
     fn inverse(rows: u16, cols: u16, value: impl Fn(usize, usize) -> f64) -> InverseTransport {
         let grid = Grid::new(rows, cols).unwrap();
-        let cells = grid.cells();
-        InverseTransport {
-            grid,
-            live: vec![true; cells],
-            shared: DMatrix::from_fn(cells, cells, value),
-            channels: vec![ChannelInverse {
-                gain: (0..cells).map(|cell| 1.0 + cell as f64).collect(),
-                scale: 1.0,
-                deviation: None,
-                ambient: vec![0.25; cells],
-            }],
-        }
+        let mut inverse = test_scene::inverse(grid, 1, |cell, _| 1.0 + cell as f64, value);
+        inverse.channels[0].ambient.fill(0.25);
+        inverse
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The Pareto front: points that no other beats in both.
+//! Pareto front: points that no other beats in both.
 
 /// Which of the points `(cost, error)` are on the front: no other point costs no more
 /// and errs less, or costs less and errs no more. What is not a number is on no front.

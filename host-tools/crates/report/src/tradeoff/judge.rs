@@ -1,12 +1,9 @@
-//! Errors of natural images.
+//! Errors of natural images, predicted and true.
 
-use super::operator::{Entries, Entry, Numbers};
+use super::float_table::{FloatTable, HaarEntries, HaarEntry};
 use iltm_compile::ladder::relative_error;
 use iltm_runtime::Grid;
-use iltm_solve::{
-    InverseTransport,
-    content::{natural_images, wanted_images},
-};
+use iltm_solve::{InverseTransport, natural_images, wanted_images};
 use nalgebra::DMatrix;
 
 /// Error of too much or too little `light` of a channel, all channels together as the
@@ -26,7 +23,7 @@ fn error_of(
 }
 
 /// Natural images, cells without a gain dark.
-fn images(numbers: &Numbers<'_>) -> DMatrix<f64> {
+fn images(numbers: &FloatTable<'_>) -> DMatrix<f64> {
     let mut images = natural_images(numbers.pixels());
     for (pixel, mut row) in images.row_iter_mut().enumerate() {
         if !numbers.is_lit(pixel, 0) {
@@ -39,10 +36,10 @@ fn images(numbers: &Numbers<'_>) -> DMatrix<f64> {
 /// Predicted error of `given` where `exact` would be right, in the scene that a table
 /// describes with `scene`: one list of entries a channel.
 pub(super) fn of_change(
-    numbers: &Numbers<'_>,
-    scene: &[Entries],
-    exact: &[Entries],
-    given: &[Entries],
+    numbers: &FloatTable<'_>,
+    scene: &[HaarEntries],
+    exact: &[HaarEntries],
+    given: &[HaarEntries],
 ) -> f64 {
     let images = images(numbers);
     error_of(numbers.channels(), &images, |channel| {
@@ -55,8 +52,8 @@ pub(super) fn of_change(
 /// Predicted error of `entries` in a scene that `inverse` describes; `white` is the
 /// light of the table's reference white, camera units.
 pub(super) fn of_other_grid(
-    numbers: &Numbers<'_>,
-    entries: &[Entries],
+    numbers: &FloatTable<'_>,
+    entries: &[HaarEntries],
     inverse: &InverseTransport,
     white: f64,
 ) -> f64 {
@@ -70,8 +67,8 @@ pub(super) fn of_other_grid(
     })
 }
 
-fn difference(exact: &[Entry], given: &[Entry]) -> Entries {
-    let negative = given.iter().map(|entry| Entry {
+fn difference(exact: &[HaarEntry], given: &[HaarEntry]) -> HaarEntries {
+    let negative = given.iter().map(|entry| HaarEntry {
         value: -entry.value,
         ..*entry
     });
@@ -79,7 +76,7 @@ fn difference(exact: &[Entry], given: &[Entry]) -> Entries {
 }
 
 /// The transport itself, and the light that images are wanted in.
-pub(super) struct Truth {
+pub(super) struct ReferenceTransport {
     pub(super) transports: Vec<DMatrix<f64>>,
     /// Light of reference white, camera units: one for all tables, so that all are asked
     /// for the same.
@@ -88,10 +85,15 @@ pub(super) struct Truth {
     pub(super) grid: Grid,
 }
 
-impl Truth {
+impl ReferenceTransport {
     /// Mean over images and channels of `||T p - d|| / ||d||`. `white` is the table's
     /// own reference white.
-    pub(super) fn error(&self, numbers: &Numbers<'_>, entries: &[Entries], white: f64) -> f64 {
+    pub(super) fn error(
+        &self,
+        numbers: &FloatTable<'_>,
+        entries: &[HaarEntries],
+        white: f64,
+    ) -> f64 {
         let mut wanted = wanted_images(self.grid) * self.white;
         for (mut row, _) in wanted
             .row_iter_mut()

@@ -1,4 +1,4 @@
-//! Points as JSON and as CSV.
+//! JSON and CSV of the points.
 
 use super::{Missing, Point, Tradeoff};
 use iltm_compile::cost::{BUDGET, CLOCK, RATE};

@@ -1,11 +1,11 @@
-//! What accuracy costs in time: many ways to compensate a scene, each with its error
-//! and its cost.
+//! Accuracy against time: many ways to compensate a scene, each with its error and its
+//! cost.
 //!
 //! | what | file |
 //! |---|---|
 //! | the ways, and what is asked of each | `sweep.rs`, of a table alone `of_table.rs` |
 //! | a table's tiers and bits as points | `points.rs` |
-//! | a table's numbers, read back | `operator.rs` |
+//! | a table in floating point | `float_table.rs` |
 //! | errors of natural images, predicted and true | `judge.rs` |
 //! | fewer bits, a coarser grid | `bits.rs`, `coarse.rs` |
 //! | points that no other beats | `front.rs` |
@@ -22,18 +22,18 @@
 mod advice;
 mod bits;
 mod coarse;
+mod float_table;
 mod front;
 mod judge;
 mod list;
 mod of_table;
-mod operator;
 mod page;
 mod picture;
 mod points;
 mod sweep;
 
 use iltm_capture::ReferenceError;
-use iltm_compile::{CompileError, cost::BUDGET, learn::LearnError};
+use iltm_compile::{CompileError, build_table::BuildError, cost::BUDGET};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
     Grid,
@@ -165,7 +165,7 @@ pub struct Tradeoff {
 pub enum TradeoffError {
     /// The capture does not become a table.
     #[error(transparent)]
-    Learn(#[from] LearnError),
+    Build(#[from] BuildError),
     /// The reference cannot be used.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
@@ -185,7 +185,7 @@ pub enum TradeoffError {
 
 impl From<iltm_capture::CaptureError> for TradeoffError {
     fn from(error: iltm_capture::CaptureError) -> Self {
-        Self::Learn(error.into())
+        Self::Build(error.into())
     }
 }
 

@@ -1,7 +1,8 @@
-//! The sweeps that a table alone allows.
+//! Sweeps that a table alone allows.
 
 use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Sweep, Tradeoff, TradeoffError};
+use iltm_compile::{Photographs, Provenance};
 use iltm_picture::progress::Progress;
 use iltm_runtime::image::Table;
 
@@ -11,18 +12,13 @@ pub(super) fn of_table(
     table: &Table<'_>,
     progress: &dyn Progress,
 ) -> Result<Tradeoff, TradeoffError> {
-    let provenance = provenance(table);
-    let text = |key: &str| Some(provenance.as_ref()?.get(key)?.as_str()?.to_owned());
-    let count = |key: &str| {
-        let counts = provenance.as_ref()?.get("photographs")?;
-        u64::try_from(counts.get(key)?.as_integer()?).ok()
-    };
-    let photographs = ["white", "gray_code", "bernoulli"].map(count);
+    let provenance = Provenance::read(table.provenance());
+    let count = |of: Photographs| (of.white + of.gray_code + of.bernoulli) as u64;
     let common = Common {
         sweep: Sweep::Table,
         setting: "the table".to_owned(),
-        method: text("method"),
-        photographs: photographs.into_iter().sum(),
+        method: Some(provenance.method).filter(|name| !name.is_empty()),
+        photographs: provenance.photographs.map(count),
         seconds: None,
     };
     let mut points = of_tiers(&common, table, None)?;
@@ -54,23 +50,10 @@ pub(super) fn of_table(
     }
     Ok(Tradeoff {
         name: name.to_owned(),
-        scene: scene(table),
+        scene: provenance.scene,
         grid: table.grid(),
         channels: table.channels(),
         points,
         missing,
     })
-}
-
-fn provenance(table: &Table<'_>) -> Option<toml::Table> {
-    table.provenance().parse().ok()
-}
-
-/// The scene's name in a table; empty if it has none.
-pub(super) fn scene(table: &Table<'_>) -> String {
-    let provenance = provenance(table);
-    let name = provenance
-        .as_ref()
-        .and_then(|text| text.get("scene")?.as_str());
-    name.unwrap_or_default().to_owned()
 }

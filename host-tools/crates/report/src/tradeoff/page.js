@@ -82,7 +82,7 @@ function draw() {
   const step = 1 / 255;
   if (step > up.low && step < up.high) {
     const place = up.place(step);
-    element("line", { class: "level", x1: room.left, x2: right, y1: place, y2: place });
+    element("line", { class: "limit", x1: room.left, x2: right, y1: place, y2: place });
     write("1/255", { class: "note", x: right - 6, y: place - 6, "text-anchor": "end" });
   }
   const stairs = front(shown, x, y).map((p, index) => {

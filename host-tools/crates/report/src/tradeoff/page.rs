@@ -1,13 +1,10 @@
-//! The page: one HTML file with everything inside, that a browser shows without network.
+//! HTML page of the trade-off: one file that a browser shows without network.
 
-use super::advice::{fraction, share};
+use super::advice::fraction;
 use super::picture::{colour, title};
 use super::{Point, Sweep, Tradeoff};
 use iltm_compile::cost::{CLOCK, RATE};
-use iltm_picture::{
-    html::document,
-    numbers::{grouped, percent},
-};
+use iltm_picture::html::{capitalised, document, grouped, percent};
 use maud::{Markup, PreEscaped, html};
 
 impl Tradeoff {
@@ -16,17 +13,13 @@ impl Tradeoff {
     pub fn html(&self) -> String {
         // No string within can end the script.
         let data = self.data().to_string().replace('<', "\\u003c");
-        let what = if self.scene.is_empty() {
-            &self.name
-        } else {
-            &self.scene
-        };
+        let what = self.heading();
         let body = html! {
             main {
                 header {
                     p .over { "iltm tradeoff" }
                     h1 { (what) }
-                    p .lead .advice { (sentence(&self.advice())) }
+                    p .lead .advice { (capitalised(&self.advice())) "." }
                 }
                 (self.chart())
                 (self.tiers())
@@ -68,7 +61,7 @@ impl Tradeoff {
                         @for sweep in sweeps {
                             label .toggle {
                                 input type="checkbox" name="sweep" value=(sweep.name()) checked;
-                                span .swatch style=(format!("--own:{}", css(sweep))) {}
+                                span .swatch style=(format!("--own:{}", colour(sweep))) {}
                                 (title(sweep))
                             }
                         }
@@ -109,7 +102,7 @@ impl Tradeoff {
                         td { (point.tier) }
                         td { (percent(point.predicted)) @if point.predicted < 0.1 { " (" (fraction(point.predicted)) ")" } }
                         @if truth { td { @if let Some(error) = point.truth { (percent(error)) } } }
-                        td { (percent(point.left_out)) } td { (grouped(point.instructions)) } td { (share(point.share())) }
+                        td { (percent(point.left_out)) } td { (grouped(point.instructions)) } td { (percent(point.share())) }
                         td { (micros(point).unwrap_or_default()) } td { (grouped(point.bytes)) }
                     } } }
                 } }
@@ -158,22 +151,4 @@ impl Tradeoff {
             }
         }
     }
-}
-
-/// A colour that the page's own style can change on dark paper.
-fn css(sweep: Sweep) -> String {
-    match sweep {
-        Sweep::Table => "var(--ink)".to_owned(),
-        other => {
-            let plotters::style::RGBColor(red, green, blue) = colour(other);
-            format!("rgb({red} {green} {blue})")
-        }
-    }
-}
-
-/// A capital letter in front and a full stop behind.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|first| first.to_uppercase().to_string());
-    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }

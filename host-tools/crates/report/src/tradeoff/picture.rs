@@ -1,33 +1,21 @@
-//! Error against instructions, as an SVG picture.
+//! Chart of the trade-off: error against instructions, as an SVG file.
 
 use super::{Point, Sweep, Tradeoff};
 use iltm_compile::cost::{BUDGET, CLOCK, RATE};
-use plotters::coord::Shift;
-use plotters::coord::combinators::IntoLogRange;
-use plotters::prelude::*;
-use std::ops::Range;
+use iltm_picture::chart::{Axis, Chart, INK, PALETTE, Series};
 
-/// Width and height, pixels.
-const SIZE: (u32, u32) = (960, 640);
+/// One step of an 8-bit code.
+const STEP: f64 = 1.0 / 255.0;
 
-/// Letters that all systems have.
-const FONT: &str = "sans-serif";
-
-/// Ink of words and axes, and of grid lines.
-const INK: RGBColor = RGBColor(29, 32, 37);
-const FAINT: RGBColor = RGBColor(226, 223, 217);
-
-type Failure<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
-
-/// A sweep's colour: those of Okabe and Ito, which colour-blind people can tell apart.
-pub(super) const fn colour(sweep: Sweep) -> RGBColor {
+/// A sweep's colour.
+pub(super) const fn colour(sweep: Sweep) -> &'static str {
     match sweep {
-        Sweep::Table => RGBColor(29, 32, 37),
-        Sweep::Tiers => RGBColor(120, 126, 135),
-        Sweep::Photographs => RGBColor(0, 114, 178),
-        Sweep::Solver => RGBColor(213, 94, 0),
-        Sweep::Bits => RGBColor(204, 121, 167),
-        Sweep::Grid => RGBColor(0, 158, 115),
+        Sweep::Table => INK,
+        Sweep::Tiers => PALETTE[7],
+        Sweep::Photographs => PALETTE[0],
+        Sweep::Solver => PALETTE[1],
+        Sweep::Bits => PALETTE[3],
+        Sweep::Grid => PALETTE[2],
     }
 }
 
@@ -44,178 +32,89 @@ pub(super) const fn title(sweep: Sweep) -> &'static str {
 }
 
 impl Tradeoff {
-    /// The picture; `None` if there is nothing to draw.
+    /// The scene, or what else it is called.
+    pub(super) fn heading(&self) -> &str {
+        if self.scene.is_empty() {
+            &self.name
+        } else {
+            &self.scene
+        }
+    }
+
+    /// The chart; `None` if there is nothing to draw.
     #[must_use]
     pub fn svg(&self) -> Option<String> {
         let drawn = self.points.iter().filter(|point| {
             point.predicted.is_finite() && point.predicted > 0.0 && point.instructions > 0
         });
         let drawn: Vec<&Point> = drawn.collect();
-        let mut text = String::new();
-        {
-            let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-            self.draw(&root, &drawn).ok()??;
-            root.present().ok()?;
+        if drawn.is_empty() {
+            return None;
         }
-        Some(text)
-    }
-
-    fn draw<'b>(
-        &self,
-        root: &DrawingArea<SVGBackend<'b>, Shift>,
-        drawn: &[&Point],
-    ) -> Result<Option<()>, Failure<'b>> {
-        root.fill(&WHITE)?;
-        let Some((x, y)) = ranges(drawn) else {
-            return Ok(None);
-        };
-        let what = if self.scene.is_empty() {
-            &self.name
-        } else {
-            &self.scene
-        };
-        let words = |size: i32| (FONT, size).into_font().color(&INK);
-        root.draw(&Text::new(
-            format!("What accuracy costs: {what}"),
-            (24, 16),
-            words(22),
-        ))?;
-        for (line, advice) in (0..).zip(wrapped(&self.advice(), 128)) {
-            root.draw(&Text::new(advice, (24, 46 + 18 * line), words(14)))?;
-        }
-        let mut chart = ChartBuilder::on(root)
-            .margin_top(92)
-            .margin_right(28)
-            .x_label_area_size(52)
-            .y_label_area_size(72)
-            .margin_left(22)
-            .build_cartesian_2d(x.clone().log_scale(), y.clone().log_scale())?;
-        let share = |x: &f64| format!("{:.0} k", x / 1e3);
-        chart
-            .configure_mesh()
-            .light_line_style(WHITE)
-            .bold_line_style(FAINT)
-            .axis_style(INK)
-            .x_labels(10)
-            .y_labels(8)
-            .x_label_formatter(&share)
-            .y_label_formatter(&|error| percent(*error))
-            .x_desc(format!(
-                "instructions a frame on the reference board (a {RATE} Hz frame on a {} MHz part has {:.1} million)",
-                CLOCK / 1_000_000,
-                BUDGET as f64 / 1e6
-            ))
-            .y_desc("predicted error, relative")
-            .label_style(words(13))
-            .axis_desc_style(words(14))
-            .draw()?;
-        let step = 1.0 / 255.0;
-        if y.contains(&step) {
-            let level = [(x.start, step), (x.end, step)];
-            chart.draw_series(DashedLineSeries::new(
-                level,
-                6,
-                5,
-                INK.mix(0.5).stroke_width(1),
-            ))?;
-        }
-        let front = front_line(drawn);
-        chart
-            .draw_series(LineSeries::new(front, INK.mix(0.18).stroke_width(9)))?
-            .label("Pareto front")
-            .legend(|(x, y)| {
-                PathElement::new([(x, y), (x + 18, y)], INK.mix(0.18).stroke_width(9))
-            });
+        let mut series = vec![Series {
+            name: "Pareto front".to_owned(),
+            points: front_line(&drawn),
+            line: 9.0,
+            dot: 0.0,
+            opacity: 0.18,
+            ..Series::default()
+        }];
         for sweep in Sweep::ALL.into_iter().rev() {
-            Self::draw_sweep(&mut chart, sweep, drawn)?;
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .label_font(words(13))
-            .background_style(WHITE.mix(0.85))
-            .border_style(FAINT)
-            .draw()?;
-        Ok(Some(()))
-    }
-
-    fn draw_sweep<'b>(
-        chart: &mut Plot<'_, 'b>,
-        sweep: Sweep,
-        drawn: &[&Point],
-    ) -> Result<(), Failure<'b>> {
-        let colour = colour(sweep);
-        let own: Vec<&&Point> = drawn.iter().filter(|point| point.sweep == sweep).collect();
-        for curve in own.chunk_by(|a, b| a.setting == b.setting && sweep != Sweep::Tiers) {
-            let line = curve.iter().map(|point| place(point));
-            let width = if sweep == Sweep::Table { 2 } else { 1 };
-            if sweep != Sweep::Tiers {
-                let style = colour.mix(if sweep == Sweep::Bits { 0.25 } else { 0.7 });
-                chart.draw_series(LineSeries::new(line, style.stroke_width(width)))?;
+            let own: Vec<&Point> = drawn.iter().copied().filter(|p| p.sweep == sweep).collect();
+            if !own.is_empty() {
+                series.extend(of_sweep(sweep, &own));
             }
         }
-        let radius = if sweep == Sweep::Table { 5 } else { 3 };
-        let hollow = sweep == Sweep::Bits;
-        let style = if hollow {
-            colour.stroke_width(1)
-        } else {
-            colour.filled()
+        let title = format!("What accuracy costs: {}", self.heading());
+        let x = format!(
+            "thousand instructions a frame on the reference board (a {RATE} Hz frame on a {} MHz part has {})",
+            CLOCK / 1_000_000,
+            BUDGET / 1000
+        );
+        let near = drawn.iter().any(|point| point.predicted < 1.4 * STEP);
+        let chart = Chart {
+            title: &title,
+            notes: wrapped(&self.advice(), 128),
+            size: (960.0, 640.0),
+            x: Axis::logarithmic(&x),
+            y: Axis::logarithmic("predicted error, relative, %"),
+            limit: near.then_some((100.0 * STEP, "1/255")),
+            series,
+            ..Chart::default()
         };
-        let series = chart.draw_series(
-            own.iter()
-                .map(|point| Circle::new(place(point), radius, style)),
-        )?;
-        if !own.is_empty() {
-            series
-                .label(title(sweep))
-                .legend(move |(x, y)| Circle::new((x + 9, y), radius, style));
-        }
-        if sweep == Sweep::Table {
-            let label = |point: &&&Point| {
-                let (x, y) = place(point);
-                let name = point.tier.to_string();
-                EmptyElement::at((x, y))
-                    + Text::new(name, (7, -17), (FONT, 14).into_font().color(&INK))
-            };
-            chart.draw_series(own.iter().map(label))?;
-        }
-        Ok(())
+        Some(chart.file())
     }
 }
 
-type Plot<'a, 'b> = ChartContext<
-    'a,
-    SVGBackend<'b>,
-    Cartesian2d<
-        plotters::coord::combinators::LogCoord<f64>,
-        plotters::coord::combinators::LogCoord<f64>,
-    >,
->;
+/// The lines of a sweep, a table each, and its dots.
+fn of_sweep(sweep: Sweep, own: &[&Point]) -> Vec<Series> {
+    let (colour, table) = (colour(sweep), sweep == Sweep::Table);
+    let curves = own.chunk_by(|a, b| a.setting == b.setting && sweep != Sweep::Tiers);
+    let curves = curves.map(|curve| Series {
+        colour,
+        points: curve.iter().map(|point| place(point)).collect(),
+        line: if table { 2.0 } else { 1.0 },
+        dot: 0.0,
+        opacity: if sweep == Sweep::Bits { 0.25 } else { 0.7 },
+        ..Series::default()
+    });
+    let mut series: Vec<Series> = curves.filter(|curve| curve.points.len() > 1).collect();
+    let labels = own.iter().filter(|_| table);
+    series.push(Series {
+        name: title(sweep).to_owned(),
+        colour,
+        points: own.iter().map(|point| place(point)).collect(),
+        labels: labels.map(|point| point.tier.to_string()).collect(),
+        dot: if table { 5.0 } else { 3.0 },
+        hollow: sweep == Sweep::Bits,
+        ..Series::default()
+    });
+    series
+}
 
+/// In thousands of instructions and per cent.
 fn place(point: &Point) -> (f64, f64) {
-    (point.instructions as f64, point.predicted)
-}
-
-/// A tick's error, without digits that say nothing.
-fn percent(error: f64) -> String {
-    let text = format!("{:.4}", 100.0 * error);
-    format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
-}
-
-/// Both axes with some room; `None` of no points.
-fn ranges(drawn: &[&Point]) -> Option<(Range<f64>, Range<f64>)> {
-    let range = |of: fn(&Point) -> f64| {
-        let values = drawn.iter().map(|point| of(point));
-        let (low, high) = (
-            values.clone().fold(f64::INFINITY, f64::min),
-            values.fold(0.0, f64::max),
-        );
-        (low <= high).then_some(low / 1.25..high * 1.4)
-    };
-    Some((
-        range(|point| point.instructions as f64)?,
-        range(|point| point.predicted)?,
-    ))
+    (point.instructions as f64 / 1e3, 100.0 * point.predicted)
 }
 
 /// The front as stairs: between two of its points, the cheaper one is what can be had.
@@ -292,7 +191,8 @@ mod tests {
             point.front = true;
         }
         let drawn: Vec<&Point> = points.iter().collect();
-        let (near, far) = (900_000.0, 1_800_000.0);
-        assert_eq!(front_line(&drawn), [(near, 0.5), (far, 0.5), (far, 0.25)]);
+        let (near, far) = (900.0, 1800.0);
+        let stairs = [(near, 50.0), (far, 50.0), (far, 25.0)];
+        assert_eq!(front_line(&drawn), stairs);
     }
 }

@@ -1,10 +1,10 @@
 //! Points of one table: its tiers, and the same with fewer bits.
 
 use super::bits::{BITS, Rounded};
-use super::judge::{Truth, of_change};
-use super::operator::Numbers;
+use super::float_table::FloatTable;
+use super::judge::{ReferenceTransport, of_change};
 use super::{Point, Sweep, TradeoffError};
-use crate::{microseconds, steps};
+use crate::{TierCost, microseconds, tier_costs};
 use iltm_compile::cost::Shape;
 use iltm_picture::progress::Progress;
 use iltm_runtime::{FrameSize, image::Table};
@@ -26,7 +26,7 @@ impl Common {
         Self {
             sweep,
             setting,
-            method: Some(report.method.name().to_owned()),
+            method: Some(report.method.to_string()),
             photographs: Some((counts.white + counts.gray_code + counts.bernoulli) as u64),
             seconds: Some(seconds.prepare + seconds.choose + seconds.solve + seconds.finish),
         }
@@ -40,40 +40,52 @@ impl Common {
             ..*self
         }
     }
+
+    /// The point of one of a table's tiers, without a true error.
+    pub(super) fn point(&self, table: &Table<'_>, cost: TierCost, microseconds: f64) -> Point {
+        Point {
+            sweep: self.sweep,
+            setting: self.setting.clone(),
+            tier: cost.tier,
+            method: self.method.clone(),
+            photographs: self.photographs,
+            bits: 16,
+            grid: table.grid(),
+            left_out: cost.left_out,
+            inverse: table.inverse_error().to_num(),
+            predicted: cost.total,
+            truth: None,
+            instructions: cost.instructions,
+            microseconds: Some(microseconds),
+            bytes: cost.table_bytes,
+            seconds: self.seconds,
+            hypothetical: false,
+            front: false,
+        }
+    }
 }
 
 /// A point for each tier of a table.
 pub(super) fn of_tiers(
     common: &Common,
     table: &Table<'_>,
-    truth: Option<&Truth>,
+    truth: Option<&ReferenceTransport>,
 ) -> Result<Vec<Point>, TradeoffError> {
-    let numbers = Numbers::new(table);
+    let numbers = FloatTable::new(table);
     let timed = microseconds(table).map_err(TradeoffError::Timing)?;
     let white = table.reference_white().to_num::<f64>();
-    let point = |(step, microseconds): (crate::Step, f64)| Point {
-        sweep: common.sweep,
-        setting: common.setting.clone(),
-        tier: step.tier,
-        method: common.method.clone(),
-        photographs: common.photographs,
-        bits: 16,
-        grid: table.grid(),
-        left_out: step.left_out,
-        inverse: table.inverse_error().to_num(),
-        predicted: step.total,
+    let point = |(cost, microseconds): (TierCost, f64)| Point {
         truth: truth.map(|truth| {
-            let entries = numbers.entries(&numbers.segments(step.tier));
+            let entries = numbers.entries(&numbers.segments(cost.tier));
             truth.error(&numbers, &entries, white)
         }),
-        instructions: step.instructions,
-        microseconds: Some(microseconds),
-        bytes: step.table_bytes,
-        seconds: common.seconds,
-        hypothetical: false,
-        front: false,
+        ..common.point(table, cost, microseconds)
     };
-    Ok(steps(table).into_iter().zip(timed).map(point).collect())
+    Ok(tier_costs(table)
+        .into_iter()
+        .zip(timed)
+        .map(point)
+        .collect())
 }
 
 /// Points of a table's tiers with coefficients of fewer bits; `points` are those of the
@@ -81,10 +93,10 @@ pub(super) fn of_tiers(
 pub(super) fn of_bits(
     table: &Table<'_>,
     points: &[Point],
-    truth: Option<&Truth>,
+    truth: Option<&ReferenceTransport>,
     progress: &dyn Progress,
 ) -> Result<Vec<Point>, TradeoffError> {
-    let numbers = Numbers::new(table);
+    let numbers = FloatTable::new(table);
     let white = table.reference_white().to_num::<f64>();
     let scene = numbers.entries(&numbers.segments(table.top_tier()));
     let shape = Shape::of(table, FrameSize::of_grid(table.grid()));

@@ -1,17 +1,17 @@
-//! The sweeps over a capture: the ways, and what is asked of each.
+//! Sweeps over a capture: the ways, and what is asked of each.
 
 use super::coarse::{averaged, coarser};
-use super::judge::{Truth, of_other_grid};
-use super::of_table::scene;
-use super::operator::Numbers;
+use super::float_table::FloatTable;
+use super::judge::{ReferenceTransport, of_other_grid};
 use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Point, Sweep, Tradeoff, TradeoffError};
-use crate::{microseconds_at, steps};
+use crate::{microseconds_at, tier_costs};
 use iltm_capture::{CaptureOptions, FineFlood, Measurements, read_reference};
 use iltm_compile::{
-    CompileOptions, compile, cost, gain,
+    CompileOptions, Provenance,
+    build_table::{BuildError, BuiltTable, build_table_from},
+    compile, cost, gain,
     ladder::TARGETS,
-    learn::{LearnError, Learned, learn_measured},
 };
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
@@ -20,6 +20,7 @@ use iltm_runtime::{
 };
 use iltm_solve::{Method, SolveOptions};
 use std::path::Path;
+use strum::VariantArray;
 
 /// Numbers of Bernoulli photographs that are tried, and all.
 const PHOTOGRAPHS: [usize; 7] = [10, 20, 30, 40, 80, 120, 160];
@@ -46,9 +47,9 @@ const FACTORS: [usize; 2] = [2, 4];
 /// What is known of the scene by the table that it has now.
 struct Base<'b> {
     folder: &'b Path,
-    learned: &'b Learned,
+    learned: &'b BuiltTable,
     common: Common,
-    truth: Option<Truth>,
+    truth: Option<ReferenceTransport>,
     progress: &'b dyn Progress,
 }
 
@@ -61,10 +62,10 @@ pub(super) fn of_capture(
     let channels = measurements.channels.len();
     let reference = read_reference(folder, measurements.grid, channels)?;
     let options = SolveOptions::default();
-    let learned = learn_measured(measurements, folder, &options, None, progress)?;
-    let truth = reference.map(|transports| Truth {
+    let learned = build_table_from(measurements, folder, &options, None, progress)?;
+    let truth = reference.map(|transports| ReferenceTransport {
         transports,
-        white: learned.compiled.white.light,
+        white: learned.compiled.white,
         live: learned.inverse.live.clone(),
         grid: learned.inverse.grid,
     });
@@ -96,7 +97,7 @@ pub(super) fn of_capture(
     points.extend(base.coarser(&table, &mut missing)?);
     Ok(Tradeoff {
         name: folder.display().to_string(),
-        scene: scene(&table),
+        scene: Provenance::read(table.provenance()).scene,
         grid: table.grid(),
         channels: table.channels(),
         points,
@@ -117,7 +118,7 @@ impl Base<'_> {
 
     /// Tiers between those of the table.
     fn between(&self) -> Result<Vec<Point>, TradeoffError> {
-        let Learned {
+        let BuiltTable {
             measurements,
             inverse,
             ..
@@ -151,7 +152,7 @@ impl Base<'_> {
             };
             let learned = iltm_capture::read(self.folder, &options, self.progress);
             let learned = learned
-                .map_err(LearnError::from)
+                .map_err(BuildError::from)
                 .and_then(|measurements| self.learn(measurements, &SolveOptions::default()));
             points.extend(self.solved(Sweep::Photographs, setting, learned, missing)?);
         }
@@ -161,13 +162,13 @@ impl Base<'_> {
     fn other_methods(&self, missing: &mut Vec<Missing>) -> Result<Vec<Point>, TradeoffError> {
         let own = self.learned.report.method;
         let mut points = Vec::new();
-        for method in Method::ALL.into_iter().filter(|method| *method != own) {
+        for &method in Method::VARIANTS.iter().filter(|method| **method != own) {
             let options = SolveOptions {
                 method,
                 ..SolveOptions::default()
             };
             let learned = self.learn(self.learned.measurements.clone(), &options);
-            let setting = method.name().to_owned();
+            let setting = method.to_string();
             points.extend(self.solved(Sweep::Solver, setting, learned, missing)?);
         }
         Ok(points)
@@ -177,8 +178,8 @@ impl Base<'_> {
         &self,
         measurements: Measurements,
         options: &SolveOptions,
-    ) -> Result<Learned, LearnError> {
-        learn_measured(measurements, self.folder, options, None, self.progress)
+    ) -> Result<BuiltTable, BuildError> {
+        build_table_from(measurements, self.folder, options, None, self.progress)
     }
 
     /// Points of what was learned in another way; why there are none goes to `missing`.
@@ -186,7 +187,7 @@ impl Base<'_> {
         &self,
         sweep: Sweep,
         setting: String,
-        learned: Result<Learned, LearnError>,
+        learned: Result<BuiltTable, BuildError>,
         missing: &mut Vec<Missing>,
     ) -> Result<Vec<Point>, TradeoffError> {
         let learned = match learned {
@@ -232,7 +233,7 @@ impl Base<'_> {
         let Some((coarse, fine)) = averaged(inverse, grid) else {
             return Ok(Vec::new());
         };
-        let white = self.learned.compiled.white.light;
+        let white = self.learned.compiled.white;
         let options = CompileOptions {
             reference_white: Some(white),
             targets: Some(TARGETS.to_vec()),
@@ -243,7 +244,7 @@ impl Base<'_> {
         self.progress.end();
         let compiled = compiled?;
         let coarse = Table::check(&compiled.image).map_err(TradeoffError::Table)?;
-        let Some(numbers) = Numbers::finer(&coarse, inverse.grid) else {
+        let Some(numbers) = FloatTable::finer(&coarse, inverse.grid) else {
             return Ok(Vec::new());
         };
         let timed = microseconds_at(&coarse, inverse.grid).map_err(TradeoffError::Timing)?;
@@ -252,31 +253,21 @@ impl Base<'_> {
         let common = self
             .common
             .again(Sweep::Grid, format!("operator of {grid} cells"));
-        let point = |(step, microseconds): (crate::Step, f64)| {
-            let entries = numbers.entries(&numbers.segments(step.tier));
+        let point = |(cost, microseconds): (crate::TierCost, f64)| {
+            let entries = numbers.entries(&numbers.segments(cost.tier));
             let left_out = of_other_grid(&numbers, &entries, inverse, white);
             let truth = self.truth.as_ref();
             Point {
-                sweep: common.sweep,
-                setting: common.setting.clone(),
-                tier: step.tier,
-                method: common.method.clone(),
-                photographs: common.photographs,
-                bits: 16,
-                grid,
                 left_out,
                 inverse: own,
                 predicted: left_out.hypot(own),
                 truth: truth.map(|truth| truth.error(&numbers, &entries, white)),
-                instructions: cost::stages(&coarse, step.tier, size).total(),
-                microseconds: Some(microseconds),
-                bytes: step.table_bytes - fine_bytes(&coarse) + fine_bytes(table),
-                seconds: common.seconds,
-                hypothetical: false,
-                front: false,
+                instructions: cost::stages(&coarse, cost.tier, size).total(),
+                bytes: cost.table_bytes - fine_bytes(&coarse) + fine_bytes(table),
+                ..common.point(&coarse, cost, microseconds)
             }
         };
-        let points = steps(&coarse).into_iter().zip(timed).map(point);
+        let points = tier_costs(&coarse).into_iter().zip(timed).map(point);
         // Gain only is the same on every grid.
         Ok(points.filter(|point| point.tier > 0).collect())
     }

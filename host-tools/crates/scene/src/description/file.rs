@@ -1,6 +1,6 @@
-//! A scene file as it is written: TOML, every key named, unknown ones refused.
+//! Scene file format: TOML, every key named, unknown ones refused.
 
-use super::Projector;
+use super::{Gloss, Projector};
 use iltm_picture::Response;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -9,13 +9,12 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
-    #[serde(default)]
     pub(super) name: Option<String>,
     pub(super) projector: ProjectorTable,
     pub(super) camera: CameraTable,
     /// Light from elsewhere.
     #[serde(default)]
-    pub(super) ambient: Colour,
+    pub(super) ambient: ColourValue,
     #[serde(default, rename = "panel")]
     pub(super) panels: Vec<PanelTable>,
 }
@@ -31,7 +30,6 @@ pub(super) struct ProjectorTable {
     pub(super) field_of_view: f64,
     pub(super) rows: u16,
     pub(super) cols: u16,
-    #[serde(default)]
     pub(super) aspect: Option<f64>,
     #[serde(default = "srgb")]
     pub(super) response: Response,
@@ -60,11 +58,9 @@ pub(super) struct CameraTable {
     pub(super) height: u32,
     #[serde(default = "exposed")]
     pub(super) white: f64,
-    #[serde(default)]
     pub(super) full_well: Option<f64>,
     #[serde(default)]
     pub(super) read_noise: f64,
-    #[serde(default)]
     pub(super) bits: Option<u8>,
     #[serde(default)]
     pub(super) response: Response,
@@ -76,42 +72,30 @@ pub(super) struct CameraTable {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PanelTable {
-    #[serde(default)]
     pub(super) name: Option<String>,
-    #[serde(default)]
     pub(super) corners: Option<Vec<[f64; 3]>>,
-    #[serde(default)]
     pub(super) mesh: Option<PathBuf>,
     pub(super) albedo: AlbedoValue,
-    #[serde(default)]
-    pub(super) gloss: Option<GlossTable>,
+    pub(super) gloss: Option<Gloss>,
     #[serde(default)]
     pub(super) mirror: f64,
-}
-
-/// `gloss = { reflectance = .., exponent = .. }`
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GlossTable {
-    pub(super) reflectance: f64,
-    pub(super) exponent: f64,
 }
 
 /// One number for all channels, or red, green and blue.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged, expecting = "a number, or [red, green, blue]")]
-pub(super) enum Colour {
+pub(super) enum ColourValue {
     Grey(f64),
     Rgb([f64; 3]),
 }
 
-impl Default for Colour {
+impl Default for ColourValue {
     fn default() -> Self {
         Self::Grey(0.0)
     }
 }
 
-impl Colour {
+impl ColourValue {
     pub(super) fn channels(self) -> [f64; 3] {
         match self {
             Self::Grey(value) => [value; 3],
@@ -127,7 +111,7 @@ impl Colour {
     expecting = "a number, [red, green, blue], or the path of a PNG picture"
 )]
 pub(super) enum AlbedoValue {
-    Uniform(Colour),
+    Uniform(ColourValue),
     Texture(PathBuf),
 }
 

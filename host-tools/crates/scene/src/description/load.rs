@@ -1,15 +1,16 @@
-//! Reads a scene file and checks what it says.
+//! Scene file reader: reads a scene file and checks what it says.
 
-use super::file::{AlbedoValue, CameraTable, Colour, PanelTable, ProjectorTable, SceneFile};
-use super::{Albedo, Camera, Facet, Gloss, Panel, Projector, Scene, SceneError, Texture, mesh};
+use super::file::{AlbedoValue, CameraTable, ColourValue, PanelTable, ProjectorTable, SceneFile};
+use super::{
+    Albedo, Camera, Facet, Gloss, Panel, Projector, Scene, SceneError, SceneProblem, Texture, mesh,
+};
 use crate::geometry::Polygon;
-use crate::view::View;
+use crate::pinhole::Pinhole;
 use iltm_runtime::Grid;
 use nalgebra::{Vector2, Vector3};
 use std::fmt::Display;
 use std::fs::File;
 use std::io::Read;
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// Bytes of a scene file at most: a person writes it.
@@ -25,15 +26,12 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] with the key, the panel or the line.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let io = |source| SceneError::Io {
-            path: path.to_owned(),
-            source,
-        };
         let mut bytes = Vec::new();
-        let file = File::open(path).map_err(io)?;
-        file.take(MOST_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map_err(io)?;
+        let read = File::open(path).and_then(|f| f.take(MOST_BYTES + 1).read_to_end(&mut bytes));
+        read.map_err(|source| SceneError {
+            path: path.to_owned(),
+            problem: source.into(),
+        })?;
         Self::parse(&bytes, path)
     }
 
@@ -43,325 +41,234 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, SceneError> {
-        let refuse = |reason| SceneError::Syntax {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let scene = table(bytes).and_then(|file| scene(file, folder));
+        scene.map_err(|problem| SceneError {
             path: path.to_owned(),
-            reason,
-        };
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(refuse(format!("it is longer than {MOST_BYTES} bytes")));
-        }
-        let text = std::str::from_utf8(bytes).map_err(|error| refuse(error.to_string()))?;
-        let file: SceneFile = toml::from_str(text)
-            .map_err(|error| refuse(error.to_string().trim_end().to_owned()))?;
-        Check { path }.scene(file)
+            problem,
+        })
     }
 }
 
-/// Checks with the file's name at hand.
-struct Check<'p> {
-    path: &'p Path,
+fn table(bytes: &[u8]) -> Result<SceneFile, SceneProblem> {
+    if bytes.len() as u64 > MOST_BYTES {
+        let reason = format!("it is longer than {MOST_BYTES} bytes");
+        return Err(SceneProblem::Syntax(reason));
+    }
+    let text = std::str::from_utf8(bytes);
+    let text = text.map_err(|error| SceneProblem::Syntax(error.to_string()))?;
+    toml::from_str(text)
+        .map_err(|error| SceneProblem::Syntax(error.to_string().trim_end().to_owned()))
 }
 
-impl Check<'_> {
-    fn scene(&self, file: SceneFile) -> Result<Scene, SceneError> {
-        if file.panels.is_empty() {
-            return Err(SceneError::NoPanels {
-                path: self.path.to_owned(),
-            });
-        }
-        let panels = file.panels.into_iter().enumerate();
-        Ok(Scene {
-            name: file.name,
-            projector: self.projector(&file.projector)?,
-            camera: self.camera(&file.camera)?,
-            ambient: self.light("ambient", file.ambient)?,
-            panels: panels
-                .map(|(index, panel)| self.panel(index, panel))
-                .collect::<Result<_, _>>()?,
-        })
+/// Checks a scene file whose meshes and textures are in `folder`.
+fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
+    if file.panels.is_empty() {
+        return Err(SceneProblem::NoPanels);
     }
+    let panels = file.panels.into_iter().enumerate();
+    Ok(Scene {
+        name: file.name,
+        projector: projector(&file.projector)?,
+        camera: camera(&file.camera)?,
+        ambient: ambient(file.ambient)?,
+        panels: panels
+            .map(|(index, table)| panel(index, table, folder))
+            .collect::<Result<_, _>>()?,
+    })
+}
 
-    fn projector(&self, table: &ProjectorTable) -> Result<Projector, SceneError> {
-        let grid = Grid::new(table.rows, table.cols).map_err(|source| SceneError::Grid {
-            path: self.path.to_owned(),
-            source,
-        })?;
-        let square = f64::from(table.cols) / f64::from(table.rows);
-        let aspect = table.aspect.unwrap_or(square);
-        self.within(
-            "[projector] aspect",
-            aspect,
-            1e-3..=1e3,
-            "from 0.001 to 1000",
-        )?;
-        Ok(Projector {
-            view: self.view(
-                "projector",
-                [table.position, table.look_at, table.up],
-                table.field_of_view,
-                aspect,
-            )?,
-            grid,
-            response: table.response,
-            vignetting: self.within(
-                "[projector] vignetting",
-                table.vignetting,
-                0.0..=0.95,
-                "from 0 to 0.95",
-            )?,
-            blur: self.within(
-                "[projector] blur",
-                table.blur,
-                0.0..=4.0,
-                "from 0 to 4 cells",
-            )?,
-            black: self.within(
-                "[projector] black",
-                table.black,
-                0.0..=0.5,
-                "from 0 to 0.5 of white",
-            )?,
-            drift: self.within(
-                "[projector] drift",
-                table.drift,
-                0.0..=0.5,
-                "from 0 to 0.5 of the light",
-            )?,
-            mixing: self.mixing(table.mixing)?,
-        })
+fn projector(table: &ProjectorTable) -> Result<Projector, SceneProblem> {
+    let grid = Grid::new(table.rows, table.cols)?;
+    let square = f64::from(table.cols) / f64::from(table.rows);
+    let within =
+        |key: &str, value, range, unit| within(&format!("[projector] {key}"), value, range, unit);
+    let aspect = within("aspect", table.aspect.unwrap_or(square), [1e-3, 1e3], "")?;
+    let places = [table.position, table.look_at, table.up];
+    Ok(Projector {
+        view: pinhole("projector", places, table.field_of_view, aspect)?,
+        grid,
+        response: table.response,
+        vignetting: within("vignetting", table.vignetting, [0.0, 0.95], "")?,
+        blur: within("blur", table.blur, [0.0, 4.0], " cells")?,
+        black: within("black", table.black, [0.0, 0.5], " of white")?,
+        drift: within("drift", table.drift, [0.0, 0.5], " of the light")?,
+        mixing: mixing(table.mixing)?,
+    })
+}
+
+fn mixing(mixing: [[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SceneProblem> {
+    let key = "[projector] mixing";
+    for value in mixing.as_flattened() {
+        within(key, *value, [0.0, 10.0], "")?;
     }
-
-    fn mixing(&self, mixing: [[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SceneError> {
-        let key = "[projector] mixing";
-        for value in mixing.as_flattened() {
-            self.within(key, *value, 0.0..=10.0, "from 0 to 10")?;
-        }
-        let dark = |row: &[f64; 3]| row.iter().sum::<f64>() <= 0.0;
-        if mixing.iter().any(dark) {
-            let must = "some light in every channel of the camera, a row each";
-            return Err(self.value(key, format!("{mixing:?}"), must));
-        }
-        Ok(mixing)
+    let dark = |row: &[f64; 3]| row.iter().sum::<f64>() <= 0.0;
+    if mixing.iter().any(dark) {
+        let must = "some light in every channel of the camera, a row each";
+        return Err(refused(key, format!("{mixing:?}"), must));
     }
+    Ok(mixing)
+}
 
-    fn camera(&self, table: &CameraTable) -> Result<Camera, SceneError> {
-        let pixels = u64::from(table.width) * u64::from(table.height);
-        if pixels == 0 || pixels > MOST_PIXELS {
-            return Err(self.value(
-                "[camera] width and height",
-                format!("{} x {}", table.width, table.height),
-                "1 to 16,000,000 pixels together",
-            ));
-        }
-        let bits = table.bits.map_or(16.0, f64::from);
-        self.within("[camera] bits", bits, 4.0..=16.0, "from 4 to 16")?;
-        if let Some(full_well) = table.full_well {
-            self.within(
-                "[camera] full_well",
-                full_well,
-                10.0..=1e9,
-                "from 10 to 1e9 electrons",
-            )?;
-        } else if table.read_noise != 0.0 {
-            return Err(self.value(
-                "[camera] read_noise",
-                table.read_noise,
-                "0 where no full_well is given: it is in electrons",
-            ));
-        }
-        let aspect = f64::from(table.width) / f64::from(table.height);
-        Ok(Camera {
-            view: self.view(
-                "camera",
-                [table.position, table.look_at, table.up],
-                table.field_of_view,
-                aspect,
-            )?,
-            size: (table.width, table.height),
-            white: self.within(
-                "[camera] white",
-                table.white,
-                0.01..=10.0,
-                "from 0.01 to 10 of full scale",
-            )?,
-            full_well: table.full_well,
-            read_noise: self.within(
-                "[camera] read_noise",
-                table.read_noise,
-                0.0..=1e6,
-                "from 0 to 1e6 electrons",
-            )?,
-            bits: table.bits,
-            response: table.response,
-            distortion: self.distortion(table.distortion)?,
-        })
+fn camera(table: &CameraTable) -> Result<Camera, SceneProblem> {
+    let within =
+        |key: &str, value, range, unit| within(&format!("[camera] {key}"), value, range, unit);
+    let pixels = u64::from(table.width) * u64::from(table.height);
+    if pixels == 0 || pixels > MOST_PIXELS {
+        return Err(refused(
+            "[camera] width and height",
+            format!("{} x {}", table.width, table.height),
+            "1 to 16,000,000 pixels together",
+        ));
     }
-
-    /// Beyond half, a lens of this kind would fold the picture over.
-    fn distortion(&self, terms: [f64; 2]) -> Result<[f64; 2], SceneError> {
-        for term in terms {
-            self.within(
-                "[camera] distortion",
-                term,
-                -0.15..=0.5,
-                "from -0.15 to 0.5",
-            )?;
-        }
-        Ok(terms)
+    within("bits", table.bits.map_or(16.0, f64::from), [4.0, 16.0], "")?;
+    if let Some(full_well) = table.full_well {
+        within("full_well", full_well, [10.0, 1e9], " electrons")?;
+    } else if table.read_noise != 0.0 {
+        let must = "0 where no full_well is given: it is in electrons";
+        return Err(refused("[camera] read_noise", table.read_noise, must));
     }
-
-    fn view(
-        &self,
-        which: &'static str,
-        [position, target, up]: [[f64; 3]; 3],
-        field_of_view: f64,
-        aspect: f64,
-    ) -> Result<View, SceneError> {
-        for (key, place) in [("position", position), ("look_at", target), ("up", up)] {
-            for value in place {
-                self.within(
-                    &format!("[{which}] {key}"),
-                    value,
-                    -FARTHEST..=FARTHEST,
-                    "within 10 km of the origin, in metres",
-                )?;
-            }
-        }
-        self.within(
-            &format!("[{which}] field_of_view"),
-            field_of_view,
-            0.1..=170.0,
-            "from 0.1 to 170 degrees",
-        )?;
-        let [position, target, up] = [position, target, up].map(Vector3::from);
-        View::new(position, target, up, field_of_view, aspect).ok_or_else(|| SceneError::View {
-            path: self.path.to_owned(),
-            which,
-        })
+    let aspect = f64::from(table.width) / f64::from(table.height);
+    let places = [table.position, table.look_at, table.up];
+    let camera = Camera {
+        view: pinhole("camera", places, table.field_of_view, aspect)?,
+        size: (table.width, table.height),
+        white: within("white", table.white, [0.01, 10.0], " of full scale")?,
+        full_well: table.full_well,
+        read_noise: within("read_noise", table.read_noise, [0.0, 1e6], " electrons")?,
+        bits: table.bits,
+        response: table.response,
+        distortion: table.distortion,
+    };
+    // Beyond half, a lens of this kind would fold the picture over.
+    for term in camera.distortion {
+        within("distortion", term, [-0.15, 0.5], "")?;
     }
+    Ok(camera)
+}
 
-    fn panel(&self, index: usize, table: PanelTable) -> Result<Panel, SceneError> {
-        let name = table.name.unwrap_or_else(|| format!("panel {}", index + 1));
-        let refuse = |reason: String| SceneError::Panel {
-            path: self.path.to_owned(),
-            panel: name.clone(),
-            reason,
-        };
-        let facets = match (table.corners, &table.mesh) {
-            (Some(corners), None) => vec![self.quad(&name, &corners)?],
-            (None, Some(mesh)) => mesh::read(&self.beside(mesh))
-                .map_err(|error| refuse(format!("{}: {error}", mesh.display())))?,
-            _ => return Err(refuse("it needs either `corners` or `mesh`".to_owned())),
-        };
-        let albedo = match table.albedo {
-            AlbedoValue::Uniform(colour) => Albedo::Uniform(colour.channels()),
-            AlbedoValue::Texture(path) => {
-                Albedo::Texture(Texture::read(&self.beside(&path)).map_err(refuse)?)
-            }
-        };
-        let gloss = table.gloss.map(|gloss| Gloss {
-            reflectance: gloss.reflectance,
-            exponent: gloss.exponent,
-        });
-        let shares = [
-            ("albedo", albedo.largest().into_iter().fold(0.0, f64::max)),
-            (
-                "gloss reflectance",
-                gloss.map_or(0.0, |gloss| gloss.reflectance),
-            ),
-            ("mirror", table.mirror),
-        ];
-        if let Albedo::Uniform(channels) = albedo
-            && channels.iter().any(|value| !(0.0..=1.0).contains(value))
-        {
-            return Err(refuse(format!(
-                "albedo is {channels:?}; it must be from 0 to 1"
-            )));
-        }
-        for (what, value) in shares {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(refuse(format!("{what} is {value}; it must be from 0 to 1")));
-            }
-        }
-        let together: f64 = shares.iter().map(|(_, value)| value).sum();
-        if together > 1.0 + 1e-9 {
-            return Err(refuse(format!(
-                "albedo, gloss and mirror together send back {together:.3} of the light; at most 1 is possible"
-            )));
-        }
-        if let Some(Gloss { exponent, .. }) = gloss
-            && !(1.0..=1e5).contains(&exponent)
-        {
-            return Err(refuse(format!(
-                "the gloss exponent is {exponent}; it must be from 1 to 100000"
-            )));
-        }
-        Ok(Panel {
-            name,
-            facets,
-            albedo,
-            gloss,
-            mirror: table.mirror,
-        })
-    }
-
-    /// A panel of corners; its texture is spread over the first, second and last
-    /// one, as the top left, top right and bottom left corner of the picture.
-    fn quad(&self, name: &str, corners: &[[f64; 3]]) -> Result<Facet, SceneError> {
-        let places: Vec<_> = corners.iter().map(|c| Vector3::from(*c)).collect();
-        let polygon = Polygon::new(places).map_err(|source| SceneError::Outline {
-            path: self.path.to_owned(),
-            panel: name.to_owned(),
-            face: None,
-            source,
-        })?;
-        let texture = match polygon.corners().len() {
-            4 => [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
-                .map(Vector2::from)
-                .to_vec(),
-            _ => across(&polygon),
-        };
-        Ok(Facet { polygon, texture })
-    }
-
-    fn light(&self, key: &str, colour: Colour) -> Result<[f64; 3], SceneError> {
-        let channels = colour.channels();
-        for value in channels {
-            self.within(
-                key,
-                value,
-                0.0..=10.0,
-                "from 0 to 10 of the projector's white",
-            )?;
-        }
-        Ok(channels)
-    }
-
-    fn within(
-        &self,
-        key: &str,
-        value: f64,
-        range: RangeInclusive<f64>,
-        must: &'static str,
-    ) -> Result<f64, SceneError> {
+fn pinhole(
+    which: &'static str,
+    [position, target, up]: [[f64; 3]; 3],
+    field_of_view: f64,
+    aspect: f64,
+) -> Result<Pinhole, SceneProblem> {
+    for (key, place) in [("position", position), ("look_at", target), ("up", up)] {
         // NaN is in no range.
-        if range.contains(&value) {
-            return Ok(value);
-        }
-        Err(self.value(key, value, must))
-    }
-
-    fn value(&self, key: &str, value: impl Display, must: &'static str) -> SceneError {
-        SceneError::Value {
-            path: self.path.to_owned(),
-            key: key.to_owned(),
-            value: value.to_string(),
-            must,
+        let far = |value: &&f64| !(-FARTHEST..=FARTHEST).contains(*value);
+        if let Some(value) = place.iter().find(far) {
+            let must = "within 10 km of the origin, in metres";
+            return Err(refused(&format!("[{which}] {key}"), value, must));
         }
     }
+    let key = format!("[{which}] field_of_view");
+    within(&key, field_of_view, [0.1, 170.0], " degrees")?;
+    let [position, target, up] = [position, target, up].map(Vector3::from);
+    Pinhole::new(position, target, up, field_of_view, aspect).ok_or(SceneProblem::View(which))
+}
 
-    fn beside(&self, path: &Path) -> std::path::PathBuf {
-        self.path.parent().unwrap_or(Path::new("")).join(path)
+fn panel(index: usize, table: PanelTable, folder: &Path) -> Result<Panel, SceneProblem> {
+    let name = table.name.unwrap_or_else(|| format!("panel {}", index + 1));
+    let refuse = |reason: String| SceneProblem::Panel {
+        panel: name.clone(),
+        reason,
+    };
+    let facets = match (table.corners, &table.mesh) {
+        (Some(corners), None) => vec![quad(&name, &corners)?],
+        (None, Some(mesh)) => mesh::read(&folder.join(mesh))
+            .map_err(|error| refuse(format!("{}: {error}", mesh.display())))?,
+        _ => return Err(refuse("it needs either `corners` or `mesh`".to_owned())),
+    };
+    let albedo = match table.albedo {
+        AlbedoValue::Uniform(colour) => Albedo::Uniform(colour.channels()),
+        AlbedoValue::Texture(path) => {
+            Albedo::Texture(Texture::read(&folder.join(&path)).map_err(refuse)?)
+        }
+    };
+    let reflectance = table.gloss.map_or(0.0, |gloss| gloss.reflectance);
+    let shares = [
+        ("albedo", albedo.largest().into_iter().fold(0.0, f64::max)),
+        ("gloss reflectance", reflectance),
+        ("mirror", table.mirror),
+    ];
+    if let Albedo::Uniform(channels) = albedo
+        && channels.iter().any(|value| !(0.0..=1.0).contains(value))
+    {
+        return Err(refuse(format!(
+            "albedo is {channels:?}; it must be from 0 to 1"
+        )));
+    }
+    for (what, value) in shares {
+        if !(0.0..=1.0).contains(&value) {
+            return Err(refuse(format!("{what} is {value}; it must be from 0 to 1")));
+        }
+    }
+    let together: f64 = shares.iter().map(|(_, value)| value).sum();
+    if together > 1.0 + 1e-9 {
+        return Err(refuse(format!(
+            "albedo, gloss and mirror together send back {together:.3} of the light; at most 1 is possible"
+        )));
+    }
+    if let Some(Gloss { exponent, .. }) = table.gloss
+        && !(1.0..=1e5).contains(&exponent)
+    {
+        return Err(refuse(format!(
+            "the gloss exponent is {exponent}; it must be from 1 to 100000"
+        )));
+    }
+    Ok(Panel {
+        name,
+        facets,
+        albedo,
+        gloss: table.gloss,
+        mirror: table.mirror,
+    })
+}
+
+/// A panel of corners; its texture is spread over the first, second and last
+/// one, as the top left, top right and bottom left corner of the picture.
+fn quad(name: &str, corners: &[[f64; 3]]) -> Result<Facet, SceneProblem> {
+    let places: Vec<_> = corners.iter().map(|c| Vector3::from(*c)).collect();
+    let polygon = Polygon::new(places).map_err(|source| SceneProblem::Outline {
+        panel: name.to_owned(),
+        source,
+    })?;
+    let texture = match polygon.corners().len() {
+        4 => [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+            .map(Vector2::from)
+            .to_vec(),
+        _ => across(&polygon),
+    };
+    Ok(Facet { polygon, texture })
+}
+
+fn ambient(colour: ColourValue) -> Result<[f64; 3], SceneProblem> {
+    let channels = colour.channels();
+    for value in channels {
+        within("ambient", value, [0.0, 10.0], " of the projector's white")?;
+    }
+    Ok(channels)
+}
+
+/// A value that is in its range, which is named with its unit if it is not.
+fn within(key: &str, value: f64, [low, high]: [f64; 2], unit: &str) -> Result<f64, SceneProblem> {
+    // NaN is in no range.
+    if (low..=high).contains(&value) {
+        return Ok(value);
+    }
+    let high = if high < 1e6 {
+        high.to_string()
+    } else {
+        format!("{high:e}")
+    };
+    Err(refused(key, value, &format!("from {low} to {high}{unit}")))
+}
+
+fn refused(key: &str, value: impl Display, must: &str) -> SceneProblem {
+    SceneProblem::Value {
+        key: key.to_owned(),
+        value: value.to_string(),
+        must: must.to_owned(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Panels from Wavefront OBJ files.
+//! Meshes: panels from Wavefront OBJ files.
 
 use super::Facet;
 use crate::geometry::{Polygon, PolygonError};

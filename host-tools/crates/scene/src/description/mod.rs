@@ -1,4 +1,4 @@
-//! What a scene is made of, checked: panels, projector, camera, ambient light.
+//! Scene description, checked: panels, projector, camera, ambient light.
 //!
 //! ```text
 //! file       scene.toml as it is written
@@ -17,15 +17,16 @@ mod load;
 mod mesh;
 mod texture;
 
-pub use error::SceneError;
+pub use error::{SceneError, SceneProblem};
 pub use mesh::{MeshError, parse as parse_mesh};
 pub use texture::Texture;
 
 use super::geometry::Polygon;
-use super::view::View;
+use super::pinhole::Pinhole;
 use iltm_picture::Response;
 use iltm_runtime::Grid;
 use nalgebra::{Vector2, Vector3};
+use serde::Deserialize;
 
 /// A scene and who looks at it.
 #[derive(Clone, Debug)]
@@ -47,7 +48,7 @@ pub struct Scene {
 #[derive(Clone, Debug)]
 pub struct Projector {
     /// Where it stands and what it looks at.
-    pub view: View,
+    pub view: Pinhole,
     /// Its cells, spread evenly over the frame.
     pub grid: Grid,
     /// From input values to light; photographs of patterns do not depend on it.
@@ -72,7 +73,7 @@ pub struct Projector {
 #[derive(Clone, Debug)]
 pub struct Camera {
     /// Where it stands and what it looks at.
-    pub view: View,
+    pub view: Pinhole,
     /// Pixels across and down.
     pub size: (u32, u32),
     /// Share of full scale that the bright parts of a flood photograph reach: its
@@ -184,7 +185,8 @@ pub enum Albedo {
 /// A lobe around the mirror direction: the energy-conserving form of Phong's,
 /// `reflectance (n + 2) / (2 pi) cos^n` (Lafortune, Willems, *Using the modified
 /// Phong reflectance model for physically based rendering*, 1994).
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Gloss {
     /// Share of light in the lobe at normal incidence.
     pub reflectance: f64,

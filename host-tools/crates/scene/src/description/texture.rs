@@ -1,4 +1,4 @@
-//! Albedo from a picture.
+//! Textures: albedo from a picture.
 
 use iltm_picture::Response;
 use image::{ImageReader, Limits};

@@ -1,4 +1,4 @@
-//! The exchange area of two polygons by Stokes' theorem, as integrals along
+//! Contour integration: the exchange area of two polygons by Stokes' theorem, as integrals along
 //! both outlines.
 //!
 //! `S = 1/(2 pi) sum over pairs of edges (u . v) I`, `I` the integral of

@@ -1,4 +1,4 @@
-//! How much light two surfaces exchange: form factors of convex polygons.
+//! Form factors of convex polygons: how much light two surfaces exchange.
 //!
 //! Surfaces are one-sided and Lambertian. Their exchange area `S_ab = A_a F_ab`,
 //! m^2, is the same both ways; `F_ab = S_ab / A_a` is the form factor: the

@@ -1,4 +1,4 @@
-//! How much of what a point receives comes from a polygon.
+//! Point-to-polygon form factor: how much of what a point receives comes from a polygon.
 
 use crate::geometry::{Plane, Polygon};
 use nalgebra::Vector3;
@@ -58,15 +58,9 @@ mod tests {
     use super::*;
 
     fn rectangle(width: f64, height: f64, distance: f64) -> Polygon {
-        let at = |x, y| Vector3::new(x, y, distance);
+        let (w, h, z) = (width, height, distance);
         // Faces down, to the origin.
-        Polygon::new(vec![
-            at(0.0, 0.0),
-            at(0.0, height),
-            at(width, height),
-            at(width, 0.0),
-        ])
-        .unwrap()
+        crate::geometry::polygon(&[[0., 0., z], [0., h, z], [w, h, z], [w, 0., z]])
     }
 
     /// Howell, *A Catalog of Radiation Heat Transfer Configuration Factors*, B-3:
@@ -98,22 +92,12 @@ mod tests {
     #[test]
     fn a_wall_that_reaches_below_the_horizon_counts_down_to_it() {
         let (width, height, distance) = (2.0_f64, 1.5_f64, 0.8_f64);
-        let at = |y: f64, z: f64| Vector3::new(distance, y, z);
         let (y, x) = (width / distance, height / distance);
         let root = x.hypot(1.0);
         let known = (y.atan() - (y / root).atan() / root) / TAU;
-        let wall = Polygon::new(vec![
-            at(0.0, -3.0),
-            at(0.0, height),
-            at(width, height),
-            at(width, -3.0),
-        ])
-        .unwrap();
-        let wall = if wall.normal().x > 0.0 {
-            wall.flipped()
-        } else {
-            wall
-        };
+        let (x0, h, w) = (distance, height, width);
+        let wall = [[x0, 0., -3.], [x0, 0., h], [x0, w, h], [x0, w, -3.]];
+        let wall = crate::geometry::polygon(&wall);
         let found = from_point(&Vector3::zeros(), &Vector3::z(), &wall);
         assert!((found - known).abs() < 1e-14, "{found} {known}");
     }

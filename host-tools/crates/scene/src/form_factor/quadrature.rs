@@ -31,12 +31,12 @@ pub(super) fn rule(nodes: usize) -> &'static [Node] {
 }
 
 /// A place on a polygon and the area, m^2, that it stands for.
-pub(super) type Sample = (Vector3<f64>, f64);
+pub(super) type QuadraturePoint = (Vector3<f64>, f64);
 
 /// Places on a convex polygon that integrate polynomials of degree
 /// `2 order - 1` over it exactly, `2 order - 2` if it is a quadrangle but no
 /// parallelogram; the areas sum to the polygon's.
-pub(super) fn samples(polygon: &Polygon, order: usize) -> Vec<Sample> {
+pub(super) fn samples(polygon: &Polygon, order: usize) -> Vec<QuadraturePoint> {
     let corners = polygon.corners();
     if order <= 1 {
         return vec![(polygon.centroid(), polygon.area())];
@@ -59,7 +59,7 @@ pub(super) fn irregularity(polygon: &Polygon) -> f64 {
 }
 
 /// The product rule, mapped bilinearly.
-pub(super) fn quadrangle([a, b, c, d]: &[Vector3<f64>; 4], order: usize) -> Vec<Sample> {
+pub(super) fn quadrangle([a, b, c, d]: &[Vector3<f64>; 4], order: usize) -> Vec<QuadraturePoint> {
     let mut samples = Vec::with_capacity(order * order);
     for (x, wx) in rule(order) {
         let (bottom, top) = (a + (b - a) * *x, d + (c - d) * *x);
@@ -74,7 +74,7 @@ pub(super) fn quadrangle([a, b, c, d]: &[Vector3<f64>; 4], order: usize) -> Vec<
 
 /// The product rule on the square that collapses into the triangle; one node
 /// more across, where the width adds a degree.
-fn triangle([a, b, c]: &[Vector3<f64>; 3], order: usize) -> Vec<Sample> {
+fn triangle([a, b, c]: &[Vector3<f64>; 3], order: usize) -> Vec<QuadraturePoint> {
     let area = (b - a).cross(&(c - a)).norm() / 2.0;
     let mut samples = Vec::with_capacity((order + 1) * order);
     for (x, wx) in rule(order + 1) {

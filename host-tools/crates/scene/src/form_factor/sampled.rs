@@ -1,6 +1,6 @@
-//! A polygon made ready for many form factors.
+//! Sampled polygons, made ready for many form factors.
 
-use super::quadrature::{MOST_ORDER, Sample, irregularity, samples};
+use super::quadrature::{MOST_ORDER, QuadraturePoint, irregularity, samples};
 use super::{Tolerance, contour, ordered};
 use crate::geometry::Polygon;
 use nalgebra::Vector3;
@@ -23,7 +23,7 @@ pub struct Sampled {
     /// Of the circle around the centre of area that holds it, metres.
     radius: f64,
     irregularity: f64,
-    samples: Vec<Vec<Sample>>,
+    samples: Vec<Vec<QuadraturePoint>>,
 }
 
 impl Sampled {

@@ -1,4 +1,4 @@
-//! What may stand between two groups of surfaces.
+//! Shaft culling: what may stand between two groups of surfaces.
 //!
 //! The shaft between two convex hulls is the hull of both: all light between them
 //! stays inside. A convex polygon outside it blocks nothing.

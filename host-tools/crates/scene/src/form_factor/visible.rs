@@ -1,4 +1,4 @@
-//! The exchange area of two polygons with obstacles between them.
+//! Visibility: the exchange area of two polygons with obstacles between them.
 //!
 //! From a point of one polygon, the other one is seen without the shadows that
 //! the obstacles cast on it: convex pieces, so their form factors are exact. Over the
@@ -49,23 +49,23 @@ pub(crate) fn visible_share(
     tolerance: Tolerance,
     obstacles: &[&Polygon],
 ) -> f64 {
-    let view = View {
+    let receiver = Receiver {
         normal: a.normal(),
         b,
         hull: Hull::of(b),
     };
-    let between = view.between(a, obstacles);
+    let between = receiver.between(a, obstacles);
     if between.is_empty() {
         return 1.0;
     }
     let from = Hull::of(a);
-    if between.iter().any(|o| blocks_all(&from, &view.hull, o)) {
+    if between.iter().any(|o| blocks_all(&from, &receiver.hull, o)) {
         return 0.0;
     }
-    let light = view.light(a, &between);
+    let light = receiver.light(a, &between);
     let share = (light.seen / light.whole.max(f64::MIN_POSITIVE)).clamp(LEAST_SHARE, 1.0);
     let error = tolerance.relative() * light.whole * share.sqrt();
-    let light = view.refined(a, light, &between, error, QUARTERINGS);
+    let light = receiver.refined(a, light, &between, error, QUARTERINGS);
     if light.whole > 0.0 {
         (light.seen / light.whole).clamp(0.0, 1.0)
     } else {
@@ -75,12 +75,12 @@ pub(crate) fn visible_share(
 
 /// Light from `b` that arrives on a part of `a`, as exchange area, m^2.
 #[derive(Clone, Copy, Debug, Default)]
-struct Light {
+struct SeenLight {
     seen: f64,
     whole: f64,
 }
 
-impl std::ops::AddAssign for Light {
+impl std::ops::AddAssign for SeenLight {
     fn add_assign(&mut self, other: Self) {
         self.seen += other.seen;
         self.whole += other.whole;
@@ -88,13 +88,13 @@ impl std::ops::AddAssign for Light {
 }
 
 /// What parts of a polygon with this normal see of `b`.
-struct View<'b> {
+struct Receiver<'b> {
     normal: Vector3<f64>,
     b: &'b Polygon,
     hull: Hull,
 }
 
-impl View<'_> {
+impl Receiver<'_> {
     /// The obstacles that may stand between a part and `b`.
     fn between<'o>(&self, part: &Polygon, obstacles: &[&'o Polygon]) -> Vec<&'o Polygon> {
         let hull = Hull::of(part);
@@ -103,8 +103,8 @@ impl View<'_> {
     }
 
     /// What a part receives, by the rule of its few places.
-    fn light(&self, part: &Polygon, between: &[&Polygon]) -> Light {
-        let mut light = Light::default();
+    fn light(&self, part: &Polygon, between: &[&Polygon]) -> SeenLight {
+        let mut light = SeenLight::default();
         for (place, area) in samples(part, ORDER) {
             light.whole += area * from_point(&place, &self.normal, self.b);
             light.seen += area * self.seen(&place, between);
@@ -116,18 +116,18 @@ impl View<'_> {
     fn refined(
         &self,
         part: &Polygon,
-        coarse: Light,
+        coarse: SeenLight,
         between: &[&Polygon],
         error: f64,
         quarterings: usize,
-    ) -> Light {
+    ) -> SeenLight {
         let quarters: Vec<_> = quartered(part)
             .map(|quarter| {
                 let light = self.light(&quarter, between);
                 (quarter, light)
             })
             .collect();
-        let mut fine = Light::default();
+        let mut fine = SeenLight::default();
         for (_, light) in &quarters {
             fine += *light;
         }
@@ -138,7 +138,7 @@ impl View<'_> {
         if quarterings == 0 || (agree && !self.missed(part, fine, between)) {
             return fine;
         }
-        let mut light = Light::default();
+        let mut light = SeenLight::default();
         for (quarter, coarse) in quarters {
             // Few obstacles cost less to look past than to rule out.
             let nearer = (between.len() > FEW).then(|| self.between(&quarter, between));
@@ -150,7 +150,7 @@ impl View<'_> {
     }
 
     /// Whether a part that seems to see all or nothing sees something else from a corner.
-    fn missed(&self, part: &Polygon, light: Light, between: &[&Polygon]) -> bool {
+    fn missed(&self, part: &Polygon, light: SeenLight, between: &[&Polygon]) -> bool {
         let share = light.seen / light.whole.max(f64::MIN_POSITIVE);
         let even = !(1e-9..=1.0 - 1e-9).contains(&share);
         let centre = part.centroid();
@@ -321,11 +321,8 @@ fn quartered(polygon: &Polygon) -> impl Iterator<Item = Polygon> {
 mod tests {
     use super::super::exchange_area;
     use super::*;
+    use crate::geometry::polygon;
     use proptest::prelude::*;
-
-    fn polygon(corners: &[[f64; 3]]) -> Polygon {
-        Polygon::new(corners.iter().map(|c| Vector3::from(*c)).collect()).unwrap()
-    }
 
     fn rectangle(x: [f64; 2], y: [f64; 2], z: f64) -> Polygon {
         polygon(&[

@@ -1,8 +1,11 @@
-//! Which surface a ray meets first, and whether two places see each other.
+//! Ray casting: which surface a ray meets first, and whether two places see each other. Where
+//! there are many surfaces, a tree of their bounding boxes comes first.
 
-use super::bounds::{Bounds, Stretch};
 use super::polygon::Polygon;
-use nalgebra::Vector3;
+use bvh::aabb::{Aabb, Bounded, IntersectsAabb};
+use bvh::bounding_hierarchy::BHShape;
+use bvh::bvh::Bvh;
+use nalgebra::{Point3, Vector3};
 
 /// Part of a segment at either end that no surface blocks: the surfaces that it
 /// starts and ends on.
@@ -16,7 +19,7 @@ const MANY: usize = 16;
 pub struct Obstacles {
     facets: Vec<Polygon>,
     /// Boxes around them, if there are [`MANY`].
-    bounds: Option<Bounds>,
+    bounds: Option<BoundingBoxes>,
 }
 
 /// Where a ray meets a surface.
@@ -32,7 +35,7 @@ impl Obstacles {
     /// Obstacles in the order that [`Hit::facet`] counts them.
     #[must_use]
     pub fn new(facets: Vec<Polygon>) -> Self {
-        let bounds = (facets.len() >= MANY).then(|| Bounds::new(&facets));
+        let bounds = (facets.len() >= MANY).then(|| BoundingBoxes::new(&facets));
         Self { facets, bounds }
     }
 
@@ -105,20 +108,104 @@ fn meets(polygon: &Polygon, origin: &Vector3<f64>, direction: &Vector3<f64>) -> 
     inside.then_some(along)
 }
 
+/// Part of a surface's size that its box is wider: a flat box has no inside to hit.
+const WIDER: f64 = 1e-6;
+
+/// The boxes of all surfaces of a scene.
+#[derive(Clone, Debug)]
+struct BoundingBoxes {
+    tree: Bvh<f64, 3>,
+    boxes: Vec<BoxOfFacet>,
+}
+
+#[derive(Clone, Debug)]
+struct BoxOfFacet {
+    bounds: Aabb<f64, 3>,
+    facet: usize,
+    node: usize,
+}
+
+impl Bounded<f64, 3> for BoxOfFacet {
+    fn aabb(&self) -> Aabb<f64, 3> {
+        self.bounds
+    }
+}
+
+impl BHShape<f64, 3> for BoxOfFacet {
+    fn set_bh_node_index(&mut self, node: usize) {
+        self.node = node;
+    }
+
+    fn bh_node_index(&self) -> usize {
+        self.node
+    }
+}
+
+impl BoundingBoxes {
+    fn new(facets: &[Polygon]) -> Self {
+        let mut boxes: Vec<_> = facets
+            .iter()
+            .enumerate()
+            .map(|(facet, polygon)| {
+                let first = polygon.corners()[0];
+                let corners = polygon.corners().iter();
+                let (least, most) = corners.fold((first, first), |(l, m), c| (l.inf(c), m.sup(c)));
+                let wider = Vector3::repeat(WIDER * polygon.size());
+                let (least, most) = (Point3::from(least - wider), Point3::from(most + wider));
+                BoxOfFacet {
+                    bounds: Aabb::with_bounds(least, most),
+                    facet,
+                    node: 0,
+                }
+            })
+            .collect();
+        Self {
+            tree: Bvh::build(&mut boxes),
+            boxes,
+        }
+    }
+
+    /// Surfaces whose boxes a stretch of a line meets.
+    fn near<'a>(&'a self, stretch: &'a Stretch) -> impl Iterator<Item = usize> + 'a {
+        let met = self.tree.traverse_iterator(stretch, &self.boxes);
+        met.map(|near| near.facet)
+    }
+}
+
+/// Part of a line, from `origin` to that many lengths of `direction` away.
+struct Stretch {
+    origin: Vector3<f64>,
+    direction: Vector3<f64>,
+    lengths: f64,
+}
+
+impl IntersectsAabb<f64, 3> for Stretch {
+    fn intersects_aabb(&self, aabb: &Aabb<f64, 3>) -> bool {
+        let (mut enters, mut leaves) = (0.0_f64, self.lengths);
+        for axis in 0..3 {
+            let (start, slope) = (self.origin[axis], self.direction[axis]);
+            let (least, most) = (aabb.min[axis], aabb.max[axis]);
+            if slope == 0.0 {
+                if start < least || start > most {
+                    return false;
+                }
+                continue;
+            }
+            let (a, b) = ((least - start) / slope, (most - start) / slope);
+            enters = enters.max(a.min(b));
+            leaves = leaves.min(a.max(b));
+        }
+        enters <= leaves
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
     fn square(z: f64) -> Polygon {
-        let corner = |x, y| Vector3::new(x, y, z);
-        Polygon::new(vec![
-            corner(-1.0, -1.0),
-            corner(1.0, -1.0),
-            corner(1.0, 1.0),
-            corner(-1.0, 1.0),
-        ])
-        .unwrap()
+        crate::geometry::polygon(&[[-1., -1., z], [1., -1., z], [1., 1., z], [-1., 1., z]])
     }
 
     #[test]

@@ -1,8 +1,47 @@
-//! Convex planar polygons: what surfaces, patches and their shadows are made of.
+//! Convex planar polygons, and the planes they lie in: what surfaces, patches and their
+//! shadows are made of.
 
-use super::plane::Plane;
 use nalgebra::Vector3;
 use thiserror::Error;
+
+/// An oriented plane; metres.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Plane {
+    normal: Vector3<f64>,
+    offset: f64,
+}
+
+impl Plane {
+    /// The plane through `place` with this unit normal.
+    #[must_use]
+    pub fn through(place: Vector3<f64>, normal: Vector3<f64>) -> Self {
+        Self {
+            normal,
+            offset: normal.dot(&place),
+        }
+    }
+
+    /// Unit normal.
+    #[must_use]
+    pub fn normal(&self) -> Vector3<f64> {
+        self.normal
+    }
+
+    /// Distance of a point, positive on the side that the normal points to.
+    #[must_use]
+    pub fn distance(&self, place: &Vector3<f64>) -> f64 {
+        self.normal.dot(place) - self.offset
+    }
+
+    /// The same plane facing the other way.
+    #[must_use]
+    pub fn flipped(&self) -> Self {
+        Self {
+            normal: -self.normal,
+            offset: -self.offset,
+        }
+    }
+}
 
 /// Relative distance of a corner from the polygon's plane that still counts as
 /// on it.
@@ -213,14 +252,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn square() -> Polygon {
-        let corner = |x, y| Vector3::new(x, y, 0.0);
-        Polygon::new(vec![
-            corner(0.0, 0.0),
-            corner(2.0, 0.0),
-            corner(2.0, 2.0),
-            corner(0.0, 2.0),
-        ])
-        .unwrap()
+        crate::geometry::polygon(&[[0., 0., 0.], [2., 0., 0.], [2., 2., 0.], [0., 2., 0.]])
     }
 
     #[test]
@@ -234,35 +266,18 @@ mod tests {
 
     #[test]
     fn what_is_no_convex_surface_is_refused_with_the_corner() {
-        let at = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
-        let bent = vec![
-            at(0., 0., 0.),
-            at(1., 0., 0.),
-            at(1., 1., 0.1),
-            at(0., 1., 0.),
-        ];
-        assert!(matches!(
-            Polygon::new(bent),
-            Err(PolygonError::NotPlanar { .. })
-        ));
-        let dart = vec![
-            at(0., 0., 0.),
-            at(1., 0., 0.),
-            at(0.2, 0.2, 0.),
-            at(0., 1., 0.),
-        ];
-        assert_eq!(
-            Polygon::new(dart),
-            Err(PolygonError::NotConvex { corner: 2 })
-        );
-        let line = vec![at(0., 0., 0.), at(1., 0., 0.), at(2., 0., 0.)];
-        assert_eq!(Polygon::new(line), Err(PolygonError::NoArea));
-        let odd = vec![at(0., 0., 0.), at(f64::NAN, 0., 0.), at(2., 1., 0.)];
-        assert_eq!(Polygon::new(odd), Err(PolygonError::NotFinite(1)));
-        assert_eq!(
-            Polygon::new(vec![at(0., 0., 0.); 2]),
-            Err(PolygonError::TooFewCorners(2))
-        );
+        let refused = |corners: &[[f64; 3]]| {
+            Polygon::new(corners.iter().map(|c| Vector3::from(*c)).collect()).unwrap_err()
+        };
+        let bent = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.1], [0., 1., 0.]];
+        assert!(matches!(refused(&bent), PolygonError::NotPlanar { .. }));
+        let dart = [[0., 0., 0.], [1., 0., 0.], [0.2, 0.2, 0.], [0., 1., 0.]];
+        assert_eq!(refused(&dart), PolygonError::NotConvex { corner: 2 });
+        let line = [[0., 0., 0.], [1., 0., 0.], [2., 0., 0.]];
+        assert_eq!(refused(&line), PolygonError::NoArea);
+        let odd = [[0., 0., 0.], [f64::NAN, 0., 0.], [2., 1., 0.]];
+        assert_eq!(refused(&odd), PolygonError::NotFinite(1));
+        assert_eq!(refused(&[[0.; 3]; 2]), PolygonError::TooFewCorners(2));
     }
 
     proptest! {

@@ -1,4 +1,4 @@
-//! Why there is no verdict.
+//! Errors of a verification: why there is no verdict.
 
 use crate::PatternsError;
 use iltm_capture::CaptureError;

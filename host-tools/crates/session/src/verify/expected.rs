@@ -1,4 +1,4 @@
-//! The light that a table expects of any projector input, cell by cell.
+//! Expected light: what a table expects of any projector input, cell by cell.
 //!
 //! The pipeline read backwards, as `report/predict.rs` reads it at full resolution: it
 //! makes `p = g d' - K d'` of the wanted light `d' = d - a`, so the light that an input

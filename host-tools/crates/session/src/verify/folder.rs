@@ -1,13 +1,12 @@
-//! Writes the folder of pictures that a table is verified with.
+//! Verification folder: writes the pictures that a table is verified with.
 
 use super::images::test_images;
+use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
-use super::role::{VerifyManifest, VerifyRole};
 use super::{TestImage, VerifyError};
 use crate::{Layout, slide_name};
-use iltm_capture::VERIFY_FILE;
-use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, numbered, pattern_set};
-use iltm_picture::{Picture, Samples, WholeFolder, progress::Progress};
+use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, pattern_set};
+use iltm_picture::{Picture, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::Compensator;
 use rayon::prelude::*;
@@ -101,7 +100,8 @@ fn slides(
     let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
     let within = Layout::new(table.grid(), layout.inner(), 0)?;
     let code = |(role, pattern): &(Role, Pattern)| -> Result<Slide, VerifyError> {
-        let cells = of_pattern(pattern);
+        let lit = |cell: usize, _| 255 * u8::from(pattern.lit[cell]);
+        let cells = Picture::of_codes(FrameSize::of_grid(table.grid()), 1, lit);
         Ok(Slide {
             role: VerifyRole::Code(*role),
             full: layout.slide(&cells)?,
@@ -109,17 +109,10 @@ fn slides(
         })
     };
     let coded = pattern_set(table.grid(), BERNOULLI, SEED);
-    let ends = || {
-        coded
-            .iter()
-            .take(2)
-            .map(code)
-            .collect::<Result<Vec<_>, VerifyError>>()
-    };
-    let mut slides = coded
-        .iter()
-        .map(code)
-        .collect::<Result<Vec<_>, VerifyError>>()?;
+    let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
+    // White and black.
+    let ends = || all(&coded[..2]);
+    let mut slides = all(&coded)?;
     slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);
@@ -146,37 +139,8 @@ fn slides(
 /// A wanted picture as a projector is sent it that is not compensated: the same light,
 /// relative to the projector's own white.
 pub(super) fn plain(wanted: &Picture, curves: &ProjectorCurves) -> Picture {
-    let channels = wanted.channels();
     let light = iltm_picture::LightPicture::decode(wanted, iltm_picture::Response::Srgb);
-    let pixels = 0..wanted.size().pixels();
-    let samples = pixels.flat_map(|pixel| {
-        let planes = light.planes().iter().enumerate();
-        planes.map(move |(channel, plane)| (channel, f64::from(plane[pixel])))
-    });
-    let samples = samples.map(|(channel, light)| curves.code(channel, light));
-    eight(
-        wanted.size(),
-        samples.take(pixels_of(wanted) * channels).collect(),
-    )
-}
-
-fn pixels_of(picture: &Picture) -> usize {
-    picture.size().pixels()
-}
-
-/// A pattern as a grey picture of one pixel a cell.
-fn of_pattern(pattern: &Pattern) -> Picture {
-    let lit = pattern.lit.iter().map(|lit| 255 * u8::from(*lit));
-    match FrameSize::new(pattern.cols as u16, pattern.rows as u16) {
-        Some(size) => eight(size, lit.collect()),
-        None => unreachable!("a grid has cells"),
-    }
-}
-
-/// A picture of 8-bit samples, one or three for each pixel.
-fn eight(size: FrameSize, samples: Vec<u8>) -> Picture {
-    match Picture::new(size, Samples::Eight(samples)) {
-        Some(picture) => picture,
-        None => unreachable!("samples were made pixel by pixel"),
-    }
+    Picture::of_codes(wanted.size(), wanted.channels(), |pixel, channel| {
+        curves.code(channel, f64::from(light.planes()[channel][pixel]))
+    })
 }

@@ -1,4 +1,4 @@
-//! The test images: wanted light, one value a cell and channel.
+//! Test images: wanted light, one value a cell and channel.
 //!
 //! Natural ones, an even grey, a checkerboard and, where a table has colours, bars. None
 //! wants black beside white, which walls that light each other cannot show; where a table
@@ -7,9 +7,9 @@
 
 use super::Expected;
 use iltm_capture::CellPlanes;
-use iltm_picture::{Picture, Samples};
+use iltm_picture::Picture;
 use iltm_runtime::{FrameSize, Grid, image::Table};
-use iltm_solve::content::wanted_images;
+use iltm_solve::wanted_images;
 use iltm_video::{CompensateOptions, Compensator, VideoError};
 
 /// Natural images among the test images.
@@ -90,7 +90,7 @@ fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellPlanes)> {
     let (rows, cols) = (grid.rows(), grid.cols());
     let cells = move || (0..rows * cols).map(move |cell| (cell / cols, cell % cols));
     // Back from the range that `wanted_images` has to 0 to 1.
-    let darkest = iltm_solve::content::DARKEST;
+    let darkest = iltm_solve::DARKEST_WANTED;
     let natural = wanted_images(grid).map(|light| (light - darkest) / (1.0 - darkest));
     let mut drawn: Vec<(String, CellPlanes)> = (0..NATURAL)
         .map(|image| {
@@ -140,10 +140,7 @@ fn codes(grid: Grid, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Picture 
         let light = dark + (bright - dark) * shape;
         (iltm_picture::Response::Srgb.value(light) * 255.0).round() as u8
     };
-    let cells = 0..grid.cells();
-    let samples = cells.flat_map(|cell| shape.iter().map(move |plane| code(plane[cell])));
-    match Picture::new(FrameSize::of_grid(grid), Samples::Eight(samples.collect())) {
-        Some(picture) => picture,
-        None => unreachable!("a sample for each cell and channel"),
-    }
+    Picture::of_codes(FrameSize::of_grid(grid), shape.len(), |cell, channel| {
+        code(shape[channel][cell])
+    })
 }

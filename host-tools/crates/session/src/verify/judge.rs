@@ -1,4 +1,4 @@
-//! From photographs to a verdict.
+//! Verdict: from photographs to errors before and after.
 //!
 //! The error is the one that a solve predicts and the documentation measures: a
 //! photograph against the wanted light at the one scale, for all cells and colours, that
@@ -10,7 +10,7 @@ use super::session::Shown;
 use super::{Expected, Session, VerifyError};
 use iltm_capture::CellPlanes;
 use iltm_picture::LightPicture;
-use iltm_report::{Comparison, steps};
+use iltm_report::{Comparison, tier_costs};
 use iltm_runtime::{FrameSize, image::Table};
 use std::path::Path;
 
@@ -265,7 +265,7 @@ fn bound(
     lit: &LiveCells,
 ) -> Bound {
     let own = table.inverse_error().to_num::<f64>();
-    let predicted = steps(table).last().map(|step| step.total);
+    let predicted = tier_costs(table).last().map(|step| step.total);
     let predicted = predicted.filter(|_| own > 0.0);
     let noise = noise(session, lit);
     let count = images.len().max(1) as f64;

@@ -1,11 +1,11 @@
-//! The pictures of a verdict: maps of the cells, and the test images as the wall showed
+//! Pictures of a verdict: maps of the cells, and the test images as the wall showed
 //! them.
 
 use super::judge::over_images;
 use super::{Session, Verdict};
 use iltm_capture::CellPlanes;
 use iltm_picture::{
-    ColourScale, LightPicture, Palette, Picture, Samples,
+    ColourScale, LightPicture, Palette, Picture,
     html::{PictureFile, picture_file},
 };
 use iltm_runtime::{FrameSize, Grid, image::Table};
@@ -73,8 +73,11 @@ fn rounded(value: f64) -> f64 {
 }
 
 fn map(grid: Grid, scale: &ColourScale, cells: &[Option<f64>]) -> Picture {
-    let colour = |cell: &Option<f64>| cell.map_or(UNKNOWN, |value| scale.colour(value));
-    blocks(grid, 3, &cells.iter().flat_map(colour).collect::<Vec<u8>>())
+    let colour = |cell: Option<f64>| cell.map_or(UNKNOWN, |value| scale.colour(value));
+    let size = FrameSize::of_grid(grid);
+    blocks(&Picture::from_fn(size, |col, row| {
+        colour(cells[row * grid.cols() + col])
+    }))
 }
 
 /// A photograph's cells at the brightness that suits the wanted image best, as its error is
@@ -98,30 +101,14 @@ fn as_seen(grid: Grid, seen: &CellPlanes, wanted: &CellPlanes, live: &[bool]) ->
 
 /// Light of the cells as a screen shows it.
 fn lit(grid: Grid, light: &CellPlanes) -> Picture {
-    let plane = |plane: &Vec<f64>| plane.iter().map(|light| *light as f32).collect();
-    let planes = light.iter().map(plane).collect();
-    let Some(picture) = LightPicture::new(FrameSize::of_grid(grid), planes) else {
-        unreachable!("one or three values for each cell");
-    };
-    let shown = picture.for_display();
-    match shown.samples() {
-        Samples::Eight(samples) => blocks(grid, shown.channels(), samples),
-        Samples::Sixteen(_) => unreachable!("screens get 8 bits"),
-    }
+    let light = LightPicture::from_fn(FrameSize::of_grid(grid), light.len(), |channel, cell| {
+        light[channel][cell] as f32
+    });
+    blocks(&light.for_display())
 }
 
 /// Cells as squares of pixels.
-fn blocks(grid: Grid, channels: usize, samples: &[u8]) -> Picture {
-    let side = MAP_SIDE.div_ceil(grid.rows().max(grid.cols()));
-    let (width, height) = (grid.cols() * side, grid.rows() * side);
-    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y / side, x / side)));
-    let all = pixels.flat_map(|(row, col)| {
-        let at = (row * grid.cols() + col) * channels;
-        samples[at..at + channels].iter().copied()
-    });
-    let size = FrameSize::new(width as u16, height as u16);
-    match size.and_then(|size| Picture::new(size, Samples::Eight(all.collect()))) {
-        Some(picture) => picture,
-        None => unreachable!("squares of the cells' samples"),
-    }
+fn blocks(cells: &Picture) -> Picture {
+    let size = cells.size();
+    cells.enlarged(MAP_SIDE.div_ceil(size.width().max(size.height())))
 }

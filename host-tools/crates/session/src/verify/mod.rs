@@ -1,4 +1,4 @@
-//! Whether a table keeps its promise on the wall.
+//! Verification: whether a table keeps its promise on the wall.
 //!
 //! Test images are projected as they are and compensated, photographed, and compared with
 //! what was wanted, cell by cell. The camera may stand elsewhere than when the table was
@@ -18,10 +18,10 @@ mod expected;
 mod folder;
 mod images;
 mod judge;
+mod manifest;
 mod maps;
 mod page;
 mod response;
-mod role;
 mod session;
 #[cfg(test)]
 #[path = "../../../compile/src/test_scene.rs"]
@@ -32,9 +32,8 @@ pub use expected::Expected;
 pub use folder::{Written, write};
 pub use images::{TestImage, test_images};
 pub use judge::{Bound, Drift, ImageVerdict, Verdict, WhiteChange, WorstCell, judge};
+pub use manifest::{VerifyManifest, VerifyRole, VerifyShot};
 pub use maps::pictures;
-pub use page::html;
-pub use page::reason;
+pub use page::{html, reason};
 pub use response::ProjectorCurves;
-pub use role::{VerifyManifest, VerifyRole, VerifyShot};
 pub use session::{Session, Shown};

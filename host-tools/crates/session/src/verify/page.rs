@@ -1,13 +1,8 @@
-//! The verdict as a page: one HTML file with everything inside.
+//! Page of a verdict: one HTML file with everything inside.
 
 use super::maps::{drift_scale, error_scale};
 use super::{ImageVerdict, TestImage, Verdict};
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use iltm_picture::{
-    html::{PictureFile, colour_bar, document},
-    numbers::percent,
-};
+use iltm_picture::html::{PictureFile, colour_bar, document, img_named, percent};
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
 
@@ -158,13 +153,13 @@ fn pictures(verdict: &Verdict, images: &[TestImage], files: &[PictureFile]) -> M
             div .example {
                 h3 { (title(image).unwrap_or("Test image")) }
                 div .three {
-                    figure { (picture(files, &format!("{}-wanted", image.image), "Wanted")) figcaption { "Wanted" } }
+                    figure { (img_named(files, &format!("{}-wanted", image.image), "Wanted")) figcaption { "Wanted" } }
                     figure {
-                        (picture(files, &format!("{}-before", image.image), "Photograph without compensation"))
+                        (img_named(files, &format!("{}-before", image.image), "Photograph without compensation"))
                         figcaption .error { "As it is: error " b { (percent(image.error[0])) } }
                     }
                     figure {
-                        (picture(files, &format!("{}-after", image.image), "Photograph with compensation"))
+                        (img_named(files, &format!("{}-after", image.image), "Photograph with compensation"))
                         figcaption .error { "Compensated: error " b { (percent(image.error[1])) } }
                     }
                 }
@@ -178,8 +173,8 @@ fn worst(verdict: &Verdict, files: &[PictureFile]) -> Markup {
         h2 { "Where it is worst" }
         p { "Error of every cell over all test images, relative to reference white. Grey cells could not be compared." }
         div .half {
-            figure { (picture(files, "worst-cells-before", "Error of each cell without compensation")) (colour_bar(&error_scale(verdict, 0), false)) figcaption { "As it is" } }
-            figure { (picture(files, "worst-cells", "Error of each cell with compensation")) (colour_bar(&error_scale(verdict, 1), false)) figcaption { "Compensated; the colours have another scale" } }
+            figure { (img_named(files, "worst-cells-before", "Error of each cell without compensation")) (colour_bar(&error_scale(verdict, 0), false)) figcaption { "As it is" } }
+            figure { (img_named(files, "worst-cells", "Error of each cell with compensation")) (colour_bar(&error_scale(verdict, 1), false)) figcaption { "Compensated; the colours have another scale" } }
         }
         div .scroll { table {
             thead { tr { th { "row" } th { "column" } th { "error, of white" } } }
@@ -200,7 +195,7 @@ fn drift(verdict: &Verdict, files: &[PictureFile]) -> Markup {
     let levels: Vec<String> = white.level.iter().map(|level| percent(*level)).collect();
     html! { section .split {
         figure {
-            (picture(files, "drift", "Change of white since the table was made"))
+            (img_named(files, "drift", "Change of white since the table was made"))
             (colour_bar(&drift_scale(verdict), false))
         }
         div {
@@ -223,12 +218,5 @@ fn origin(table: &Table<'_>) -> Markup {
     html! { section {
         h2 { "The table" }
         pre { (table.provenance().trim_end()) }
-    } }
-}
-
-fn picture(files: &[PictureFile], name: &str, alt: &str) -> Markup {
-    let file = files.iter().find(|file| file.name == name);
-    html! { @if let Some(file) = file {
-        img .cells src=(format!("data:image/png;base64,{}", STANDARD.encode(&file.png))) alt=(alt);
     } }
 }

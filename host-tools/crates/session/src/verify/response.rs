@@ -1,4 +1,4 @@
-//! Between light and the codes that a projector is sent, by a table's response.
+//! Projector response: between light and the codes that a projector is sent.
 
 use iltm_runtime::{
     image::Table,

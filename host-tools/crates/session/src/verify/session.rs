@@ -1,12 +1,12 @@
 //! A verification folder with its photographs, read back and checked.
 
 use super::folder::{plain, wanted_file};
+use super::manifest::{VerifyManifest, VerifyRole, VerifyShot};
 use super::response::ProjectorCurves;
-use super::role::{VerifyManifest, VerifyRole, VerifyShot};
 use super::{Expected, VerifyError};
 use iltm_capture::VERIFY_FILE;
 use iltm_capture::{CaptureError, CellPlanes, CellReadings, Settings, Shot, find_photo, remeasure};
-use iltm_compile::learn::mixing_in;
+use iltm_compile::Provenance;
 use iltm_picture::{LightPicture, Picture, Response, Samples, png, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::{Compensator, VideoError};
@@ -62,7 +62,7 @@ impl Session {
             other => other.into(),
         })?;
         let settings = Settings::read(folder)?;
-        let mixing = mixing_in(table.provenance());
+        let mixing = Provenance::read(table.provenance()).mixing;
         let mut code: Vec<Shot> = Vec::new();
         let mut images: BTreeMap<u8, [Option<VerifyShot>; 2]> = BTreeMap::new();
         for shot in manifest.shots {

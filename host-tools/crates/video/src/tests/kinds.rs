@@ -1,6 +1,7 @@
 //! Kinds of frames and of tables, and which go together.
 
 use super::*;
+use ::png::{BitDepth, ColorType};
 use iltm_picture::{png, png::PngError, progress::Silent};
 use std::io::Cursor;
 
@@ -76,12 +77,12 @@ fn samples_beyond_black_and_white_are_counted() {
 }
 
 /// A PNG file of the given colour type and samples.
-fn png_file(colour: ::png::ColorType, depth: ::png::BitDepth, samples: &[u8]) -> Vec<u8> {
+fn png_file(colour: ColorType, depth: BitDepth, samples: &[u8]) -> Vec<u8> {
     let mut file = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut file, 4, 2);
     encoder.set_color(colour);
     encoder.set_depth(depth);
-    if colour == ::png::ColorType::Indexed {
+    if colour == ColorType::Indexed {
         encoder.set_palette(vec![0, 0, 0, 255, 0, 0, 0, 255, 0, 9, 9, 9]);
     }
     let mut writer = encoder.write_header().unwrap();
@@ -114,19 +115,11 @@ fn pictures_keep_their_size_depth_and_colour() {
 
 #[test]
 fn palettes_and_few_bits_become_eight_bits() {
-    let indexed = png_file(
-        ::png::ColorType::Indexed,
-        ::png::BitDepth::Two,
-        &[0b00_01_10_11; 2],
-    );
+    let indexed = png_file(ColorType::Indexed, BitDepth::Two, &[0b00_01_10_11; 2]);
     let picture = png::read(&indexed[..]).unwrap();
     let row = [0, 0, 0, 255, 0, 0, 0, 255, 0, 9, 9, 9];
     assert_eq!(picture.samples(), &Samples::Eight([row, row].concat()));
-    let grey = png_file(
-        ::png::ColorType::Grayscale,
-        ::png::BitDepth::One,
-        &[0b0101_0000; 2],
-    );
+    let grey = png_file(ColorType::Grayscale, BitDepth::One, &[0b0101_0000; 2]);
     let picture = png::read(&grey[..]).unwrap();
     assert_eq!(
         picture.samples(),
@@ -136,11 +129,8 @@ fn palettes_and_few_bits_become_eight_bits() {
 
 #[test]
 fn transparent_pictures_are_refused() {
-    for (colour, channels) in [
-        (::png::ColorType::Rgba, 4),
-        (::png::ColorType::GrayscaleAlpha, 2),
-    ] {
-        let file = png_file(colour, ::png::BitDepth::Eight, &vec![255; 8 * channels]);
+    for (colour, channels) in [(ColorType::Rgba, 4), (ColorType::GrayscaleAlpha, 2)] {
+        let file = png_file(colour, BitDepth::Eight, &vec![255; 8 * channels]);
         let error = png::read(&file[..]).unwrap_err();
         assert!(matches!(error, PngError::Alpha));
         assert!(error.next_step().contains("-alpha off"));
@@ -149,7 +139,7 @@ fn transparent_pictures_are_refused() {
 
 #[test]
 fn a_picture_that_says_it_is_huge_is_refused_before_it_is_read() {
-    let mut file = png_file(::png::ColorType::Grayscale, ::png::BitDepth::Eight, &[0; 8]);
+    let mut file = png_file(ColorType::Grayscale, BitDepth::Eight, &[0; 8]);
     for (width, height) in [(65_536_u32, 1_u32), (60_000, 60_000), (1, u32::MAX >> 1)] {
         file[16..20].copy_from_slice(&width.to_be_bytes());
         file[20..24].copy_from_slice(&height.to_be_bytes());
@@ -165,7 +155,7 @@ fn a_picture_that_says_it_is_huge_is_refused_before_it_is_read() {
 
 #[test]
 fn damaged_pictures_give_an_error_and_never_a_panic() {
-    let whole = png_file(::png::ColorType::Rgb, ::png::BitDepth::Eight, &[77; 24]);
+    let whole = png_file(ColorType::Rgb, BitDepth::Eight, &[77; 24]);
     for end in 0..whole.len() - 12 {
         assert!(png::read(&whole[..end]).is_err());
     }

@@ -20,50 +20,23 @@ fn error(stream: &[u8]) -> Y4mError {
 
 #[test]
 fn tags_say_how_frames_are_laid_out() {
+    use ChromaSampling::{Chroma420, Chroma444, Mono};
+    use CodeRange::{Full, Limited};
     for (line, sampling, range, bytes) in [
+        ("W5 H3", Chroma420, Limited, 15 + 2 * 3 * 2),
+        ("W5 H3 C420mpeg2", Chroma420, Limited, 27),
         (
-            "YUV4MPEG2 W5 H3",
-            ChromaSampling::Chroma420,
-            CodeRange::Limited,
-            15 + 2 * 3 * 2,
-        ),
-        (
-            "YUV4MPEG2 W5 H3 C420mpeg2",
-            ChromaSampling::Chroma420,
-            CodeRange::Limited,
+            "W5 H3 C420paldv XCOLORRANGE=LIMITED",
+            Chroma420,
+            Limited,
             27,
         ),
-        (
-            "YUV4MPEG2 W5 H3 C420paldv XCOLORRANGE=LIMITED",
-            ChromaSampling::Chroma420,
-            CodeRange::Limited,
-            27,
-        ),
-        (
-            "YUV4MPEG2 H3 W5 Ip C420jpeg XCOLORRANGE=FULL",
-            ChromaSampling::Chroma420,
-            CodeRange::Full,
-            27,
-        ),
-        (
-            "YUV4MPEG2 W5 H3 I? C444 A1:1 F30000:1001",
-            ChromaSampling::Chroma444,
-            CodeRange::Limited,
-            45,
-        ),
-        (
-            "YUV4MPEG2 W5 H3  Cmono Xsomething",
-            ChromaSampling::Mono,
-            CodeRange::Full,
-            15,
-        ),
-        (
-            "YUV4MPEG2 W1 H1",
-            ChromaSampling::Chroma420,
-            CodeRange::Limited,
-            3,
-        ),
+        ("H3 W5 Ip C420jpeg XCOLORRANGE=FULL", Chroma420, Full, 27),
+        ("W5 H3 I? C444 A1:1 F30000:1001", Chroma444, Limited, 45),
+        ("W5 H3  Cmono Xsomething", Mono, Full, 15),
+        ("W1 H1", Chroma420, Limited, 3),
     ] {
+        let line = &format!("YUV4MPEG2 {line}");
         let header = Header::parse(line.as_bytes()).expect(line);
         assert_eq!(
             (header.sampling(), header.range()),

@@ -1,20 +1,23 @@
-//! Cells in clusters that are halved again and again.
+//! Clusters of cells that are halved again and again, and photographs of them, forwards and
+//! with projector and camera exchanged.
 
+use crate::Rig;
+use crate::rig::live_cells;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 
 /// A partition of the live cells of a grid.
 #[derive(Clone, Debug)]
-pub(super) struct Clusters {
+pub(super) struct CellClusters {
     grid: Grid,
     /// Cells of each cluster, none of them empty.
     members: Vec<Vec<usize>>,
 }
 
-impl Clusters {
+impl CellClusters {
     /// All `live` cells (length `N`) in one.
     pub(super) fn whole(grid: Grid, live: &[bool]) -> Self {
-        let members: Vec<usize> = (0..live.len()).filter(|cell| live[*cell]).collect();
+        let members = live_cells(live);
         Self {
             grid,
             members: if members.is_empty() {
@@ -89,6 +92,51 @@ impl Clusters {
     }
 }
 
+/// Whole clusters lit alone.
+pub(super) struct ClusterSamples {
+    pub(super) clusters: CellClusters,
+    /// `N x k`.
+    pub(super) columns: DMatrix<f64>,
+    /// With projector and camera exchanged, `N x k`.
+    pub(super) rows: DMatrix<f64>,
+}
+
+impl ClusterSamples {
+    /// All live cells as one cluster.
+    pub(super) fn first(rig: &mut Rig) -> Self {
+        let clusters = CellClusters::whole(rig.grid(), rig.live());
+        let lights = clusters.lights();
+        Self {
+            columns: rig.photograph(&lights),
+            rows: rig.photograph_exchanged(&lights),
+            clusters,
+        }
+    }
+
+    /// Every cluster in two: one half photographed, the other is what remains.
+    pub(super) fn halved(&self, rig: &mut Rig) -> Self {
+        let (clusters, parents) = self.clusters.halved();
+        let second: Vec<usize> = (1..parents.len())
+            .filter(|child| parents[*child] == parents[*child - 1])
+            .collect();
+        let shown = clusters.lights().select_columns(&second);
+        let divide = |whole: &DMatrix<f64>, seen: &DMatrix<f64>| {
+            let mut light = whole.select_columns(&parents);
+            for (photograph, child) in seen.column_iter().zip(&second) {
+                let first = light.column(*child - 1) - photograph;
+                light.set_column(*child - 1, &first);
+                light.set_column(*child, &photograph);
+            }
+            light
+        };
+        Self {
+            columns: divide(&self.columns, &rig.photograph(&shown)),
+            rows: divide(&self.rows, &rig.photograph_exchanged(&shown)),
+            clusters,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,7 +145,7 @@ mod tests {
     fn halves_of_halves_end_as_single_live_cells() {
         let grid = Grid::new(5, 7).unwrap();
         let live: Vec<bool> = (0..35).map(|cell| cell % 6 != 0).collect();
-        let mut clusters = Clusters::whole(grid, &live);
+        let mut clusters = CellClusters::whole(grid, &live);
         while clusters.splits() > 0 {
             let before = clusters.lights();
             let (halved, parents) = clusters.halved();

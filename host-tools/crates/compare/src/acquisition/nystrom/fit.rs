@@ -1,7 +1,8 @@
-//! A transport from samples: direct light, and all other by a kernel of low rank.
+//! Kernel fit: a transport from samples, direct light, and all other by a kernel of low rank.
 
-use super::samples::Samples;
+use super::clusters::ClusterSamples;
 use super::separation::Separation;
+use crate::rig::clear_dead;
 use nalgebra::{DMatrix, DVector};
 
 /// Exponents of the element-wise kernel that are tried.
@@ -13,12 +14,12 @@ const TURNS: usize = 2;
 
 /// Kernel and rank.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Model {
+pub(super) struct KernelModel {
     exponent: f64,
     cut: f64,
 }
 
-impl Default for Model {
+impl Default for KernelModel {
     fn default() -> Self {
         Self {
             exponent: 1.0,
@@ -27,7 +28,7 @@ impl Default for Model {
     }
 }
 
-impl Model {
+impl KernelModel {
     /// The model of least `error`, and that error.
     pub(super) fn best(error: impl Fn(&Self) -> f64) -> (f64, Self) {
         let mut best = (f64::INFINITY, Self::default());
@@ -44,7 +45,7 @@ impl Model {
     }
 
     /// `f^-1(f(C) f(A)^+ f(R))`, `N x N`, of samples less `direct` light.
-    fn transport(self, samples: &Samples, direct: &DVector<f64>) -> DMatrix<f64> {
+    fn transport(self, samples: &ClusterSamples, direct: &DVector<f64>) -> DMatrix<f64> {
         let (lights, means) = (samples.clusters.lights(), samples.clusters.means());
         let own = DMatrix::from_diagonal(direct) * &lights;
         let sizes = lights.row_sum();
@@ -83,14 +84,18 @@ impl Model {
 }
 
 /// Direct light and all other.
-pub(super) struct Fit {
+pub(super) struct DirectAndGlobal {
     direct: DVector<f64>,
     other: DMatrix<f64>,
 }
 
-impl Fit {
+impl DirectAndGlobal {
     /// Each in turn from what the other leaves.
-    pub(super) fn new(samples: &Samples, model: Model, separation: Option<&Separation>) -> Self {
+    pub(super) fn new(
+        samples: &ClusterSamples,
+        model: KernelModel,
+        separation: Option<&Separation>,
+    ) -> Self {
         let cells = samples.columns.nrows();
         let mut fit = Self {
             direct: DVector::zeros(cells),
@@ -108,7 +113,7 @@ impl Fit {
     }
 
     /// Relative error of samples it was not made of.
-    pub(super) fn error(&self, next: &Samples) -> f64 {
+    pub(super) fn error(&self, next: &ClusterSamples) -> f64 {
         let lights = next.clusters.lights();
         let own = DMatrix::from_diagonal(&self.direct) * &lights;
         let columns = &self.other * &lights + &own - &next.columns;
@@ -124,13 +129,10 @@ impl Fit {
     /// `T`, `N x N`; rows and columns of cells that are not `live` are zero.
     pub(super) fn transport(self, live: &[bool]) -> DMatrix<f64> {
         let mut transport = self.other;
-        for (cell, live) in live.iter().enumerate() {
-            transport[(cell, cell)] += self.direct[cell];
-            if !live {
-                transport.row_mut(cell).fill(0.0);
-                transport.column_mut(cell).fill(0.0);
-            }
+        for (cell, direct) in self.direct.iter().enumerate() {
+            transport[(cell, cell)] += direct;
         }
+        clear_dead(&mut transport, live);
         transport
     }
 }

@@ -2,15 +2,13 @@
 
 mod clusters;
 mod fit;
-mod samples;
 mod separation;
 
 use super::Acquisition;
-use crate::{Found, Rig, Source, Unfit};
-use fit::{Fit, Model};
-use iltm_picture::progress::Progress;
+use crate::{Acquired, Citation, Description, Rig, Unfit};
+use clusters::ClusterSamples;
+use fit::{DirectAndGlobal, KernelModel};
 use nalgebra::DMatrix;
-use samples::Samples;
 use separation::{PHOTOGRAPHS, Separation};
 
 /// More samples have to lower the predicted error by this factor, or they are in vain;
@@ -51,38 +49,34 @@ impl Nystrom {
 }
 
 impl Acquisition for Nystrom {
-    fn name(&self) -> String {
+    fn description(&self) -> Description {
         let Self { photographs, .. } = self;
-        if self.separated {
-            format!("kernel Nystrom, direct light apart, up to {photographs}")
-        } else {
-            format!("kernel Nystrom, up to {photographs}")
+        Description {
+            name: if self.separated {
+                format!("kernel Nystrom, direct light apart, up to {photographs}")
+            } else {
+                format!("kernel Nystrom, up to {photographs}")
+            },
+            source: Citation {
+                authors: "Wang, Dong, Tong, Lin, Guo",
+                title: "Kernel Nystrom Method for Light Transport",
+                venue: "ACM Transactions on Graphics (SIGGRAPH)",
+                year: 2009,
+            },
+            how: if self.separated {
+                "Each cell's own light by patterns as fine as cells (Nayar and others, 2006); the \
+                 rest, smooth and of low rank, from clusters of cells lit alone. Needs a second \
+                 projector and camera in each other's places."
+            } else {
+                "Clusters of cells lit alone, forwards and with projector and camera exchanged: \
+                 columns and rows that all others are made of if the rank is low. Needs a second \
+                 projector and camera in each other's places, and fails where cells have light of \
+                 their own, which is of full rank."
+            },
         }
     }
 
-    fn source(&self) -> Source {
-        Source {
-            authors: "Wang, Dong, Tong, Lin, Guo",
-            title: "Kernel Nystrom Method for Light Transport",
-            venue: "ACM Transactions on Graphics (SIGGRAPH)",
-            year: 2009,
-        }
-    }
-
-    fn how(&self) -> &'static str {
-        if self.separated {
-            "Each cell's own light by patterns as fine as cells (Nayar and others, 2006); the \
-             rest, smooth and of low rank, from clusters of cells lit alone. Needs a second \
-             projector and camera in each other's places."
-        } else {
-            "Clusters of cells lit alone, forwards and with projector and camera exchanged: \
-             columns and rows that all others are made of if the rank is low. Needs a second \
-             projector and camera in each other's places, and fails where cells have light of \
-             their own, which is of full rank."
-        }
-    }
-
-    fn acquire(&self, rig: &mut Rig, _progress: &dyn Progress) -> Result<Found, Unfit> {
+    fn acquire(&self, rig: &mut Rig) -> Result<Acquired, Unfit> {
         let live = rig.live_cells();
         if live.is_empty() {
             return Err(Unfit::Condition("0 cells are live".to_owned()));
@@ -102,7 +96,7 @@ impl Acquisition for Nystrom {
                 100.0 * error,
             )));
         }
-        Ok(Found::Forward(transport))
+        Ok(Acquired::Forward(transport))
     }
 }
 
@@ -118,10 +112,10 @@ impl Nystrom {
             )));
         }
         let separation = self.separated.then(|| Separation::take(rig));
-        let mut samples = Samples::first(rig);
+        let mut samples = ClusterSamples::first(rig);
         let mut best = (
             None,
-            Fit::new(&samples, Model::default(), separation.as_ref()),
+            DirectAndGlobal::new(&samples, KernelModel::default(), separation.as_ref()),
         );
         let mut in_vain = 0;
         while samples.clusters.splits() > 0
@@ -131,13 +125,18 @@ impl Nystrom {
             let next = samples.halved(rig);
             let (error, model) = if next.clusters.splits() == 0 {
                 // Every cell alone: nothing is left to predict.
-                (0.0, Model::default())
+                (0.0, KernelModel::default())
             } else {
-                Model::best(|model| Fit::new(&samples, *model, separation.as_ref()).error(&next))
+                KernelModel::best(|model| {
+                    DirectAndGlobal::new(&samples, *model, separation.as_ref()).error(&next)
+                })
             };
             samples = next;
             if best.0.is_none_or(|before| error < SETTLED * before) {
-                best = (Some(error), Fit::new(&samples, model, separation.as_ref()));
+                best = (
+                    Some(error),
+                    DirectAndGlobal::new(&samples, model, separation.as_ref()),
+                );
                 in_vain = 0;
             } else {
                 in_vain += 1;
@@ -149,10 +148,9 @@ impl Nystrom {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_scenes::{forward, m_scene, rig};
     use super::*;
+    use crate::test_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
-    use iltm_picture::progress::Silent;
     use iltm_runtime::Grid;
 
     /// Rank 3, smooth, positive; cells 0 and 17 dead.
@@ -213,7 +211,7 @@ mod tests {
         let grid = Grid::new(12, 16).unwrap();
         let (transport, live) = m_scene(grid);
         let rig = || rig(grid, &transport, &live, NoiseModel::default());
-        let refused = Nystrom::new(100, false).acquire(&mut rig(), &Silent);
+        let refused = Nystrom::new(100, false).acquire(&mut rig());
         assert!(matches!(refused, Err(Unfit::Condition(why)) if why.contains("singular value")));
         let found = forward(&Nystrom::new(100, true), &mut rig());
         let off = (found - &transport).norm() / transport.norm();

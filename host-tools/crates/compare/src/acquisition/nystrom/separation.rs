@@ -1,4 +1,4 @@
-//! Direct light apart from all other by patterns finer than the light between surfaces.
+//! Direct-global separation: direct light apart from all other by patterns finer than the light between surfaces.
 //!
 //! Nayar, Krishnan, Grossberg, Raskar, *Fast Separation of Direct and Global Components of
 //! a Scene using High Frequency Illumination*, ACM Transactions on Graphics (SIGGRAPH)
@@ -68,8 +68,8 @@ impl Separation {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::test_scenes::{m_scene, rig};
     use super::*;
+    use crate::test_scene::{m_scene, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
 

@@ -1,0 +1,233 @@
+//! Benchmark scenes: the light that methods are compared on, a capture's, or a described scene's.
+//!
+//! Most methods want photographs that nobody took, so the scene's transport has to be
+//! known: for a described scene it is simulated, one cell lit at a time, as the camera
+//! sees it; for a capture it is its `reference_T.npy`, or what all its photographs
+//! together tell.
+
+use super::{GroundTruth, Rig};
+use crate::rig::clear_dead;
+use iltm_capture::{
+    CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, pattern_set,
+    read_reference,
+};
+use iltm_picture::progress::Progress;
+use iltm_runtime::Grid;
+use iltm_scene::{
+    Simulation, SimulationError, SimulationOptions, VirtualCamera,
+    description::{Scene, SceneError},
+    folder::{self, CaptureFolderError},
+};
+use iltm_solve::{SolveError, SolveOptions, solve};
+use nalgebra::DMatrix;
+use std::path::Path;
+use thiserror::Error;
+
+/// Cells of the largest grid that is compared on: every method works with whole
+/// matrices.
+pub const MOST_CELLS: usize = 1_024;
+
+/// Cells lit alone that are simulated together.
+const TOGETHER: usize = 64;
+
+/// Bernoulli photographs by which a described scene's camera is registered.
+const REGISTRATION: usize = 60;
+
+/// A scene's light, cell by cell.
+#[derive(Debug)]
+pub struct BenchmarkScene {
+    /// How the transport is known.
+    pub known: &'static str,
+    /// Whether there are three channels, of which it is the green one.
+    pub colour: bool,
+    /// What answers are judged by.
+    pub truth: GroundTruth,
+    /// What photographs are taken with; its noise is the camera's.
+    pub rig: Rig,
+}
+
+/// Why there is no light to compare on.
+#[derive(Debug, Error)]
+pub enum BenchmarkSceneError {
+    /// The photographs cannot be used.
+    #[error(transparent)]
+    Capture(#[from] CaptureError),
+    /// The capture does not tell its scene's transport.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The capture's reference cannot be used.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The scene's description cannot be used.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The scene cannot be simulated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// The scene's photographs could not be written.
+    #[error(transparent)]
+    Folder(#[from] CaptureFolderError),
+    /// There is no room for the scene's photographs.
+    #[error("there is no room for temporary photographs: {0}")]
+    Room(#[from] std::io::Error),
+    /// More cells than methods with whole matrices can work with.
+    #[error("{cells} cells; methods are compared on {MOST_CELLS} at most")]
+    TooLarge {
+        /// Cells of the grid.
+        cells: usize,
+    },
+    /// The transport has no inverse.
+    #[error("the scene's transport has no inverse, by which answers could be judged")]
+    Singular,
+}
+
+impl BenchmarkScene {
+    /// The light of a capture folder, its green channel if it has colour.
+    ///
+    /// # Errors
+    /// [`BenchmarkSceneError`] if it cannot be read or solved.
+    pub fn of_capture(
+        folder: &Path,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<Self, BenchmarkSceneError> {
+        let measurements = iltm_capture::read(folder, &CaptureOptions::default(), progress)?;
+        check_size(measurements.grid)?;
+        let (inverse, _) = solve(&measurements, &SolveOptions::default(), progress)?;
+        let cells = measurements.grid.cells();
+        let channel = inverse.channels.len() / 2;
+        let measured = read_reference(folder, measurements.grid, inverse.channels.len())?;
+        let measured = measured.and_then(|mut channels| channels.drain(channel..).next());
+        let (transport, known) = if let Some(transport) = measured {
+            (transport, "measured: the capture\u{2019}s reference_T.npy")
+        } else {
+            let light = inverse
+                .channel(channel)
+                .light(&DMatrix::identity(cells, cells));
+            let known = "what iltm finds from all photographs of the capture, which is kind \
+                         to methods that look for the same";
+            (light.ok_or(BenchmarkSceneError::Singular)?, known)
+        };
+        Self::new(&measurements, inverse.live, transport, known, seed)
+    }
+
+    /// The light of a described scene, its green channel if it has colour.
+    ///
+    /// # Errors
+    /// [`BenchmarkSceneError`] if it cannot be read or simulated.
+    pub fn of_scene(
+        file: &Path,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<Self, BenchmarkSceneError> {
+        let scene = Scene::read(file)?;
+        check_size(scene.projector.grid)?;
+        let simulation = Simulation::new(&scene, &SimulationOptions::default(), progress)?;
+        let room = tempfile::tempdir()?;
+        let folder = room.path().join("capture");
+        let patterns = pattern_set(simulation.grid(), REGISTRATION, seed);
+        let camera = VirtualCamera::new(&scene, &simulation, seed)?;
+        folder::write(&camera, &patterns, &folder, progress)?;
+        let measurements = iltm_capture::read(&folder, &CaptureOptions::default(), progress)?;
+        let transport = simulated(&simulation, &measurements, progress)?;
+        let live = measurements.live.clone();
+        let known = "simulated without noise, one cell lit at a time";
+        Self::new(&measurements, live, transport, known, seed)
+    }
+
+    fn new(
+        measurements: &Measurements,
+        live: Vec<bool>,
+        mut transport: DMatrix<f64>,
+        known: &'static str,
+        seed: u64,
+    ) -> Result<Self, BenchmarkSceneError> {
+        clear_dead(&mut transport, &live);
+        let noise = cell_noise(measurements, &live);
+        let grid = measurements.grid;
+        let rig = Rig::new(grid, transport.clone(), live.clone(), noise, seed);
+        let truth = GroundTruth::new(grid, transport, live).ok_or(BenchmarkSceneError::Singular)?;
+        Ok(Self {
+            known,
+            colour: measurements.channels.len() > 1,
+            truth,
+            rig,
+        })
+    }
+}
+
+fn check_size(grid: Grid) -> Result<(), BenchmarkSceneError> {
+    let cells = grid.cells();
+    if cells > MOST_CELLS {
+        return Err(BenchmarkSceneError::TooLarge { cells });
+    }
+    Ok(())
+}
+
+/// Noise of a cell with as many pixels as most have.
+fn cell_noise(measurements: &Measurements, live: &[bool]) -> NoiseModel {
+    let cells = measurements.pixels.iter().zip(live);
+    let mut pixels: Vec<u32> = cells.filter(|(_, l)| **l).map(|(p, _)| *p).collect();
+    pixels.sort_unstable();
+    let typical = f64::from(pixels.get(pixels.len() / 2).copied().unwrap_or(1).max(1));
+    let channel = measurements.channels.len() / 2;
+    let of_pixel = measurements.channels[channel].noise_model;
+    NoiseModel {
+        shot: of_pixel.shot / typical,
+        floor: of_pixel.floor / typical,
+    }
+}
+
+/// `T` as the camera sees it: mean light of each cell's pixels while one cell after the
+/// other is lit, in the units of the measurements.
+fn simulated(
+    simulation: &Simulation<'_>,
+    measurements: &Measurements,
+    progress: &dyn Progress,
+) -> Result<DMatrix<f64>, BenchmarkSceneError> {
+    let cells = simulation.grid().cells();
+    let channel = simulation.channels() / 2;
+    let labels = &measurements.registration.cell_of_pixel;
+    let means = |photograph: &[f32]| {
+        let mut sums = vec![(0.0, 0_u32); cells];
+        for (light, label) in photograph.iter().zip(labels) {
+            if let Some((sum, count)) = sums.get_mut(*label as usize) {
+                *sum += f64::from(*light);
+                *count += 1;
+            }
+        }
+        sums.into_iter()
+            .map(|(sum, count)| sum / f64::from(count.max(1)))
+    };
+    let black = simulation.expose(&DMatrix::zeros(cells, 1))?;
+    let black: Vec<f64> = means(&simulation.photograph(&black, 0)[channel]).collect();
+    let mut transport = DMatrix::zeros(cells, cells);
+    progress.begin("lighting one cell at a time", cells as u64);
+    for first in (0..cells).step_by(TOGETHER) {
+        let count = TOGETHER.min(cells - first);
+        let lit = DMatrix::from_fn(cells, count, |cell, k| {
+            f64::from(u8::from(cell == first + k))
+        });
+        let exposed = simulation.expose(&lit)?;
+        for k in 0..count {
+            let light = means(&simulation.photograph(&exposed, k)[channel]);
+            let mut column = transport.column_mut(first + k);
+            for (value, (light, black)) in column.iter_mut().zip(light.zip(&black)) {
+                *value = light - black;
+            }
+        }
+        progress.advance(count as u64);
+    }
+    progress.end();
+    // The camera's exposure: the same flood light, as measured and as simulated.
+    let white = measurements.channels[measurements.channels.len() / 2]
+        .observations
+        .column(Measurements::WHITE)
+        .into_owned();
+    let flood = transport.column_sum();
+    let exposure = white.dot(&flood) / flood.norm_squared();
+    if !exposure.is_finite() {
+        return Err(BenchmarkSceneError::Singular);
+    }
+    Ok(transport * exposure)
+}

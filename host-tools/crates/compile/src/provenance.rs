@@ -1,0 +1,184 @@
+//! Provenance: where a table comes from, as the TOML text that it carries.
+
+use crate::reference_white::ReferenceWhite;
+use iltm_capture::{Measurements, Settings};
+use iltm_solve::{Recovery, SolveReport};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::path::Path;
+
+/// What a table says about where it comes from.
+///
+/// Each part that another version of the program may have written otherwise is read for
+/// itself: one that cannot be read is `None`, and so is one that is not there.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Provenance {
+    /// The program and its version.
+    pub made_by: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// When it was made, UTC.
+    pub date: String,
+    /// Name of the [`Method`](iltm_solve::Method); empty if unsaid.
+    pub method: String,
+    /// Photographs that it was made from.
+    #[serde(deserialize_with = "if_readable")]
+    pub photographs: Option<Photographs>,
+    /// Cells that took part in the solve.
+    pub live_cells: usize,
+    /// Weight of the l1 term.
+    pub lambda: f64,
+    /// Largest over smallest singular value of the forward transport.
+    pub condition: f64,
+    /// Names of the gates that failed and were ignored.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ignored_gates: Vec<String>,
+    /// Name of the [`Compensation`](iltm_solve::Compensation).
+    pub compensation: String,
+    /// Errors that held-out photographs predict.
+    #[serde(deserialize_with = "if_readable")]
+    pub predicted_error: Option<PredictedError>,
+    /// Constants of the theorem about the paper's method.
+    #[serde(
+        deserialize_with = "if_readable",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub recovery: Option<Recovery>,
+    /// The mixing of projector channels in the camera's that the photographs were freed
+    /// of, `[camera][projector]`. Before the tables, as TOML wants it.
+    #[serde(
+        deserialize_with = "if_readable",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub mixing: Option<[[f64; 3]; 3]>,
+    /// The reference white.
+    #[serde(deserialize_with = "if_readable")]
+    pub white: Option<ReferenceWhite>,
+    /// The `capture.toml` that it was made with.
+    #[serde(deserialize_with = "if_readable")]
+    pub capture: Option<Settings>,
+}
+
+/// Photographs by what they show.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Photographs {
+    /// Flood photographs.
+    pub white: usize,
+    /// Gray code, both signs.
+    pub gray_code: usize,
+    /// Bernoulli patterns.
+    pub bernoulli: usize,
+}
+
+/// Predicted errors, relative to the wanted light.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct PredictedError {
+    /// With the picture as it is.
+    pub uncompensated: f64,
+    /// With gain alone.
+    pub gain_only: f64,
+    /// With the operator.
+    pub compensated: f64,
+}
+
+impl Provenance {
+    /// That of a table made from these photographs in the folder `capture`.
+    pub(crate) fn new(
+        capture: &Path,
+        measurements: &Measurements,
+        report: &SolveReport,
+        white: &ReferenceWhite,
+    ) -> Self {
+        let folder = || {
+            let name = capture.canonicalize().ok();
+            let name = name.as_deref().and_then(Path::file_name);
+            name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+        };
+        let scene = measurements.settings.scene.name.clone();
+        let date = chrono::Utc::now().format("%Y-%m-%d %H:%M:%S UTC");
+        let failed = measurements.diagnostics.gates.iter();
+        let failed = failed.filter(|gate| gate.fails());
+        let mixing = measurements.devices.mixing().map(|mixing| mixing.matrix);
+        Self {
+            made_by: concat!("iltm ", env!("CARGO_PKG_VERSION")).to_owned(),
+            scene: scene.unwrap_or_else(folder),
+            date: date.to_string(),
+            method: report.method.to_string(),
+            photographs: Some(Photographs {
+                white: report.photographs.white,
+                gray_code: report.photographs.gray_code,
+                bernoulli: report.photographs.bernoulli,
+            }),
+            live_cells: report.live_cells,
+            lambda: report.lambda,
+            condition: report.condition,
+            ignored_gates: failed.map(|gate| gate.name.to_string()).collect(),
+            compensation: report.compensation.to_string(),
+            predicted_error: Some(PredictedError {
+                uncompensated: report.prediction.uncompensated,
+                gain_only: report.prediction.gain_only,
+                compensated: report.prediction.compensated,
+            }),
+            recovery: report.recovery,
+            mixing: mixing.filter(|_| measurements.devices.unmixed),
+            white: Some(*white),
+            capture: Some(measurements.settings.clone()),
+        }
+    }
+
+    /// Reads a table's text; nothing of a text that says nothing.
+    #[must_use]
+    pub fn read(text: &str) -> Self {
+        toml::from_str(text).unwrap_or_default()
+    }
+
+    /// The text for a table.
+    pub(crate) fn to_text(&self) -> String {
+        // A struct of numbers and strings always has a TOML form.
+        toml::to_string(self).unwrap_or_default()
+    }
+}
+
+fn if_readable<'de, T: DeserializeOwned, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<T>, D::Error> {
+    Ok(toml::Value::deserialize(from)?.try_into().ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_of_the_recovery_theorem_survive_and_what_cannot_be_read_is_left_out() {
+        let recovery = Recovery {
+            k: 3,
+            photographs: 30,
+            kappa_at_least: 1.5,
+            kappa_at_most: f64::INFINITY,
+            gamma_at_least: 1.2,
+            gamma_at_most: 7.0,
+            gamma_as_shown_at_least: 4.0,
+            product_at_least: 2.7,
+            product_at_most: f64::INFINITY,
+            ratio_at_least: 3.1,
+            coherence: 0.4,
+            k_may_hold: 2,
+            k_holds: 1,
+            supports: 100,
+        };
+        let provenance = Provenance {
+            method: "direct".to_owned(),
+            recovery: Some(recovery),
+            capture: Some(Settings::default()),
+            ..Provenance::default()
+        };
+        let text = provenance.to_text();
+        assert_eq!(Provenance::read(&text), provenance);
+        let newer = format!("{text}\n[capture.lens]\nfocus = 1\n");
+        let read = Provenance::read(&newer);
+        assert_eq!((read.recovery, read.capture), (Some(recovery), None));
+        assert_eq!(Provenance::read("method = \"joint\"").recovery, None);
+    }
+}

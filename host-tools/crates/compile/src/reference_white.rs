@@ -1,0 +1,140 @@
+//! Reference white: what a wanted 255 means in camera units, as asked for and as it became.
+
+use super::clip_thresholds::{ClipThresholds, Cut};
+use super::{CompileError, FineGains};
+use iltm_picture::LightPicture;
+use iltm_solve::InverseTransport;
+use serde::{Deserialize, Serialize};
+
+/// What reference white is asked for, if not the brightest even grey that every live cell
+/// reaches.
+#[derive(Clone, Copy, Debug)]
+pub enum WhiteRequest<'c> {
+    /// This light, camera units.
+    Light(f64),
+    /// The brightest at which no more than a share of the content is cut.
+    Content {
+        /// Frames: light relative to white, of any size.
+        frames: &'c [LightPicture],
+        /// Share of the samples that may be cut at the projector's white.
+        share: f64,
+    },
+}
+
+/// The reference white of a table, and why it is that.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct ReferenceWhite {
+    /// Light of reference white, camera units.
+    pub light: f64,
+    /// The brightest even grey that every live cell reaches, camera units.
+    pub uniform: f64,
+    /// Why.
+    pub chosen: Chosen,
+    /// What of the content is cut, where there was some.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub content: Option<Cut>,
+}
+
+/// Why a reference white is what it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Chosen {
+    /// It is the brightest even grey.
+    Uniform,
+    /// It was given.
+    Given,
+    /// It is the brightest that cuts no more of the content than was allowed.
+    Content,
+}
+
+impl ReferenceWhite {
+    /// Chooses as asked. Content that nothing could cut, black all over, leaves it to the
+    /// even grey.
+    ///
+    /// # Errors
+    /// [`CompileError::Dark`] if no cell can be lit, [`CompileError::GreyContent`] if
+    /// content is grey and the scene has colours.
+    pub fn new(
+        inverse: &InverseTransport,
+        fine: Option<&FineGains>,
+        request: Option<WhiteRequest<'_>>,
+    ) -> Result<Self, CompileError> {
+        let uniform = uniform_white(inverse).ok_or(CompileError::Dark)?;
+        let mut own = Self {
+            light: uniform,
+            uniform,
+            chosen: Chosen::Uniform,
+            content: None,
+        };
+        match request {
+            None => {}
+            Some(WhiteRequest::Light(light)) => {
+                (own.light, own.chosen) = (light, Chosen::Given);
+            }
+            Some(WhiteRequest::Content { frames, share }) => {
+                let thresholds = ClipThresholds::of(inverse, fine, frames)?;
+                if let Some((light, cut)) = thresholds.and_then(|found| found.choose(share)) {
+                    (own.light, own.chosen) = (light, Chosen::Content);
+                    own.content = Some(cut);
+                }
+            }
+        }
+        Ok(own)
+    }
+
+    /// Why, for people.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        match (self.chosen, &self.content) {
+            (Chosen::Uniform, _) => {
+                "the brightest even grey that every live cell reaches".to_owned()
+            }
+            (Chosen::Content, Some(cut)) => format!(
+                "the brightest that cuts at most {:.3} % of {} frames of content: {:.3} % at the \
+                 projector's white, {:.3} % at its black; even grey would reach {:.4}",
+                100.0 * cut.allowed,
+                cut.frames,
+                100.0 * cut.bright,
+                100.0 * cut.dark,
+                self.uniform
+            ),
+            (Chosen::Given | Chosen::Content, _) => {
+                format!("as asked for; even grey would reach {:.4}", self.uniform)
+            }
+        }
+    }
+}
+
+/// Light of the brightest uniform grey, the same in all channels, that every live cell
+/// reaches without clipping, camera units; `None` if there is no such cell or light.
+///
+/// For a wanted light `w` everywhere, cell `i` needs
+/// `p_i = w s_i - t_i` with `s = g - K 1` and `t = g a - K a`, so it reaches
+/// `w <= (1 + t_i) / s_i`.
+#[must_use]
+pub fn uniform_white(inverse: &InverseTransport) -> Option<f64> {
+    let mut lowest: Option<f64> = None;
+    for (index, channel) in inverse.channels.iter().enumerate() {
+        let operator = inverse.channel(index).operator;
+        let live = |cell: usize| inverse.live.get(cell).copied().unwrap_or(false);
+        for cell in (0..inverse.grid.cells()).filter(|cell| live(*cell)) {
+            let row = operator.row(cell);
+            let (mut slope, mut offset) = (
+                channel.gain[cell],
+                channel.gain[cell] * channel.ambient[cell],
+            );
+            for (source, value) in row.iter().enumerate().filter(|(source, _)| live(*source)) {
+                slope -= value;
+                offset -= value * channel.ambient[source];
+            }
+            if slope <= 0.0 {
+                continue;
+            }
+            let light = (1.0 + offset) / slope;
+            if light.is_finite() && light > 0.0 && lowest.is_none_or(|low| light < low) {
+                lowest = Some(light);
+            }
+        }
+    }
+    lowest
+}

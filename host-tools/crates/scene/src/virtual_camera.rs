@@ -1,0 +1,253 @@
+//! Virtual camera: one photograph after another of what the projector shows, as a session takes
+//! them. The lamp drifts, and whatever is asked to go wrong does.
+
+use super::description::Scene;
+use super::injected_fault::{CaptureFault, InjectedFault, InjectedFaults};
+use super::sensor::Sensor;
+use super::simulation::{Simulation, SimulationError};
+use iltm_capture::Pattern;
+use iltm_picture::Response;
+use iltm_runtime::Grid;
+use image::codecs::png::PngEncoder;
+use image::{ColorType, ImageEncoder};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::io;
+
+/// Photographs that are exposed together: their light is held in memory.
+const TOGETHER: usize = 64;
+
+/// What the projector is given for one photograph.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ProjectedFrame {
+    /// Input codes of every cell, red, green and blue, 0 to 255, length `N`.
+    pub codes: Vec<[u8; 3]>,
+    /// Exposure relative to that of the other photographs.
+    pub exposure: f64,
+}
+
+impl From<&Pattern> for ProjectedFrame {
+    fn from(pattern: &Pattern) -> Self {
+        let code = |lit: &bool| [255 * u8::from(*lit); 3];
+        Self {
+            codes: pattern.lit.iter().map(code).collect(),
+            exposure: 1.0,
+        }
+    }
+}
+
+/// Values of a photograph's file.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Photograph {
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+    /// One plane a channel, row by row, 0 to [`Photograph::scale`].
+    pub values: Vec<Vec<u16>>,
+    /// Full scale: 255 or 65,535.
+    pub scale: u16,
+}
+
+impl Photograph {
+    /// The bytes of a PNG of 8 or 16 bits, grey or in colour.
+    ///
+    /// # Errors
+    /// What the encoder says.
+    pub fn png(&self) -> io::Result<Vec<u8>> {
+        let eight = self.scale == 255;
+        let mut bytes = Vec::new();
+        for pixel in 0..self.values[0].len() {
+            for plane in &self.values {
+                if eight {
+                    bytes.push(plane[pixel] as u8);
+                } else {
+                    bytes.extend(plane[pixel].to_ne_bytes());
+                }
+            }
+        }
+        let kind = match (self.values.len(), eight) {
+            (1, true) => ColorType::L8,
+            (1, false) => ColorType::L16,
+            (_, true) => ColorType::Rgb8,
+            (_, false) => ColorType::Rgb16,
+        };
+        png(&bytes, self.size, kind)
+    }
+}
+
+/// The bytes of a PNG with these samples.
+pub(super) fn png(
+    samples: &[u8],
+    (width, height): (u32, u32),
+    kind: ColorType,
+) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new(&mut bytes);
+    let written = encoder.write_image(samples, width, height, kind.into());
+    written.map_err(io::Error::other)?;
+    Ok(bytes)
+}
+
+/// A camera set up before a scene, exposed for white.
+#[derive(Clone, Debug)]
+pub struct VirtualCamera<'s> {
+    pub(super) scene: &'s Scene,
+    pub(super) simulation: &'s Simulation<'s>,
+    sensor: Sensor<'s>,
+    /// Mean light of white.
+    white: f64,
+    seed: u64,
+    faults: &'s [InjectedFault],
+    /// Most bounces that white's light was followed over.
+    bounces: usize,
+}
+
+impl<'s> VirtualCamera<'s> {
+    /// Exposes for white. `seed` repeats the noise.
+    ///
+    /// # Errors
+    /// [`SimulationError`] if there is no end to the bounces.
+    pub fn new(
+        scene: &'s Scene,
+        simulation: &'s Simulation<'s>,
+        seed: u64,
+    ) -> Result<Self, SimulationError> {
+        let flood = DMatrix::from_element(simulation.grid().cells(), 1, 1.0);
+        let flood = simulation.expose(&flood)?;
+        let planes = simulation.photograph(&flood, 0);
+        Ok(Self {
+            scene,
+            simulation,
+            sensor: simulation.sensor(&planes),
+            white: mean(&planes),
+            seed,
+            faults: &[],
+            bounces: flood.bounces,
+        })
+    }
+
+    /// The projector's cells.
+    #[must_use]
+    pub fn grid(&self) -> Grid {
+        self.simulation.grid()
+    }
+
+    /// The same, with things that go wrong.
+    #[must_use]
+    pub fn with_faults(mut self, faults: &'s [InjectedFault]) -> Self {
+        self.faults = faults;
+        if let Some(fault) = faults.iter().find(|f| f.kind == CaptureFault::Gamma) {
+            self.sensor = self.sensor.responding(Response::Gamma(fault.size));
+        }
+        self
+    }
+
+    /// Takes the photographs at `places` of a session that shows `frames`, and hands
+    /// each to `keep` with its place; `None` where the camera missed it. Returns the
+    /// most bounces that light was followed over.
+    ///
+    /// # Errors
+    /// [`SimulationError`], or the first error of `keep`.
+    ///
+    /// # Panics
+    /// If a place is beyond the frames, or a frame has not one code a cell.
+    pub fn take<E>(
+        &self,
+        frames: &[ProjectedFrame],
+        places: &[usize],
+        keep: impl Fn(usize, Option<Photograph>) -> Result<(), E> + Sync,
+    ) -> Result<usize, E>
+    where
+        E: From<SimulationError> + Send,
+    {
+        let faults = InjectedFaults {
+            faults: self.faults,
+            count: frames.len(),
+        };
+        let mut bounces = self.bounces;
+        for places in places.chunks(TOGETHER) {
+            let shown: Vec<(usize, &ProjectedFrame)> = places
+                .iter()
+                .filter_map(|place| Some((*place, &frames[faults.shown_at(*place)?])))
+                .collect();
+            for place in places.iter().filter(|p| faults.shown_at(**p).is_none()) {
+                keep(*place, None)?;
+            }
+            let (projected, lamp) = self.projected(&faults, &shown);
+            let exposed = self.simulation.expose_projected(&projected, &lamp)?;
+            bounces = bounces.max(exposed.bounces);
+            let kept = shown
+                .par_iter()
+                .enumerate()
+                .map(|(column, (place, frame))| {
+                    let mut light = self.simulation.photograph(&exposed, column);
+                    faults.disturb(&mut light, self.scene.camera.size.0 as usize, *place);
+                    let exposure = frame.exposure * faults.exposure(mean(&light), self.white);
+                    keep(*place, Some(self.photograph(&light, exposure, *place)))
+                });
+            kept.collect::<Result<Vec<()>, E>>()?;
+        }
+        Ok(bounces)
+    }
+
+    /// Light of each of the projector's channels under some frames, cells x frames, and
+    /// its lamp's under each; one entry where all channels show the same.
+    fn projected(
+        &self,
+        faults: &InjectedFaults<'_>,
+        shown: &[(usize, &ProjectedFrame)],
+    ) -> (Vec<DMatrix<f64>>, Vec<f64>) {
+        let response = self.scene.projector.response;
+        let light: Vec<f64> = (0..=255_u8)
+            .map(|code| response.light(f64::from(code) / 255.0))
+            .collect();
+        let cells = self.simulation.grid().cells();
+        let mut channels = vec![DMatrix::zeros(cells, shown.len()); 3];
+        for (column, (_, frame)) in shown.iter().enumerate() {
+            assert_eq!(frame.codes.len(), cells, "a code for every cell");
+            for (cell, codes) in frame.codes.iter().enumerate() {
+                let projected = faults.projected(codes.map(|code| light[usize::from(code)]));
+                for (channel, light) in channels.iter_mut().zip(projected) {
+                    channel[(cell, column)] = light;
+                }
+            }
+        }
+        let last = faults.count.saturating_sub(1).max(1) as f64;
+        let lamp = shown.iter().enumerate().map(|(column, (place, _))| {
+            let mean = channels
+                .iter()
+                .map(|c| c.column(column).mean())
+                .sum::<f64>()
+                / 3.0;
+            self.simulation.lamp(*place as f64 / last) * faults.dimmed(mean)
+        });
+        let lamp = lamp.collect();
+        if channels[0] == channels[1] && channels[0] == channels[2] {
+            channels.truncate(1);
+        }
+        (channels, lamp)
+    }
+
+    fn photograph(&self, light: &[Vec<f32>], exposure: f64, place: usize) -> Photograph {
+        let seed = self.seed.wrapping_add(place as u64);
+        let exposed = |plane: &Vec<f32>| -> Vec<f32> {
+            plane
+                .iter()
+                .map(|l| (f64::from(*l) * exposure) as f32)
+                .collect()
+        };
+        let values = (light.iter().zip(0_u64..))
+            // Each channel has noise of its own.
+            .map(|(plane, channel)| self.sensor.values(&exposed(plane), seed ^ (channel << 40)));
+        Photograph {
+            size: self.scene.camera.size,
+            values: values.collect(),
+            scale: self.sensor.file_scale(),
+        }
+    }
+}
+
+/// Mean of all channels.
+fn mean(planes: &[Vec<f32>]) -> f64 {
+    let sum: f64 = planes.iter().flatten().map(|light| f64::from(*light)).sum();
+    sum / planes.iter().map(Vec::len).sum::<usize>().max(1) as f64
+}

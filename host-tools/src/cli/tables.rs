@@ -1,0 +1,52 @@
+//! Table files: checked when they are read, signed when they are written.
+
+use super::args::SealTerms as Given;
+use super::failure::{Failure, Kind};
+use crate::compile::sign::{self, SealTerms};
+use ed25519_dalek::SigningKey;
+use iltm_runtime::image::{Seal, Table, unseal};
+use std::path::Path;
+
+/// Checks the bytes of a table file. The signature is not looked at.
+pub(super) fn check<'a>(path: &Path, file: &'a [u8]) -> Result<Table<'a>, Failure> {
+    Ok(check_sealed(path, file)?.0)
+}
+
+/// The same, with the seal if there is one.
+pub(super) fn check_sealed<'a>(
+    path: &Path,
+    file: &'a [u8],
+) -> Result<(Table<'a>, Option<Seal>), Failure> {
+    let checked = unseal(file).and_then(|(image, seal)| Ok((Table::check(image)?, seal)));
+    checked.map_err(|error| {
+        let message = format!("{}: {error}", path.display());
+        Failure::new(
+            Kind::Table,
+            message,
+            "Copy the table again, or make it anew with `iltm solve`.",
+        )
+    })
+}
+
+/// Signs a file on the terms of the command line.
+pub(super) fn seal(file: &[u8], key: &SigningKey, given: &Given) -> Result<Vec<u8>, Failure> {
+    if given.revoke_below > given.table_version {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!(
+                "version {} would revoke itself: versions below {} are to be revoked",
+                given.table_version, given.revoke_below
+            ),
+            "Give --revoke-below at most the --table-version.",
+        ));
+    }
+    let terms = SealTerms {
+        version: given.table_version,
+        oldest: given.revoke_below,
+        device: given.for_device.unwrap_or(0),
+    };
+    sign::sign(file, key, terms).map_err(|error| {
+        let next_step = "Make the table anew with `iltm solve`.";
+        Failure::new(Kind::Table, error, next_step)
+    })
+}

@@ -1,0 +1,238 @@
+//! Words and data that several commands have in common: a device, its state, its tables.
+
+use iltm_runtime::link::{Hello, Mode, PassThrough, SlotInfo, SlotState, Slots, Status, TableName};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// Lines under a heading, the following ones indented as far.
+pub(super) fn lines(heading: &str, lines: &[String]) -> String {
+    let indent = " ".repeat(heading.len());
+    let mut text = String::new();
+    for (at, line) in lines.iter().enumerate() {
+        let start = if at == 0 { heading } else { &indent };
+        let _ = writeln!(text, "{start}{line}");
+    }
+    text
+}
+
+/// A device's number, in words.
+pub(super) fn number(number: u64) -> String {
+    if number == 0 {
+        "no number".to_owned()
+    } else {
+        format!("number {number:016x}")
+    }
+}
+
+/// Who a device is, for programs.
+pub(super) fn identity(device: &Hello) -> Value {
+    json!({
+        "board": device.board.as_str(),
+        "firmware": device.firmware.to_string(),
+        "number": format!("{:016x}", device.device),
+        "protocol": device.protocol,
+        "table_format": device.table_format,
+        "max_payload": device.max_payload,
+        "limits": {
+            "cells": device.limits.cells,
+            "frame_bytes": device.limits.frame_bytes,
+            "table_bytes": device.limits.table_bytes,
+        },
+    })
+}
+
+/// What a table is called, for programs.
+pub(super) fn table_name(table: Option<TableName>) -> Option<Value> {
+    table.map(|table| {
+        json!({
+            "id": format!("{:08x}", table.id),
+            "version": table.version,
+        })
+    })
+}
+
+/// A device's state, for programs.
+pub(super) fn status_data(status: &Status) -> Value {
+    let (mode, reason) = match status.mode {
+        Mode::Compensating => ("compensating", None),
+        Mode::PassThrough(why) => ("pass-through", Some(why)),
+    };
+    let name = |why: PassThrough| match why {
+        PassThrough::NoTable => "no-table",
+        PassThrough::BrokenTable => "broken-table",
+        PassThrough::OtherFrames => "other-frames",
+        PassThrough::Memory => "memory",
+    };
+    json!({
+        "firmware": status.firmware.to_string(),
+        "board": status.board.as_str(),
+        "uptime_ms": status.uptime_ms,
+        "table": table_name(status.table),
+        "mode": mode,
+        "reason": reason.map(name),
+        "tier": status.tier,
+        "top_tier": status.top_tier,
+        "frames": {
+            "received": status.frames.received,
+            "shown": status.frames.shown,
+            "late": status.frames.late,
+            "dropped": status.frames.dropped,
+            "broken": status.frames.broken,
+        },
+        "clipped": {
+            "last": status.clipping.last,
+            "total": status.clipping.total,
+            "samples": status.clipping.samples,
+        },
+        "frame_time_us": {
+            "last": status.frame_time.last_us,
+            "mean": status.frame_time.mean_us,
+            "worst": status.frame_time.worst_us,
+            "budget": status.frame_time.budget_us,
+        },
+        "slots": status.slots.map(|slot| slot.to_string()),
+        "last_fault": status.last_fault.map(|fault| fault.to_string()),
+        "stack": { "used": status.stack.used, "size": status.stack.size },
+        "watchdog_resets": status.watchdog_resets,
+        "serial": { "bad": status.serial.bad, "unsent": status.serial.unsent },
+    })
+}
+
+/// The table in use.
+pub(super) fn table_in_use(status: &Status) -> String {
+    let table = status.table.map(|table| table.to_string());
+    table.unwrap_or_else(|| "none".to_owned())
+}
+
+/// Both slots, in a few words.
+pub(super) fn slot_states(status: &Status) -> String {
+    let [a, b] = status.slots;
+    format!("A {a}, B {b}")
+}
+
+pub(super) fn milliseconds(us: u32) -> String {
+    format!("{:.1} ms", f64::from(us) / 1000.0)
+}
+
+/// Share of the last frame's samples that were clipped.
+pub(super) fn clipped_share(status: &Status) -> f64 {
+    f64::from(status.clipping.last) / f64::from(status.clipping.samples.max(1))
+}
+
+pub(super) fn serial(status: &Status) -> String {
+    format!(
+        "{} bad frames, {} unsent",
+        status.serial.bad, status.serial.unsent
+    )
+}
+
+pub(super) fn watchdog(status: &Status) -> String {
+    match status.watchdog_resets {
+        0 => "never restarted the device".to_owned(),
+        1 => "restarted the device once".to_owned(),
+        times => format!("restarted the device {times} times"),
+    }
+}
+
+/// Hours, minutes and seconds.
+pub(super) fn duration(ms: u64) -> String {
+    let seconds = ms / 1000;
+    let (hours, minutes) = (seconds / 3600, seconds / 60 % 60);
+    format!("{hours}:{minutes:02}:{:02}", seconds % 60)
+}
+
+/// `A` or `B`.
+pub(super) const fn letter(slot: u8) -> char {
+    if slot == 0 { 'A' } else { 'B' }
+}
+
+/// What names a key.
+pub(super) fn key_id(id: &[u8]) -> String {
+    let mut text = String::new();
+    for byte in id {
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+fn used(slots: &Slots) -> Option<&SlotInfo> {
+    let mut all = slots.slots.iter();
+    all.find(|slot| matches!(slot.state, SlotState::Active | SlotState::Trial))
+}
+
+/// The table in use.
+pub(super) fn in_use(slots: &Slots) -> Option<TableName> {
+    used(slots)?.table
+}
+
+/// The table to go back to.
+pub(super) fn other(slots: &Slots) -> Option<TableName> {
+    let mut all = slots.slots.iter();
+    all.find(|slot| slot.state == SlotState::Valid)?.table
+}
+
+/// Whether a file of this length with this table is in use.
+pub(super) fn uses(slots: &Slots, table: TableName, length: usize) -> bool {
+    used(slots).is_some_and(|slot| slot.table == Some(table) && slot.length as usize == length)
+}
+
+/// The table slots, for programs.
+pub(super) fn slots_data(slots: &Slots) -> Value {
+    let slot = |slot: &SlotInfo| {
+        json!({
+            "state": slot.state.to_string(),
+            "table": table_name(slot.table),
+            "bytes": slot.length,
+            "erases": slot.erases,
+        })
+    };
+    json!({
+        "slots": slots.slots.iter().map(slot).collect::<Vec<_>>(),
+        "target": letter(slots.target).to_string(),
+        "trial_ms": slots.trial_ms,
+        "oldest": slots.oldest,
+        "key": slots.key.map(|id| key_id(&id)),
+        "number": format!("{:016x}", slots.device),
+        "sector_bytes": slots.sector,
+        "record_erases": slots.record_erases,
+    })
+}
+
+/// A line a slot.
+pub(super) fn slot_lines(slots: &Slots) -> Vec<String> {
+    let line = |(index, slot): (u8, &SlotInfo)| {
+        let table = match slot.table {
+            Some(table) => format!("table {table}, {} bytes, ", slot.length),
+            None => String::new(),
+        };
+        let trial = match slot.state {
+            SlotState::Trial => format!(", {} s left", slots.trial_ms.div_ceil(1_000)),
+            _ => String::new(),
+        };
+        let erases = match slot.erases {
+            // The device notes it when a table is confirmed.
+            0 if slot.state == SlotState::Broken => {
+                return format!("{} no whole table", letter(index));
+            }
+            0 => "never erased".to_owned(),
+            1 => "erased once".to_owned(),
+            times => format!("erased {times} times"),
+        };
+        let state = match slot.state {
+            // A transfer that was cut is no defect.
+            SlotState::Broken => "no whole table".to_owned(),
+            state => state.to_string(),
+        };
+        format!("{} {state}{trial}: {table}{erases}", letter(index))
+    };
+    (0..).zip(&slots.slots).map(line).collect()
+}
+
+/// Whose tables the device takes.
+pub(super) fn trust(slots: &Slots) -> String {
+    match slots.key {
+        Some(id) => format!("{}; versions from {} on", key_id(&id), slots.oldest),
+        None if slots.oldest == u32::MAX => "lost: this device takes no table".to_owned(),
+        None => "none: this device takes tables from anybody (`iltm key install`)".to_owned(),
+    }
+}

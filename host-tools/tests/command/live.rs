@@ -1,0 +1,144 @@
+//! `iltm compensate` on a pipe whose table is replaced while frames flow.
+
+use super::user::{Ended, SAMPLE, User, contains};
+use std::fs;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Stdio};
+use std::sync::OnceLock;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::Duration;
+
+const HEADER: &[u8] = b"YUV4MPEG2 W48 H26 F60:1 C444 XCOLORRANGE=FULL\n";
+
+/// Bytes of a frame with its header.
+const FRAME: usize = 6 + 3 * 48 * 26;
+
+/// Two tables of the sample, which differ in brightness.
+fn tables() -> &'static [Vec<u8>; 2] {
+    static TABLES: OnceLock<[Vec<u8>; 2]> = OnceLock::new();
+    TABLES.get_or_init(|| {
+        let user = User::new();
+        ["0.3", "0.15"].map(|white| {
+            let solve = "solve SAMPLE -o made.iltm --photos 20 --white";
+            user.says(&format!("{solve} {white}"));
+            user.read("made.iltm")
+        })
+    })
+}
+
+fn frame() -> Vec<u8> {
+    let grey = [&[140_u8; 48 * 26][..], &[128; 2 * 48 * 26]].concat();
+    [b"FRAME\n", grey.as_slice()].concat()
+}
+
+/// The frames of the process, one by one as they come.
+fn read_frames(mut out: ChildStdout) -> Receiver<Vec<u8>> {
+    let (send, frames) = channel();
+    thread::spawn(move || {
+        let mut header = vec![0; HEADER.len()];
+        out.read_exact(&mut header).expect("a header");
+        let mut frame = vec![0; FRAME];
+        while out.read_exact(&mut frame).is_ok() && send.send(frame.clone()).is_ok() {}
+    });
+    frames
+}
+
+struct Stream {
+    child: Child,
+    input: ChildStdin,
+    frames: Receiver<Vec<u8>>,
+}
+
+impl Stream {
+    /// Sends a frame and waits for what becomes of it.
+    fn next(&mut self) -> Vec<u8> {
+        self.input.write_all(&frame()).expect("a pipe");
+        self.input.flush().expect("a pipe");
+        let waited = self.frames.recv_timeout(Duration::from_mins(1));
+        waited.expect("a frame for each frame")
+    }
+
+    /// Sends frames until one is other than `old`; it.
+    fn until_other_than(&mut self, old: &[u8]) -> Vec<u8> {
+        for _ in 0..3_000 {
+            let frame = self.next();
+            if frame != old {
+                return frame;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+        panic!("the new table is never used");
+    }
+
+    /// Closes the input; what people read.
+    fn end(self) -> String {
+        drop(self.input);
+        let ended = Ended::of(self.child);
+        assert_eq!(ended.code, 0, "{}", ended.said);
+        ended.said
+    }
+}
+
+#[test]
+fn a_table_replaced_while_frames_flow_is_used_and_a_broken_one_is_not() {
+    let user = User::new();
+    let [first, second] = tables();
+    user.write("t.iltm", first);
+    let mut command = user.iltm("compensate t.iltm - -o - --watch");
+    let mut child = command.stdin(Stdio::piped()).spawn().expect("a binary");
+    let mut input = child.stdin.take().expect("a pipe");
+    input.write_all(HEADER).expect("a pipe");
+    let frames = read_frames(child.stdout.take().expect("a pipe"));
+    let mut stream = Stream {
+        child,
+        input,
+        frames,
+    };
+    let old = stream.next();
+    assert_eq!(stream.next(), old);
+    // Beside its place, then renamed, as `iltm solve` does.
+    user.write("beside", second);
+    user.rename("beside", "t.iltm");
+    let new = stream.until_other_than(&old);
+    assert_eq!(stream.next(), new);
+    // Half a table: for a second and more nothing happens.
+    user.write("t.iltm", &first[..first.len() / 2]);
+    for _ in 0..100 {
+        assert_eq!(stream.next(), new);
+        thread::sleep(Duration::from_millis(15));
+    }
+    user.write("t.iltm", first);
+    assert_eq!(stream.until_other_than(&new), old);
+    let stays = "the table before stays in use";
+    contains(&stream.end(), &[stays, "new tables: 2 taken, 1 refused"]);
+}
+
+#[test]
+fn a_budget_tells_which_tiers_there_was_time_for() {
+    let user = User::new();
+    user.write("t.iltm", &tables()[0]);
+    user.write("v.y4m", [HEADER, &frame().repeat(40)].concat());
+    for (budget, top) in [("0.001", 0), ("10000", 2)] {
+        let line = format!("compensate t.iltm v.y4m -o o.y4m --budget {budget}");
+        let events = user.events(&line);
+        let (end, changes) = events.split_last().expect("at least the end");
+        assert_eq!((&end["event"], &end["frames"]), (&"end".into(), &40.into()));
+        assert_eq!(end["overruns"], if top == 0 { 40 } else { 0 });
+        let tiers = end["tiers"].as_array().expect("a list").len();
+        assert!(tiers > top, "{events:?}");
+        assert_eq!(changes.len() + 1, tiers, "{events:?}");
+    }
+}
+
+#[test]
+fn what_has_no_frames_to_change_between_is_refused() {
+    let user = User::new();
+    user.write("t.iltm", &tables()[0]);
+    let picture = Path::new(SAMPLE).join("patterns/000.png");
+    fs::copy(picture, user.path("p.png")).expect("a copy");
+    let said = user.fails(2, "compensate t.iltm p.png -o o.png --budget 16");
+    contains(&said, &["still picture"]);
+    assert!(!user.path("o.png").exists());
+}

@@ -1,0 +1,16 @@
+//! Command line as a user meets it: `iltm` is run, and what it says, its exit code and the
+//! files that it leaves behind are looked at. One module for a command or a task: `cargo
+//! test -p iltm --test command simulate` runs the tests of one.
+
+mod check;
+mod cli;
+mod compare;
+mod device;
+mod emulate;
+mod flash;
+mod live;
+mod session;
+mod simulate;
+mod tradeoff;
+mod user;
+mod verify;

@@ -1,0 +1,247 @@
+//! `iltm patterns` and `iltm capture` as a user meets them: a folder is made, and
+//! photographed by a camera of a few shell commands; where X can be had without a
+//! screen, on a display too.
+
+use super::user::{Ended, User, contains, interrupt};
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use tempfile::TempDir;
+
+/// With a capture `c` of 3 x 4 cells that nobody has photographed.
+fn patterns(more: &str) -> User {
+    let user = User::new();
+    let line = "patterns -o c --rows 3 --cols 4 --photos 2 --projector 64x48";
+    user.says(&format!("{line} {more}"));
+    user
+}
+
+/// Shows slides and photographs them, at once.
+const SESSION: &str = "capture c --latency 0 --show 'cp {slide} now' --camera 'cp now {photo}'";
+
+fn slides(user: &User) -> usize {
+    user.names("c/slides").len()
+}
+
+#[test]
+fn a_folder_of_patterns_says_how_many_slides_it_has() {
+    let user = User::new();
+    let made = user.run("patterns -o c --rows 3 --cols 4 --json");
+    assert_eq!(made.said, "");
+    assert_eq!(made.json()["slides"], slides(&user));
+    // White, black, 9 + 3 * 8 levels, two probes, 2 * (2 + 2) stripes and 150 by chance;
+    // white and black return after every 16 of all but the first two, and last.
+    let others = 33 + 2 + 8 + 150_usize;
+    assert_eq!(slides(&user), 2 + others + 2 * others.div_ceil(16));
+    let again = user.run("patterns -o c --rows 3 --cols 4");
+    insta::assert_snapshot!(again.with_code());
+}
+
+#[test]
+fn sizes_that_cannot_be_are_refused_before_anything_is_written() {
+    let user = User::new();
+    let mut text = String::new();
+    for (rows, cols) in [(30, 0), (300, 300), (15, 1921)] {
+        let refused = user.run(&format!("patterns -o c --rows {rows} --cols {cols}"));
+        text += &refused.with_code();
+    }
+    insta::assert_snapshot!(text);
+    assert_eq!(user.names(""), [""; 0]);
+}
+
+#[test]
+fn help_names_cameras_to_copy() {
+    for command in ["patterns", "capture"] {
+        let help = User::new().run(&format!("{command} --help"));
+        insta::assert_snapshot!(command, help.out);
+    }
+}
+
+#[test]
+fn a_session_tells_programs_an_event_a_line() {
+    let user = patterns("--no-calibration");
+    let session = "capture c --json --show 'cp {slide} now' --camera 'cp now {photo}'";
+    let done = user.run(session);
+    assert_eq!((done.code, &*done.said), (0, ""));
+    let events = done.events();
+    let named = |name: &str| events.iter().filter(|event| event["event"] == name).count();
+    let slides = slides(&user);
+    assert_eq!((named("begun"), named("latency"), named("done")), (1, 1, 1));
+    assert_eq!((named("shown"), named("taken")), (slides, slides));
+    assert_eq!(events.last().expect("some")["taken"], slides);
+    // Nothing is left to do, so nothing is asked for.
+    let said = format!("capture     c: {slides} of {slides} photographs are there\n");
+    assert_eq!(user.says("capture c --list"), said);
+}
+
+#[test]
+fn what_is_missing_is_listed() {
+    let user = patterns("--no-calibration");
+    for index in [0, 1, 2, 5, 7] {
+        let slide = user.read(&format!("c/slides/{index:03}.png"));
+        user.write(&format!("c/photos/{index:03}.png"), slide);
+    }
+    user.write("c/photos/003.png", "P");
+    let text = user.run("capture c --list").with_code();
+    let place = user.path(".").canonicalize().expect("there");
+    insta::assert_snapshot!(text.replace(&*place.to_string_lossy(), "FOLDER"));
+}
+
+#[test]
+fn a_session_without_a_camera_or_a_screen_is_a_mistake_in_the_command() {
+    let user = patterns("--no-calibration");
+    for arguments in [
+        "",
+        "--show true",
+        "--camera 'cp now {photo}'",
+        "--show true --camera 'cp now there'",
+        "--show true --camera {photo} --again 9-7",
+        "--show true --camera {photo} --again 99",
+    ] {
+        user.fails(2, &format!("capture c {arguments}"));
+    }
+}
+
+#[test]
+fn a_camera_that_fails_and_a_desktop_that_is_not_there_have_codes_of_their_own() {
+    let user = patterns("--no-calibration");
+    let camera = "--retries 0 --latency 0 --show true --camera 'echo no battery; exit 7 # {photo}'";
+    let mut text = user.run(&format!("capture c {camera}")).with_code();
+    let said = user.fails(33, "capture c --display 0 --camera 'cp now {photo}'");
+    contains(&said, &["--show"]);
+    text += &user.run("capture nowhere --list").with_code();
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn ctrl_c_ends_a_session_that_can_go_on() {
+    let user = patterns("--no-calibration");
+    let slow = "if [ {index} = 4 ]; then touch four; sleep 60; fi; cp now {photo}";
+    let mut session = user.spawn(&format!(
+        "{} --json",
+        SESSION.replace("cp now {photo}", slow)
+    ));
+    let mut lines = BufReader::new(session.stdout.take().expect("piped")).lines();
+    // Until the fourth is on the wall.
+    let shown = lines.by_ref().map(|line| line.expect("text"));
+    let fourth = |line: &String| line.contains("\"shown\"") && line.contains("\"index\":4");
+    assert!(shown.into_iter().any(|line| fourth(&line)));
+    interrupt(&session);
+    let rest: String = lines.map(|line| line.expect("text")).collect();
+    assert_eq!(Ended::of(session).code, 29, "{rest}");
+    contains(&rest, &["interrupted"]);
+    let photos = user.names("c/photos");
+    assert_eq!(photos.len(), 4, "{photos:?}");
+    let events: Vec<Value> = user.events(SESSION);
+    assert_eq!(events.last().expect("some")["taken"], slides(&user) - 4);
+}
+
+/// An X server without a screen, its picture in a file.
+struct Desktop {
+    server: Child,
+    display: String,
+    folder: TempDir,
+}
+
+impl Desktop {
+    fn start(size: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", size])
+            .arg("-fbdir")
+            .arg(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb is installed: `sudo apt-get install xvfb`");
+        let mut number = String::new();
+        let mut said = BufReader::new(server.stdout.take().expect("piped"));
+        said.read_line(&mut number).expect("a display number");
+        Self {
+            server,
+            display: format!(":{}", number.trim()),
+            folder,
+        }
+    }
+
+    /// Runs `iltm capture c --display ...` on it.
+    fn run(&self, user: &User, display: &str) -> Ended {
+        let mut command = user.iltm(&format!("capture c --display {display}"));
+        let child = command.env("DISPLAY", &self.display).spawn();
+        Ended::of(child.expect("a binary"))
+    }
+}
+
+impl Drop for Desktop {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// What an X server shows, `0RGB` a pixel, from its file in the format of `xwd`
+/// (`XWDFile.h`): 25 big-endian words, the second pair of which are sizes, a colour map
+/// of 12 bytes an entry, the pixels.
+fn on_the_screen(file: &Path) -> (usize, Vec<u32>) {
+    let mut bytes = Vec::new();
+    let mut opened = fs::File::open(file).expect("kept");
+    opened.read_to_end(&mut bytes).expect("readable");
+    let word = |at: usize| {
+        let word: [u8; 4] = bytes[4 * at..4 * at + 4].try_into().expect("four bytes");
+        u32::from_be_bytes(word) as usize
+    };
+    let (header, width, height, line, colours) = (word(0), word(4), word(5), word(12), word(19));
+    let little = word(7) == 0;
+    let from = header + 12 * colours;
+    let mut pixels = Vec::new();
+    for y in 0..height {
+        let row = &bytes[from + y * line..][..4 * width];
+        for pixel in row.chunks_exact(4) {
+            let pixel: [u8; 4] = pixel.try_into().expect("four bytes");
+            let value = if little {
+                u32::from_le_bytes(pixel)
+            } else {
+                u32::from_be_bytes(pixel)
+            };
+            pixels.push(value & 0xff_ff_ff);
+        }
+    }
+    (width, pixels)
+}
+
+#[test]
+fn slides_fill_a_display_pixel_by_pixel() {
+    let desktop = Desktop::start("64x48x24");
+    let user = patterns("--ramp 2");
+    // What is on the screen is kept; all photographs are alike.
+    let screen = desktop.folder.path().join("Xvfb_screen0");
+    let camera = format!(
+        "cp {} {{index}}.xwd; cp c/slides/000.png {{photo}}",
+        screen.display()
+    );
+    let shown = desktop.run(&user, &format!("0 --latency 100 --camera '{camera}'"));
+    assert_eq!(shown.code, 0, "{}", shown.said);
+    for index in 0..slides(&user) {
+        let slide = user.picture(&format!("c/slides/{index:03}.png")).to_rgb8();
+        let (width, pixels) = on_the_screen(&user.path(&format!("{index}.xwd")));
+        assert_eq!((width, pixels.len() / width), (64, 48));
+        let wanted = slide
+            .pixels()
+            .map(|pixel| u32::from_be_bytes([0, pixel[0], pixel[1], pixel[2]]));
+        assert!(wanted.eq(pixels.iter().copied()), "slide {index}");
+    }
+}
+
+#[test]
+fn a_display_that_is_not_there_or_of_another_size_is_refused_with_what_there_is() {
+    let desktop = Desktop::start("80x48x24");
+    let user = patterns("--no-calibration");
+    let mut text = String::new();
+    for display in ["0", "7"] {
+        let refused = desktop.run(&user, &format!("{display} --camera 'cp now {{photo}}'"));
+        text += &refused.with_code();
+    }
+    insta::assert_snapshot!(text);
+}

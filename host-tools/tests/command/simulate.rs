@@ -1,0 +1,247 @@
+//! `iltm simulate` as a user meets it, the wrong ways in particular.
+
+use super::user::{User, contains};
+use std::fs;
+
+/// A small scene, two walls that face each other.
+const CORNER: &str = "name = \"Corner\"
+[projector]
+position = [0, 0, 4]
+look_at = [0, 0, 0]
+field_of_view = 24
+rows = 4
+cols = 6
+[camera]
+position = [0.3, 0.2, 4]
+look_at = [0, 0, 0]
+field_of_view = 28
+width = 60
+height = 44
+full_well = 20000
+[[panel]]
+name = \"left\"
+corners = [[-1, 0.6, 1], [0, 0.6, 0], [0, -0.6, 0], [-1, -0.6, 1]]
+albedo = 0.8
+[[panel]]
+name = \"right\"
+corners = [[0, 0.6, 0], [1, 0.6, 1], [1, -0.6, 1], [0, -0.6, 0]]
+albedo = 0.8
+";
+/// With the small scene, in which words are replaced.
+fn user(replaced: &[(&str, &str)]) -> User {
+    let mut scene = CORNER.to_owned();
+    for (from, to) in replaced {
+        assert!(scene.contains(from), "{from}");
+        scene = scene.replace(from, to);
+    }
+    let user = User::new();
+    user.write("scene.toml", scene);
+    user
+}
+
+#[test]
+fn a_scene_becomes_a_capture_that_solve_takes() {
+    let user = user(&[]);
+    let data = user.json("simulate scene.toml -o capture --photos 40");
+    // White, black, 2 bits of rows and 3 of columns with inverses, and 40 more.
+    assert_eq!(data["photographs"], 52);
+    assert_eq!(data["effects"].as_array().map(Vec::len), Some(19));
+    assert_eq!(user.names(""), ["capture", "scene.toml"]);
+    user.says("solve capture -o t.iltm");
+}
+
+#[test]
+fn explain_says_of_every_effect_whether_and_why_and_writes_nothing() {
+    let user = user(&[]);
+    let said = user.says("simulate scene.toml --explain");
+    contains(
+        &said,
+        &[
+            "interreflection  on",
+            "1 of 1 pairs of surfaces face each other",
+            "shadows          off",
+            "noise            on",
+            "a full well of 20000 electrons",
+            "camera's rays",
+        ],
+    );
+    assert_eq!(user.names(""), ["scene.toml"]);
+    let said = user.says("simulate scene.toml --explain --without interreflection");
+    contains(&said, &["interreflection  off, asked for"]);
+}
+
+#[test]
+fn an_effect_that_is_asked_for_and_that_the_scene_does_not_have_is_not_passed_over() {
+    let said = user(&[])
+        .run("simulate scene.toml --explain --with blur")
+        .said;
+    contains(&said, &["asked for, but the projector is in focus"]);
+}
+
+#[test]
+fn ablate_says_what_each_effect_contributes() {
+    let data = user(&[]).json("simulate scene.toml --ablate");
+    let ablated = data["ablated"].as_array().expect("a list");
+    let error = |name: &str| {
+        let effect = ablated.iter().find(|a| a["effect"] == name);
+        effect.expect("listed")["error"].as_f64().expect("a number")
+    };
+    // A right angle of albedo .8 returns some tenth of its light.
+    let light = error("interreflection");
+    assert!((0.03..0.3).contains(&light), "{light}");
+    assert!(error("noise") > 1e-3);
+}
+
+#[test]
+fn every_scene_that_comes_with_the_tools_is_explained() {
+    for scene in [
+        "flat-screen",
+        "m-panels",
+        "m-panels-painted",
+        "painted-corner",
+        "dome",
+        "stage",
+    ] {
+        User::new().says(&format!("simulate SCENES/{scene}.toml --explain"));
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
+    let panels = &CORNER[CORNER.find("[[panel").expect("two")..];
+    let left = "albedo = 0.8\n[[";
+    for (from, to, words) in [
+        ("rows = 4", "rovs = 4", &["rovs", "line 6"][..]),
+        (left, "albedo = 1.8\n[[", &["`left`", "1.8"]),
+        (left, "albedo = nan\n[[", &["`left`"]),
+        (left, "albedo = \"none.png\"\n[[", &["none.png"]),
+        (
+            "[0, -0.6, 0], [-1, -0.6, 1]",
+            "[0, -0.6, 0.3], [-1, -0.6, 1]",
+            &["`left`", "off the plane"],
+        ),
+        (
+            "field_of_view = 24",
+            "field_of_view = inf",
+            &["field_of_view"],
+        ),
+        (
+            "look_at = [0, 0, 0]\nfield_of_view = 24",
+            "look_at = [0, 0, 9]\nfield_of_view = 24",
+            &["lights none"],
+        ),
+        (
+            "look_at = [0, 0, 0]",
+            "look_at = [0, 0, 4]",
+            &["looks nowhere"],
+        ),
+        ("full_well", "read_noise", &["full_well"]),
+        (panels, "", &["no [[panel]]"]),
+    ] {
+        let user = user(&[(from, to)]);
+        let said = user.fails(30, "simulate scene.toml -o capture");
+        contains(&said, words);
+        contains(&said, &["next: "]);
+        assert_eq!(user.names(""), ["scene.toml"], "nothing half-written");
+    }
+}
+
+#[test]
+fn a_folder_that_is_not_empty_is_left_alone() {
+    let user = user(&[]);
+    fs::create_dir(user.path("capture")).expect("made");
+    user.write("capture/notes.txt", "mine");
+    user.fails(9, "simulate scene.toml -o capture");
+    assert_eq!(user.names("capture"), ["notes.txt"]);
+}
+
+#[test]
+fn words_that_are_no_effect_and_scenes_that_are_not_there_have_codes_of_their_own() {
+    let user = user(&[]);
+    let said = user.fails(2, "simulate scene.toml --explain --with fog");
+    contains(&said, &["there is no effect `fog`"]);
+    user.fails(3, "simulate other.toml --explain");
+    // Without -o there is nothing to do.
+    user.fails(2, "simulate scene.toml");
+}
+
+/// With a capture `c` of the small scene whose photographs are in `taken`.
+fn without_photographs() -> User {
+    let user = user(&[]);
+    user.says("simulate scene.toml -o c --photos 12");
+    user.rename("c/photos", "taken");
+    user
+}
+
+const PHOTOGRAPH: &str = "simulate scene.toml --photograph c";
+
+/// Sum of the squared differences of two pictures' values.
+fn difference(user: &User, a: &str, b: &str) -> f64 {
+    let [a, b] = [a, b].map(|name| user.picture(name).into_luma16());
+    let pairs = a.iter().zip(b.iter());
+    pairs.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum()
+}
+
+#[test]
+fn a_folder_of_patterns_gets_the_photographs_that_it_lacks() {
+    let user = without_photographs();
+    user.says(&format!("{PHOTOGRAPH} --shot 7 -o one.png"));
+    // Bounces end where the patterns of one pass have lost their light, so that a pattern
+    // by itself differs by that little.
+    let own = difference(&user, "one.png", "taken/007.png");
+    let other = difference(&user, "one.png", "taken/008.png");
+    assert!(own < 1e-4 * other, "{own} {other}");
+    // White, black, three bits of columns and two of rows with inverses, 12 by chance.
+    assert_eq!(user.json(PHOTOGRAPH)["photographs"], 24);
+    for name in user.names("taken") {
+        let same = user.read(&format!("c/photos/{name}")) == user.read(&format!("taken/{name}"));
+        assert!(same, "{name}");
+    }
+    user.remove("c/photos/011.png");
+    assert_eq!(user.json(PHOTOGRAPH)["photographs"], 1);
+    let alone = difference(&user, "c/photos/011.png", "taken/011.png");
+    assert!(alone < 1e-4 * other, "{alone} {other}");
+}
+
+#[test]
+fn what_goes_wrong_on_purpose_is_in_the_photographs() {
+    let user = without_photographs();
+    let faults = "--fault swapped=0.5 --fault dropped=0.9";
+    user.says(&format!("{PHOTOGRAPH} {faults}"));
+    assert!(!user.path("c/photos/021.png").exists());
+    // The photograph named 12 shows the pattern of 13: the same but for the noise.
+    let own = difference(&user, "c/photos/012.png", "taken/012.png");
+    let other = difference(&user, "c/photos/012.png", "taken/013.png");
+    assert!(other < 0.01 * own, "{own} {other}");
+    let said = user.fails(2, &format!("{PHOTOGRAPH} --fault flikker"));
+    contains(&said, &["auto-exposure"]);
+    let said = user.fails(2, &format!("{PHOTOGRAPH} --shot 99 -o x.png"));
+    contains(&said, &["index 99"]);
+}
+
+#[test]
+fn patterns_of_another_grid_are_refused() {
+    let user = without_photographs();
+    user.write("scene.toml", CORNER.replace("cols = 6", "cols = 5"));
+    let said = user.fails(4, PHOTOGRAPH);
+    contains(&said, &["4 x 6 cells", "has 4 x 5"]);
+}
+
+#[test]
+fn a_lamp_that_drifts_darkens_later_photographs_and_a_lens_bends_them() {
+    let user = user(&[
+        ("cols = 6", "cols = 6\ndrift = 0.1"),
+        ("full_well = 20000", "distortion = [0.1, 0]"),
+    ]);
+    for without in ["c", "d --without drift", "e --without distortion"] {
+        user.says(&format!("simulate scene.toml --photos 12 -o {without}"));
+    }
+    let sum = |name: &str| -> f64 {
+        let picture = user.picture(name).into_luma16();
+        picture.iter().map(|value| f64::from(*value)).sum()
+    };
+    // The last photograph has lost what the scene says, the first nothing.
+    assert!((sum("c/photos/023.png") / sum("d/photos/023.png") - 0.9).abs() < 1e-3);
+    assert!((sum("c/photos/000.png") / sum("d/photos/000.png") - 1.0).abs() < 1e-9);
+    assert_ne!(user.read("c/photos/000.png"), user.read("e/photos/000.png"));
+}

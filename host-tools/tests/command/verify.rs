@@ -1,0 +1,93 @@
+//! `iltm verify` as a user meets it: the whole way with simulated photographs, and the
+//! wrong ways.
+
+use super::user::{User, contains};
+use std::sync::OnceLock;
+
+/// With a table, and a folder `v` to verify it with, photographed.
+fn photographed() -> &'static User {
+    static USER: OnceLock<User> = OnceLock::new();
+    USER.get_or_init(|| {
+        let user = User::new();
+        for line in [
+            "simulate SCENES/m-panels.toml -o c --photos 80",
+            "solve c -o t.iltm",
+            "verify t.iltm -o v --projector 640x400 --border 3",
+            "simulate SCENES/m-panels.toml --photograph v --seed 9",
+        ] {
+            user.says(line);
+        }
+        user
+    })
+}
+
+/// The same in a folder that may be harmed.
+fn copy() -> User {
+    let user = User::new();
+    user.write("t.iltm", photographed().read("t.iltm"));
+    for part in ["v", "v/patterns", "v/photos", "v/wanted"] {
+        user.copy(&photographed().path(part), part);
+    }
+    user
+}
+
+#[test]
+fn a_good_table_passes_and_a_bound_below_what_is_possible_fails_with_the_same_figures() {
+    let user = photographed();
+    let figures = user.json("verify t.iltm v --report r");
+    assert_eq!(figures["passed"], true);
+    let error = |half: &str| figures["mean_error"][half].as_f64().unwrap();
+    assert!(error("after") < 0.1 * error("before"), "{figures}");
+    for file in [
+        "verdict.html",
+        "worst-cells.png",
+        "drift.png",
+        "0-after.png",
+    ] {
+        assert!(user.path("r").join(file).is_file(), "{file}");
+    }
+    let failed = user.run("--json verify t.iltm v --bound 0.0001");
+    let again = failed.json();
+    assert_eq!(failed.code, 31);
+    assert_eq!(again["error"]["kind"], "verdict");
+    assert_eq!(
+        (&again["passed"], &again["mean_error"]),
+        (&false.into(), &figures["mean_error"])
+    );
+    // The slides have the projector's size, the border and the cells.
+    let slide = user.picture("v/slides/000.png").into_luma8();
+    assert_eq!(slide.dimensions(), (640, 400));
+    let row = [2, 3, 637].map(|x| slide[(x, 200)][0]);
+    assert_eq!(row, [0, 255, 0]);
+}
+
+#[test]
+fn what_is_missing_is_listed_and_what_was_made_with_another_table_fails() {
+    let user = copy();
+    for photo in ["004", "060"] {
+        user.remove(&format!("v/photos/{photo}.png"));
+    }
+    let said = user.fails(4, "verify t.iltm v");
+    let missing = "2 photographs are missing: photos/004.png, photos/060.png";
+    contains(&said, &[missing]);
+    let user = copy();
+    // The same photographs, solved for another white.
+    let capture = photographed().path("c");
+    user.says(&format!(
+        "solve '{}' -o u.iltm --white 0.3",
+        capture.display()
+    ));
+    let said = user.fails(31, "verify u.iltm v");
+    contains(&said, &["made with another table"]);
+}
+
+#[test]
+fn a_folder_that_is_none_and_one_that_is_in_the_way_are_named() {
+    let user = photographed();
+    let said = user.fails(3, "verify t.iltm nowhere");
+    contains(&said, &["nowhere: there is no verify.csv"]);
+    user.fails(9, "verify t.iltm -o v");
+    user.fails(2, "verify t.iltm -o w --projector 20x400");
+    assert!(!user.path("w").exists());
+    user.fails(2, "verify t.iltm");
+}

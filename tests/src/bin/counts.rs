@@ -1,0 +1,33 @@
+//! Instruction counts on the reference board, and bytes of firmware: prints the lists that
+//! `docs` holds:
+//!
+//!     cargo run --release -p iltm-tests --bin counts -- instructions > docs/instructions.csv
+//!     cargo run --release -p iltm-tests --bin counts -- costs > docs/costs.csv
+//!     cargo run --release -p iltm-tests --bin counts -- stages > docs/stages.csv
+//!     cargo run --release -p iltm-tests --bin counts -- sizes > docs/firmware-sizes.csv
+//!
+//! The last builds the firmware with every choice of stages, 32 in all.
+
+use iltm_tests::instructions::{self, count};
+use iltm_tests::{costs, stages};
+
+fn main() {
+    match std::env::args().nth(1).as_deref() {
+        Some("instructions") => {
+            let counts: Vec<_> = instructions::cases().iter().flat_map(count).collect();
+            print!("{}", instructions::csv(&counts));
+        }
+        Some("costs") => {
+            let counts: Vec<_> = costs::cases().iter().flat_map(count).collect();
+            print!("{}", costs::csv(&counts));
+        }
+        Some("stages") => print!("{}", stages::csv(&stages::costs())),
+        Some("sizes") => {
+            println!("stages,bytes of flash");
+            for stages in stages::choices() {
+                println!("{}", stages::size_line(&stages));
+            }
+        }
+        _ => panic!("name a list: instructions, costs, stages or sizes"),
+    }
+}

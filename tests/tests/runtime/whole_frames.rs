@@ -1,0 +1,108 @@
+//! Frames larger than the grid: a device's way through a frame larger than the grid
+//! against the host's.
+
+use iltm::video::OperatorMemory;
+use iltm_runtime::frame_buffers::Format;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::{Encoding, FullMemory, FullPipeline, RowBuffers};
+use iltm_runtime::{FrameSize, Grid};
+use iltm_tests::firmware::{Effects, on_host, random_frame, random_table};
+use iltm_tests::made_up::MadeUp;
+
+fn device<const C: usize>(
+    table: &Table<'_>,
+    (tier, format): (u8, Format),
+    wanted: &[u8],
+) -> Vec<u8> {
+    let (cells, size) = (C * table.grid().cells(), format.size());
+    let pipeline = FullPipeline::<C>::new(table, size).expect("it fits");
+    let mut memory = FullMemory {
+        gains: &mut vec![[0; 2]; C * size.pixels()],
+        ambient: &mut vec![[0; 2]; C * size.pixels()],
+        sums: &mut vec![0; cells],
+        corrections: &mut vec![0; cells],
+        columns: &mut vec![0; 2 * C * size.width()],
+        row: RowBuffers {
+            line: &mut vec![0; pipeline.line_len()],
+            spread: &mut vec![0; size.width()],
+        },
+        values: &mut vec![0; size.width()],
+    };
+    pipeline.prepare(&mut memory).expect("sized");
+    let mut input = vec![[0; C]; size.pixels()];
+    let (encoding, mut operator) = (format.encoding(), OperatorMemory::new(table));
+    pipeline
+        .compensate(
+            tier,
+            encoding,
+            wanted.as_chunks().0,
+            &mut input,
+            &mut memory,
+            &mut operator.workspace(),
+        )
+        .expect("sized");
+    input.into_flattened()
+}
+
+#[test]
+fn a_device_makes_of_a_larger_frame_what_the_host_makes_of_it() {
+    let sizes = [
+        (5, 9, 40, 23),
+        (13, 21, 68, 53),
+        (6, 8, 48, 36),
+        (7, 3, 3, 61),
+    ];
+    for (seed, (rows, cols, width, height)) in (0..).zip(sizes) {
+        for channels in [1, 3] {
+            let grid = Grid::new(rows, cols).expect("a small grid");
+            let image = random_table(grid, channels, Effects::ALL, seed);
+            let table = Table::check(&image).expect("compile checked it");
+            let size = FrameSize::new(width, height).expect("not empty");
+            for encoding in [Encoding::Display, Encoding::Linear] {
+                let format = Format::new(size, channels as u8, encoding, 1_000).expect("a format");
+                for tier in 0..=table.top_tier() {
+                    let wanted = random_frame(format, seed + u64::from(tier));
+                    let (expected, _) = on_host(&table, tier, format, &wanted);
+                    let made = match channels {
+                        1 => device::<1>(&table, (tier, format), &wanted),
+                        _ => device::<3>(&table, (tier, format), &wanted),
+                    };
+                    assert!(
+                        made == expected,
+                        "{grid} to {size}, {channels} channels, {encoding:?}, tier {tier}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn ambient_light_that_falls_to_none_between_cells_leaves_no_pixel_dark() {
+    let grids = [(13, 21), (36, 48), (4, 5), (32, 32)];
+    let sizes = [
+        (320, 240),
+        (641, 97),
+        (1280, 720),
+        (1366, 768),
+        (1920, 1080),
+    ];
+    for (seed, (rows, cols)) in (0..).zip(grids) {
+        let grid = Grid::new(rows, cols).expect("a small grid");
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut made_up = MadeUp::new(grid, 1);
+        made_up.ambient = Some((0..grid.cells()).map(|_| random.u16(..2)).collect());
+        let image = made_up.image();
+        let table = Table::check(&image).expect("a whole table");
+        for (width, height) in sizes {
+            let size = FrameSize::new(width, height).expect("not empty");
+            let format = Format::new(size, 1, Encoding::Linear, 1_000).expect("a format");
+            let wanted = vec![255; size.pixels()];
+            let made = device::<1>(&table, (0, format), &wanted);
+            // Gain 1, and ambient light of at most one step of light.
+            assert!(made.iter().all(|code| *code >= 254), "{grid} to {size}");
+            let (expected, _) = on_host(&table, 0, format, &wanted);
+            assert!(made == expected, "{grid} to {size}");
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Verification: verdicts of `iltm verify` against the truth: the same pictures projected
+//! onto the simulated scene and measured without a camera's noise, in the cells that the
+//! table was learned in.
+
+use iltm::build_table::BuiltTable;
+use iltm::capture::Settings;
+use iltm::progress::Silent;
+use iltm::scene::description::Scene;
+use iltm::scene::{Effect, Forced, VirtualCamera, fill_capture};
+use iltm::session::Layout;
+use iltm::verify::{Session, Verdict, VerifyError, WhiteChange, judge, write};
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use iltm_tests::simulated::{self, cell_means, error, photograph, simulation};
+use nalgebra::DMatrix;
+use std::path::Path;
+
+/// The M-shaped panels as they come with the tools, with some words replaced.
+fn scene(replaced: &[(&str, &str)]) -> Scene {
+    simulated::scene("m-panels", replaced)
+}
+
+/// How white differs from what the table expects.
+fn white_of(verdict: &Verdict) -> &WhiteChange {
+    verdict.drift.white.as_ref().unwrap()
+}
+
+/// A table learned from simulated photographs, and what was learned.
+fn learned(scene: &Scene, place: &Path) -> BuiltTable {
+    let capture = place.join("capture");
+    photograph(scene, 100, 3, &capture);
+    simulated::learned(&capture)
+}
+
+/// A folder to verify `learned` with, photographed in `scene`.
+fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
+    let table = Table::check(&learned.compiled.image).unwrap();
+    let projector = FrameSize::new(320, 200).unwrap();
+    let layout = Layout::new(table.grid(), projector, 4).unwrap();
+    let settings = Settings {
+        camera: learned.measurements.settings.camera.clone(),
+        ..Settings::default()
+    };
+    write(&table, &layout, &settings, folder, &Silent).unwrap();
+    let simulation = simulation(scene, Forced::default());
+    let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
+    let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();
+    session.take_missing(&camera, &Silent).unwrap();
+}
+
+fn verdict(learned: &BuiltTable, folder: &Path) -> Result<Verdict, VerifyError> {
+    let table = Table::check(&learned.compiled.image).unwrap();
+    let session = Session::read(folder, &table, &Silent)?;
+    judge(folder, &table, &session, None)
+}
+
+/// Mean errors of plain and compensated pictures on the wall, without noise.
+fn truth(learned: &BuiltTable, scene: &Scene, folder: &Path) -> [f64; 2] {
+    let table = Table::check(&learned.compiled.image).unwrap();
+    let session = Session::read(folder, &table, &Silent).unwrap();
+    let simulation = simulation(scene, Forced::default().with(Effect::Noise, false));
+    [0, 1].map(|half| {
+        let inputs: Vec<&Vec<f64>> = session.shown.iter().map(|s| &s.input[half][0]).collect();
+        let inputs = DMatrix::from_fn(inputs[0].len(), inputs.len(), |cell, k| inputs[k][cell]);
+        let exposed = simulation.expose(&inputs).unwrap();
+        let errors = session.shown.iter().enumerate().map(|(k, shown)| {
+            let plane = &simulation.photograph(&exposed, k)[0];
+            let seen = cell_means(&learned.measurements.registration, plane, inputs.nrows());
+            error(&seen, &shown.wanted[0], &session.live)
+        });
+        errors.sum::<f64>() / session.shown.len() as f64
+    })
+}
+
+#[test]
+fn a_good_table_passes_with_the_errors_that_are_really_there_wherever_the_camera_stands() {
+    let place = tempfile::tempdir().unwrap();
+    let original = scene(&[]);
+    let learned = learned(&original, place.path());
+    let moved = scene(&[
+        ("position = [0.6, 0.3, 9.0]", "position = [-0.2, 0.6, 8.6]"),
+        ("field_of_view = 27.0", "field_of_view = 29.0"),
+    ]);
+    for (name, scene) in [("same", &original), ("moved", &moved)] {
+        let folder = place.path().join(name);
+        photographed(&learned, scene, &folder);
+        let verdict = verdict(&learned, &folder).unwrap();
+        let truth = truth(&learned, &original, &folder);
+        println!(
+            "{name}: verdict {:?}, truth {truth:?}, bound {:?}, drift {:?} {:?}",
+            verdict.error,
+            verdict.bound,
+            white_of(&verdict).level,
+            white_of(&verdict).shape
+        );
+        assert!(verdict.passed, "{name}");
+        assert!(
+            verdict.cells.0 * 100 >= verdict.cells.1 * 95,
+            "{:?}",
+            verdict.cells
+        );
+        assert!((verdict.error[0] / truth[0] - 1.0).abs() < 0.05, "{name}");
+        // The photographs' noise comes on top of the compensated pictures' small error, and
+        // what a camera elsewhere sees of other parts of the cells.
+        let noise = verdict.bound.noise.unwrap();
+        let both = truth[1].hypot(noise).hypot(verdict.bound.viewpoint);
+        assert!(
+            (verdict.error[1] / both - 1.0).abs() < 0.35,
+            "{name}: {both}"
+        );
+        assert!(verdict.error[1] < 0.15 * verdict.error[0], "{name}");
+        // What the table makes of its own pictures without compensation is no guess.
+        let modelled: f64 = verdict
+            .images
+            .iter()
+            .map(|image| image.modelled.unwrap()[0])
+            .sum();
+        let modelled = modelled / verdict.images.len() as f64;
+        assert!(
+            (modelled / verdict.error[0] - 1.0).abs() < 0.05,
+            "{modelled}"
+        );
+        let shape = white_of(&verdict).shape;
+        assert!(shape < 0.02, "{shape}");
+    }
+}
+
+#[test]
+fn a_table_of_another_scene_fails_and_white_says_that_the_scene_is_another() {
+    let place = tempfile::tempdir().unwrap();
+    let learned = learned(&scene(&[]), place.path());
+    // The inner panels were painted, and the outer ones are not.
+    let painted = scene(&[(
+        "name = \"left inner\"\ncorners = [[-1, 1.25, -1], [0, 1.25, 0], [0, -1.25, 0], [-1, -1.25, -1]]\nalbedo = 0.8",
+        "name = \"left inner\"\ncorners = [[-1, 1.25, -1], [0, 1.25, 0], [0, -1.25, 0], [-1, -1.25, -1]]\nalbedo = 0.5",
+    )]);
+    let folder = place.path().join("other");
+    photographed(&learned, &painted, &folder);
+    let verdict = verdict(&learned, &folder).unwrap();
+    assert!(!verdict.passed, "{:?} {:?}", verdict.error, verdict.bound);
+    assert!(white_of(&verdict).shape > 0.1, "{:?}", verdict.drift);
+    // The worst cells are on the panel that was painted, or on the one that it lights:
+    // columns 5 to 15 of 21 are the inner two.
+    assert!(
+        (4..=16).contains(&verdict.worst[0].col),
+        "{:?}",
+        verdict.worst
+    );
+}
+
+#[test]
+fn exchanged_photographs_are_named_and_missing_ones_listed() {
+    let place = tempfile::tempdir().unwrap();
+    let original = scene(&[]);
+    let learned = learned(&original, place.path());
+    let folder = place.path().join("folder");
+    photographed(&learned, &original, &folder);
+    let photo = |index: usize| folder.join("photos").join(format!("{index:03}.png"));
+    // White and black, the Gray code, random patterns, white and black again.
+    let first = 2 + 2 * (4 + 5) + 32 + 2;
+    std::fs::rename(photo(first), photo(900)).unwrap();
+    std::fs::rename(photo(first + 3), photo(first)).unwrap();
+    std::fs::rename(photo(900), photo(first + 3)).unwrap();
+    let error = verdict(&learned, &folder).unwrap_err();
+    assert!(matches!(error, VerifyError::Order { .. }), "{error}");
+    assert!(error.to_string().contains("plain-0"), "{error}");
+    std::fs::remove_file(photo(3)).unwrap();
+    std::fs::remove_file(photo(first)).unwrap();
+    let error = verdict(&learned, &folder).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("003.png") && text.contains(&format!("{first:03}.png")),
+        "{text}"
+    );
+}
