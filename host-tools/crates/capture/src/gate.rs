@@ -1,6 +1,7 @@
 //! Gate: a number, a limit, a verdict, a sentence and a next step on one question that a
 //! capture must pass before it is solved. [`gates`](crate::gates) judges.
 
+use iltm_runtime::Grid;
 use std::fmt;
 use std::str::FromStr;
 
@@ -158,6 +159,19 @@ pub enum Evidence {
     },
 }
 
+impl Evidence {
+    /// A number for each cell of a grid.
+    pub(crate) fn cells(what: &'static str, grid: Grid, values: Vec<f64>) -> Self {
+        let (rows, cols) = (grid.rows(), grid.cols());
+        Self::Cells {
+            what,
+            rows,
+            cols,
+            values,
+        }
+    }
+}
+
 impl Gate {
     /// A gate that has nothing to look at.
     pub(crate) fn not_judged(name: GateName, why: impl Into<String>) -> Self {
@@ -170,6 +184,28 @@ impl Gate {
             what: why.into(),
             next_step: "",
             evidence: Evidence::None,
+        }
+    }
+
+    /// A gate on a share of something, in parts of a hundred, without words yet. The next
+    /// step is one unless it passes.
+    pub(crate) fn of_share(
+        name: GateName,
+        verdict: Verdict,
+        (share, most): (f64, f64),
+        next_step: &'static str,
+    ) -> Self {
+        Self {
+            verdict,
+            number: 100.0 * share,
+            limit: 100.0 * most,
+            unit: "%",
+            next_step: if verdict == Verdict::Pass {
+                ""
+            } else {
+                next_step
+            },
+            ..Self::not_judged(name, "")
         }
     }
 

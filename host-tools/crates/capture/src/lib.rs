@@ -142,7 +142,7 @@ pub fn examine(
     };
     let mut cause = None;
     match CaptureEvidence::collect(folder, &sequence, &settings, progress) {
-        Err(error @ (CaptureError::PhotoSize { .. } | CaptureError::PhotoChannels { .. })) => {
+        Err(error @ CaptureError::Unlike { .. }) => {
             examined.gates.push(gates::files::refuse_format(&error));
         }
         found => {

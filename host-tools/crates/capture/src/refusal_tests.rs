@@ -26,8 +26,7 @@ fn an_undeclared_camera_curve_is_refused_as_not_linear() {
         encode: |light| Response::Srgb.value(light),
         ..TestCapture::default()
     };
-    let folder = tempfile::tempdir().unwrap();
-    scene.write(folder.path());
+    let folder = scene.folder();
     let error = read_default(folder.path()).unwrap_err();
     assert!(fails(&error, GateName::Superposition), "{error}");
     assert!(error.next_step().contains("response = \"srgb\""));
@@ -122,8 +121,7 @@ fn an_overexposed_flood_photograph_is_refused() {
         direct: 1.2,
         ..TestCapture::default()
     };
-    let folder = tempfile::tempdir().unwrap();
-    scene.write(folder.path());
+    let folder = scene.folder();
     let error = read_default(folder.path()).unwrap_err();
     assert!(fails(&error, GateName::Saturation), "{error}");
     assert!(error.to_string().contains("overexposed"), "{error}");
@@ -137,8 +135,7 @@ fn photographs_without_projector_light_are_refused() {
         bounced: 0.0,
         ..TestCapture::default()
     };
-    let folder = tempfile::tempdir().unwrap();
-    scene.write(folder.path());
+    let folder = scene.folder();
     let error = read_default(folder.path()).unwrap_err();
     let nothing = matches!(error, CaptureError::NoLight { .. });
     assert!(nothing || fails(&error, GateName::Coverage), "{error}");

@@ -1,11 +1,12 @@
 //! Small simulated captures for tests: a flat grid in front of a camera that
 //! does not line up with it, with bounced light, ambient light and noise.
 
-use iltm_capture::{Axis, CaptureOptions, Code, Manifest, Measurements, Pattern, Role, Shot};
+use iltm_capture::{Axis, CaptureOptions, Code, Manifest, Measurements, Pattern, Role};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
-use image::{ImageBuffer, Luma, Rgb};
+use image::{ExtendedColorType, ImageBuffer, Luma};
 use std::path::Path;
+use tempfile::TempDir;
 
 /// Repeatable random numbers (xorshift64*, Vigna 2016).
 pub(crate) struct Dice(u64);
@@ -48,6 +49,8 @@ pub(crate) struct TestCapture {
     /// Standard deviation of a camera pixel.
     pub(crate) noise: f64,
     pub(crate) bernoulli: usize,
+    /// Exposures at which each pattern is photographed; one without a name if empty.
+    pub(super) times: Vec<f64>,
     /// Photographs of white and of black each.
     pub(crate) repeats: usize,
     /// Number of the first column and of the first row in the Gray code.
@@ -75,6 +78,7 @@ impl Default for TestCapture {
             ambient: 0.02,
             noise: 0.004,
             bernoulli: 30,
+            times: Vec::new(),
             repeats: 1,
             offset: [0; 2],
             gains: vec![1.0],
@@ -155,22 +159,24 @@ impl TestCapture {
         for part in ["patterns", "photos"] {
             std::fs::create_dir_all(folder.join(part)).unwrap();
         }
-        let mut dice = Dice::new(2);
-        let mut shots = Vec::new();
-        for (index, (role, pattern)) in (0..).zip(self.patterns()) {
-            let shot = Shot {
-                index,
-                role,
-                pattern: format!("patterns/{index:03}.png").into(),
-                photo: format!("photos/{index:03}.png").into(),
-                exposure: None,
-                line: u64::from(index) + 2,
-            };
-            save_pattern(&pattern, &folder.join(&shot.pattern));
-            self.save_photo(&self.light(&pattern), &mut dice, &folder.join(&shot.photo));
-            shots.push(shot);
+        let times: Vec<Option<f64>> = match self.times.as_slice() {
+            [] => vec![None],
+            times => times.iter().copied().map(Some).collect(),
+        };
+        let (mut dice, mut roles) = (Dice::new(2), Vec::new());
+        let patterns = self.patterns();
+        for (role, _) in &patterns {
+            roles.extend(times.iter().map(|_| *role));
         }
-        let manifest = Manifest { shots };
+        let mut manifest = Manifest::numbered("patterns", (0..).zip(roles));
+        for (at, shot) in manifest.shots.iter_mut().enumerate() {
+            let (_, pattern) = &patterns[at / times.len()];
+            shot.exposure = times[at % times.len()];
+            let time = shot.exposure.unwrap_or(1.0);
+            let light: Vec<f64> = self.light(pattern).iter().map(|l| time * l).collect();
+            save_pattern(pattern, &folder.join(&shot.pattern));
+            self.save_photo(&light, &mut dice, &folder.join(&shot.photo));
+        }
         std::fs::write(folder.join(iltm_capture::MANIFEST_FILE), manifest.to_csv()).unwrap();
         manifest
     }
@@ -182,28 +188,19 @@ impl TestCapture {
             let noisy = (light + self.noise * dice.normal()).clamp(0.0, 1.0);
             ((self.encode)(noisy) * full).round() as u16
         };
-        let values: Vec<u16> = light
+        let values = light
             .iter()
             .flat_map(|&light| self.gains.iter().map(move |gain| gain * light))
-            .map(&mut value)
-            .collect();
-        let (width, height) = (width as u32, height as u32);
-        let bytes = || values.iter().map(|&v| v as u8).collect::<Vec<u8>>();
-        match (self.gains.len(), self.full_scale) {
-            (1, 255) => ImageBuffer::<Luma<u8>, _>::from_raw(width, height, bytes())
-                .unwrap()
-                .save(path),
-            (1, _) => ImageBuffer::<Luma<u16>, _>::from_raw(width, height, values)
-                .unwrap()
-                .save(path),
-            (_, 255) => ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, bytes())
-                .unwrap()
-                .save(path),
-            _ => ImageBuffer::<Rgb<u16>, _>::from_raw(width, height, values)
-                .unwrap()
-                .save(path),
-        }
-        .unwrap();
+            .map(&mut value);
+        let (bytes, colour): (Vec<u8>, _) = if self.full_scale == 255 {
+            let colours = [ExtendedColorType::L8, ExtendedColorType::Rgb8];
+            (values.map(|value| value as u8).collect(), colours)
+        } else {
+            let colours = [ExtendedColorType::L16, ExtendedColorType::Rgb16];
+            (values.flat_map(u16::to_ne_bytes).collect(), colours)
+        };
+        let colour = colour[self.gains.len() / 3];
+        image::save_buffer(path, &bytes, width as u32, height as u32, colour).unwrap();
     }
 
     /// Writes the capture into a new folder and reads it.

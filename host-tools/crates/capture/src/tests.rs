@@ -167,8 +167,7 @@ fn with_too_few_photographs_the_gray_code_alone_leaves_borders_out() {
         bernoulli: 2,
         ..TestCapture::default()
     };
-    let folder = tempfile::tempdir().unwrap();
-    scene.write(folder.path());
+    let folder = scene.folder();
     let options = CaptureOptions {
         min_bernoulli: 0,
         ..CaptureOptions::default()
@@ -221,8 +220,7 @@ fn an_eight_bit_colour_capture_has_three_channels_in_proportion() {
         encode: |light| Response::Srgb.value(light),
         ..TestCapture::default()
     };
-    let folder = tempfile::tempdir().unwrap();
-    scene.write(folder.path());
+    let folder = scene.folder();
     fs::write(
         folder.path().join(SETTINGS_FILE),
         "[camera]\nresponse = \"srgb\"\n",
@@ -477,19 +475,10 @@ fn patterns_of_more_cells_than_a_table_has_are_looked_at_in_blocks() {
     let stripes = |bit| [Axis::Column, Axis::Row].map(|axis| axis.stripe(bit, false));
     roles.extend((0..8).flat_map(stripes));
     let codes = [Code { bits: 8, offset: 0 }; 2];
-    let mut shots = Vec::new();
-    for (index, role) in (0..).zip(roles) {
-        let pattern = Pattern::of_codes((rows, cols), role, codes).unwrap();
-        let shot = Shot {
-            index,
-            role,
-            pattern: format!("patterns/{index:03}.png").into(),
-            photo: "none".into(),
-            exposure: None,
-            line: u64::from(index) + 2,
-        };
+    let shots = Manifest::numbered("patterns", (0..).zip(roles)).shots;
+    for shot in &shots {
+        let pattern = Pattern::of_codes((rows, cols), shot.role, codes).unwrap();
         save_pattern(&pattern, &folder.path().join(&shot.pattern));
-        shots.push(shot);
     }
     let read = |coarsen| {
         let options = CaptureOptions {

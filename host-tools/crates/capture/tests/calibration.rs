@@ -8,11 +8,11 @@ use iltm_capture::*;
 use iltm_picture::progress::Silent;
 use iltm_picture::{DeviceResponse, Response};
 use iltm_solve::{SolveOptions, solve};
-use image::{ImageBuffer, Luma, Rgb};
+use image::{ImageBuffer, Rgb};
 use nalgebra::DVector;
 use std::fmt::Write;
 use std::fs;
-use test_capture::{Dice, TestCapture, save_pattern};
+use test_capture::{Dice, TestCapture};
 
 /// Light that each cell throws on every other one, by channel: the walls are
 /// redder than blue.
@@ -213,8 +213,7 @@ fn an_eight_bit_gamma_camera_that_measures_itself_is_as_good_as_one_declared() {
         ..TestCapture::default()
     };
     let read_as = |response: &str| {
-        let folder = tempfile::tempdir().unwrap();
-        scene.write(folder.path());
+        let folder = scene.folder();
         let toml = format!("[camera]\nresponse = {response}\n");
         fs::write(folder.path().join(SETTINGS_FILE), toml).unwrap();
         examine(folder.path(), &CaptureOptions::default(), &Silent).unwrap()
@@ -246,53 +245,20 @@ fn an_eight_bit_gamma_camera_that_measures_itself_is_as_good_as_one_declared() {
     );
 }
 
-/// Writes a default capture with every photograph taken at each of `times`.
-fn bracketed(times: &[f64], noise: f64) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = TestCapture::default();
-    for part in ["patterns", "photos"] {
-        fs::create_dir_all(folder.path().join(part)).unwrap();
-    }
-    let mut dice = Dice::new(4);
-    let mut shots = Vec::new();
-    let (width, height) = scene.camera();
-    for (role, pattern) in scene.patterns() {
-        for &time in times {
-            let index = shots.len() as u32;
-            let shot = Shot {
-                index,
-                role,
-                pattern: format!("patterns/{index:03}.png").into(),
-                photo: format!("photos/{index:03}.png").into(),
-                exposure: Some(time),
-                line: u64::from(index) + 2,
-            };
-            save_pattern(&pattern, &folder.path().join(&shot.pattern));
-            let values: Vec<u16> = scene
-                .light(&pattern)
-                .iter()
-                .map(|light| (time * light + noise * dice.normal()).clamp(0.0, 1.0))
-                .map(|value| (value * 65_535.0).round() as u16)
-                .collect();
-            ImageBuffer::<Luma<u16>, _>::from_raw(width as u32, height as u32, values)
-                .unwrap()
-                .save(folder.path().join(&shot.photo))
-                .unwrap();
-            shots.push(shot);
-        }
-    }
-    fs::write(
-        folder.path().join(MANIFEST_FILE),
-        Manifest { shots }.to_csv(),
-    )
-    .unwrap();
-    folder
+/// A default capture with every photograph taken at each of `times`.
+fn bracketed(times: &[f64]) -> tempfile::TempDir {
+    let times = times.to_vec();
+    let scene = TestCapture {
+        times,
+        ..TestCapture::default()
+    };
+    scene.folder()
 }
 
 #[test]
 fn a_bracket_sees_what_its_longest_exposure_clips() {
     // Light is .5 + .13 under white at most: at four times the exposure it clips.
-    let folder = bracketed(&[1.0, 4.0], 0.004);
+    let folder = bracketed(&[1.0, 4.0]);
     let measured = read(folder.path(), &CaptureOptions::default(), &Silent).unwrap();
     assert!(measured.live.iter().all(|&live| live));
     assert_eq!(measured.diagnostics.photographs, 2 * 44);
@@ -307,7 +273,7 @@ fn a_bracket_sees_what_its_longest_exposure_clips() {
     let off = (a * 0.25 - b).norm() / b.norm();
     assert!(off < 0.01, "{off}");
     let long_alone = read(
-        bracketed(&[4.0], 0.004).path(),
+        bracketed(&[4.0]).path(),
         &CaptureOptions::default(),
         &Silent,
     );

@@ -4,7 +4,7 @@
 //! between them: it may bend at every cell, as it does where the surface has a
 //! crease, and it does not reach across an edge where the surface ends.
 
-use crate::registration::cell_map::{NO_CELL, Registration};
+use crate::registration::cell_map::{NO_CELL, Registration, cell_beside};
 use iltm_runtime::Grid;
 
 /// Ratio of a cell's distances to its two neighbours from which the farther one
@@ -107,13 +107,6 @@ impl Registration {
         }
         best.0.map(|offset| offset.clamp(-1.0, 1.0))
     }
-}
-
-/// The cell `rows` down and `cols` right of `cell`, if the grid has it.
-fn cell_beside(grid: Grid, cell: usize, rows: isize, cols: isize) -> Option<usize> {
-    let row = (cell / grid.cols()).checked_add_signed(rows)?;
-    let col = (cell % grid.cols()).checked_add_signed(cols)?;
-    (row < grid.rows() && col < grid.cols()).then_some(row * grid.cols() + col)
 }
 
 #[cfg(test)]

@@ -40,10 +40,8 @@ const SATURATED_PIXELS: f64 = 0.1;
 
 /// The cells that can be measured, and their pixels.
 pub(crate) struct CellPixels {
-    /// Pixels of all live cells, cell after cell.
-    pixels: Vec<u32>,
-    /// Where each cell's pixels begin in `pixels`, length `N + 1`.
-    begin: Vec<usize>,
+    /// Pixels of each cell, none of one that is not live, length `N`.
+    of_cell: Vec<Vec<u32>>,
     pub(crate) live: Vec<bool>,
     pub(crate) left_out: Vec<LeftOut>,
 }
@@ -82,32 +80,18 @@ impl CellPixels {
         let mut live = vec![true; cells];
         for out in &left_out {
             live[out.cell] = false;
-        }
-        let mut begin = vec![0];
-        let mut pixels = Vec::new();
-        for (cell, of_cell) in of_cell.iter().enumerate() {
-            if live[cell] {
-                pixels.extend(of_cell);
-            }
-            begin.push(pixels.len());
+            of_cell[out.cell].clear();
         }
         Self {
-            pixels,
-            begin,
+            of_cell,
             live,
             left_out,
         }
     }
 
-    /// Number of cells.
-    pub(super) fn cells(&self) -> usize {
-        self.live.len()
-    }
-
     /// Pixels of each cell, `N` slices; empty for a cell that is not live.
     pub(crate) fn of_cells(&self) -> impl Iterator<Item = &[u32]> {
-        let range = |range: &[usize]| &self.pixels[range[0]..range[1]];
-        self.begin.windows(2).map(range)
+        self.of_cell.iter().map(Vec::as_slice)
     }
 
     /// Number of pixels of each cell, length `N`.

@@ -9,6 +9,7 @@
 //! brighter a photograph is than predicted, over all cells, is its gain.
 
 use crate::format::sequence::Sequence;
+use crate::registration::cell_map::cell_beside;
 use iltm_picture::statistics::median;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -188,11 +189,8 @@ impl Row {
         shown: &[(usize, &[bool])],
         far: &DMatrix<f64>,
     ) -> Self {
-        let grid = sequence.grid;
-        let (row, col) = (cell / grid.cols(), cell % grid.cols());
-        let near: Vec<usize> = (row.saturating_sub(1)..(row + 2).min(grid.rows()))
-            .flat_map(|r| (col.saturating_sub(1)..(col + 2).min(grid.cols())).map(move |c| (r, c)))
-            .map(|(r, c)| r * grid.cols() + c)
+        let near: Vec<usize> = (0..9)
+            .filter_map(|k| cell_beside(sequence.grid, cell, k / 3 - 1, k % 3 - 1))
             .collect();
         let unknowns = near.len() + far.ncols();
         let known = DMatrix::from_fn(shown.len(), unknowns, |at, k| match near.get(k) {

@@ -30,7 +30,7 @@ pub(crate) fn observe(
     progress: &dyn Progress,
 ) -> Result<CellLight, CaptureError> {
     let shots: Vec<usize> = (0..sequence.shots.len()).collect();
-    let empty = DMatrix::zeros(cells.cells(), shots.len());
+    let empty = DMatrix::zeros(cells.live.len(), shots.len());
     let mut channels = vec![empty; photographs.format.channels];
     let mut samples = NoiseSamples::new(sequence, cells);
     photographs.for_batches(&shots, progress, |photos| {

@@ -146,23 +146,16 @@ impl Pairs {
     fn best_factors(&self) -> (Vec<f64>, f64) {
         let (mut factors, mut off, mut all) = (Vec::new(), 0.0, 0.0);
         for (a, b) in &self.both {
-            let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
             let row = |cell: usize| {
                 let black = self.black[cell];
                 let known = Vector2::new(a[cell] - black, b[cell] - black);
                 (known, self.white[cell] - black)
             };
-            for cell in 0..self.white.len() {
-                let (known, white) = row(cell);
-                normal += known * known.transpose();
-                right += known * white;
-            }
-            let Some(inverse) = normal.try_inverse() else {
+            let rows = (0..self.white.len()).map(row);
+            let Some((solved, _)) = least_squares(rows.clone()) else {
                 continue;
             };
-            let solved = inverse * right;
-            for cell in 0..self.white.len() {
-                let (known, white) = row(cell);
+            for (known, white) in rows {
                 off += (known.dot(&solved) - white).powi(2);
                 all += white * white;
             }
@@ -172,29 +165,38 @@ impl Pairs {
     }
 }
 
+/// The factors of two known numbers that give the sums best, and the inverse of the normal
+/// equations; `None` if these are singular.
+fn least_squares(
+    rows: impl Iterator<Item = (Vector2<f64>, f64)>,
+) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    for (known, sum) in rows {
+        normal += known * known.transpose();
+        right += known * sum;
+    }
+    let inverse = normal.try_inverse()?;
+    Some((inverse * right, inverse))
+}
+
 /// Whether ambient light follows the picture too. Sums of pairs are compared with
 /// white's light and with black's over squares of the whole photograph: one factor
 /// for each.
 fn ambient(sequence: &Sequence, sampled: &Sampled) -> Nonlinearity {
     let white = by_square(&sampled.mean(&sequence.white().shots));
     let black = by_square(&sampled.mean(&sequence.black));
-    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     let mut rows = Vec::new();
     for (a, b) in sequence.code_pairs() {
         let one = by_square(&sampled.mean(&sequence.views[a].shots));
         let other = by_square(&sampled.mean(&sequence.views[b].shots));
-        for square in 0..white.len() {
+        rows.extend((0..white.len()).map(|square| {
             let known = Vector2::new(white[square] - black[square], 2.0 * black[square]);
-            let sum = one[square] + other[square];
-            normal += known * known.transpose();
-            right += known * sum;
-            rows.push((known, sum));
-        }
+            (known, one[square] + other[square])
+        }));
     }
-    let Some(inverse) = normal.try_inverse() else {
+    let Some((factors, inverse)) = least_squares(rows.iter().copied()) else {
         return Nonlinearity::Either;
     };
-    let factors = inverse * right;
     let left: f64 = rows
         .iter()
         .map(|(k, sum)| (k.dot(&factors) - sum).powi(2))

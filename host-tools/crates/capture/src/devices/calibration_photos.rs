@@ -9,7 +9,7 @@ use crate::format::manifest::{CALIBRATION_FILE, MANIFEST_FILE, Shot};
 use crate::format::photo_files::find_photo;
 use crate::format::picture_file::{Opened, Samples, Source};
 use crate::format::role::Role;
-use crate::format::sequence::Sequence;
+use crate::format::sequence::{Sequence, another_grid};
 use crate::photographs::Photographs;
 use crate::photographs::linearise::LinearPhotographs;
 use iltm_picture::progress::{Progress, Silent};
@@ -39,8 +39,7 @@ impl CalibrationPhotos {
     ///
     /// # Errors
     /// A manifest's or a photograph's own error;
-    /// [`CaptureError::PhotoSize`] and [`CaptureError::PhotoChannels`] if they are
-    /// not of the capture's kind.
+    /// [`CaptureError::Unlike`] if they are not of the capture's kind.
     pub(super) fn read(
         folder: &Path,
         sequence: &Sequence,
@@ -72,7 +71,7 @@ impl CalibrationPhotos {
         let brackets = Bracket::of_each(&files, sequence.longest.or(own));
         let reading = &linear.photographs.format.reading;
         let mut photographs = Photographs::of_brackets(folder, brackets, reading)?;
-        check_kind(folder, &files, &photographs, &linear.photographs)?;
+        linear.photographs.format.check_like(&photographs.format)?;
         progress.begin("reading the calibration", shots.len() as u64);
         let black = mean_of(&linear.black, &used);
         let all: Vec<usize> = (0..shots.len()).collect();
@@ -135,36 +134,6 @@ fn as_shot(shot: &CalibrationShot) -> Shot {
         exposure: shot.exposure,
         line: shot.line,
     }
-}
-
-/// Refuses photographs of another size or colour than the capture's.
-fn check_kind(
-    folder: &Path,
-    files: &[Shot],
-    photographs: &Photographs<'_>,
-    captured: &Photographs<'_>,
-) -> Result<(), CaptureError> {
-    let path = folder.join(&files[0].photo);
-    let first = folder.join(MANIFEST_FILE);
-    let size = |of: &Photographs<'_>| (of.format.width as u32, of.format.height as u32);
-    let channels = |of: &Photographs<'_>| of.format.channels;
-    if size(photographs) != size(captured) {
-        return Err(CaptureError::PhotoSize {
-            path,
-            found: size(photographs),
-            first,
-            expected: size(captured),
-        });
-    }
-    if channels(photographs) != channels(captured) {
-        return Err(CaptureError::PhotoChannels {
-            path,
-            found: channels(photographs),
-            first,
-            expected: channels(captured),
-        });
-    }
-    Ok(())
 }
 
 /// Mean of each plane over the used pixels.
@@ -254,21 +223,17 @@ fn merged_probes(
 
 /// Which cells a calibration picture lights.
 fn lit_cells(folder: &Path, grid: Grid, shot: &CalibrationShot) -> Result<Vec<bool>, CaptureError> {
-    let path = folder.join(&shot.pattern);
     let picture = Opened::open(Source {
-        path: &path,
+        path: &folder.join(&shot.pattern),
         what: "pattern",
         line: shot.line,
     })?;
-    let expected = (grid.rows() as u32, grid.cols() as u32);
     let (width, height) = picture.size();
-    if (height, width) != expected {
-        return Err(CaptureError::PatternSize {
-            path,
-            found: (height, width),
-            first: folder.join(MANIFEST_FILE),
-            expected,
-        });
+    let found = (height as usize, width as usize);
+    let expected = (grid.rows(), grid.cols());
+    if found != expected {
+        let first = (Path::new(MANIFEST_FILE), expected);
+        return Err(another_grid(folder, &shot.pattern, found, first));
     }
     let channels = picture.channels();
     Ok(match picture.decode()? {

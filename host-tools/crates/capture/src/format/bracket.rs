@@ -4,7 +4,7 @@
 //! scale at the longest exposure of the capture, so that of a short one may be above 1.
 
 use super::error::CaptureError;
-use super::manifest::Shot;
+use super::manifest::{LINE, Shot};
 use super::pattern::Pattern;
 use std::path::Path;
 
@@ -54,6 +54,7 @@ pub(crate) fn longest(shots: &[Shot], manifest: &Path) -> Result<Option<f64>, Ca
             path: manifest.to_owned(),
             line: shot.line,
             reason: "no exposure is given here, though other lines have one".to_owned(),
+            next_step: LINE,
         }),
         None => Ok(Some(longest)),
     }

@@ -1,9 +1,7 @@
 //! Calibration role: what a picture of `calibration.csv` was shown for, and its name there.
 
-use super::error::CaptureError;
 use super::manifest::{CALIBRATION_FILE, ListedRole, ManifestOf, ShotOf};
 use std::fmt;
-use std::path::Path;
 
 /// Channels of the projector that a ramp is shown in.
 #[derive(
@@ -99,15 +97,11 @@ impl ListedRole for CalibrationRole {
         Self::from_name(name)
     }
 
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
-        CaptureError::ManifestLine {
-            path: path.to_owned(),
-            line,
-            reason: format!(
-                "unknown role \"{role}\"; it must be probe, or ramp-white-LLL, ramp-red-LLL, \
-                 ramp-green-LLL or ramp-blue-LLL with a level LLL from 000 to 255"
-            ),
-        }
+    fn unknown(role: &str) -> String {
+        format!(
+            "unknown role \"{role}\"; it must be probe, or ramp-white-LLL, ramp-red-LLL, \
+             ramp-green-LLL or ramp-blue-LLL with a level LLL from 000 to 255"
+        )
     }
 }
 

@@ -1,6 +1,6 @@
 //! Capture errors: everything that can be wrong with a capture folder.
 
-use super::role::{Axis, Role};
+use super::role::Axis;
 use crate::gate::Gate;
 use iltm_runtime::GridError;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub enum CaptureError {
         /// Where it should be.
         path: PathBuf,
     },
-    /// A line of `capture.csv` is not `index,role,pattern,photo`.
+    /// A line of a manifest cannot be used.
     #[error("{}, line {line}: {reason}", path.display())]
     ManifestLine {
         /// The `capture.csv`.
@@ -32,38 +32,8 @@ pub enum CaptureError {
         line: u64,
         /// What is wrong with it.
         reason: String,
-    },
-    /// A role that is not one of the known ones.
-    #[error("{}, line {line}: unknown role \"{role}\"", path.display())]
-    UnknownRole {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Line, the first is 1.
-        line: u64,
-        /// What stands there.
-        role: String,
-    },
-    /// Two lines have the same index.
-    #[error("{}, line {line}: index {index} is already used in line {first_line}", path.display())]
-    DuplicateIndex {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Line, the first is 1.
-        line: u64,
-        /// The index.
-        index: u32,
-        /// Line that used it first.
-        first_line: u64,
-    },
-    /// A pattern or photograph is looked for outside of the capture folder.
-    #[error("{}, line {line}: {file:?} is not a relative path inside the capture without \\ : \" % {{ }} or control characters", path.display())]
-    OutsideFolder {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Line, the first is 1.
-        line: u64,
-        /// What stands there.
-        file: String,
+        /// What to do about it.
+        next_step: &'static str,
     },
     /// A file that `capture.csv` names is not there.
     #[error("{}: missing {what}, named in line {line} of capture.csv", path.display())]
@@ -91,23 +61,25 @@ pub enum CaptureError {
         /// "camera" or "projector".
         device: &'static str,
     },
-    /// A picture cannot be decoded.
+    /// A picture cannot be decoded, or is not what its line says.
     #[error("{}: {reason}", path.display())]
     Picture {
         /// The picture.
         path: PathBuf,
-        /// What is wrong, with what the decoder says.
+        /// What is wrong, with the place or with what the decoder says.
         reason: String,
+        /// What to do about it.
+        next_step: &'static str,
     },
-    /// A floating point picture has a value that is no number.
-    #[error("{}: the value at row {row}, column {col} is not a finite number", path.display())]
-    NotFinite {
-        /// The picture.
+    /// A photograph has another size or other channels than the first one.
+    #[error("{}: {reason}", path.display())]
+    Unlike {
+        /// The photograph.
         path: PathBuf,
-        /// Row of the first such pixel.
-        row: u32,
-        /// Column of the first such pixel.
-        col: u32,
+        /// Its size or channels, and those of the first one.
+        reason: String,
+        /// What to do about it.
+        next_step: &'static str,
     },
     /// A photograph is missing under its name, and several could stand for it.
     #[error("{}: missing, and both {} and {} could stand for it", path.display(), first.display(), second.display())]
@@ -131,53 +103,6 @@ pub enum CaptureError {
         /// Pixels it may have.
         limit: u64,
     },
-    /// A picture is see-through somewhere, so that its values mean nothing.
-    #[error("{}: pixel at row {row}, column {col} is transparent", path.display())]
-    Transparent {
-        /// The picture.
-        path: PathBuf,
-        /// Row of the first such pixel.
-        row: u32,
-        /// Column of the first such pixel.
-        col: u32,
-    },
-    /// A pattern has a value that is neither 0 nor 255.
-    #[error("{}: row {row}, column {col} is {value}; a pattern holds only 0 and 255", path.display())]
-    PatternValue {
-        /// The pattern.
-        path: PathBuf,
-        /// Row of the first such cell.
-        row: u32,
-        /// Column of the first such cell.
-        col: u32,
-        /// What stands there.
-        value: String,
-    },
-    /// A pattern has another size than the first one.
-    #[error("{}: {} x {} cells (rows x columns), but {} has {} x {}",
-        path.display(), found.0, found.1, first.display(), expected.0, expected.1)]
-    PatternSize {
-        /// The pattern.
-        path: PathBuf,
-        /// Its rows and columns.
-        found: (u32, u32),
-        /// The first pattern.
-        first: PathBuf,
-        /// The first pattern's rows and columns.
-        expected: (u32, u32),
-    },
-    /// A pattern's cells are not those of its role.
-    #[error("{}: row {row}, column {col} is not what \"{role}\" lights there", path.display())]
-    PatternRole {
-        /// The pattern.
-        path: PathBuf,
-        /// The role given in `capture.csv`.
-        role: Role,
-        /// Row of the first wrong cell.
-        row: u32,
-        /// Column of the first wrong cell.
-        col: u32,
-    },
     /// The patterns have no cells or more than a table can index.
     #[error("{}: {source}", path.display())]
     Grid {
@@ -185,31 +110,6 @@ pub enum CaptureError {
         path: PathBuf,
         /// What is wrong with it.
         source: GridError,
-    },
-    /// A photograph has another size than the first one.
-    #[error("{}: {} x {} pixels, but {} has {} x {}",
-        path.display(), found.0, found.1, first.display(), expected.0, expected.1)]
-    PhotoSize {
-        /// The photograph.
-        path: PathBuf,
-        /// Its width and height.
-        found: (u32, u32),
-        /// The first photograph.
-        first: PathBuf,
-        /// The first photograph's width and height.
-        expected: (u32, u32),
-    },
-    /// Some photographs are grey and some in colour.
-    #[error("{}: {found} colour channels, but {} has {expected}", path.display(), first.display())]
-    PhotoChannels {
-        /// The photograph.
-        path: PathBuf,
-        /// Its channels, 1 or 3.
-        found: usize,
-        /// The first photograph.
-        first: PathBuf,
-        /// The first photograph's channels.
-        expected: usize,
     },
     /// There is no black photograph.
     #[error("{}: no photograph of the black pattern", path.display())]
@@ -329,17 +229,6 @@ impl CaptureError {
             Self::NoManifest { .. } => {
                 "Give the folder that holds capture.csv; `iltm patterns` makes one."
             }
-            Self::ManifestLine { .. } => {
-                "Write the header and every line as index,role,pattern,photo."
-            }
-            Self::UnknownRole { .. } => {
-                "Use white, black, column-B, column-B-inverse, row-B, row-B-inverse or bernoulli, \
-                 B being a bit from 0."
-            }
-            Self::DuplicateIndex { .. } => "Give every line an index of its own.",
-            Self::OutsideFolder { .. } => {
-                "Copy the file into the capture folder and name it relative to that folder."
-            }
             Self::MissingFile { .. } => {
                 "Put the file there, or remove its line if it was never taken."
             }
@@ -356,26 +245,12 @@ impl CaptureError {
             Self::ResponseUnknown { .. } => {
                 "Photograph the pictures of calibration.csv, or write the projector's response."
             }
-            Self::Picture { .. } => {
-                "Copy or export the picture again: photographs as PNG, TIFF, JPEG, OpenEXR, PGM \
-                 or PPM, patterns as PNG with 8 bit."
-            }
-            Self::NotFinite { .. } => "Export the picture again, without undefined pixels.",
+            Self::ManifestLine { next_step, .. }
+            | Self::Picture { next_step, .. }
+            | Self::Unlike { next_step, .. } => next_step,
             Self::Ambiguous { .. } => "Name the right one in capture.csv, or remove the other.",
             Self::TooLarge { .. } => "Scale the photographs down, all by the same factor.",
-            Self::Transparent { .. } => "Export the picture without an alpha channel.",
-            Self::PatternValue { .. } => {
-                "Use the pattern file as `iltm patterns` wrote it: one pixel a cell, not scaled."
-            }
-            Self::PatternSize { .. } => "Use patterns of one grid only.",
-            Self::PatternRole { .. } => {
-                "Correct the role in capture.csv, or name the pattern that was really shown."
-            }
             Self::Grid { .. } => "Use fewer cells: a pattern has one pixel a cell.",
-            Self::PhotoSize { .. } => {
-                "Take all photographs with one camera setting, without cropping."
-            }
-            Self::PhotoChannels { .. } => "Export all photographs grey, or all in colour.",
             Self::NoBlack { .. } => {
                 "Photograph the black pattern with the same exposure; ambient light is subtracted \
                  with it."
@@ -406,17 +281,17 @@ impl CaptureError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Manifest;
+    use std::path::Path;
 
     #[test]
     fn an_error_names_its_place_and_fits_a_register_sized_result() {
-        let error = CaptureError::UnknownRole {
-            path: "c/capture.csv".into(),
-            line: 7,
-            role: "whit".into(),
-        };
+        let path = Path::new("c/capture.csv");
+        let text = b"index,role,pattern,photo\n0,whit,p,f\n";
+        let error = Manifest::parse(text, path).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "c/capture.csv, line 7: unknown role \"whit\""
+            "c/capture.csv, line 2: unknown role \"whit\""
         );
         assert!(error.next_step().contains("white"));
         assert!(size_of::<CaptureError>() <= 128);

@@ -3,7 +3,7 @@
 use super::error::CaptureError;
 use super::role::Role;
 use std::collections::HashMap;
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
@@ -32,23 +32,27 @@ pub trait ListedRole: Clone + fmt::Display {
     /// Reads a role's name; `None` if it is not one.
     fn from_name(name: &str) -> Option<Self>;
 
+    /// What to do about another name.
+    const NEXT_STEP: &'static str = LINE;
+
     /// What is said about another name.
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError;
+    fn unknown(role: &str) -> String;
 }
+
+/// What to do about a line that is not as it should be.
+pub(super) const LINE: &str = "Write the header and every line as index,role,pattern,photo.";
 
 impl ListedRole for Role {
     const FILE: &'static str = MANIFEST_FILE;
+    const NEXT_STEP: &'static str = "Use white, black, column-B, column-B-inverse, row-B, \
+         row-B-inverse or bernoulli, B being a bit from 0.";
 
     fn from_name(name: &str) -> Option<Self> {
         Self::from_name(name)
     }
 
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
-        CaptureError::UnknownRole {
-            path: path.to_owned(),
-            line,
-            role: role.to_owned(),
-        }
+    fn unknown(role: &str) -> String {
+        format!("unknown role \"{role}\"")
     }
 }
 
@@ -143,15 +147,15 @@ impl<R: ListedRole> ManifestOf<R> {
     /// Reads the contents of a manifest; `path` is only for errors.
     ///
     /// # Errors
-    /// [`CaptureError::ManifestLine`], [`CaptureError::UnknownRole`],
-    /// [`CaptureError::DuplicateIndex`] or [`CaptureError::OutsideFolder`], each
-    /// with its line.
+    /// [`CaptureError::ManifestLine`] with the first line that cannot be used.
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, CaptureError> {
-        let refuse = |line, reason| CaptureError::ManifestLine {
+        let refuse_by = |line, (reason, next_step)| CaptureError::ManifestLine {
             path: path.to_owned(),
             line,
             reason,
+            next_step,
         };
+        let refuse = |line, reason| refuse_by(line, (reason, LINE));
         if bytes.len() as u64 > MAX_BYTES {
             return Err(refuse(
                 1,
@@ -182,14 +186,11 @@ impl<R: ListedRole> ManifestOf<R> {
                 }
                 continue;
             }
-            let shot = shot(&record, columns, line, path)?;
-            if let Some(first_line) = seen.insert(shot.index, line) {
-                return Err(CaptureError::DuplicateIndex {
-                    path: path.to_owned(),
-                    line,
-                    index: shot.index,
-                    first_line,
-                });
+            let shot = shot(&record, columns, line).map_err(|flaw| refuse_by(line, flaw))?;
+            if let Some(first) = seen.insert(shot.index, line) {
+                let reason = format!("index {} is already used in line {first}", shot.index);
+                let flaw = (reason, "Give every line an index of its own.");
+                return Err(refuse_by(line, flaw));
             }
             shots.push(shot);
         }
@@ -206,18 +207,24 @@ impl<R: ListedRole> ManifestOf<R> {
     pub fn to_csv(&self) -> String {
         let exposed = self.shots.iter().any(|shot| shot.exposure.is_some());
         let columns = if exposed { HEADER.len() } else { NEEDED };
-        let mut text = HEADER[..columns].join(",") + "\n";
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let mut line = |fields: &[String]| {
+            // Writing into memory cannot fail, and all lines have as many fields.
+            let _ = writer.write_record(&fields[..columns]);
+        };
+        line(&HEADER.map(str::to_owned));
         for shot in &self.shots {
-            let (pattern, photo) = (quoted(&shot.pattern), quoted(&shot.photo));
-            // Writing into a string cannot fail.
-            let _ = write!(text, "{},{},{pattern},{photo}", shot.index, shot.role);
-            if exposed {
-                let exposure = shot.exposure.map(|exposure| exposure.to_string());
-                let _ = write!(text, ",{}", exposure.unwrap_or_default());
-            }
-            text.push('\n');
+            let exposure = shot.exposure.map(|exposure| exposure.to_string());
+            line(&[
+                shot.index.to_string(),
+                shot.role.to_string(),
+                shot.pattern.to_string_lossy().into_owned(),
+                shot.photo.to_string_lossy().into_owned(),
+                exposure.unwrap_or_default(),
+            ]);
         }
-        text
+        let bytes = writer.into_inner().unwrap_or_default();
+        String::from_utf8_lossy(&bytes).into_owned()
     }
 }
 
@@ -267,48 +274,47 @@ impl<'a> LineCounter<'a> {
     }
 }
 
+/// What is wrong with a line, and what to do about it.
+type Flaw = (String, &'static str);
+
 /// Reads one line of as many `columns` as the header.
 fn shot<R: ListedRole>(
     record: &csv::StringRecord,
     columns: usize,
     line: u64,
-    path: &Path,
-) -> Result<ShotOf<R>, CaptureError> {
-    let refuse = |reason| CaptureError::ManifestLine {
-        path: path.to_owned(),
-        line,
-        reason,
-    };
+) -> Result<ShotOf<R>, Flaw> {
     let fields: Vec<&str> = record.iter().collect();
     let (&[index, role, pattern, photo, ref exposure @ ..], true) =
         (fields.as_slice(), fields.len() == columns)
     else {
-        return Err(refuse(format!(
-            "{} fields instead of the {columns} of {}",
-            fields.len(),
-            HEADER[..columns].join(",")
-        )));
+        let (found, header) = (fields.len(), HEADER[..columns].join(","));
+        let reason = format!("{found} fields instead of the {columns} of {header}");
+        return Err((reason, LINE));
     };
     let index = index.parse().map_err(|_| {
-        refuse(format!(
-            "the index \"{index}\" is not a whole number from 0"
-        ))
+        let reason = format!("the index \"{index}\" is not a whole number from 0");
+        (reason, LINE)
     })?;
-    let role = R::from_name(role).ok_or_else(|| R::unknown(path, line, role))?;
+    let role = R::from_name(role).ok_or_else(|| (R::unknown(role), R::NEXT_STEP))?;
     let exposure = match exposure.first() {
         None | Some(&"") => None,
         Some(text) => Some(self::exposure(text).ok_or_else(|| {
-            refuse(format!(
+            let reason = format!(
                 "the exposure \"{text}\" is not a number above 0 (seconds, or any unit that all \
                  lines share)"
-            ))
+            );
+            (reason, LINE)
         })?),
     };
     let inside = |file: &str| {
-        inside_folder(file).ok_or_else(|| CaptureError::OutsideFolder {
-            path: path.to_owned(),
-            line,
-            file: file.to_owned(),
+        inside_folder(file).ok_or_else(|| {
+            let reason = format!(
+                "{file:?} is not a relative path inside the capture without \\ : \" % {{ }} or \
+                 control characters"
+            );
+            let next_step =
+                "Copy the file into the capture folder and name it relative to that folder.";
+            (reason, next_step)
         })
     };
     Ok(ShotOf {
@@ -346,16 +352,6 @@ fn inside_folder(file: &str) -> Option<PathBuf> {
     (normal > 0 && !foreign).then(|| path.to_owned())
 }
 
-/// A path as a CSV field.
-fn quoted(path: &Path) -> String {
-    let text = path.to_string_lossy();
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.into_owned()
-    }
-}
-
 /// Name of the list in a folder that was made to verify a table.
 pub const VERIFY_FILE: &str = "verify.csv";
 
@@ -380,12 +376,8 @@ impl ListedRole for RoleName {
         (!name.is_empty()).then(|| Self(name.to_owned()))
     }
 
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
-        CaptureError::ManifestLine {
-            path: path.to_owned(),
-            line,
-            reason: format!("the role \"{role}\" is no name"),
-        }
+    fn unknown(role: &str) -> String {
+        format!("the role \"{role}\" is no name")
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::code::{Code, lit_by_role};
 use super::error::CaptureError;
-use super::picture_file::{FileFormat, Opened, Samples, Source};
+use super::picture_file::{EXPORT, FileFormat, Opened, Samples, Source};
 use super::role::Role;
 use iltm_runtime::Grid;
 
@@ -48,16 +48,19 @@ impl Pattern {
     /// with equal colours, every value 0 or 255, of at most `most` cells.
     ///
     /// # Errors
-    /// [`CaptureError::PatternValue`] with the first cell that is neither, or
+    /// [`CaptureError::Picture`] with the first cell that is neither, or
     /// what [`Opened`] returns.
     pub(crate) fn read(source: Source<'_>, most: u64) -> Result<Self, CaptureError> {
         let picture = Opened::open(source)?;
+        let refuse = |reason, next_step| CaptureError::Picture {
+            path: source.path.to_owned(),
+            reason,
+            next_step,
+        };
         // What `iltm patterns` writes and scripts beside this tool read.
         if picture.format() != FileFormat::Png {
-            return Err(CaptureError::Picture {
-                path: source.path.to_owned(),
-                reason: format!("a pattern is a PNG, this is {}", picture.format()),
-            });
+            let reason = format!("a pattern is a PNG, this is {}", picture.format());
+            return Err(refuse(reason, EXPORT));
         }
         let (width, height) = picture.size();
         let channels = picture.channels();
@@ -70,11 +73,12 @@ impl Pattern {
                 limit: most,
             });
         }
-        let refuse = |at: usize, value: String| CaptureError::PatternValue {
-            path: source.path.to_owned(),
-            row: at as u32 / width,
-            col: at as u32 % width,
-            value,
+        let refuse = |at: usize, value: String| {
+            let (row, col) = (at as u32 / width, at as u32 % width);
+            refuse(
+                format!("row {row}, column {col} is {value}; a pattern holds only 0 and 255"),
+                "Use the pattern file as `iltm patterns` wrote it: one pixel a cell, not scaled.",
+            )
         };
         let samples = match picture.decode()? {
             Samples::Eight(samples) => samples,

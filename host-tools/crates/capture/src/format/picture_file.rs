@@ -12,7 +12,7 @@ use image::codecs::openexr::OpenExrDecoder;
 use image::codecs::png::PngDecoder;
 use image::codecs::pnm::PnmDecoder;
 use image::codecs::tiff::TiffDecoder;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageResult, Limits};
+use image::{DynamicImage, ImageDecoder, ImageResult, Limits};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -84,6 +84,10 @@ impl FileFormat {
     }
 }
 
+/// What to do about a picture that cannot be read.
+pub(super) const EXPORT: &str = "Copy or export the picture again: photographs as PNG, TIFF, \
+     JPEG, OpenEXR, PGM or PPM, patterns as PNG with 8 bit.";
+
 /// A picture file and who named it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Source<'a> {
@@ -142,6 +146,7 @@ impl Opened {
         let refuse = |reason: String| CaptureError::Picture {
             path: path.clone(),
             reason,
+            next_step: EXPORT,
         };
         // Opening a pipe would wait for a writer for ever.
         if !metadata.is_file() {
@@ -188,10 +193,7 @@ impl Opened {
 
     /// Colour channels without alpha, 1 or 3.
     pub(crate) fn channels(&self) -> usize {
-        match &self.decoder {
-            Decoder::Image(decoder) if decoder.color_type().has_color() => 3,
-            _ => 1,
-        }
+        self.decoder.channels()
     }
 
     /// Bits of a sample: 8, 16, or 32 for floating point.
@@ -212,40 +214,33 @@ impl Opened {
     /// refused.
     ///
     /// # Errors
-    /// [`CaptureError::Picture`], [`CaptureError::Transparent`] or
-    /// [`CaptureError::NotFinite`].
+    /// [`CaptureError::Picture`].
     pub(crate) fn decode(self) -> Result<Samples, CaptureError> {
         let Self {
             path,
             format,
             decoder,
         } = self;
-        let refuse = |reason| CaptureError::Picture {
+        let refuse = |(reason, next_step)| CaptureError::Picture {
             path: path.clone(),
             reason,
+            next_step,
         };
-        let ((width, _), channels) = (decoder.size(), decoder.channels());
-        let place = |at: usize| (at as u32 / width, at as u32 % width);
+        let (width, channels) = (decoder.size().0 as usize, decoder.channels());
         let samples = match decoder {
-            Decoder::Image(decoder) => {
-                let decoded = DynamicImage::from_decoder(decoder);
-                let decoded = decoded.map_err(|error| refuse(unreadable(format, &error)))?;
-                without_alpha(decoded).map_err(|flaw| match flaw {
-                    Flaw::Transparent(at) => {
-                        let (row, col) = place(at);
-                        let path = path.clone();
-                        CaptureError::Transparent { path, row, col }
-                    }
-                    Flaw::Pixels(colour) => refuse(format!("its pixels are {colour:?}")),
-                })?
-            }
-            Decoder::GreyFloat(grey) => grey.decode().map_err(refuse)?,
+            Decoder::Image(decoder) => DynamicImage::from_decoder(decoder)
+                .map_err(|error| (unreadable(format, &error), EXPORT))
+                .and_then(|decoded| without_alpha(decoded, width)),
+            Decoder::GreyFloat(grey) => grey.decode().map_err(|reason| (reason, EXPORT)),
         };
+        let samples = samples.map_err(refuse)?;
         if let Samples::Float(values) = &samples
             && let Some(at) = values.iter().position(|value| !value.is_finite())
         {
-            let (row, col) = place(at / channels);
-            return Err(CaptureError::NotFinite { path, row, col });
+            let (row, col) = (at / channels / width, at / channels % width);
+            let reason = format!("the value at row {row}, column {col} is not a finite number");
+            let next_step = "Export the picture again, without undefined pixels.";
+            return Err(refuse((reason, next_step)));
         }
         Ok(samples)
     }
@@ -373,28 +368,21 @@ pub(crate) enum Samples {
     Float(Vec<f32>),
 }
 
-/// Why decoded pixels cannot be used.
-enum Flaw {
-    /// The first pixel whose alpha is not full.
-    Transparent(usize),
-    /// Pixels of a kind that no camera writes.
-    Pixels(ColorType),
-}
-
-/// The samples of a picture whose alpha, if any, is full everywhere.
-fn without_alpha(decoded: DynamicImage) -> Result<Samples, Flaw> {
+/// The samples of a picture so many pixels wide whose alpha, if any, is full everywhere;
+/// otherwise what is wrong, and what to do about it.
+fn without_alpha(decoded: DynamicImage, width: usize) -> Result<Samples, (String, &'static str)> {
     match decoded {
         DynamicImage::ImageLuma8(picture) => Ok(Samples::Eight(picture.into_raw())),
         DynamicImage::ImageRgb8(picture) => Ok(Samples::Eight(picture.into_raw())),
         DynamicImage::ImageLuma16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
         DynamicImage::ImageRgb16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
         DynamicImage::ImageRgb32F(picture) => Ok(Samples::Float(picture.into_raw())),
-        DynamicImage::ImageLumaA8(picture) => opaque(&picture, 2).map(Samples::Eight),
-        DynamicImage::ImageRgba8(picture) => opaque(&picture, 4).map(Samples::Eight),
-        DynamicImage::ImageLumaA16(picture) => opaque(&picture, 2).map(Samples::Sixteen),
-        DynamicImage::ImageRgba16(picture) => opaque(&picture, 4).map(Samples::Sixteen),
-        DynamicImage::ImageRgba32F(picture) => opaque(&picture, 4).map(Samples::Float),
-        other => Err(Flaw::Pixels(other.color())),
+        DynamicImage::ImageLumaA8(picture) => opaque(&picture, 2, width).map(Samples::Eight),
+        DynamicImage::ImageRgba8(picture) => opaque(&picture, 4, width).map(Samples::Eight),
+        DynamicImage::ImageLumaA16(picture) => opaque(&picture, 2, width).map(Samples::Sixteen),
+        DynamicImage::ImageRgba16(picture) => opaque(&picture, 4, width).map(Samples::Sixteen),
+        DynamicImage::ImageRgba32F(picture) => opaque(&picture, 4, width).map(Samples::Float),
+        other => Err((format!("its pixels are {:?}", other.color()), EXPORT)),
     }
 }
 
@@ -402,13 +390,14 @@ fn without_alpha(decoded: DynamicImage) -> Result<Samples, Flaw> {
 fn opaque<T: Copy + PartialEq + image::Primitive>(
     samples: &[T],
     step: usize,
-) -> Result<Vec<T>, Flaw> {
+    width: usize,
+) -> Result<Vec<T>, (String, &'static str)> {
     let pixels = samples.chunks_exact(step);
-    if let Some(at) = pixels
-        .clone()
-        .position(|pixel| pixel.last() != Some(&T::DEFAULT_MAX_VALUE))
-    {
-        return Err(Flaw::Transparent(at));
+    let seen_through = |pixel: &[T]| pixel.last() != Some(&T::DEFAULT_MAX_VALUE);
+    if let Some(at) = pixels.clone().position(seen_through) {
+        let (row, col) = (at / width, at % width);
+        let reason = format!("pixel at row {row}, column {col} is transparent");
+        return Err((reason, "Export the picture without an alpha channel."));
     }
     Ok(pixels
         .flat_map(|pixel| &pixel[..step - 1])

@@ -13,7 +13,7 @@ use crate::gate::GateName;
 use iltm_runtime::Grid;
 use rayon::prelude::*;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Bernoulli photographs that a capture needs at least.
 ///
@@ -376,17 +376,35 @@ fn common_size(
     shots: &[Shot],
     patterns: &[Pattern],
 ) -> Result<(usize, usize), CaptureError> {
-    let path = |at: usize| -> PathBuf { folder.join(&shots[at].pattern) };
-    let size = |pattern: &Pattern| (pattern.rows as u32, pattern.cols as u32);
+    let size = |pattern: &Pattern| (pattern.rows, pattern.cols);
     let expected = size(&patterns[0]);
     match patterns.iter().position(|p| size(p) != expected) {
-        Some(at) => Err(CaptureError::PatternSize {
-            path: path(at),
-            found: size(&patterns[at]),
-            first: path(0),
-            expected,
-        }),
-        None => Ok((patterns[0].rows, patterns[0].cols)),
+        Some(at) => Err(another_grid(
+            folder,
+            &shots[at].pattern,
+            size(&patterns[at]),
+            (&shots[0].pattern, expected),
+        )),
+        None => Ok(expected),
+    }
+}
+
+/// Refuses a pattern of other rows and columns than those of the first file.
+pub(crate) fn another_grid(
+    folder: &Path,
+    pattern: &Path,
+    (rows, cols): (usize, usize),
+    (first, expected): (&Path, (usize, usize)),
+) -> CaptureError {
+    CaptureError::Picture {
+        path: folder.join(pattern),
+        reason: format!(
+            "{rows} x {cols} cells (rows x columns), but {} has {} x {}",
+            folder.join(first).display(),
+            expected.0,
+            expected.1
+        ),
+        next_step: "Use patterns of one grid only.",
     }
 }
 
@@ -463,11 +481,14 @@ fn check_role(
     let wrong = |(cell, lit): (usize, &bool)| expected(cell).is_some_and(|e| e != *lit);
     let wrong = pattern.lit.iter().enumerate().position(wrong);
     wrong.map_or(Ok(()), |cell| {
-        Err(CaptureError::PatternRole {
+        let (row, col) = (cell / pattern.cols, cell % pattern.cols);
+        Err(CaptureError::Picture {
             path: folder.join(&shot.pattern),
-            role: shot.role,
-            row: (cell / pattern.cols) as u32,
-            col: (cell % pattern.cols) as u32,
+            reason: format!(
+                "row {row}, column {col} is not what \"{}\" lights there",
+                shot.role
+            ),
+            next_step: "Correct the role in capture.csv, or name the pattern that was really shown.",
         })
     })
 }

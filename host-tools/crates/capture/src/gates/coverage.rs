@@ -59,30 +59,26 @@ pub(super) fn judge(
             f64::NAN
         }
     };
+    let next_step = match verdict {
+        Verdict::Fail => {
+            "Check that the camera sees the projection, that nothing moved, and that the \
+             photographs belong to the patterns of their lines."
+        }
+        _ => {
+            "Check that the whole projection is in the camera's view and in focus; what it \
+             cannot see is left dark."
+        }
+    };
+    let values = (0..cells).map(value).collect();
     Gate {
-        name: GateName::Coverage,
-        verdict,
-        number: 100.0 * missing,
-        limit: 100.0 * (1.0 - LEAST),
-        unit: "%",
         what,
-        next_step: match verdict {
-            Verdict::Fail => {
-                "Check that the camera sees the projection, that nothing moved, and that the \
-                 photographs belong to the patterns of their lines."
-            }
-            Verdict::Warn => {
-                "Check that the whole projection is in the camera's view and in focus; what it \
-                 cannot see is left dark."
-            }
-            _ => "",
-        },
-        evidence: Evidence::Cells {
-            what: "camera pixels used for each cell",
-            rows: grid.rows(),
-            cols: grid.cols(),
-            values: (0..cells).map(value).collect(),
-        },
+        evidence: Evidence::cells("camera pixels used for each cell", grid, values),
+        ..Gate::of_share(
+            GateName::Coverage,
+            verdict,
+            (missing, 1.0 - LEAST),
+            next_step,
+        )
     }
 }
 

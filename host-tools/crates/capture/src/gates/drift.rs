@@ -39,20 +39,10 @@ pub(super) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
         );
     }
     let shots = steadiness.shots.iter().zip(&steadiness.gains);
+    let next_step = "Let the projector warm up for 20 minutes, keep daylight out, and take the \
+         capture again.";
     Gate {
-        name,
-        verdict,
-        number: 100.0 * size,
-        limit: 100.0 * MOST,
-        unit: "%",
         what,
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => {
-                "Let the projector warm up for 20 minutes, keep daylight out, and take the capture \
-                 again."
-            }
-        },
         evidence: Evidence::Photographs {
             what: "brightness against the session's mean, %",
             values: shots
@@ -60,5 +50,6 @@ pub(super) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
                 .collect(),
             limit: None,
         },
+        ..Gate::of_share(GateName::Drift, verdict, (size, MOST), next_step)
     }
 }

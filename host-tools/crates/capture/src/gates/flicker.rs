@@ -56,20 +56,10 @@ pub(super) fn judge(
         ),
     };
     let shots = steadiness.shots.iter().zip(&offs);
+    let next_step = "Set a longer exposure that is a multiple of the projector's refresh period \
+         and of the mains' (1/25 or 1/30 s and longer), switch lamps off, set the exposure by hand.";
     Gate {
-        name,
-        verdict,
-        number: 100.0 * number,
-        limit: 100.0 * MOST,
-        unit: "%",
         what,
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => {
-                "Set a longer exposure that is a multiple of the projector's refresh period and of \
-                 the mains' (1/25 or 1/30 s and longer), switch lamps off, set the exposure by hand."
-            }
-        },
         evidence: match bands {
             Some(bands) if striped > scatter && verdict != Verdict::Pass => Evidence::Curve {
                 x: "bands from the top of the photographs to the bottom",
@@ -86,6 +76,7 @@ pub(super) fn judge(
                 limit: Some(100.0 * MOST),
             },
         },
+        ..Gate::of_share(name, verdict, (number, MOST), next_step)
     }
 }
 

@@ -50,24 +50,18 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
         let index = sequence.shots[shot].index;
         (index, x.hypot(y))
     });
+    let next_step = "Fix tripod, projector and scene, use a remote release, and take the capture \
+         again; photographs from before and after a bump do not belong together.";
     Gate {
-        name,
-        verdict,
         number: bump.size,
         limit,
         unit: "pixels",
         what,
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => {
-                "Fix tripod, projector and scene, use a remote release, and take the capture again; \
-                 photographs from before and after a bump do not belong together."
-            }
-        },
         evidence: Evidence::Photographs {
             what: "shift against the session's mean, pixels",
             values: values.collect(),
             limit: None,
         },
+        ..Gate::of_share(name, verdict, (0.0, 0.0), next_step)
     }
 }

@@ -51,25 +51,12 @@ pub(super) fn judge(
              of each pattern would reach an 8-bit step ({GOAL:.4})"
         ),
     };
+    let next_step = "Expose longer or open the aperture until white reaches 80 % of full scale, \
+         lower the camera's gain (ISO), or photograph each pattern several times.";
+    let of = "noise of one observation under white, % of its light";
     Gate {
-        name: GateName::Noise,
-        verdict,
-        number: 100.0 * error,
-        limit: 100.0 * MOST,
-        unit: "%",
         what,
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => {
-                "Expose longer or open the aperture until white reaches 80 % of full scale, lower \
-                 the camera's gain (ISO), or photograph each pattern several times."
-            }
-        },
-        evidence: Evidence::Cells {
-            what: "noise of one observation under white, % of its light",
-            rows: grid.rows(),
-            cols: grid.cols(),
-            values,
-        },
+        evidence: Evidence::cells(of, grid, values),
+        ..Gate::of_share(GateName::Noise, verdict, (error, MOST), next_step)
     }
 }

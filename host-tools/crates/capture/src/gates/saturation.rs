@@ -47,19 +47,10 @@ pub(super) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gat
     } else {
         (pixels, MOST_PIXELS)
     };
+    let next_step =
+        "Take the capture again with a shorter exposure: white at about 80 % of full scale.";
     Gate {
-        name: GateName::Saturation,
-        verdict,
-        number: 100.0 * number,
-        limit: 100.0 * limit,
-        unit: "%",
         what,
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => {
-                "Take the capture again with a shorter exposure: white at about 80 % of full scale."
-            }
-        },
-        evidence: Evidence::None,
+        ..Gate::of_share(GateName::Saturation, verdict, (number, limit), next_step)
     }
 }

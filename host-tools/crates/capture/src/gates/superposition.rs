@@ -41,22 +41,13 @@ pub(super) fn judge(
     };
     let values = sums.cells.iter().map(|excess| 100.0 * excess);
     Gate {
-        name,
-        verdict,
-        number: 100.0 * number,
-        limit: 100.0 * MOST,
-        unit: "%",
         what,
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => next_step(cause),
-        },
-        evidence: Evidence::Cells {
-            what: "pattern and inverse against white and black, %",
-            rows: sequence.grid.rows(),
-            cols: sequence.grid.cols(),
-            values: values.collect(),
-        },
+        evidence: Evidence::cells(
+            "pattern and inverse against white and black, %",
+            sequence.grid,
+            values.collect(),
+        ),
+        ..Gate::of_share(name, verdict, (number, MOST), next_step(cause))
     }
 }
 
@@ -69,20 +60,11 @@ fn without_inverses(excess: Option<f64>) -> Gate {
     };
     let verdict = Verdict::of(excess.abs(), NOTABLE, MOST);
     Gate {
-        name,
-        verdict,
-        number: 100.0 * excess.abs(),
-        limit: 100.0 * MOST,
-        unit: "%",
         what: format!(
             "patterns are {:+.1} % brighter than white lets expect (there are no inverses to add up)",
             100.0 * excess
         ),
-        next_step: match verdict {
-            Verdict::Pass => "",
-            _ => next_step(None),
-        },
-        evidence: Evidence::None,
+        ..Gate::of_share(name, verdict, (excess.abs(), MOST), next_step(None))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::format::error::CaptureError;
 use crate::format::picture_file::{FileFormat, Opened, Samples, Source};
 use crate::format::settings::Reading;
 use iltm_picture::DeviceResponse;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Pixels a photograph is kept at. A larger one is averaged over squares of
 /// pixels: a cell needs tens of pixels, a sensor of 24 megapixels has thousands
@@ -125,32 +125,60 @@ impl PhotoFormat {
     /// Reads a photograph of this format.
     ///
     /// # Errors
-    /// [`CaptureError::PhotoSize`] or [`CaptureError::PhotoChannels`] before any
-    /// pixel is decoded; otherwise what [`Opened`] returns.
+    /// [`CaptureError::Unlike`] before any pixel is decoded; otherwise what [`Opened`]
+    /// returns.
     pub(crate) fn read(&self, source: Source<'_>) -> Result<Photo, CaptureError> {
         let opened = Opened::open(source)?;
-        if opened.size() != self.file_size {
-            return Err(CaptureError::PhotoSize {
-                path: source.path.to_owned(),
-                found: opened.size(),
-                first: self.first.clone(),
-                expected: self.file_size,
-            });
-        }
-        if opened.channels() != self.channels {
-            return Err(CaptureError::PhotoChannels {
-                path: source.path.to_owned(),
-                found: opened.channels(),
-                first: self.first.clone(),
-                expected: self.channels,
-            });
-        }
+        self.check_kind(source.path, opened.size(), opened.channels())?;
         let file = opened.format();
         Ok(match opened.decode()? {
             Samples::Eight(samples) => self.linear(&samples, |v| self.eight[usize::from(v)]),
             Samples::Sixteen(samples) => self.linear(&samples, |v| self.sixteen[usize::from(v)]),
             Samples::Float(samples) => self.linear(&samples, |value| self.float(file, value)),
         })
+    }
+
+    /// Refuses a photograph of another size or colour than the first one.
+    fn check_kind(
+        &self,
+        path: &Path,
+        size: (u32, u32),
+        channels: usize,
+    ) -> Result<(), CaptureError> {
+        let (width, height) = self.file_size;
+        let first = self.first.display();
+        let (reason, next_step) = if size != self.file_size {
+            (
+                format!(
+                    "{} x {} pixels, but {first} has {width} x {height}",
+                    size.0, size.1
+                ),
+                "Take all photographs with one camera setting, without cropping.",
+            )
+        } else if channels != self.channels {
+            (
+                format!(
+                    "{channels} colour channels, but {first} has {}",
+                    self.channels
+                ),
+                "Export all photographs grey, or all in colour.",
+            )
+        } else {
+            return Ok(());
+        };
+        Err(CaptureError::Unlike {
+            path: path.to_owned(),
+            reason,
+            next_step,
+        })
+    }
+
+    /// Refuses photographs of another size or colour than these.
+    ///
+    /// # Errors
+    /// [`CaptureError::Unlike`].
+    pub(crate) fn check_like(&self, other: &Self) -> Result<(), CaptureError> {
+        self.check_kind(&other.first, other.file_size, other.channels)
     }
 
     /// Light of a floating point value. What noise and a subtracted dark frame

@@ -75,3 +75,10 @@ pub(super) fn centres(grid: Grid, camera: (usize, usize), cell: &[u32]) -> Vec<O
     let mean = |[x, y, n]: [f64; 3]| (n > 0.0).then(|| [x / n, y / n]);
     sums.into_iter().map(mean).collect()
 }
+
+/// The cell `rows` down and `cols` right of `cell`, if the grid has it.
+pub(crate) fn cell_beside(grid: Grid, cell: usize, rows: isize, cols: isize) -> Option<usize> {
+    let row = (cell / grid.cols()).checked_add_signed(rows)?;
+    let col = (cell % grid.cols()).checked_add_signed(cols)?;
+    (row < grid.rows() && col < grid.cols()).then_some(row * grid.cols() + col)
+}

@@ -5,7 +5,7 @@
 //! depend on the cell only, so each is inverted once for all of its pixels, and
 //! the photographs pass by one at a time.
 
-use super::cell_map::{Candidate, NO_CELL};
+use super::cell_map::{Candidate, NO_CELL, cell_beside};
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
 use crate::photographs::Photographs;
@@ -168,15 +168,9 @@ impl Fit {
 
 /// Cells around a cell, row by row, itself in the middle.
 fn neighbours(grid: Grid, cell: usize) -> [u32; 9] {
-    let (row, col) = (cell / grid.cols(), cell % grid.cols());
     std::array::from_fn(|k| {
-        // One down and right of the neighbour, so that nothing is below zero.
-        let (r, c) = (row + k / 3, col + k % 3);
-        if (1..=grid.rows()).contains(&r) && (1..=grid.cols()).contains(&c) {
-            ((r - 1) * grid.cols() + c - 1) as u32
-        } else {
-            NO_CELL
-        }
+        let beside = cell_beside(grid, cell, k as isize / 3 - 1, k as isize % 3 - 1);
+        beside.map_or(NO_CELL, |beside| beside as u32)
     })
 }
 

@@ -1,8 +1,7 @@
 //! `verify.csv`: its lines, and the names of what each picture was shown for.
 
-use iltm_capture::{CaptureError, ListedRole, ManifestOf, Role, ShotOf, VERIFY_FILE};
+use iltm_capture::{ListedRole, ManifestOf, Role, ShotOf, VERIFY_FILE};
 use std::fmt;
-use std::path::Path;
 
 /// All lines of a `verify.csv`, ordered by index.
 pub type VerifyManifest = ManifestOf<VerifyRole>;
@@ -67,15 +66,11 @@ impl ListedRole for VerifyRole {
         Self::from_name(name)
     }
 
-    fn unknown(path: &Path, line: u64, role: &str) -> CaptureError {
-        CaptureError::ManifestLine {
-            path: path.to_owned(),
-            line,
-            reason: format!(
-                "unknown role \"{role}\"; it must be white, black, column-B, row-B (the latter \
-                 two also with -inverse), bernoulli, plain-K or compensated-K"
-            ),
-        }
+    fn unknown(role: &str) -> String {
+        format!(
+            "unknown role \"{role}\"; it must be white, black, column-B, row-B (the latter \
+             two also with -inverse), bernoulli, plain-K or compensated-K"
+        )
     }
 }
 
