@@ -203,10 +203,16 @@ impl TestCapture {
         image::save_buffer(path, &bytes, width as u32, height as u32, colour).unwrap();
     }
 
-    /// Writes the capture into a new folder and reads it.
-    pub(crate) fn read(&self) -> Measurements {
+    /// Writes the capture into a new folder.
+    pub(crate) fn folder(&self) -> TempDir {
         let folder = tempfile::tempdir().unwrap();
         self.write(folder.path());
+        folder
+    }
+
+    /// Writes the capture into a new folder and reads it.
+    pub(crate) fn read(&self) -> Measurements {
+        let folder = self.folder();
         iltm_capture::read(folder.path(), &CaptureOptions::default(), &Silent).unwrap()
     }
 }

@@ -51,7 +51,7 @@ impl Default for OrderOptions {
     }
 }
 
-/// White and black, the ramps and probes, then the patterns of [`shown`]; white and
+/// White and black, the ramps and probes, then the patterns of [`pattern_set`]; white and
 /// black again every [`OrderOptions::repeat_every`] pictures and at the very end,
 /// which shows whether lamp, camera or scene changed meanwhile.
 ///

@@ -583,8 +583,8 @@ fn sizes_that_disagree_are_refused() {
 
 #[test]
 fn options_that_make_no_sense_are_refused() {
-    let capture = Capture::new(&corner(3, 4), (3, 4), 20);
     type Spoil = fn(&mut SolveOptions);
+    let capture = Capture::new(&corner(3, 4), (3, 4), 20);
     let wrong: [(&str, Spoil); 4] = [
         ("lambda", |options| options.lambda = Some(f64::NAN)),
         ("lambda", |options| options.lambda = Some(-1.0)),
