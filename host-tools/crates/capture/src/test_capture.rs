@@ -50,7 +50,7 @@ pub(crate) struct TestCapture {
     pub(crate) noise: f64,
     pub(crate) bernoulli: usize,
     /// Exposures at which each pattern is photographed; one without a name if empty.
-    pub(super) times: Vec<f64>,
+    pub(crate) times: Vec<f64>,
     /// Photographs of white and of black each.
     pub(crate) repeats: usize,
     /// Number of the first column and of the first row in the Gray code.
@@ -203,10 +203,16 @@ impl TestCapture {
         image::save_buffer(path, &bytes, width as u32, height as u32, colour).unwrap();
     }
 
-    /// Writes the capture into a new folder and reads it.
-    pub(crate) fn read(&self) -> Measurements {
+    /// Writes the capture into a new folder.
+    pub(crate) fn folder(&self) -> TempDir {
         let folder = tempfile::tempdir().unwrap();
         self.write(folder.path());
+        folder
+    }
+
+    /// Writes the capture into a new folder and reads it.
+    pub(crate) fn read(&self) -> Measurements {
+        let folder = self.folder();
         iltm_capture::read(folder.path(), &CaptureOptions::default(), &Silent).unwrap()
     }
 }

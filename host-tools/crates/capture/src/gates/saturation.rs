@@ -2,7 +2,7 @@
 //! whatever came between sensor and file.
 
 use crate::cells::cell_pixels::{LeftOut, Why};
-use crate::gate::{Evidence, Gate, GateName, Verdict};
+use crate::gate::{Gate, GateName, Verdict};
 use crate::photographs::clipping::Clipped;
 
 /// Share of the lit pixels or of the cells from which clipping is worth a word.
