@@ -29,15 +29,25 @@ const BALLS: u32 = 400;
 /// Smallest and largest radius of a ball.
 const RADII: [f32; 2] = [0.012, 0.24];
 
-const PALETTE: [Colour; 8] = [
-    [0.86, 0.04, 0.02],
-    [0.95, 0.60, 0.02],
+/// Three are so saturated that bounced light alone may exceed a channel of theirs, which
+/// no compensation can show; they are rare, as such colours are in natural video.
+const PALETTE: [Colour; 16] = [
     [0.92, 0.90, 0.86],
-    [0.02, 0.20, 0.80],
-    [0.02, 0.50, 0.14],
-    [0.40, 0.02, 0.60],
-    [0.02, 0.55, 0.62],
-    [0.95, 0.30, 0.35],
+    [0.86, 0.24, 0.20],
+    [0.95, 0.62, 0.22],
+    [0.24, 0.36, 0.80],
+    [0.24, 0.58, 0.32],
+    [0.52, 0.24, 0.66],
+    [0.22, 0.58, 0.64],
+    [0.95, 0.46, 0.48],
+    [0.62, 0.78, 0.30],
+    [0.70, 0.46, 0.26],
+    [0.34, 0.34, 0.38],
+    [0.60, 0.74, 0.92],
+    [0.88, 0.80, 0.42],
+    [0.90, 0.05, 0.01],
+    [0.01, 0.22, 0.85],
+    [0.60, 0.01, 0.50],
 ];
 
 /// A scene of one size and frame rate.
@@ -157,7 +167,7 @@ impl Ball {
     /// squared distance and `soft` a pixel.
     fn light(&self, x: f32, y: f32, square: f32, soft: f32) -> Colour {
         let towards_us = (1.0 - square).max(0.0).sqrt();
-        let lit = 0.25 + 0.85 * (0.45 * towards_us - 0.5 * x + 0.65 * y).max(0.0);
+        let lit = 0.5 + 0.65 * (0.45 * towards_us - 0.5 * x + 0.65 * y).max(0.0);
         let at = self.stripes * (x * self.across[0] + y * self.across[1]);
         // 0 in the middle of the first colour's stripes, 1/2 in that of the second's.
         let distance = (at - at.round()).abs();
