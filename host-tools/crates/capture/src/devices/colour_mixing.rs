@@ -9,10 +9,10 @@
 
 use nalgebra::Matrix3;
 
-/// ColourMixingMatrix below this is not told from stray light and rounding.
+/// Mixing below this is not told from stray light and rounding.
 const LEAST_MIXING: f64 = 0.005;
 
-/// ColourMixingMatrix matrices worse than this cannot be undone without drowning in noise.
+/// Mixing matrices worse than this cannot be undone without drowning in noise.
 const MOST_CONDITION: f64 = 20.0;
 
 /// Light in the camera's channels by the projector's.

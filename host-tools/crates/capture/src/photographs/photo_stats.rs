@@ -39,7 +39,9 @@ impl PhotoStats {
             Samples::Eight(values) => levels(values, 255.0),
             Samples::Sixteen(values) => levels(values, 65_535.0),
             Samples::Float(mut values) => {
-                values.iter_mut().for_each(|value| *value = value.max(0.0));
+                for value in &mut values {
+                    *value = value.max(0.0);
+                }
                 levels(values, 1.0)
             }
         };
