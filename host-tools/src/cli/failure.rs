@@ -276,9 +276,7 @@ impl From<CaptureError> for Failure {
     fn from(error: CaptureError) -> Self {
         let kind = match &error {
             CaptureError::Io { .. } | CaptureError::NoManifest { .. } => Kind::Read,
-            CaptureError::MorePhotographsThanTaken { .. }
-            | CaptureError::UnknownIndex { .. }
-            | CaptureError::BlackIndex { .. } => Kind::Usage,
+            CaptureError::Asked { .. } => Kind::Usage,
             CaptureError::TooFewPhotographs { .. }
             | CaptureError::NoLight { .. }
             | CaptureError::Refused { .. }

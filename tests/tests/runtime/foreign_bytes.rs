@@ -64,7 +64,7 @@ short_runs! {
     messages_are_read_as_they_were_written, "messages", 50_000;
     a_changed_table_is_no_trouble, "image", 2_000;
     changed_videos_and_pictures_are_no_trouble, "frames", 1_000;
-    changed_photographs_of_every_format_are_no_trouble, "photograph", 2_000;
+    changed_photographs_of_every_format_are_no_trouble, "photograph", 4_000;
     changed_captures_are_no_trouble, "manifest", 1_000;
     changed_settings_are_no_trouble, "settings", 1_000;
     changed_requests_are_no_trouble, "link", 1_000;

@@ -35,7 +35,7 @@ impl LinearPhotograph {
     /// white if there is no index.
     ///
     /// # Errors
-    /// [`CaptureError::UnknownIndex`] and [`CaptureError::BlackIndex`];
+    /// [`CaptureError::Asked`] if there is no such index or it is one of black;
     /// [`CaptureError::NoBlack`] and [`CaptureError::NoWhite`] if there is none; a
     /// photograph's own error.
     pub fn read(
@@ -121,19 +121,24 @@ fn choose(shots: &[Shot], index: Option<u32>, manifest: &Path) -> Result<Vec<usi
         }
         return Ok(white);
     };
+    let asked = |line: String, reason| CaptureError::Asked {
+        place: format!("{}{line}", manifest.display()),
+        reason,
+        next_step: "Choose another index from the first column of capture.csv, or leave it out for \
+             white.",
+    };
     let Some(at) = shots.iter().position(|shot| shot.index == index) else {
-        return Err(CaptureError::UnknownIndex {
-            path: path(),
-            index,
-            last: shots.last().map_or(0, |shot| shot.index),
-        });
+        let last = shots.last().map_or(0, |shot| shot.index);
+        let reason =
+            format!("there is no photograph with the index {index}; the last one is {last}");
+        return Err(asked(String::new(), reason));
     };
     if shots[at].role == Role::Black {
-        return Err(CaptureError::BlackIndex {
-            path: path(),
-            index,
-            line: shots[at].line,
-        });
+        let reason = format!(
+            "the photograph with the index {index} is of black: it shows the ambient light, which \
+             is subtracted from every other, and nothing of the projector's"
+        );
+        return Err(asked(format!(", line {}", shots[at].line), reason));
     }
     Ok(vec![at])
 }

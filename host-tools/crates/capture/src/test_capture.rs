@@ -50,7 +50,7 @@ pub(crate) struct TestCapture {
     pub(crate) noise: f64,
     pub(crate) bernoulli: usize,
     /// Exposures at which each pattern is photographed; one without a name if empty.
-    pub(super) times: Vec<f64>,
+    pub(crate) times: Vec<f64>,
     /// Photographs of white and of black each.
     pub(crate) repeats: usize,
     /// Number of the first column and of the first row in the Gray code.

@@ -446,7 +446,7 @@ fn stripes_without_the_finest_bits_tell_blocks_of_cells() {
     };
     let refused = examine(folder.path(), &options, &Silent).unwrap_err();
     assert!(
-        matches!(refused, CaptureError::GridNotCovered { .. }),
+        matches!(refused, CaptureError::GrayCode { .. }),
         "{refused}"
     );
     let options = CaptureOptions {

@@ -20,13 +20,7 @@ const ENOUGH_CELLS: usize = 32;
 const RANDOM: usize = 8;
 
 /// A cell that takes no part in the solve.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct LeftOut {
-    /// Its index, `row * cols + col`.
-    pub cell: usize,
-    /// Why.
-    pub why: WhyLeftOut,
-}
+pub type LeftOut = iltm_capture::LeftOut<WhyLeftOut>;
 
 /// Why a cell takes no part.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]

@@ -5,13 +5,13 @@ use crate::format::sequence::Sequence;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use nalgebra::DMatrix;
 
-/// A cell that was not measured.
+/// A cell that was left out of a measurement, or of what is made of it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct LeftOut {
+pub struct LeftOut<W = Why> {
     /// Its index, `row * cols + col`.
     pub cell: usize,
     /// Why.
-    pub why: Why,
+    pub why: W,
 }
 
 /// Why a cell was not measured.

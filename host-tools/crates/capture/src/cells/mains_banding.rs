@@ -1,4 +1,4 @@
-//! Mains banding over the rows of a photograph: a shutter that rolls down the picture while
+//! Mains banding: bands over the rows of a photograph. A shutter that rolls down the picture while
 //! a lamp goes bright and dark draws the lamp's wave on it.
 //!
 //! Every photograph has the same number of bands, at another height. The light of

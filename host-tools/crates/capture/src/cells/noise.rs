@@ -43,32 +43,24 @@ pub enum NoiseSource {
     Texture,
 }
 
-/// Photographs of the same light: samples that differ by noise only.
-pub(crate) struct Alike<'a> {
-    /// Each entry has one value a pixel; all entries show the same light.
-    pub(crate) photographs: &'a [Vec<f32>],
-    /// Photographs summed in each entry.
-    pub(crate) summed: usize,
-}
-
 /// Groups of pixels of similar brightness that a model is fitted to.
 const GROUPS: usize = 24;
 
-/// Fits the noise model to the scatter of photographs that should be alike.
+/// Fits the noise model to the scatter of photographs of the same light, each of which has
+/// one value a pixel and is the sum of so many.
 ///
 /// Each pixel gives its mean light and its variance between the entries (unbiased,
 /// divided by the photographs summed). Pixels are grouped by light; the line goes
 /// through the group means by least squares, weighted for the variance of a
 /// variance, both coefficients kept from going below zero.
-pub(crate) fn fit(alike: &Alike<'_>) -> NoiseModel {
-    let entries = alike.photographs.len() as f64;
-    let summed = alike.summed as f64;
-    let pixels = alike.photographs.first().map_or(0, Vec::len);
+pub(crate) fn fit(photographs: &[Vec<f32>], summed: usize) -> NoiseModel {
+    let (entries, summed) = (photographs.len() as f64, summed as f64);
+    let pixels = photographs.first().map_or(0, Vec::len);
     if entries < 2.0 || pixels == 0 {
         return NoiseModel::default();
     }
     let sample = |pixel: usize| {
-        let values = || alike.photographs.iter().map(|p| f64::from(p[pixel]));
+        let values = || photographs.iter().map(|p| f64::from(p[pixel]));
         let mean = values().sum::<f64>() / entries;
         let scatter: f64 = values().map(|v| (v - mean) * (v - mean)).sum();
         (mean / summed, scatter / (entries - 1.0) / summed)
@@ -165,10 +157,7 @@ mod tests {
             light.iter().map(noisy).collect()
         };
         let photographs: Vec<_> = (0..9).map(|_| entry()).collect();
-        let found = fit(&Alike {
-            photographs: &photographs,
-            summed: 2,
-        });
+        let found = fit(&photographs, 2);
         // 36,000 samples with 32,000 degrees of freedom: 0.8 % on a variance.
         for light in [0.1, 0.4, 0.7] {
             let ratio = found.variance(light) / truth.variance(light);
@@ -179,20 +168,8 @@ mod tests {
     #[test]
     fn photographs_without_noise_or_pixels_have_none() {
         let still = vec![vec![0.25; 100]; 3];
-        assert_eq!(
-            fit(&Alike {
-                photographs: &still,
-                summed: 1
-            }),
-            NoiseModel::default()
-        );
-        assert_eq!(
-            fit(&Alike {
-                photographs: &[],
-                summed: 1
-            }),
-            NoiseModel::default()
-        );
+        assert_eq!(fit(&still, 1), NoiseModel::default());
+        assert_eq!(fit(&[], 1), NoiseModel::default());
         assert_eq!(fit_neighbours(std::iter::empty()), NoiseModel::default());
     }
 

@@ -1,7 +1,7 @@
 //! Noise samples: which photographs of a capture show the noise, and some of their pixels.
 
 use super::cell_pixels::CellPixels;
-use super::noise::{self, Alike, NoiseModel, NoiseSource};
+use super::noise::{self, NoiseModel, NoiseSource};
 use crate::format::sequence::Sequence;
 use crate::photographs::photo::Photo;
 
@@ -89,27 +89,22 @@ impl NoiseSamples {
             let values = &self.values[shot][channel];
             values.iter().map(|value| share * value).collect()
         };
-        match source {
+        let (photographs, summed): (Vec<Vec<f32>>, usize) = match source {
             NoiseSource::Pairs { .. } => {
-                let sum = |(a, b): (usize, usize)| -> Vec<f32> {
-                    let first = |view: usize| of_shot(sequence.views[view].shots[0]);
+                let first = |view: usize| of_shot(sequence.views[view].shots[0]);
+                let sum = |(a, b): (usize, usize)| {
                     first(a).iter().zip(&first(b)).map(|(a, b)| a + b).collect()
                 };
-                let photographs: Vec<_> = sequence.code_pairs().into_iter().map(sum).collect();
-                noise::fit(&Alike {
-                    photographs: &photographs,
-                    summed: 2,
-                })
+                (sequence.code_pairs().into_iter().map(sum).collect(), 2)
             }
             NoiseSource::Repeats { .. } => {
                 let white = &sequence.white().shots;
-                let photographs: Vec<_> = white.iter().map(|&s| of_shot(s)).collect();
-                noise::fit(&Alike {
-                    photographs: &photographs,
-                    summed: 1,
-                })
+                (white.iter().map(|&shot| of_shot(shot)).collect(), 1)
             }
-            NoiseSource::Texture => noise::fit_neighbours(self.texture[channel].iter().copied()),
-        }
+            NoiseSource::Texture => {
+                return noise::fit_neighbours(self.texture[channel].iter().copied());
+            }
+        };
+        noise::fit(&photographs, summed)
     }
 }

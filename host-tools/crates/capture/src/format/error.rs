@@ -1,8 +1,6 @@
 //! Capture errors: everything that can be wrong with a capture folder.
 
-use super::role::Axis;
 use crate::gate::Gate;
-use iltm_runtime::GridError;
 use std::path::PathBuf;
 
 /// Why a capture could not be read. Every case carries its place;
@@ -103,14 +101,6 @@ pub enum CaptureError {
         /// Pixels it may have.
         limit: u64,
     },
-    /// The patterns have no cells or more than a table can index.
-    #[error("{}: {source}", path.display())]
-    Grid {
-        /// The first pattern.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: GridError,
-    },
     /// There is no black photograph.
     #[error("{}: no photograph of the black pattern", path.display())]
     NoBlack {
@@ -123,62 +113,23 @@ pub enum CaptureError {
         /// The `capture.csv`.
         path: PathBuf,
     },
-    /// The Gray code has too few bits to tell all columns or rows apart.
-    #[error("{}: the Gray code has {given} {axis} bits, but {cells} {axis}s need {needed}", path.display())]
-    GridNotCovered {
+    /// The Gray code lacks bits, between others or to tell all columns or rows apart.
+    #[error("{}: {reason}", path.display())]
+    GrayCode {
         /// The `capture.csv`.
         path: PathBuf,
-        /// Columns or rows.
-        axis: Axis,
-        /// How many of them there are.
-        cells: usize,
-        /// Bits needed to tell them apart.
-        needed: u8,
-        /// Bits that were photographed.
-        given: u8,
+        /// Which bits.
+        reason: String,
     },
-    /// The Gray code lacks a bit between others.
-    #[error("{}: no photograph of {axis}-{bit}, though there is one of {axis}-{last}", path.display())]
-    MissingBit {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Columns or rows.
-        axis: Axis,
-        /// The missing bit.
-        bit: u8,
-        /// The last bit that was photographed.
-        last: u8,
-    },
-    /// More Bernoulli photographs were asked for than the capture holds.
-    #[error("{}: {asked} Bernoulli photographs asked for; the capture has {found}", path.display())]
-    MorePhotographsThanTaken {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Asked for.
-        asked: usize,
-        /// In the capture.
-        found: usize,
-    },
-    /// A photograph was asked for that the capture does not have.
-    #[error("{}: there is no photograph with the index {index}; the last one is {last}", path.display())]
-    UnknownIndex {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Asked for.
-        index: u32,
-        /// The largest index there is.
-        last: u32,
-    },
-    /// The photograph that was asked for shows what is subtracted from all others.
-    #[error("{}, line {line}: the photograph with the index {index} is of black: it shows the ambient \
-        light, which is subtracted from every other, and nothing of the projector's", path.display())]
-    BlackIndex {
-        /// The `capture.csv`.
-        path: PathBuf,
-        /// Asked for.
-        index: u32,
-        /// Its line.
-        line: u64,
+    /// Photographs were asked for that the capture does not have, or cannot give.
+    #[error("{place}: {reason}")]
+    Asked {
+        /// The `capture.csv`, with the line if one was meant.
+        place: String,
+        /// What was asked for and what there is.
+        reason: String,
+        /// What to ask for.
+        next_step: &'static str,
     },
     /// Too few Bernoulli photographs to learn an inverse from.
     #[error("{}: {used} Bernoulli photographs used, a solve needs at least {needed}: \
@@ -247,10 +198,10 @@ impl CaptureError {
             }
             Self::ManifestLine { next_step, .. }
             | Self::Picture { next_step, .. }
-            | Self::Unlike { next_step, .. } => next_step,
+            | Self::Unlike { next_step, .. }
+            | Self::Asked { next_step, .. } => next_step,
             Self::Ambiguous { .. } => "Name the right one in capture.csv, or remove the other.",
             Self::TooLarge { .. } => "Scale the photographs down, all by the same factor.",
-            Self::Grid { .. } => "Use fewer cells: a pattern has one pixel a cell.",
             Self::NoBlack { .. } => {
                 "Photograph the black pattern with the same exposure; ambient light is subtracted \
                  with it."
@@ -258,12 +209,8 @@ impl CaptureError {
             Self::NoWhite { .. } => {
                 "Photograph the white pattern with the same exposure; it sets the gains."
             }
-            Self::GridNotCovered { .. } | Self::MissingBit { .. } => {
+            Self::GrayCode { .. } => {
                 "Photograph the missing Gray code patterns, or check the roles in capture.csv."
-            }
-            Self::MorePhotographsThanTaken { .. } => "Ask for fewer, or leave --photos away.",
-            Self::UnknownIndex { .. } | Self::BlackIndex { .. } => {
-                "Choose another index from the first column of capture.csv, or leave it out for white."
             }
             Self::TooFewPhotographs { .. } => {
                 "Photograph more Bernoulli patterns, or ask for more; 40 are a good start."

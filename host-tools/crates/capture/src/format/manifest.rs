@@ -521,16 +521,6 @@ mod tests {
 
     proptest! {
         #[test]
-        fn random_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
-            let _ = Manifest::parse(&bytes, Path::new("c"));
-        }
-
-        #[test]
-        fn random_lines_never_panic(lines in "(([0-9]{0,3}|\"),?(white|row-[0-9]|bernoulli)?,[a-z./\"\\\\]{0,6},?\n?){0,8}") {
-            let _ = parse(&format!("index,role,pattern,photo\n{lines}"));
-        }
-
-        #[test]
         fn a_written_manifest_is_read_back(
             names in proptest::collection::vec("[a-z ,'é]{0,5}[a-z]", 1..9),
             exposed: bool,

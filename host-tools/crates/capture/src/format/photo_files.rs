@@ -11,9 +11,7 @@ use super::picture_file::FileFormat;
 use super::role::Role;
 use std::collections::HashMap;
 use std::ffi::OsStr;
-use std::fs::File;
 use std::hash::{DefaultHasher, Hasher};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The file that stands for `named` (relative to `folder`), relative to
@@ -166,15 +164,9 @@ fn alike(folder: &Path, a: &Shot, b: &Shot) -> bool {
 
 /// A hash of a file's bytes.
 fn hash(path: &Path) -> Option<u64> {
-    let mut file = File::open(path).ok()?;
     let mut hasher = DefaultHasher::new();
-    let mut part = vec![0; 1 << 16];
-    loop {
-        match file.read(&mut part).ok()? {
-            0 => return Some(hasher.finish()),
-            read => hasher.write(&part[..read]),
-        }
-    }
+    hasher.write(&std::fs::read(path).ok()?);
+    Some(hasher.finish())
 }
 
 #[cfg(test)]

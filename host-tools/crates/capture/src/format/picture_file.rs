@@ -1,4 +1,4 @@
-//! PNG, TIFF, JPEG, `OpenEXR` and netpbm files from strangers: opened with limits,
+//! Picture files from strangers, PNG, TIFF, JPEG, `OpenEXR` and netpbm: opened with limits,
 //! decoded without alpha.
 //!
 //! A format is told by a file's first bytes. What EXIF says about orientation is

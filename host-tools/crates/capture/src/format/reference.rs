@@ -274,15 +274,6 @@ mod tests {
         for length in 0..good.len() {
             assert!(parse(&good[..length], 2, 1).is_err(), "{length} bytes");
         }
-        let mut random = fastrand::Rng::with_seed(6);
-        for _ in 0..20_000 {
-            let mut harmed = good.clone();
-            for _ in 0..random.usize(1..6) {
-                let at = random.usize(..harmed.len());
-                harmed[at] = random.u8(..);
-            }
-            let _ = parse(&harmed, 2, 1);
-        }
     }
 
     #[test]

@@ -171,12 +171,12 @@ impl Sequence {
         });
         let missing = |k: usize| codes[k].bits - given[k];
         if let (Some(k), false) = ((0..2).find(|&k| missing(k) > 0), coarsen) {
-            return Err(CaptureError::GridNotCovered {
+            let ((axis, cells), needed, given) = (sides[k], codes[k].bits, given[k]);
+            return Err(CaptureError::GrayCode {
                 path: manifest,
-                axis: sides[k].0,
-                cells: sides[k].1,
-                needed: codes[k].bits,
-                given: given[k],
+                reason: format!(
+                    "the Gray code has {given} {axis} bits, but {cells} {axis}s need {needed}"
+                ),
             });
         }
         for (shot, pattern) in shots.iter().zip(&patterns) {
@@ -203,59 +203,18 @@ impl Sequence {
             keep(&mut patterns, &kept);
         }
         let grid = grid_of(folder, &shots, &patterns)?;
-        let mut sequence = Self::grouped(grid, brackets, shots, patterns);
-        sequence.codes = codes;
-        sequence.coarser = coarser;
-        sequence.longest = longest;
-        Ok(sequence)
-    }
-
-    /// Puts photographs of one pattern together.
-    fn grouped(
-        grid: Grid,
-        brackets: Vec<Bracket>,
-        shots: Vec<Shot>,
-        patterns: Vec<Pattern>,
-    ) -> Self {
-        let mut black = Vec::new();
-        let mut coded: Vec<View> = Vec::new();
-        let mut bernoulli: Vec<View> = Vec::new();
-        let again =
-            |known: &View, view: &View| grid.cells() >= FEWEST_FOR_REPEATS && known.lit == view.lit;
-        for (at, (shot, pattern)) in shots.iter().zip(patterns).enumerate() {
-            let role = shot.role;
-            let view = View {
-                role,
-                shots: vec![at],
-                lit: pattern.lit,
-            };
-            match role {
-                Role::Black => black.push(at),
-                Role::Bernoulli => match bernoulli.iter_mut().find(|known| again(known, &view)) {
-                    Some(known) => known.shots.push(at),
-                    None => bernoulli.push(view),
-                },
-                _ => match coded.iter_mut().find(|view| view.role == role) {
-                    Some(view) => view.shots.push(at),
-                    None => coded.push(view),
-                },
-            }
-        }
-        // Stable: the Gray code stays in the order it was taken.
-        coded.sort_by_key(|view| view.role != Role::White);
-        let bernoulli_from = coded.len();
-        coded.append(&mut bernoulli);
-        Self {
+        let (black, views, bernoulli_from) = grouped(grid, &shots, patterns);
+        Ok(Self {
             grid,
             brackets,
-            longest: None,
+            longest,
             shots,
             black,
-            views: coded,
-            codes: [Code::default(); 2],
-            coarser: 0,
+            views,
+            codes,
+            coarser,
             bernoulli_from,
-        }
+        })
     }
 
     /// The white view.
@@ -289,6 +248,40 @@ impl Sequence {
     pub(crate) fn bernoulli(&self) -> Range<usize> {
         self.bernoulli_from..self.views.len()
     }
+}
+
+/// Puts photographs of one pattern together: those of black, and the views, of which those
+/// of Bernoulli patterns begin at the number that is returned.
+fn grouped(grid: Grid, shots: &[Shot], patterns: Vec<Pattern>) -> (Vec<usize>, Vec<View>, usize) {
+    let mut black = Vec::new();
+    let mut coded: Vec<View> = Vec::new();
+    let mut bernoulli: Vec<View> = Vec::new();
+    let again =
+        |known: &View, view: &View| grid.cells() >= FEWEST_FOR_REPEATS && known.lit == view.lit;
+    for (at, (shot, pattern)) in shots.iter().zip(patterns).enumerate() {
+        let role = shot.role;
+        let view = View {
+            role,
+            shots: vec![at],
+            lit: pattern.lit,
+        };
+        match role {
+            Role::Black => black.push(at),
+            Role::Bernoulli => match bernoulli.iter_mut().find(|known| again(known, &view)) {
+                Some(known) => known.shots.push(at),
+                None => bernoulli.push(view),
+            },
+            _ => match coded.iter_mut().find(|view| view.role == role) {
+                Some(view) => view.shots.push(at),
+                None => coded.push(view),
+            },
+        }
+    }
+    // Stable: the Gray code stays in the order it was taken.
+    coded.sort_by_key(|view| view.role != Role::White);
+    let bernoulli_from = coded.len();
+    coded.append(&mut bernoulli);
+    (black, coded, bernoulli_from)
 }
 
 /// Reads patterns of as many cells as a table may have; of more where they may be
@@ -342,10 +335,10 @@ fn chosen(
         .count();
     let used = options.bernoulli.unwrap_or(found);
     if used > found {
-        return Err(CaptureError::MorePhotographsThanTaken {
-            path: path(),
-            asked: used,
-            found,
+        return Err(CaptureError::Asked {
+            place: manifest.display().to_string(),
+            reason: format!("{used} Bernoulli photographs asked for; the capture has {found}"),
+            next_step: "Ask for fewer, or leave --photos away.",
         });
     }
     if used < options.min_bernoulli {
@@ -413,9 +406,10 @@ fn grid_of(folder: &Path, shots: &[Shot], patterns: &[Pattern]) -> Result<Grid, 
     // A pattern of at most `Grid::MAX_CELLS` cells has sides that fit 16 bits.
     let side = |cells: usize| u16::try_from(cells).unwrap_or(u16::MAX);
     let (rows, cols) = (patterns[0].rows, patterns[0].cols);
-    Grid::new(side(rows), side(cols)).map_err(|source| CaptureError::Grid {
+    Grid::new(side(rows), side(cols)).map_err(|error| CaptureError::Picture {
         path: folder.join(&shots[0].pattern),
-        source,
+        reason: error.to_string(),
+        next_step: "Use fewer cells: a pattern has one pixel a cell.",
     })
 }
 
@@ -459,11 +453,12 @@ fn code_bits(axis: Axis, shots: &[Shot], manifest: &Path) -> Result<u8, CaptureE
     }
     let given = seen.iter().rposition(|&seen| seen).map_or(0, |bit| bit + 1);
     match seen[..given].iter().position(|&seen| !seen) {
-        Some(bit) => Err(CaptureError::MissingBit {
+        Some(bit) => Err(CaptureError::GrayCode {
             path: manifest.to_owned(),
-            axis,
-            bit: bit as u8,
-            last: given as u8 - 1,
+            reason: format!(
+                "no photograph of {axis}-{bit}, though there is one of {axis}-{}",
+                given - 1
+            ),
         }),
         None => Ok(given as u8),
     }

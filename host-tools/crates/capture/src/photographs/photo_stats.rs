@@ -2,6 +2,7 @@
 
 use crate::format::error::CaptureError;
 use crate::format::picture_file::{Opened, Samples, Source};
+use std::cmp::Ordering;
 use std::path::Path;
 
 /// Share of the samples below [`PhotoStats::bright`].
@@ -37,12 +38,11 @@ impl PhotoStats {
         let (mean, bright) = match opened.decode()? {
             Samples::Eight(values) => levels(values, 255.0),
             Samples::Sixteen(values) => levels(values, 65_535.0),
-            // Of numbers that are not negative, the bits have the same order.
-            Samples::Float(values) => {
-                let bits = values
-                    .into_iter()
-                    .map(|value| Light(value.max(0.0).to_bits()));
-                levels(bits.collect(), 1.0)
+            Samples::Float(mut values) => {
+                for value in &mut values {
+                    *value = value.max(0.0);
+                }
+                levels(values, 1.0)
             }
         };
         Ok(Self {
@@ -54,25 +54,16 @@ impl PhotoStats {
     }
 }
 
-/// A number that is not negative, by its bits.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Light(u32);
-
-impl From<Light> for f64 {
-    fn from(light: Light) -> Self {
-        f32::from_bits(light.0).into()
-    }
-}
-
-/// Mean and bright value.
-fn levels<T: Copy + Ord + Into<f64>>(mut values: Vec<T>, full: f64) -> (f64, f64) {
+/// Mean and bright value of numbers, none of which is NaN.
+fn levels<T: Copy + PartialOrd + Into<f64>>(mut values: Vec<T>, full: f64) -> (f64, f64) {
     let count = values.len();
     if count == 0 {
         return (0.0, 0.0);
     }
     let sum: f64 = values.iter().map(|value| (*value).into()).sum();
     let at = ((count as f64 * BRIGHT) as usize).min(count - 1);
-    let bright = *values.select_nth_unstable(at).1;
+    let order = |a: &T, b: &T| a.partial_cmp(b).unwrap_or(Ordering::Equal);
+    let bright = *values.select_nth_unstable_by(at, order).1;
     (sum / count as f64 / full, bright.into() / full)
 }
 
