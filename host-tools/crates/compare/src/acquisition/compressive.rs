@@ -91,7 +91,7 @@ impl Acquisition for CompressiveSensing {
             name: format!("compressive light transport sensing, {}", self.photographs),
             source: Citation {
                 authors: "Peers, Mahajan, Lamond, Ghosh, Matusik, Ramamoorthi, Debevec",
-                title: "Compressive Light Transport HaarSensing",
+                title: "Compressive Light Transport Sensing",
                 venue: "ACM Transactions on Graphics",
                 year: 2009,
             },

@@ -16,7 +16,7 @@ pub enum Occlusion {
     Everywhere,
 }
 
-/// How exact and how large an [`FormFactorMatrix`](super::FormFactorMatrix) may be.
+/// How exact and how large a [`FormFactorMatrix`](super::FormFactorMatrix) may be.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FormFactorOptions {
     /// Relative error of each form factor that is evaluated.

@@ -17,7 +17,7 @@ pub struct FacetPair {
     pub blocked: bool,
 }
 
-/// What an [`FormFactorMatrix`](super::FormFactorMatrix) consists of and what it took.
+/// What a [`FormFactorMatrix`](super::FormFactorMatrix) consists of and what it took.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct FormFactorReport {
     /// Number of patches.
