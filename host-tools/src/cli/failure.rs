@@ -19,7 +19,7 @@ use crate::user::ConfigError;
 use crate::verify::VerifyError;
 use crate::video::VideoError;
 use crate::video::y4m::Y4mError;
-use iltm_picture::{FolderError, png::PngError};
+use iltm_picture::{FolderError, html::capitalised, png::PngError};
 use iltm_runtime::{link::Refusal, trust::Rejected};
 use miette::Diagnostic;
 use serde_json::{Value, json};
@@ -474,10 +474,4 @@ pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
 pub(super) fn cannot_read(path: &Path, error: &io::Error) -> Failure {
     let message = format!("{}: cannot be read: {error}", path.display());
     Failure::new(Kind::Read, message, "Check the name and the permissions.")
-}
-
-fn capitalised(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|first| first.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
 }

@@ -1,13 +1,34 @@
-//! A small scene for tests: textured cells that light each other.
+//! Inverse transports for tests, also for those of the crates that build on this one.
 
 use iltm_runtime::Grid;
 use iltm_solve::{ChannelInverse, InverseTransport};
 use nalgebra::DMatrix;
 
+/// An inverse without ambient light from its gains, by cell and channel, and the operator
+/// that its channels share, by row and column.
+pub(crate) fn inverse(
+    grid: Grid,
+    channels: usize,
+    gain: impl Fn(usize, usize) -> f64,
+    shared: impl Fn(usize, usize) -> f64,
+) -> InverseTransport {
+    let cells = grid.cells();
+    let channel = |channel: usize| ChannelInverse {
+        gain: (0..cells).map(|cell| gain(cell, channel)).collect(),
+        scale: 1.0,
+        deviation: None,
+        ambient: vec![0.0; cells],
+    };
+    InverseTransport {
+        grid,
+        live: vec![true; cells],
+        shared: DMatrix::from_fn(cells, cells, shared),
+        channels: (0..channels).map(channel).collect(),
+    }
+}
+
 /// A textured scene whose cells light each other the more the nearer they are.
 pub(crate) fn scene(channels: usize) -> InverseTransport {
-    let grid = Grid::new(5, 8).unwrap();
-    let cells = grid.cells();
     let kernel = |i: usize, j: usize| {
         let rows = (i / 8).abs_diff(j / 8) as f64;
         let cols = (i % 8).abs_diff(j % 8) as f64;
@@ -18,16 +39,10 @@ pub(crate) fn scene(channels: usize) -> InverseTransport {
         }
     };
     let texture = |cell: usize, channel: usize| 6.0 + 2.0 * ((cell * (channel + 3)) as f64).sin();
-    let channel = |channel: usize| ChannelInverse {
-        gain: (0..cells).map(|cell| texture(cell, channel)).collect(),
-        scale: 1.0 - 0.2 * channel as f64,
-        deviation: None,
-        ambient: vec![0.004; cells],
-    };
-    InverseTransport {
-        grid,
-        live: vec![true; cells],
-        shared: DMatrix::from_fn(cells, cells, kernel),
-        channels: (0..channels).map(channel).collect(),
+    let mut inverse = inverse(Grid::new(5, 8).unwrap(), channels, texture, kernel);
+    for (index, channel) in inverse.channels.iter_mut().enumerate() {
+        channel.scale = 1.0 - 0.2 * index as f64;
+        channel.ambient.fill(0.004);
     }
+    inverse
 }

@@ -1,9 +1,9 @@
 //! PNG files of a report's pictures.
 
-use super::{CoefficientMap, Example, summary};
+use super::{CoefficientMap, Example, Treatment};
 use color_quant::NeuQuant;
 use iltm_picture::{
-    ColourScale, Picture, Samples,
+    ColourScale, ContactSheet, Picture, Samples, Tile,
     html::{PictureFile, picture_file},
     png,
 };
@@ -22,6 +22,39 @@ const BAYER: [[i16; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15,
 /// Codes from the lowest to the highest threshold: about the distance of
 /// neighbouring colours of a palette.
 const DITHER: i16 = 12;
+
+/// Composes the summary: wanted, photographed without compensation, photographed with it,
+/// and both errors; the colour bar of the error maps is `errors`.
+///
+/// `None` if the pictures are so large that their composition is not a frame.
+fn summary(example: &Example, errors: &ColourScale) -> Option<Picture> {
+    let size = example.wanted.picture.size();
+    let mut photographs = vec![Tile::new(("Wanted", ""), &example.wanted.picture)];
+    let mut maps = vec![Tile::default()];
+    for treatment in [Treatment::None, Treatment::Compensated] {
+        let mut shown = example.shown.iter();
+        let Some(shown) = shown.find(|shown| shown.treatment == treatment) else {
+            continue;
+        };
+        let words = (treatment.title(), "predicted photograph");
+        photographs.push(Tile::new(words, &shown.photograph.for_display()));
+        let error = format!("Error {:.1} %", 100.0 * shown.comparison.error);
+        let values = shown.comparison.map.iter().map(|error| f64::from(*error));
+        maps.push(Tile::new((&error, ""), &errors.picture(size, values)));
+    }
+    let sheet = ContactSheet {
+        rows: vec![photographs, maps],
+        bar: Some((
+            errors,
+            "Error of the photograph, in units of reference white",
+        )),
+        notes: vec![
+            "What is left is mostly darker than the light that arrives there anyway.".to_owned(),
+        ],
+        ..ContactSheet::default()
+    };
+    sheet.compose()
+}
 
 /// Encodes all pictures of a report. `summary` is of the first example and has a
 /// palette, since it is made to be small.

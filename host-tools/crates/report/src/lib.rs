@@ -8,7 +8,7 @@
 //! | a wanted image with and without compensation | `example.rs` |
 //! | the operator in the Haar domain | `coefficient_map.rs` |
 //! | what each tier costs | `ladder.rs` |
-//! | one picture of it all | `summary.rs` |
+//! | one picture of it all | `files.rs` |
 //! | pictures as PNG files, one of a few colours | `files.rs` |
 //! | what the solve says about itself | `facts.rs` |
 //! | what the gates say, a page of its own | `gates.rs`, `gates.css` |
@@ -29,8 +29,8 @@ pub(crate) mod page;
 mod predict;
 pub mod solve_page;
 pub mod stills;
-mod summary;
 #[cfg(test)]
+#[path = "../../compile/src/test_scene.rs"]
 mod test_scene;
 pub mod tradeoff;
 
@@ -40,7 +40,6 @@ pub use example::{Example, TreatedImage, Treatment, Wanted};
 pub use ladder::{TierCost, TimedTier, ladder, microseconds, microseconds_at, tier_costs};
 pub use page::{Command, Words};
 pub use predict::Projection;
-pub use summary::summary;
 
 use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{

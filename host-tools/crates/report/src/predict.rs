@@ -192,34 +192,11 @@ fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene;
+    use crate::test_scene::scene;
     use iltm_compile::{CompileOptions, FineGains, compile};
     use iltm_picture::{Picture, Response, Samples};
-    use iltm_runtime::Grid;
     use iltm_solve::ChannelInverse;
     use iltm_video::{CompensateOptions, Compensator};
-
-    /// A textured scene whose cells light each other the more the nearer they are.
-    fn scene(channels: usize) -> InverseTransport {
-        let grid = Grid::new(5, 8).unwrap();
-        let kernel = |i: usize, j: usize| {
-            let rows = (i / 8).abs_diff(j / 8) as f64;
-            let cols = (i % 8).abs_diff(j % 8) as f64;
-            if i == j {
-                0.0
-            } else {
-                0.25 / (1.0 + rows * rows + cols * cols)
-            }
-        };
-        let texture =
-            |cell: usize, channel: usize| 6.0 + 2.0 * ((cell * (channel + 3)) as f64).sin();
-        let mut inverse = test_scene::inverse(grid, channels, texture, kernel);
-        for (index, channel) in inverse.channels.iter_mut().enumerate() {
-            channel.scale = 1.0 - 0.2 * index as f64;
-            channel.ambient.fill(0.004);
-        }
-        inverse
-    }
 
     /// Gains twice as fine as the cells, with texture inside of them.
     fn fine(inverse: &InverseTransport) -> FineGains {
