@@ -10,9 +10,12 @@ use crate::session::{
     Camera, CommandCamera, CommandScreen, Event, Screen, Session, SessionError, SessionOptions,
     State, Summary, WatchedFolder, ranges, with_window,
 };
-use iltm_picture::progress::Progress;
+use iltm_picture::{png, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
 use std::time::Duration;
 
 /// Most numbers that `--again` may stand for.
@@ -118,7 +121,13 @@ fn photograph(
 
 /// Width and height of the slides: those of the first that can be read.
 fn slide_size(session: &Session) -> (u32, u32) {
-    let size = |path| image::image_dimensions(path).ok();
+    let size = |path: &Path| {
+        let picture = png::read(BufReader::new(File::open(path).ok()?)).ok()?;
+        Some((
+            picture.size().width() as u32,
+            picture.size().height() as u32,
+        ))
+    };
     let mut sizes = session
         .list()
         .filter_map(|(planned, _)| size(&planned.slide));

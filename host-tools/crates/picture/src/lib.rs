@@ -11,6 +11,7 @@
 //! | pictures and letters on one picture | [`ContactSheet`], [`canvas`] |
 //! | medians and quantiles | [`statistics`] |
 //! | HTML pages | [`html`] |
+//! | arrays as `NumPy` files | [`npy`] |
 //! | files and folders that are there whole or not at all | [`WholeFile`], [`WholeFolder`] |
 //! | how far long work is | [`progress`] |
 
@@ -22,6 +23,7 @@ mod curve;
 pub mod html;
 mod lattice;
 mod light_picture;
+pub mod npy;
 pub mod numbers;
 mod picture;
 pub mod png;

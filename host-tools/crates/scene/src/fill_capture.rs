@@ -4,11 +4,10 @@
 use super::simulation::SimulationError;
 use super::virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};
 use iltm_capture::{CaptureError, find_photo, listed};
-use iltm_picture::{progress::Progress, whole_file};
-use iltm_runtime::Grid;
-use image::{ImageReader, Limits};
-use std::fs;
-use std::io;
+use iltm_picture::{Samples, png, progress::Progress, whole_file};
+use iltm_runtime::{FrameSize, Grid};
+use std::fs::{self, File};
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
@@ -181,25 +180,27 @@ fn codes(path: &Path, grid: Grid) -> Result<Vec<[u8; 3]>, FillCaptureError> {
         path: path.to_owned(),
         reason,
     };
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(64 << 20);
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-    let mut reader = reader.map_err(|source| FillCaptureError::Io {
+    let file = File::open(path).map_err(|source| FillCaptureError::Io {
         path: path.to_owned(),
         source,
     })?;
-    reader.limits(limits);
-    let picture = reader
-        .decode()
-        .map_err(|error| refuse(error.to_string()))?
-        .into_rgb8();
-    let (width, height) = picture.dimensions();
-    if (width as usize, height as usize) != (grid.cols(), grid.rows()) {
+    let picture = png::read(BufReader::new(file)).map_err(|error| refuse(error.to_string()))?;
+    let size = picture.size();
+    if size != FrameSize::of_grid(grid) {
         return Err(refuse(format!(
-            "{height} x {width} cells (rows x columns), but the scene's projector has {} x {}",
-            grid.rows(),
-            grid.cols()
+            "{} x {} cells (rows x columns), but the scene's projector has {grid}",
+            size.height(),
+            size.width()
         )));
     }
-    Ok(picture.pixels().map(|pixel| pixel.0).collect())
+    let codes: Vec<u8> = match picture.samples() {
+        Samples::Eight(codes) => codes.clone(),
+        Samples::Sixteen(codes) => {
+            let eight = |code: &u16| ((u32::from(*code) + 128) / 257) as u8;
+            codes.iter().map(eight).collect()
+        }
+    };
+    let pixels = codes.chunks_exact(picture.channels());
+    let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % pixel.len()]);
+    Ok(pixels.map(colour).collect())
 }

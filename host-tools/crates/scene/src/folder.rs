@@ -8,7 +8,7 @@ use iltm_capture::{
     SceneSettings, Settings, numbered,
 };
 use iltm_picture::{FolderError, WholeFolder, progress::Progress};
-use image::ColorType;
+use png::{BitDepth, ColorType};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
@@ -50,7 +50,8 @@ pub fn write(
     for (index, (_, pattern)) in patterns.iter().enumerate() {
         let lit: Vec<u8> = pattern.lit.iter().map(|lit| 255 * u8::from(*lit)).collect();
         let size = (pattern.cols as u32, pattern.rows as u32);
-        let picture = png(&lit, size, ColorType::L8).map_err(FolderError::io(out))?;
+        let picture =
+            png(&lit, size, ColorType::Grayscale, BitDepth::Eight).map_err(FolderError::io(out))?;
         folder.file(numbered("patterns", index as u32), picture)?;
     }
     progress.begin("taking photographs", patterns.len() as u64);

@@ -8,9 +8,8 @@ use super::simulation::{Simulation, SimulationError};
 use iltm_capture::Pattern;
 use iltm_picture::Response;
 use iltm_runtime::Grid;
-use image::codecs::png::PngEncoder;
-use image::{ColorType, ImageEncoder};
 use nalgebra::DMatrix;
+use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use rayon::prelude::*;
 use std::io;
 
@@ -60,30 +59,38 @@ impl Photograph {
                 if eight {
                     bytes.push(plane[pixel] as u8);
                 } else {
-                    bytes.extend(plane[pixel].to_ne_bytes());
+                    bytes.extend(plane[pixel].to_be_bytes());
                 }
             }
         }
-        let kind = match (self.values.len(), eight) {
-            (1, true) => ColorType::L8,
-            (1, false) => ColorType::L16,
-            (_, true) => ColorType::Rgb8,
-            (_, false) => ColorType::Rgb16,
+        let colour = match self.values.len() {
+            1 => ColorType::Grayscale,
+            _ => ColorType::Rgb,
         };
-        png(&bytes, self.size, kind)
+        let depth = if eight {
+            BitDepth::Eight
+        } else {
+            BitDepth::Sixteen
+        };
+        png(&bytes, self.size, colour, depth)
     }
 }
 
-/// The bytes of a PNG with these samples.
+/// The bytes of a PNG with these samples, larger numbers with their high byte first.
+/// Noise is most of a photograph, so compressing it well takes long and saves little.
 pub(super) fn png(
     samples: &[u8],
     (width, height): (u32, u32),
-    kind: ColorType,
+    colour: ColorType,
+    depth: BitDepth,
 ) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let encoder = PngEncoder::new(&mut bytes);
-    let written = encoder.write_image(samples, width, height, kind.into());
-    written.map_err(io::Error::other)?;
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    encoder.set_compression(Compression::Fast);
+    encoder.set_filter(Filter::Adaptive);
+    encoder.write_header()?.write_image_data(samples)?;
     Ok(bytes)
 }
 

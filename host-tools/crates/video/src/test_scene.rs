@@ -123,6 +123,9 @@ fn light(balls: &[&Ball], time: f32, [u, v]: [f32; 2], pixel: f32) -> Colour {
         let from_middle = u - ball.u - time * ball.passes * PERIOD;
         let x = (from_middle - (from_middle / PERIOD).round() * PERIOD) / ball.radius;
         let (y, soft) = ((v - ball.v) / ball.radius, pixel / ball.radius);
+        if x.abs() > 1.0 + soft {
+            continue;
+        }
         let square = x * x + y * y;
         let covered = ((1.0 - square.sqrt()) / soft + 0.5).clamp(0.0, 1.0);
         if covered > 0.0 {

@@ -6,16 +6,13 @@
 //! how far a solve is off.
 
 use super::manifest::read_small;
+use iltm_picture::npy::{FloatArray, MOST_HEADER};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
-use npyz::{NpyFile, Order};
 use std::path::{Path, PathBuf};
 
 /// Its name in a capture folder.
 pub const REFERENCE_FILE: &str = "reference_T.npy";
-
-/// Bytes of a header that are read; `NumPy` writes 118 for an array of two axes.
-const MOST_HEADER: u64 = 4_096;
 
 /// Why a reference cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -94,7 +91,7 @@ pub fn read_reference(
         source,
     };
     let cells = grid.cells() as u64;
-    let most = MOST_HEADER + 8 * cells * cells * channels as u64;
+    let most = MOST_HEADER as u64 + 8 * cells * cells * channels as u64;
     // One byte more than fits: a longer file has another shape.
     let bytes = read_small(&path, most).map_err(failed)?;
     bytes
@@ -112,42 +109,25 @@ pub fn parse_reference(
     channels: usize,
     path: &Path,
 ) -> Result<Vec<DMatrix<f64>>, ReferenceError> {
-    let refuse = |reason| ReferenceError::Format {
+    let array = FloatArray::read(bytes).map_err(|reason| ReferenceError::Format {
         path: path.to_owned(),
         reason,
-    };
-    let format = |error: std::io::Error| refuse(error.to_string());
-    check_header_length(bytes).map_err(refuse)?;
+    })?;
     let cells = grid.cells();
-    let array = NpyFile::new(bytes).map_err(format)?;
-    let n = cells as u64;
     let wanted = match channels {
-        1 => vec![n, n],
-        _ => vec![channels as u64, n, n],
+        1 => vec![cells, cells],
+        _ => vec![channels, cells, cells],
     };
-    if array.shape() != wanted {
+    if array.shape != wanted {
         return Err(ReferenceError::Shape {
             path: path.to_owned(),
-            given: shape(array.shape()),
+            given: shape(&array.shape),
             wanted: shape(&wanted),
         });
     }
-    let order = array.order();
-    let wide = array.dtype().num_bytes() == Some(8);
-    // The shape is the one asked for, so its size is no stranger's choice.
-    let values: Vec<f64> = if wide {
-        array.into_vec::<f64>().map_err(format)?
-    } else {
-        let values = array.into_vec::<f32>().map_err(format)?;
-        values.into_iter().map(f64::from).collect()
-    };
-    let place = |channel: usize, row: usize, col: usize| match order {
-        Order::C => (channel * cells + row) * cells + col,
-        Order::Fortran => channel + channels * (row + cells * col),
-    };
     let mut transports = Vec::new();
-    for channel in 0..channels {
-        let transport = DMatrix::from_fn(cells, cells, |row, col| values[place(channel, row, col)]);
+    for (channel, values) in array.values.chunks_exact(cells * cells).enumerate() {
+        let transport = DMatrix::from_row_slice(cells, cells, values);
         if let Some(at) = transport.iter().position(|value| !value.is_finite()) {
             return Err(ReferenceError::NotFinite {
                 path: path.to_owned(),
@@ -161,27 +141,8 @@ pub fn parse_reference(
     Ok(transports)
 }
 
-/// A header says itself how long it is, before anything else is known of the file.
-fn check_header_length(bytes: &[u8]) -> Result<(), String> {
-    let length = match bytes.get(6..12) {
-        Some([1, _, low, high, ..]) => u64::from(u16::from_le_bytes([*low, *high])),
-        Some([_, _, a, b, c, d]) => u64::from(u32::from_le_bytes([*a, *b, *c, *d])),
-        _ => return Err("it ends within its header".to_owned()),
-    };
-    if length > MOST_HEADER {
-        return Err(format!("its header has {length} bytes"));
-    }
-    // The header is a Python literal, whose parser goes deeper with every bracket.
-    let header = bytes.get(..bytes.len().min(12 + length as usize));
-    let brackets = header.unwrap_or_default().iter();
-    if brackets.filter(|byte| b"([{".contains(byte)).count() > 8 {
-        return Err("it is not a plain array".to_owned());
-    }
-    Ok(())
-}
-
-fn shape(sides: &[u64]) -> String {
-    let sides: Vec<String> = sides.iter().map(u64::to_string).collect();
+fn shape(sides: &[usize]) -> String {
+    let sides: Vec<String> = sides.iter().map(usize::to_string).collect();
     match sides.len() {
         0 => "a single number".to_owned(),
         1 => format!("a list of {}", sides[0]),
@@ -193,7 +154,7 @@ fn shape(sides: &[u64]) -> String {
 mod tests {
     use super::ReferenceError as Error;
     use super::*;
-    use npyz::WriterBuilder;
+    use npyz::{Order, WriterBuilder};
 
     fn parse(bytes: &[u8], cells: u16, channels: usize) -> Result<Vec<DMatrix<f64>>, Error> {
         let grid = Grid::new(1, cells).unwrap();

@@ -13,8 +13,7 @@ use super::Bounces;
 use super::separate::{Layer, LayerKind, Separated};
 use super::sheet::sheet;
 use crate::frame_size;
-use iltm_picture::{FolderError, Picture, Samples, WholeFolder, png};
-use npyz::WriterBuilder;
+use iltm_picture::{FolderError, Picture, Samples, WholeFolder, npy, png};
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::io;
@@ -79,11 +78,7 @@ pub fn write(bounces: &Bounces, out: &Path) -> Result<WrittenBounces, FolderErro
         "shares and brightness",
         csv(bounces).into_bytes(),
     )?;
-    add(
-        "bounces.npy",
-        "the layers as numbers",
-        npy(separated).map_err(FolderError::io(&out.join("bounces.npy")))?,
-    )?;
+    add("bounces.npy", "the layers as numbers", array(separated))?;
     let (photograph, _) = sixteen_bits(separated.size, &separated.photograph)?;
     add("photograph.png", "the photograph", png::encode(&photograph))?;
     let mut sums = vec![0.0_f64; photograph.samples().len()];
@@ -181,20 +176,15 @@ fn csv(bounces: &Bounces) -> String {
 }
 
 /// `rows x columns x channels x layers`, float32.
-fn npy(separated: &Separated) -> io::Result<Vec<u8>> {
+fn array(separated: &Separated) -> Vec<u8> {
     let (width, height) = separated.size;
     let (channels, layers) = (separated.photograph.len(), separated.layers.len());
-    let shape = [height, width, channels, layers].map(|side| side as u64);
-    let mut bytes = Vec::new();
-    let options = npyz::WriteOptions::<f32>::new().default_dtype();
-    let mut writer = options.shape(&shape).writer(&mut bytes).begin_nd()?;
+    let mut values = Vec::with_capacity(width * height * channels * layers);
     for pixel in 0..width * height {
         for channel in 0..channels {
-            for layer in &separated.layers {
-                writer.push(&layer.planes[channel][pixel])?;
-            }
+            let layers = separated.layers.iter();
+            values.extend(layers.map(|layer| layer.planes[channel][pixel]));
         }
     }
-    writer.finish()?;
-    Ok(bytes)
+    npy::write(&[height, width, channels, layers], &values)
 }

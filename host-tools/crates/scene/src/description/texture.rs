@@ -1,14 +1,10 @@
 //! Textures: albedo from a picture.
 
-use iltm_picture::Response;
-use image::{ImageReader, Limits};
+use iltm_picture::{Response, Samples, png};
 use nalgebra::Vector2;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
-
-/// Sides of a texture, pixels, at most.
-const MOST_SIDE: u32 = 8192;
-/// Bytes that reading one may take.
-const MOST_BYTES: u64 = 256 << 20;
 
 /// A picture of albedo, decoded from sRGB: each pixel is a rectangle of one colour.
 #[derive(Clone, Debug)]
@@ -29,24 +25,24 @@ impl Texture {
         if !metadata.is_file() {
             return Err(format!("{} is not a regular file", path.display()));
         }
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(MOST_SIDE);
-        limits.max_image_height = Some(MOST_SIDE);
-        limits.max_alloc = Some(MOST_BYTES);
         let refuse = |reason: String| format!("{}: {reason}", path.display());
-        let mut reader = ImageReader::open(path).map_err(|e| refuse(e.to_string()))?;
-        reader.limits(limits);
-        let picture = reader.decode().map_err(|e| refuse(e.to_string()))?;
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
-        if width == 0 || height == 0 {
-            return Err(refuse("it has no pixels".to_owned()));
-        }
-        let light = |value: f32| Response::Srgb.light(f64::from(value)) as f32;
-        let pixels: Vec<[f32; 3]> = picture
-            .to_rgb32f()
-            .pixels()
-            .map(|pixel| pixel.0.map(light))
-            .collect();
+        let file = File::open(path).map_err(|e| refuse(e.to_string()))?;
+        let picture = png::read(BufReader::new(file)).map_err(|e| refuse(e.to_string()))?;
+        let light = |part: f32| Response::Srgb.light(f64::from(part)) as f32;
+        let light: Vec<f32> = match picture.samples() {
+            Samples::Eight(codes) => {
+                let part = |code: &u8| light(f32::from(*code) / 255.0);
+                codes.iter().map(part).collect()
+            }
+            Samples::Sixteen(codes) => {
+                let part = |code: &u16| light(f32::from(*code) / 65_535.0);
+                codes.iter().map(part).collect()
+            }
+        };
+        let pixels = light.chunks_exact(picture.channels());
+        let colour = |pixel: &[f32]| [0, 1, 2].map(|channel| pixel[channel % pixel.len()]);
+        let pixels = pixels.map(colour).collect();
+        let (width, height) = (picture.size().width(), picture.size().height());
         Ok(Self::new(width, height, pixels))
     }
 
