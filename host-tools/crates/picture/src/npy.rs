@@ -66,7 +66,8 @@ impl FloatArray {
 #[must_use]
 pub fn write(shape: &[usize], values: &[f32]) -> Vec<u8> {
     assert_eq!(shape.iter().product::<usize>(), values.len());
-    let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
+    let sides: Vec<String> = shape.iter().map(|side| format!("{side}, ")).collect();
+    let sides = sides.concat();
     let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({sides}), }}");
     // Elements begin at a multiple of 64, after magic, version, length and a line's end.
     let length = (MAGIC.len() + 4 + header.len() + 1).next_multiple_of(64) - MAGIC.len() - 4;
