@@ -7,6 +7,7 @@ use super::progress::progress;
 use super::tables::check;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
 use crate::video::watch::FileWatch;
+use crate::video::y4m::Y4mError;
 use crate::video::{CompensateOptions, Compensator, FrameTotals, VideoError};
 use iltm_picture::WholeFile;
 use iltm_runtime::pipeline::Encoding;
@@ -86,12 +87,24 @@ fn written<T>(
     write: impl FnOnce(&mut (dyn Write + Send)) -> Result<T, VideoError>,
 ) -> Result<T, Failure> {
     if is_pipe(path) {
-        return Ok(write(&mut io::stdout())?);
+        let stdout = standard_output().map_err(|source| Y4mError::Write { frame: 0, source });
+        let mut stdout = stdout.map_err(VideoError::from)?;
+        return Ok(write(&mut stdout)?);
     }
     let mut whole = WholeFile::create(path).map_err(VideoError::from)?;
     let done = write(whole.file())?;
     whole.finish().map_err(VideoError::from)?;
     Ok(done)
+}
+
+/// Standard output, which the library would search for line ends, sample by sample.
+fn standard_output() -> io::Result<File> {
+    let stdout = io::stdout();
+    #[cfg(windows)]
+    let handle = std::os::windows::io::AsHandle::as_handle(&stdout);
+    #[cfg(not(windows))]
+    let handle = std::os::fd::AsFd::as_fd(&stdout);
+    Ok(File::from(handle.try_clone_to_owned()?))
 }
 
 /// `-` stands for standard input or output.

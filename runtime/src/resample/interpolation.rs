@@ -86,6 +86,7 @@ impl Axis {
     /// Spreads `cells` values over the pixels of a row.
     ///
     /// Differences of neighbours must fit an `i32`.
+    #[inline]
     pub fn expand(&self, values: &[i32], pixels: &mut [i32]) {
         let (cells, length) = (self.cells, self.length);
         let first = values.first().copied().unwrap_or(0);

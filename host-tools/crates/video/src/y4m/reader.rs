@@ -124,7 +124,10 @@ impl<R: Read> Reader<R> {
     }
 
     fn read_samples(&mut self, frame: u64, samples: &mut Vec<u8>) -> Result<(), Y4mError> {
-        samples.resize(self.header.frame_bytes(), 0);
+        let needed = self.header.frame_bytes();
+        if samples.len() != needed {
+            *samples = vec![0; needed];
+        }
         let mut filled = 0;
         while filled < samples.len() {
             match self.input.read(&mut samples[filled..]) {
