@@ -58,7 +58,7 @@ pub fn cases() -> Vec<Case> {
         let grid = crate::grid(rows, cols);
         let mut table = MadeUp::nearly_plain(grid, channels, ambient);
         table.response = true;
-        table.rows = self::rows(grid, pairs);
+        table.tiers = vec![self::rows(grid, pairs)];
         let size = FrameSize::new(width, height).unwrap_or(FrameSize::of_grid(grid));
         let (colour, light) = (
             if channels == 3 { "colour" } else { "grey" },

@@ -28,8 +28,11 @@ pub struct MadeUp {
     pub ambient: Option<Vec<u16>>,
     /// Whether codes follow a projector's response (sRGB).
     pub response: bool,
-    /// Rows of the operator of tier 1, the only one above 0; none without an operator.
-    pub rows: Vec<StoredRow>,
+    /// Gains finer than the cells: rows, columns, and gains as above.
+    pub fine_gains: Option<(u16, u16, Vec<u16>)>,
+    /// Rows of the operator in each tier above 0, those of lower tiers included; no tier
+    /// without an operator.
+    pub tiers: Vec<Vec<StoredRow>>,
     /// Scale of the operator in each channel that there is.
     pub scales: [U1F15; 3],
 }
@@ -46,7 +49,8 @@ impl MadeUp {
             gains: vec![1 << 13; grid.cells() * channels],
             ambient: None,
             response: false,
-            rows: Vec::new(),
+            fine_gains: None,
+            tiers: Vec::new(),
             scales,
         }
     }
@@ -60,17 +64,73 @@ impl MadeUp {
         table
     }
 
-    fn operator<'a>(&self, segment: &'a [u8]) -> Result<Operator<'a>, OperatorError> {
-        let segment = Segment::new(0, 1, Channels::All, segment)?;
-        let segments = std::iter::once(segment).collect();
-        Operator::new(&Basis::new(self.grid), segments, self.scales)
+    /// Gains, ambient light and an operator of one tier that are random: up to `entries`
+    /// entries a row, as large as the proof of the bounds takes.
+    pub fn random(grid: Grid, channels: usize, entries: usize, seed: u64) -> Self {
+        let mut random = Rng::with_seed(seed);
+        let samples = grid.cells() * channels;
+        let mut made = Self::new(grid, channels);
+        made.gains = (0..samples).map(|_| random.u16(3_000..9_000)).collect();
+        made.ambient = Some((0..samples).map(|_| random.u16(..900)).collect());
+        if channels == 3 {
+            made.scales[1] = U1F15::from_num(0.7);
+        }
+        if grid.cells() == 1 {
+            // A single cell lights no other.
+            return made;
+        }
+        let basis = Basis::new(grid);
+        let rows = (0..).zip(basis.functions()).map(|(index, function)| {
+            // Fifteen levels of three functions stay below 2^30 with these.
+            let most = (24_000 / function.peak() / entries as u64).clamp(1, 8_000) as i16;
+            let mut places: Vec<u16> = (0..=random.usize(..entries))
+                .map(|_| random.u16(..grid.cells() as u16))
+                .collect();
+            places.sort_unstable();
+            places.dedup();
+            let entry = |at| (at, random.i16(-most..=most));
+            StoredRow {
+                index,
+                shift: 6,
+                entries: places.into_iter().map(entry).collect(),
+            }
+        });
+        made.tiers = vec![rows.collect()];
+        made
+    }
+
+    /// [`random`](Self::random), with every second row in a tier of its own, a response,
+    /// and gains four times finer than the cells.
+    pub fn of_all_kinds(grid: Grid, channels: usize, entries: usize, seed: u64) -> Self {
+        let mut made = Self::random(grid, channels, entries, seed);
+        if let Some(rows) = made.tiers.first() {
+            let half = rows.iter().step_by(2).cloned().collect();
+            made.tiers.insert(0, half);
+        }
+        made.response = true;
+        let (rows, cols) = (4 * grid.rows(), 4 * grid.cols());
+        let mut random = Rng::with_seed(!seed);
+        let gains = (0..rows * cols * channels).map(|_| random.u16(3_000..9_000));
+        made.fine_gains = Some((rows as u16, cols as u16, gains.collect()));
+        made
+    }
+
+    fn operator<'a>(&self, segments: &'a [Vec<u8>]) -> Result<Operator<'a>, OperatorError> {
+        let segment = |(tier, bytes): (u8, &'a Vec<u8>)| {
+            Segment::new(usize::from(tier) - 1, tier, Channels::All, bytes)
+        };
+        let segments: Result<_, _> = (1..).zip(segments).map(segment).collect();
+        Operator::new(&Basis::new(self.grid), segments?, self.scales)
     }
 
     /// The bytes of the image. Where the runtime refuses the operator, so does it the
     /// image, for the same reason.
     pub fn image(&self) -> Vec<u8> {
-        let segment = segment_bytes(self.grid.cells(), &self.rows);
-        let operator = (!self.rows.is_empty()).then(|| self.operator(&segment));
+        let tiers = self.tiers.iter();
+        let segments: Vec<_> = tiers
+            .map(|rows| segment_bytes(self.grid.cells(), rows))
+            .collect();
+        let operator = (!segments.is_empty()).then(|| self.operator(&segments));
         let operator = operator.and_then(Result::ok);
         let mut image = ImageWriter::default();
         image.section(
@@ -78,8 +138,7 @@ impl MadeUp {
             0,
             self.meta(operator.as_ref()).emit().to_vec(),
         );
-        let top = u8::from(!self.rows.is_empty());
-        let tiers = (0..=top).flat_map(|number| {
+        let tiers = (0..=segments.len() as u8).flat_map(|number| {
             let cost = operator.as_ref();
             let cost = cost.map_or((0, 0), |o| o.cost(number, self.channels as u8));
             TierInfo {
@@ -99,8 +158,12 @@ impl MadeUp {
             image.section(SectionKind::Codes, 0, response::codes(&knots));
             image.section(SectionKind::Response, 0, halfwords(knots));
         }
-        if !self.rows.is_empty() {
-            image.section(SectionKind::Operator, 1, segment.clone());
+        if let Some((rows, cols, gains)) = &self.fine_gains {
+            let all = [*rows, *cols].into_iter().chain(gains.iter().copied());
+            image.section(SectionKind::FineGain, 0, halfwords(all));
+        }
+        for (tier, segment) in (1..).zip(&segments) {
+            image.section(SectionKind::Operator, tier, segment.clone());
         }
         image.finish()
     }

@@ -25,7 +25,7 @@ pub fn table(grid: Grid, stages: &[Stage]) -> MadeUp {
     let mut table = MadeUp::nearly_plain(grid, channels, stages.contains(&Stage::Ambient));
     table.response = stages.contains(&Stage::Response);
     if stages.contains(&Stage::Operator) {
-        table.rows = rows(grid);
+        table.tiers = vec![rows(grid)];
     }
     table
 }

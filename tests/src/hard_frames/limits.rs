@@ -33,7 +33,7 @@ fn row(index: u16, shift: u16, values: &[i16]) -> StoredRow {
 pub fn at_the_accumulators_limit(more: i16) -> MadeUp {
     let mut made = MadeUp::new(five_details(), 1);
     let most = i16::MAX;
-    made.rows = vec![row(CONSTANT, 8, &[most, most, most, most, more])];
+    made.tiers = vec![vec![row(CONSTANT, 8, &[most, most, most, most, more])]];
     made
 }
 
@@ -45,7 +45,11 @@ pub fn at_the_corrections_limit(more: i16) -> MadeUp {
     let all = [most, most, most, most, 3];
     // The first functions of the finest level and of the next are positive at the first
     // cell, as the constant is.
-    made.rows = vec![row(0, 2, &all), row(5, 2, &[more]), row(CONSTANT, 2, &all)];
+    made.tiers = vec![vec![
+        row(0, 2, &all),
+        row(5, 2, &[more]),
+        row(CONSTANT, 2, &all),
+    ]];
     made
 }
 

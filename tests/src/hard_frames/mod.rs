@@ -24,7 +24,6 @@ pub mod page;
 
 use crate::grid;
 use crate::made_up::MadeUp;
-use iltm::compile::image::StoredRow;
 use iltm::video::OperatorMemory;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::{Basis, Function};
@@ -264,40 +263,6 @@ pub fn compare<const C: usize>(
     worst
 }
 
-/// A table whose gains, ambient light and operator are random: up to `entries` entries
-/// a row, as large as the proof of the bounds takes.
-pub fn random(grid: Grid, channels: usize, entries: usize, seed: u64) -> MadeUp {
-    let mut random = fastrand::Rng::with_seed(seed);
-    let samples = grid.cells() * channels;
-    let mut made = MadeUp::new(grid, channels);
-    made.gains = (0..samples).map(|_| random.u16(3_000..9_000)).collect();
-    made.ambient = Some((0..samples).map(|_| random.u16(..900)).collect());
-    if channels == 3 {
-        made.scales[1] = fixed::types::U1F15::from_num(0.7);
-    }
-    let basis = Basis::new(grid);
-    // A single cell lights no other.
-    let functions = if grid.cells() > 1 { grid.cells() } else { 0 };
-    for (index, function) in basis.functions().enumerate().take(functions) {
-        // Fifteen levels of three functions stay below 2^30 with these.
-        let most = (24_000 / function.peak() / entries as u64).clamp(1, 8_000) as i16;
-        let mut places: Vec<u16> = (0..=random.usize(..entries))
-            .map(|_| random.u16(..grid.cells() as u16))
-            .collect();
-        places.sort_unstable();
-        places.dedup();
-        made.rows.push(StoredRow {
-            index: index as u16,
-            shift: 6,
-            entries: places
-                .into_iter()
-                .map(|at| (at, random.i16(-most..=most)))
-                .collect(),
-        });
-    }
-    made
-}
-
 /// [`compare`] for all hard frames of a random table.
 pub fn all_frames(made: &MadeUp, frames: &[Frame]) -> Worst {
     let image = made.image();
@@ -333,7 +298,7 @@ pub const GRIDS: [(u16, u16); 11] = [
 /// show the same two frames, unlike in every sample, in turn: black and white, then a
 /// checkerboard and its inverse. All stages at once, in 8 bits.
 pub fn drifted(count: usize) -> usize {
-    let mut made = random(grid(5, 7), 3, 6, 5);
+    let mut made = MadeUp::random(grid(5, 7), 3, 6, 5);
     made.response = true;
     let image = made.image();
     let table = Table::check(&image).expect("made to be taken");

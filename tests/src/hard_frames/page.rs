@@ -1,7 +1,7 @@
 //! Page of hard frames: the lines of the page of hard cases that are about frames.
 
 use super::limits::{at_the_accumulators_limit, at_the_corrections_limit, corrections, verdict};
-use super::{Frame, GRIDS, Worst, all_frames, drifted, random};
+use super::{Frame, GRIDS, Worst, all_frames, drifted};
 use crate::grid;
 use crate::made_up::MadeUp;
 use iltm_runtime::operator::{Bounds, OperatorError};
@@ -48,7 +48,7 @@ fn within(case: &'static str, reason: &'static str, worst: Worst) -> Row {
 /// The largest difference of some frames on all grids.
 fn on_all_grids(choose: fn(&Frame) -> bool) -> Worst {
     let of = |(seed, (rows, cols)): (u64, (u16, u16))| {
-        let made = random(grid(rows, cols), 1, 6, seed);
+        let made = MadeUp::random(grid(rows, cols), 1, 6, seed);
         let frames: Vec<_> = Frame::all(made.grid).into_iter().filter(choose).collect();
         all_frames(&made, &frames)
     };
@@ -172,7 +172,7 @@ fn drift_row() -> Row {
 fn grid_rows() -> Vec<Row> {
     let on = |sides: &[(u16, u16)]| {
         let of = |(seed, (rows, cols)): (u64, &(u16, u16))| {
-            let made = random(grid(*rows, *cols), 3, 5, 100 + seed);
+            let made = MadeUp::random(grid(*rows, *cols), 3, 5, 100 + seed);
             all_frames(&made, &Frame::all(made.grid))
         };
         (0..).zip(sides).map(of).fold(Worst::default(), Worst::max)

@@ -16,7 +16,7 @@ pub(super) fn table(grid: Grid, channels: usize, entries: f64, shape: &Table<'_>
     let mut table = MadeUp::nearly_plain(grid, channels, true);
     table.scales[..channels].fill(U1F15::from_num(0.9));
     table.response = true;
-    table.rows = rows(grid, entries, shape);
+    table.tiers = vec![rows(grid, entries, shape)];
     table.image()
 }
 

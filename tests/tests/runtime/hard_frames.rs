@@ -13,14 +13,15 @@ use iltm_tests::grid;
 use iltm_tests::hard_frames::limits::{
     at_the_accumulators_limit, at_the_corrections_limit, corrections, verdict,
 };
-use iltm_tests::hard_frames::{Frame, GRIDS, all_frames, random};
+use iltm_tests::hard_frames::{Frame, GRIDS, all_frames};
+use iltm_tests::made_up::MadeUp;
 use proptest::prelude::*;
 
 #[test]
 fn every_hard_frame_on_every_hard_grid_is_the_exact_one_within_its_roundings() {
     for (seed, (rows, cols)) in (0..).zip(GRIDS) {
         for channels in [1, 3] {
-            let made = random(grid(rows, cols), channels, 8, seed);
+            let made = MadeUp::random(grid(rows, cols), channels, 8, seed);
             let worst = all_frames(&made, &Frame::all(made.grid));
             let [samples, inside] = worst.samples;
             println!("{rows} x {cols}, {channels} channels: {worst}, {inside} of {samples} inside");
@@ -41,7 +42,7 @@ proptest! {
         entries in 1_usize..12,
         seed: u64,
     ) {
-        let made = random(grid(rows, cols), channels, entries, seed);
+        let made = MadeUp::random(grid(rows, cols), channels, entries, seed);
         let worst = all_frames(&made, &Frame::all(made.grid));
         prop_assert!(worst.holds(), "{rows} x {cols}: {worst}");
     }
@@ -99,7 +100,7 @@ fn a_correction_at_the_limit_is_refused_with_what_it_could_reach() {
 fn the_firmware_makes_of_hard_frames_what_the_host_makes_of_them() {
     let mut tables = vec![at_the_accumulators_limit(3), at_the_corrections_limit(1)];
     for (seed, (rows, cols)) in (0..).zip([(1, 1), (1, 37), (37, 1), (7, 11), (257, 3)]) {
-        tables.extend([1, 3].map(|channels| random(grid(rows, cols), channels, 8, seed)));
+        tables.extend([1, 3].map(|channels| MadeUp::random(grid(rows, cols), channels, 8, seed)));
     }
     let firmware = elf(Board::An500, "selftest");
     let mut compared = 0;

@@ -1,6 +1,7 @@
 //! Exactness: tables and frames that must not change a single bit.
 
 use super::*;
+use iltm_compile::image::StoredRow;
 use proptest::prelude::*;
 
 proptest! {
@@ -23,7 +24,7 @@ proptest! {
                 *sample = ((light * 65_535 + 16_384) >> 15) as u16;
             }
         }
-        let table = SampleTable::identity(grid, table_channels);
+        let table = MadeUp::new(grid, table_channels);
         let (result, summary) = compensated(&table, settings(Encoding::Linear), &picture).unwrap();
         prop_assert_eq!(result, picture);
         prop_assert_eq!(summary.clipped, 0);
@@ -36,7 +37,7 @@ proptest! {
         wide: bool,
         seed: u64,
     ) {
-        let table = SampleTable::random(grid(13, 21), table_channels, 5, seed);
+        let table = MadeUp::of_all_kinds(grid(13, 21), table_channels, 5, seed);
         let picture = random_picture(size(width, height), channels, wide, seed);
         let by = |threads| {
             let settings = CompensateOptions { threads, ..CompensateOptions::default() };
@@ -52,8 +53,8 @@ proptest! {
 
 #[test]
 fn display_codes_come_back_through_a_projector_that_undoes_them() {
-    let mut table = SampleTable::identity(grid(4, 4), 3);
-    table.response = Some(sample_table::srgb_response());
+    let mut table = MadeUp::new(grid(4, 4), 3);
+    table.response = true;
     let ramp = (0..=255)
         .flat_map(|code: u8| [code, 255 - code, code / 2])
         .collect();
@@ -68,13 +69,16 @@ fn a_frame_of_one_pixel_a_cell_is_what_the_full_resolution_way_makes_of_it() {
     // those of the cells, and with gains and ambient light alike everywhere, and
     // no operator but the constant, nothing depends on the place within a cell.
     let grid = grid(6, 10);
-    let mut table = SampleTable::identity(grid, 3);
+    let mut table = MadeUp::new(grid, 3);
     table.gains.fill(5000);
     table.ambient = Some(vec![321; table.gains.len()]);
-    table.response = Some(sample_table::srgb_response());
-    table.row_shifts = vec![4; grid.cells()];
+    table.response = true;
     let constant = grid.cells() as u16 - 1;
-    table.tiers = vec![vec![(constant, constant, 1500)]];
+    table.tiers = vec![vec![StoredRow {
+        index: constant,
+        shift: 4,
+        entries: vec![(constant, 1500)],
+    }]];
     let small = random_picture(size(10, 6), 3, false, 7);
     let Samples::Eight(samples) = small.samples() else {
         panic!("a picture of bytes");

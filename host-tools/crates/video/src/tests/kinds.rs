@@ -7,7 +7,7 @@ use std::io::Cursor;
 
 #[test]
 fn a_grey_frame_is_refused_by_a_table_of_three_channels() {
-    let table = SampleTable::identity(grid(2, 2), 3);
+    let table = MadeUp::new(grid(2, 2), 3);
     let picture = random_picture(size(4, 4), 1, false, 1);
     let error = compensated(&table, CompensateOptions::default(), &picture).unwrap_err();
     assert!(matches!(error, VideoError::GreyFrame));
@@ -16,7 +16,7 @@ fn a_grey_frame_is_refused_by_a_table_of_three_channels() {
 
 #[test]
 fn a_table_of_one_channel_treats_each_colour_like_grey() {
-    let table = SampleTable::random(grid(4, 6), 1, 4, 3);
+    let table = MadeUp::of_all_kinds(grid(4, 6), 1, 4, 3);
     for (width, height) in [(6, 4), (31, 17)] {
         let frame = size(width, height);
         let colour = random_picture(frame, 3, false, 5);
@@ -43,7 +43,7 @@ fn a_table_of_one_channel_treats_each_colour_like_grey() {
 
 #[test]
 fn a_frame_smaller_than_the_grid_is_refused_with_both_sizes() {
-    let table = SampleTable::identity(grid(4, 6), 3);
+    let table = MadeUp::new(grid(4, 6), 3);
     for (width, height) in [(5, 4), (6, 3), (5, 40), (60, 3)] {
         let picture = random_picture(size(width, height), 3, false, 1);
         let error = compensated(&table, CompensateOptions::default(), &picture).unwrap_err();
@@ -55,7 +55,7 @@ fn a_frame_smaller_than_the_grid_is_refused_with_both_sizes() {
 
 #[test]
 fn a_tier_that_the_table_has_not_is_refused() {
-    let table = SampleTable::random(grid(4, 6), 3, 4, 3);
+    let table = MadeUp::of_all_kinds(grid(4, 6), 3, 4, 3);
     let settings = CompensateOptions {
         tier: Some(3),
         ..CompensateOptions::default()
@@ -68,8 +68,8 @@ fn a_tier_that_the_table_has_not_is_refused() {
 #[test]
 fn samples_beyond_black_and_white_are_counted() {
     // Gain 2 sends everything above half scale beyond white.
-    let mut table = SampleTable::identity(grid(2, 2), 1);
-    table.gains.fill(2 << 12);
+    let mut table = MadeUp::new(grid(2, 2), 1);
+    table.gains.fill(2 << table.gain_fraction);
     let ramp = (0..=255_u8).collect();
     let picture = Picture::new(size(16, 16), Samples::Eight(ramp)).unwrap();
     let (_, summary) = compensated(&table, settings(Encoding::Linear), &picture).unwrap();
@@ -98,7 +98,7 @@ fn pictures_keep_their_size_depth_and_colour() {
         let mut file = Vec::new();
         png::write(&mut file, &picture).unwrap();
         assert_eq!(png::read(Cursor::new(&file)).unwrap(), picture);
-        let image = SampleTable::identity(grid(2, 3), 1).image();
+        let image = MadeUp::new(grid(2, 3), 1).image();
         let table = Table::check(&image).unwrap();
         let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
         let mut output = Vec::new();
@@ -170,7 +170,7 @@ fn damaged_pictures_give_an_error_and_never_a_panic() {
 
 #[test]
 fn an_input_of_another_kind_is_named() {
-    let image = SampleTable::identity(grid(2, 2), 3).image();
+    let image = MadeUp::new(grid(2, 2), 3).image();
     let table = Table::check(&image).unwrap();
     let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
     for input in ["", "x", "RIFF....AVI LIST", "\u{89}PN"] {

@@ -85,7 +85,7 @@ fn live(
 }
 
 fn tables() -> [Vec<u8>; 2] {
-    [1, 2].map(|seed| SampleTable::random(grid(13, 21), 3, 5, seed).image())
+    [1, 2].map(|seed| MadeUp::of_all_kinds(grid(13, 21), 3, 5, seed).image())
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn a_new_table_takes_over_between_two_frames_and_no_frame_is_torn() {
 #[test]
 fn a_new_table_of_another_grid_and_of_one_channel_takes_over_too() {
     let [first, _] = tables();
-    let second = SampleTable::random(grid(4, 6), 1, 3, 9).image();
+    let second = MadeUp::of_all_kinds(grid(4, 6), 1, 3, 9).image();
     let input = stream(LINE, 6);
     // The frame that a table takes over at is asked for twice, before and after.
     let (output, _, _) = live(&first, None, &[(3, &second), (5, &first)], &input);
@@ -134,7 +134,7 @@ fn what_is_no_table_or_does_not_suit_the_stream_keeps_the_old_one() {
     let mut damaged = second.clone();
     damaged[200] ^= 1;
     // More cells than the frames have pixels along a side.
-    let large = SampleTable::identity(grid(50, 70), 3).image();
+    let large = MadeUp::new(grid(50, 70), 3).image();
     let bad: [&[u8]; 4] = [&damaged, &second[..100], b"", &large];
     let newer: Vec<(usize, &[u8])> = (1..).zip(bad).collect();
     let (output, summary, events) = live(&first, None, &newer, &input);
@@ -157,7 +157,7 @@ fn what_is_no_table_or_does_not_suit_the_stream_keeps_the_old_one() {
 #[test]
 fn a_colour_table_for_a_grey_stream_is_refused_while_it_runs() {
     let line = "YUV4MPEG2 W63 H41 Cmono";
-    let grey = SampleTable::random(grid(13, 21), 1, 5, 1).image();
+    let grey = MadeUp::of_all_kinds(grid(13, 21), 1, 5, 1).image();
     let [colour, _] = tables();
     let input = stream(line, 3);
     let (output, summary, _) = live(&grey, None, &[(1, &colour)], &input);

@@ -4,17 +4,12 @@ mod exactness;
 mod kinds;
 mod live;
 mod reference;
-mod sample_table;
 mod streams;
 
 use crate::VideoError;
-use iltm_compile::{
-    image::{ImageWriter, StoredRow, segment_bytes},
-    response::codes as response_codes,
-};
 use iltm_picture::{Picture, Samples};
 use iltm_runtime::{FrameSize, Grid, image::Table, pipeline::Encoding};
-use sample_table::SampleTable;
+use iltm_tests::made_up::MadeUp;
 
 use super::{CompensateOptions, Compensator, FrameTotals};
 
@@ -48,7 +43,7 @@ fn random_picture(size: FrameSize, channels: usize, wide: bool, seed: u64) -> Pi
 
 /// The picture through a table.
 fn compensated(
-    table: &SampleTable,
+    table: &MadeUp,
     settings: CompensateOptions,
     picture: &Picture,
 ) -> Result<(Picture, FrameTotals), VideoError> {

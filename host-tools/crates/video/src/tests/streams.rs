@@ -22,7 +22,7 @@ fn stream(line: &str, frames: usize, codes: std::ops::RangeInclusive<u8>) -> Vec
 
 /// The stream through a table.
 fn video(
-    table: &SampleTable,
+    table: &MadeUp,
     settings: CompensateOptions,
     input: &[u8],
 ) -> Result<(Vec<u8>, FrameTotals), VideoError> {
@@ -48,7 +48,7 @@ impl Progress for Counter {
 
 #[test]
 fn headers_and_frame_parameters_are_kept_byte_for_byte() {
-    let table = SampleTable::identity(grid(2, 2), 1);
+    let table = MadeUp::new(grid(2, 2), 1);
     for line in [
         "YUV4MPEG2 W6 H4 F30000:1001 Ip A128:117 C420mpeg2 XYSCSS=420MPEG2 XCOLORRANGE=FULL",
         "YUV4MPEG2 H5 W7",
@@ -68,7 +68,7 @@ fn headers_and_frame_parameters_are_kept_byte_for_byte() {
 
 #[test]
 fn mono_video_that_is_not_changed_comes_back_exactly() {
-    let table = SampleTable::identity(grid(2, 2), 1);
+    let table = MadeUp::new(grid(2, 2), 1);
     for (line, codes) in [
         ("YUV4MPEG2 W7 H5 Cmono", 0..=255),
         ("YUV4MPEG2 W2 H2 Cmono", 0..=255),
@@ -95,7 +95,7 @@ fn scene_stream(line: &str, frames: usize) -> Vec<u8> {
 
 #[test]
 fn video_that_is_not_changed_comes_back_as_good_as_it_was() {
-    let table = SampleTable::identity(grid(9, 16), 3);
+    let table = MadeUp::new(grid(9, 16), 3);
     for colour in ["420jpeg", "420mpeg2", "444"] {
         for range in ["LIMITED", "FULL"] {
             for (width, height) in [(320, 180), (321, 181), (1024, 578)] {
@@ -131,7 +131,7 @@ fn video_that_is_not_changed_comes_back_as_good_as_it_was() {
 fn subsampled_colours_that_rgb_has_come_back_within_a_code() {
     // Chroma within 18 of grey and luma within 40 of the middle is inside RGB for
     // either standard, whatever their combination.
-    let table = SampleTable::identity(grid(9, 16), 3);
+    let table = MadeUp::new(grid(9, 16), 3);
     for (line, luma) in [
         ("YUV4MPEG2 W64 H36 C420", 64 * 36),
         ("YUV4MPEG2 W65 H37 C420 XCOLORRANGE=FULL", 65 * 37),
@@ -158,7 +158,7 @@ proptest! {
             (1, "mono"), (1, "420"), (3, "420jpeg"), (3, "444"),
         ]),
     ) {
-        let table = SampleTable::random(grid(13, 21), table_channels, 5, 3);
+        let table = MadeUp::of_all_kinds(grid(13, 21), table_channels, 5, 3);
         let input = stream(&format!("YUV4MPEG2 W{width} H{height} C{colour}"), 3, 0..=255);
         let by = |threads| {
             let settings = CompensateOptions { threads, ..CompensateOptions::default() };
@@ -176,7 +176,7 @@ proptest! {
         byte: u8,
         cut in 0_usize..260,
     ) {
-        let table = SampleTable::identity(grid(2, 2), 3);
+        let table = MadeUp::new(grid(2, 2), 3);
         let mut input = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
         input[place] = byte;
         input.truncate(input.len() - cut);
@@ -186,7 +186,7 @@ proptest! {
 
 #[test]
 fn frames_before_a_fault_have_been_written_and_the_fault_is_named() {
-    let table = SampleTable::identity(grid(2, 2), 3);
+    let table = MadeUp::new(grid(2, 2), 3);
     let image = table.image();
     let table = Table::check(&image).unwrap();
     let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
@@ -240,7 +240,7 @@ impl Write for Limited {
 
 #[test]
 fn a_reader_that_goes_away_ends_an_endless_stream() {
-    let table = SampleTable::identity(grid(2, 2), 3);
+    let table = MadeUp::new(grid(2, 2), 3);
     let image = table.image();
     let table = Table::check(&image).unwrap();
     let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
@@ -253,7 +253,7 @@ fn a_reader_that_goes_away_ends_an_endless_stream() {
 
 #[test]
 fn a_stream_without_frames_has_none() {
-    let table = SampleTable::identity(grid(2, 2), 3);
+    let table = MadeUp::new(grid(2, 2), 3);
     let (output, summary) =
         video(&table, CompensateOptions::default(), b"YUV4MPEG2 W6 H4\n").unwrap();
     assert_eq!(output, b"YUV4MPEG2 W6 H4\n");
@@ -265,7 +265,7 @@ fn a_stream_without_frames_has_none() {
 
 #[test]
 fn mono_video_is_refused_by_a_table_of_three_channels() {
-    let table = SampleTable::identity(grid(2, 2), 3);
+    let table = MadeUp::new(grid(2, 2), 3);
     let input = stream("YUV4MPEG2 W6 H4 Cmono", 1, 0..=255);
     let error = video(&table, CompensateOptions::default(), &input).unwrap_err();
     assert!(matches!(error, VideoError::GreyFrame));
@@ -273,7 +273,7 @@ fn mono_video_is_refused_by_a_table_of_three_channels() {
 
 #[test]
 fn files_are_replaced_whole_or_left_alone() {
-    let table = SampleTable::identity(grid(2, 2), 3);
+    let table = MadeUp::new(grid(2, 2), 3);
     let image = table.image();
     let table = Table::check(&image).unwrap();
     let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
