@@ -3,7 +3,7 @@
 
 use crate::flash_simulator::NorSimulator;
 use crate::line_faults::{FarEnd, PacedLine};
-use crate::slots::{Layout, SimDevice};
+use crate::slots::{SimDevice, SlotLayout};
 use iltm_runtime::image::layout::FORMAT_VERSION;
 use iltm_runtime::link::{
     Clipping, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode, Name,
@@ -24,7 +24,7 @@ pub const SECTOR: usize = 4_096;
 /// The fake device's flash.
 pub type Flash = NorSimulator<4, SECTOR>;
 
-const LAYOUT: Layout = Layout {
+const LAYOUT: SlotLayout = SlotLayout {
     slot: 32,
     sector: SECTOR,
 };

@@ -16,14 +16,14 @@ const BERNOULLI: usize = 60;
 
 /// What the gates say of one session.
 #[derive(Clone, Debug)]
-pub struct Session {
+pub struct GateSession {
     /// The fault, with its size.
     pub fault: Option<InjectedFault>,
     /// All gates.
     pub gates: Vec<Gate>,
 }
 
-impl Session {
+impl GateSession {
     /// The gates with this verdict.
     pub fn that(&self, verdict: Verdict) -> Vec<GateName> {
         let that = self.gates.iter().filter(|gate| gate.verdict == verdict);
@@ -39,12 +39,12 @@ impl Session {
 }
 
 /// A scene to take photographs of.
-pub struct Rig<'s> {
+pub struct GateRig<'s> {
     scene: &'s Scene,
     simulation: Simulation<'s>,
 }
 
-impl<'s> Rig<'s> {
+impl<'s> GateRig<'s> {
     /// Computes the light of a scene.
     pub fn new(scene: &'s Scene) -> Self {
         let simulation = simulation(scene, Forced::default());
@@ -52,7 +52,7 @@ impl<'s> Rig<'s> {
     }
 
     /// Takes photographs with a fault, or none, and asks the gates.
-    pub fn session(&self, fault: Option<InjectedFault>) -> Session {
+    pub fn session(&self, fault: Option<InjectedFault>) -> GateSession {
         let folder = tempfile::tempdir().expect("a folder");
         let out = folder.path().join("capture");
         let camera = VirtualCamera::new(self.scene, &self.simulation, SEED).expect("light");
@@ -61,7 +61,7 @@ impl<'s> Rig<'s> {
         let patterns = pattern_set(self.simulation.grid(), BERNOULLI, SEED);
         folder::write(&camera, &patterns, &out, &Silent).expect("written");
         let examined = capture::examine(&out, &CaptureOptions::default(), &Silent);
-        Session {
+        GateSession {
             fault,
             gates: examined.expect("a capture").gates,
         }
@@ -120,19 +120,19 @@ pub fn tried() -> Vec<(CaptureFault, &'static str, Vec<f64>)> {
 }
 
 /// A table of what was noticed, a line for each fault.
-pub fn table(sessions: &[(&'static str, Vec<Session>)]) -> String {
+pub fn table(sessions: &[(&'static str, Vec<GateSession>)]) -> String {
     let mut text = String::from(
         "| fault | passes in silence | remark from | refused from | by |\n|---|---|---|---|---|\n",
     );
     for (what, sessions) in sessions {
-        let size = |session: &Session| session.fault.map_or(0.0, |fault| fault.size);
-        let fails = |session: &&Session| !session.that(Verdict::Fail).is_empty();
-        let remarks = |session: &&Session| !session.that(Verdict::Warn).is_empty();
+        let size = |session: &GateSession| session.fault.map_or(0.0, |fault| fault.size);
+        let fails = |session: &&GateSession| !session.that(Verdict::Fail).is_empty();
+        let remarks = |session: &&GateSession| !session.that(Verdict::Warn).is_empty();
         let silent: Vec<String> = (sessions.iter())
             .filter(|session| !fails(session) && !remarks(session))
             .map(|session| size(session).to_string())
             .collect();
-        let first = |of: &dyn Fn(&&Session) -> bool| {
+        let first = |of: &dyn Fn(&&GateSession) -> bool| {
             let found = sessions.iter().find(of);
             found.map_or_else(|| "-".to_owned(), |session| size(session).to_string())
         };

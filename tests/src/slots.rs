@@ -13,14 +13,14 @@ use std::ops::Range;
 /// Where the slots of a device are: both at the start of the flash, then a sector for
 /// each half of the records and one for the identity.
 #[derive(Clone, Copy, Debug)]
-pub struct Layout {
+pub struct SlotLayout {
     /// Sectors of a slot.
     pub slot: usize,
     /// Bytes of a sector.
     pub sector: usize,
 }
 
-impl Layout {
+impl SlotLayout {
     /// Sectors in all.
     pub const fn sectors(self) -> usize {
         2 * self.slot + 3
@@ -58,7 +58,7 @@ impl Layout {
 /// Which table frames would go through.
 #[derive(Clone, Debug)]
 pub struct SimTables {
-    layout: Layout,
+    layout: SlotLayout,
     /// The slot.
     pub selected: Result<Slot, PassThrough>,
     /// Slots whose table is kept.
@@ -112,7 +112,7 @@ pub struct SimDevice<const W: usize, const E: usize> {
     pub updater: Updater<NorSimulator<W, E>>,
     /// Its tables.
     pub tables: SimTables,
-    layout: Layout,
+    layout: SlotLayout,
     /// Milliseconds since it started.
     pub now_ms: u64,
 }
@@ -120,12 +120,12 @@ pub struct SimDevice<const W: usize, const E: usize> {
 impl<const W: usize, const E: usize> SimDevice<W, E> {
     /// One fresh from the factory.
     pub fn new(slot: usize, seed: u64) -> Self {
-        let layout = Layout { slot, sector: E };
+        let layout = SlotLayout { slot, sector: E };
         Self::start(NorSimulator::new(layout.sectors(), seed), layout)
     }
 
     /// One that finds this in its flash when it starts.
-    pub fn start(flash: NorSimulator<W, E>, layout: Layout) -> Self {
+    pub fn start(flash: NorSimulator<W, E>, layout: SlotLayout) -> Self {
         let mut tables = SimTables {
             layout,
             selected: Err(PassThrough::NoTable),
@@ -171,7 +171,7 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
     }
 
     /// Where its slots are.
-    pub const fn layout(&self) -> Layout {
+    pub const fn layout(&self) -> SlotLayout {
         self.layout
     }
 

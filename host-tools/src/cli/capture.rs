@@ -7,8 +7,8 @@ use super::output::Output;
 use super::progress::progress;
 use crate::capture::{MANIFEST_FILE, PhotoStats, Role};
 use crate::session::{
-    Camera, CommandCamera, CommandScreen, Event, Screen, Session, SessionError, SessionOptions,
-    State, Summary, WatchedFolder, ranges, with_window,
+    CameraDriver, CaptureSession, CommandCamera, CommandScreen, Screen, SessionError,
+    SessionOptions, ShootEvent, State, Summary, WatchedFolder, ranges, with_window,
 };
 use iltm_picture::{png, progress::Progress};
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ const TOO_DARK: f64 = 0.4;
 
 pub(super) fn run(arguments: &Capture, output: &Output) -> Result<(), Failure> {
     let bars = progress(output);
-    let mut session = Session::open(&arguments.capture, bars.as_ref())?;
+    let mut session = CaptureSession::open(&arguments.capture, bars.as_ref())?;
     if arguments.list {
         let (data, text) = listed(&session, arguments);
         output.result(&data, &text);
@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &Capture, output: &Output) -> Result<(), Failure> {
 }
 
 fn photograph(
-    session: &mut Session,
+    session: &mut CaptureSession,
     arguments: &Capture,
     options: &SessionOptions,
     screen: &mut dyn Screen,
@@ -107,7 +107,7 @@ fn photograph(
     teller: &mut Teller<'_>,
 ) -> Result<Summary, SessionError> {
     let patience = Duration::from_secs(arguments.timeout.into());
-    let mut camera: Box<dyn Camera> = match (&arguments.watch, &arguments.camera) {
+    let mut camera: Box<dyn CameraDriver> = match (&arguments.watch, &arguments.camera) {
         (Some(folder), _) => Box::new(WatchedFolder::new(folder, patience, stop)),
         (None, command) => {
             let command = command.as_deref().unwrap_or_default();
@@ -120,7 +120,7 @@ fn photograph(
 }
 
 /// Width and height of the slides: those of the first that can be read.
-fn slide_size(session: &Session) -> (u32, u32) {
+fn slide_size(session: &CaptureSession) -> (u32, u32) {
     let size = |path: &Path| {
         let picture = png::read(BufReader::new(File::open(path).ok()?)).ok()?;
         Some((
@@ -136,7 +136,7 @@ fn slide_size(session: &Session) -> (u32, u32) {
 }
 
 /// What there is and what is missing.
-fn listed(session: &Session, arguments: &Capture) -> (Value, String) {
+fn listed(session: &CaptureSession, arguments: &Capture) -> (Value, String) {
     let mut photographs = Vec::new();
     let mut missing = Vec::new();
     let mut bad = Vec::new();
@@ -214,12 +214,12 @@ struct Teller<'a> {
 }
 
 impl Teller<'_> {
-    fn tell(&mut self, event: &Event<'_>) {
+    fn tell(&mut self, event: &ShootEvent<'_>) {
         self.output.event(&data(event));
         match event {
-            Event::Begun { missing, .. } => self.left = *missing,
-            Event::Measuring => self.bars.begin("flashing white and black", 0),
-            Event::Latency(latency) => {
+            ShootEvent::Begun { missing, .. } => self.left = *missing,
+            ShootEvent::Measuring => self.bars.begin("flashing white and black", 0),
+            ShootEvent::Latency(latency) => {
                 self.bars.end();
                 self.output.remark(&format!(
                     "latency     {} ms after each change, {} photographs thrown away",
@@ -230,16 +230,16 @@ impl Teller<'_> {
                     self.bars.begin("photographing", self.left as u64);
                 }
             }
-            Event::Shown(planned) if self.by_hand => self.output.remark(&format!(
+            ShootEvent::Shown(planned) if self.by_hand => self.output.remark(&format!(
                 "slide {:4}  take its photograph ({}); {} are missing",
                 planned.index, planned.role, self.left
             )),
-            Event::Shown(_) => {}
-            Event::Failed { planned, reason } => self.output.remark(&format!(
+            ShootEvent::Shown(_) => {}
+            ShootEvent::Failed { planned, reason } => self.output.remark(&format!(
                 "slide {:4}  {reason}; it is taken again",
                 planned.index
             )),
-            Event::Taken {
+            ShootEvent::Taken {
                 planned,
                 exposed,
                 left,
@@ -272,27 +272,27 @@ fn exposure(white: &PhotoStats) -> Option<String> {
 }
 
 /// An event for programs.
-fn data(event: &Event<'_>) -> Value {
+fn data(event: &ShootEvent<'_>) -> Value {
     match event {
-        Event::Begun { missing, all } => json!({
+        ShootEvent::Begun { missing, all } => json!({
             "event": "begun", "missing": missing, "all": all,
         }),
-        Event::Measuring => json!({ "event": "measuring" }),
-        Event::Latency(latency) => json!({
+        ShootEvent::Measuring => json!({ "event": "measuring" }),
+        ShootEvent::Latency(latency) => json!({
             "event": "latency",
             "latency_ms": latency.wait.as_millis() as u64,
             "discard": latency.discard,
         }),
-        Event::Shown(planned) => json!({
+        ShootEvent::Shown(planned) => json!({
             "event": "shown",
             "index": planned.index,
             "role": planned.role,
             "slide": planned.slide.display().to_string(),
         }),
-        Event::Failed { planned, reason } => json!({
+        ShootEvent::Failed { planned, reason } => json!({
             "event": "failed", "index": planned.index, "reason": reason,
         }),
-        Event::Taken {
+        ShootEvent::Taken {
             planned,
             photo,
             exposed,

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::output::Output;
 use super::progress::progress;
 use super::summary;
-use crate::demo::{self, Outcome};
+use crate::demo::{self, DemoOutcome};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -26,7 +26,7 @@ fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn data(outcome: &Outcome, seconds: f64) -> Value {
+fn data(outcome: &DemoOutcome, seconds: f64) -> Value {
     let paths = &outcome.paths;
     let images = outcome
         .images
@@ -59,7 +59,7 @@ fn data(outcome: &Outcome, seconds: f64) -> Value {
     data
 }
 
-fn text(outcome: &Outcome, seconds: f64) -> String {
+fn text(outcome: &DemoOutcome, seconds: f64) -> String {
     let paths = &outcome.paths;
     let mut text = summary::text(&outcome.built);
     let listed = [

@@ -7,7 +7,7 @@ use super::output::{Output, read_file};
 use super::tables::check;
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
-use crate::device::frame_source::FrameSource;
+use crate::device::frame_source::FrameFeed;
 use crate::device::memory::BoardMemory;
 use crate::device::playback::{Playback, PlaybackError};
 use crate::user::Folders;
@@ -128,10 +128,10 @@ fn put_table(memory: &BoardMemory, path: &Path, image: &[u8]) -> Result<(), Fail
     })
 }
 
-fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameSource, Failure> {
+fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameFeed, Failure> {
     let channels = table.map(Table::channels);
     if let Some(path) = &arguments.frames {
-        let frames = FrameSource::file(path, channels, arguments.fps);
+        let frames = FrameFeed::file(path, channels, arguments.fps);
         return frames.map_err(|error| match error {
             VideoError::File { path, source } => cannot_read(&path, &source),
             error => error.into(),
@@ -139,7 +139,7 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameSource,
     }
     let size = arguments.size.unwrap_or_else(|| scene_size(table));
     let rate = arguments.fps.unwrap_or(RATE);
-    Ok(FrameSource::scene(size, channels.unwrap_or(3), rate))
+    Ok(FrameFeed::scene(size, channels.unwrap_or(3), rate))
 }
 
 /// A size that the emulated board can keep up with.
@@ -152,7 +152,7 @@ fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
     FrameSize::new(width, side(96, FrameSize::height)).expect("neither side is zero")
 }
 
-fn format(frames: &FrameSource) -> Result<Format, Failure> {
+fn format(frames: &FrameFeed) -> Result<Format, Failure> {
     let period = (1e6 / frames.rate()).round().clamp(1.0, 1e8) as u32;
     let format = Format::new(frames.size(), frames.channels(), Encoding::Display, period);
     format.ok_or_else(|| {
@@ -243,7 +243,7 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 fn play(
     emulator: &mut Emulator,
     playback: &mut Playback<'_>,
-    frames: &mut FrameSource,
+    frames: &mut FrameFeed,
 ) -> Result<(), Failure> {
     let period = Duration::from_secs_f64(1.0 / frames.rate());
     let mut due = Instant::now();

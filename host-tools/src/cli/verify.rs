@@ -8,7 +8,8 @@ use super::tables::check;
 use crate::compile::Provenance;
 use crate::session::Layout;
 use crate::verify::{
-    ImageVerdict, Session, TestImage, Verdict, html, judge, pictures, reason, test_images, write,
+    ImageVerdict, Readings, TableVerdict, TestImage, html, judge, pictures, reason, test_images,
+    write,
 };
 use iltm_picture::progress::Progress;
 use iltm_runtime::{FrameSize, image::Table};
@@ -89,7 +90,7 @@ fn verdict(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
-    let session = Session::read(folder, table, bars)?;
+    let session = Readings::read(folder, table, bars)?;
     let verdict = judge(folder, table, &session, arguments.bound)?;
     let images = test_images(table)?;
     let out = arguments
@@ -122,8 +123,8 @@ fn verdict(
 /// Writes the page and its pictures; the page.
 fn report(
     table: &Table<'_>,
-    session: &Session,
-    verdict: &Verdict,
+    session: &Readings,
+    verdict: &TableVerdict,
     images: &[TestImage],
     out: &Path,
 ) -> Result<PathBuf, Failure> {
@@ -145,7 +146,7 @@ fn title<'i>(images: &'i [TestImage], image: &ImageVerdict) -> &'i str {
 fn data(
     arguments: &Verify,
     folder: &Path,
-    verdict: &Verdict,
+    verdict: &TableVerdict,
     images: &[TestImage],
     page: &Path,
 ) -> Value {
@@ -195,7 +196,7 @@ fn data(
     })
 }
 
-fn text(verdict: &Verdict, images: &[TestImage], page: &Path) -> String {
+fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
     let mut text = String::new();
     let _ = writeln!(text, "test image            before    after");
     for image in &verdict.images {

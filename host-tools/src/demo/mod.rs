@@ -84,7 +84,7 @@ impl Paths {
 
 /// What the demo has done.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct DemoOutcome {
     /// Where it is.
     pub paths: Paths,
     /// What was built from the sample.
@@ -105,7 +105,7 @@ pub struct Outcome {
 ///
 /// # Errors
 /// [`DemoError`]; files that are not whole are not left behind.
-pub fn run(out: &Path, progress: &dyn Progress) -> Result<Outcome, DemoError> {
+pub fn run(out: &Path, progress: &dyn Progress) -> Result<DemoOutcome, DemoError> {
     let paths = Paths::new(out);
     let mut clock = Clock::new();
     make_folder(out)?;
@@ -138,7 +138,7 @@ pub fn run(out: &Path, progress: &dyn Progress) -> Result<Outcome, DemoError> {
         (example.wanted.name, errors)
     };
     let images = report.examples.iter().map(errors).collect();
-    Ok(Outcome {
+    Ok(DemoOutcome {
         paths,
         images,
         video,

@@ -11,7 +11,7 @@
 
 use crate::board::{Board, Clock, FrameSink, FrameSource, Peripherals, Watchdog};
 use crate::frame_path::FramePath;
-use crate::hooks::{FrameHooks, Outcome};
+use crate::hooks::{FrameHooks, FrameOutcome};
 use crate::memory::Memory;
 use crate::table_slots::Tables;
 use crate::telemetry::Telemetry;
@@ -264,7 +264,7 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         let ticks = self.clock.ticks().saturating_sub(start);
         let ticks = u32::try_from(ticks).unwrap_or(u32::MAX);
         let change = stream.governor.frame(ticks);
-        let outcome = Outcome {
+        let outcome = FrameOutcome {
             sequence,
             tier,
             ticks,

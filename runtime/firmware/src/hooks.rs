@@ -18,12 +18,12 @@ pub trait FrameHooks {
     fn during_frame(&mut self, _sequence: u32, _tier: u8, _clock: &impl Clock) {}
 
     /// Called after every frame.
-    fn after_frame(&mut self, _outcome: Outcome, _status: &Telemetry) {}
+    fn after_frame(&mut self, _outcome: FrameOutcome, _status: &Telemetry) {}
 }
 
 /// What became of a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Outcome {
+pub struct FrameOutcome {
     /// Its number.
     pub sequence: u32,
     /// Its tier.

@@ -4,14 +4,14 @@
 //! Words choose the faults whose names contain one of them.
 
 use iltm::capture::Verdict;
-use iltm_tests::gates::{Rig, Session, table, tried};
+use iltm_tests::gates::{GateRig, GateSession, table, tried};
 use iltm_tests::simulated::scene;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let scene = scene("m-panels", &[]);
-    let rig = Rig::new(&scene);
-    let say = |session: &Session| {
+    let rig = GateRig::new(&scene);
+    let say = |session: &GateSession| {
         let name = session
             .fault
             .map_or_else(|| "no fault".to_owned(), |f| f.to_string());

@@ -2,7 +2,7 @@
 
 use super::files::{DEVICES, Owner, files, keys};
 use crate::flash_simulator::{NorSimulator, Violations};
-use crate::slots::{Layout, SimDevice};
+use crate::slots::{SimDevice, SlotLayout};
 use iltm_runtime::image::crc32;
 
 /// Bytes of something that is put into the flash.
@@ -28,7 +28,7 @@ pub fn flash(bytes: &[u8]) {
 }
 
 fn start<const W: usize, const E: usize>(slot: usize, puts: &[[u8; GROUP]]) {
-    let layout = Layout { slot, sector: E };
+    let layout = SlotLayout { slot, sector: E };
     let mut flash = NorSimulator::<W, E>::new(layout.sectors(), 1);
     let size = layout.sectors() * E;
     let slots = 2 * slot * E;

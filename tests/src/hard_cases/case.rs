@@ -16,12 +16,12 @@ pub struct Case {
     /// Which theory the bound is from.
     pub theory: &'static str,
     /// Runs it, with so many seeds.
-    pub run: fn(seeds: u64) -> Outcome,
+    pub run: fn(seeds: u64) -> CaseOutcome,
 }
 
 /// What came of a [`Case`].
 #[derive(Clone, PartialEq, Debug)]
-pub struct Outcome {
+pub struct CaseOutcome {
     /// What must hold, with its number.
     pub bound: String,
     /// What was found.
@@ -32,7 +32,7 @@ pub struct Outcome {
     pub refused: bool,
 }
 
-impl Outcome {
+impl CaseOutcome {
     /// Of a condition.
     pub fn new(holds: bool, bound: impl Into<String>, measured: impl Into<String>) -> Self {
         Self {
@@ -88,7 +88,7 @@ pub fn closed_loop(
     seeds: u64,
     demand: Demand,
     make: impl Fn(u64) -> Capture,
-) -> Outcome {
+) -> CaseOutcome {
     let mut found: Vec<(f64, LoopErrors)> = Vec::new();
     let mut chosen = Vec::new();
     let (mut photographs, mut live) = (0, Vec::new());
@@ -102,7 +102,7 @@ pub fn closed_loop(
                 live = cells;
             }
             Err(error) => {
-                return Outcome::new(false, "an inverse", format!("seed {seed}: {error}"));
+                return CaseOutcome::new(false, "an inverse", format!("seed {seed}: {error}"));
             }
         }
     }
@@ -131,13 +131,13 @@ pub fn closed_loop(
     );
     if demand.no_harm_only {
         let bound = "at most gain alone and nothing";
-        return Outcome::new(harmless, bound, measured);
+        return CaseOutcome::new(harmless, bound, measured);
     }
     let words = match demand.required {
         Some(required) => format!("{required:.4} asked for, {theory:.4} by theory"),
         None => format!("{theory:.4}"),
     };
-    Outcome::new(harmless && worst <= bound, words, measured)
+    CaseOutcome::new(harmless && worst <= bound, words, measured)
 }
 
 /// Error of what `iltm solve` would write, all errors, what it is and the cells

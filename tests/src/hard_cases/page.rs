@@ -1,6 +1,6 @@
 //! Page of hard cases: lists all of them.
 
-use super::case::{Case, Outcome};
+use super::case::{Case, CaseOutcome};
 use crate::hard_frames::page::Row;
 use std::fmt::Write as _;
 
@@ -46,7 +46,7 @@ reference. A step is 2^-15 of the projector's white: 128 steps are an 8-bit code
 ";
 
 /// The page, and how many cases fail.
-pub fn render(groups: &[(&str, Vec<(Case, Outcome)>)], frames: &[Row]) -> (String, usize) {
+pub fn render(groups: &[(&str, Vec<(Case, CaseOutcome)>)], frames: &[Row]) -> (String, usize) {
     let mut page = HEAD.to_owned();
     let mut failures = 0;
     let cell = |text: &str| text.replace('|', "\\|").replace('\n', " ");

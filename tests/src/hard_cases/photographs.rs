@@ -15,7 +15,7 @@ const MARGIN: usize = 5;
 
 /// How a camera takes pictures.
 #[derive(Clone, Copy, Debug)]
-pub struct Camera {
+pub struct TestCamera {
     /// Value of the brightest cell under white; above 1 it is saturated.
     pub exposure: f64,
     /// Standard deviation of a pixel, of full scale.
@@ -28,7 +28,7 @@ pub struct Camera {
     pub bernoulli: usize,
 }
 
-impl Default for Camera {
+impl Default for TestCamera {
     fn default() -> Self {
         Self {
             exposure: 0.8,
@@ -40,7 +40,7 @@ impl Default for Camera {
     }
 }
 
-impl Camera {
+impl TestCamera {
     /// Writes the capture of a scene into a folder that exists; `settings` is its
     /// `capture.toml`.
     ///

@@ -52,12 +52,16 @@ impl FaultRates {
         }
     }
 
+    /// No faults but those that are set.
+    pub fn only(set: impl FnOnce(&mut Self)) -> Self {
+        let mut rates = Self::default();
+        set(&mut rates);
+        rates
+    }
+
     /// Nothing arrives.
     pub fn silence() -> Self {
-        Self {
-            drop: 1_000,
-            ..Self::default()
-        }
+        Self::only(|rates| rates.drop = 1_000)
     }
 
     /// The fault of the next frame, if it has one.

@@ -6,7 +6,7 @@ use iltm::picture::Response as Projector;
 use iltm_runtime::link::{Refusal, Request, Response, SlotState};
 use iltm_runtime::trust::Rejected;
 use iltm_tests::flash_simulator::{ERASE_STAGES, NorSimulator, Violations};
-use iltm_tests::slots::{self, Layout, SimDevice, Step, digest};
+use iltm_tests::slots::{self, SimDevice, SlotLayout, Step, digest};
 use iltm_tests::{signing_key, wedge_table_for};
 
 type Device = SimDevice<8, 256>;
@@ -161,7 +161,7 @@ fn a_rollback_that_is_repeated_confirms_nothing() {
 /// A device whose records read differently from one time to the next where a cut caught
 /// a bit in motion; it runs the second of these files, the first is in the other slot.
 fn weak(files: [&[u8]; 2], seed: u64) -> Device {
-    let layout = Layout {
+    let layout = SlotLayout {
         slot: 3,
         sector: 256,
     };
@@ -208,7 +208,7 @@ fn a_record_cut_in_its_last_byte_reads_the_same_at_every_start() {
 fn the_first_record_of_a_part_cut_in_its_last_byte_reads_the_same_at_every_start() {
     let file = image(1);
     // A part has room for one record and its twin only: each record goes to the other.
-    let layout = Layout {
+    let layout = SlotLayout {
         slot: 4,
         sector: 128,
     };

@@ -8,7 +8,7 @@ use iltm_runtime::link::{Fault, Refusal, Request, Response};
 use iltm_runtime::store::{RECORD, identity_record};
 use iltm_runtime::trust::{Rejected, Trust};
 use iltm_tests::flash_simulator::{Misread, NorSimulator, Violations, Wear};
-use iltm_tests::slots::{Layout, SimDevice};
+use iltm_tests::slots::{SimDevice, SlotLayout};
 use iltm_tests::{signing_key, wedge_table_for};
 
 type Device = SimDevice<4, 256>;
@@ -232,7 +232,7 @@ fn cut_everywhere<const W: usize, const E: usize>(
 ) {
     let (first_table, unsigned) = (signed(1, 1), table(2));
     for confirmed in [false, true] {
-        let layout = Layout { slot, sector: E };
+        let layout = SlotLayout { slot, sector: E };
         let mut new = SimDevice::start(flash.clone(), layout);
         if confirmed {
             new.update(&first_table, true).expect("a good table");
@@ -266,7 +266,7 @@ fn cut_everywhere<const W: usize, const E: usize>(
 }
 
 fn kinds_of_flash<const W: usize, const E: usize>(slot: usize) {
-    let new = || NorSimulator::<W, E>::new(Layout { slot, sector: E }.sectors(), 1);
+    let new = || NorSimulator::<W, E>::new(SlotLayout { slot, sector: E }.sectors(), 1);
     cut_everywhere(slot, "plain", &new());
     cut_everywhere(slot, "weak", &new().with_weak_bits());
     cut_everywhere(slot, "preprogrammed", &new().with_preprogramming());

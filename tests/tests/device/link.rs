@@ -102,10 +102,7 @@ fn a_proxy_that_is_unplugged_takes_its_port_with_it() {
 
 #[test]
 fn events_that_are_lost_on_the_way_are_missed() {
-    let rates = FaultRates {
-        drop: 300,
-        ..FaultRates::default()
-    };
+    let rates = FaultRates::only(|rates| rates.drop = 300);
     let mut client = client(rates, 3);
     let granted = client.subscribe(Duration::from_millis(100));
     assert_eq!(granted.expect("an answer").period.as_millis(), 100);

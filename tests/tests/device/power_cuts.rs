@@ -12,7 +12,7 @@ use ed25519_dalek::SigningKey;
 use iltm::picture::Response;
 use iltm_runtime::link::Refusal;
 use iltm_tests::flash_simulator::{Violations, Wear, Work};
-use iltm_tests::slots::{Layout, SimDevice, Step, provision};
+use iltm_tests::slots::{SimDevice, SlotLayout, Step, provision};
 use iltm_tests::{signed, signing_key, wedge_table_for};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
@@ -144,7 +144,7 @@ fn live<const W: usize, const E: usize>(files: &Files, slot: usize, weak: bool, 
     let mut device = SimDevice::<W, E>::new(slot, 1);
     if weak {
         let flash = device.updater.into_flash().with_weak_bits();
-        let layout = Layout { slot, sector: E };
+        let layout = SlotLayout { slot, sector: E };
         device = SimDevice::start(flash, layout);
     }
     device.ask(provision(&key(), DEVICE));
@@ -217,7 +217,7 @@ fn cut_twice<const W: usize, const E: usize>(
     flash.reseed(first << 32 | second);
     flash.cut_after(first);
     let _ = device.update(&files.new, true);
-    let layout = Layout {
+    let layout = SlotLayout {
         slot: device.updater.map().slot_bytes() as usize / E,
         sector: E,
     };

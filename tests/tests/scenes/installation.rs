@@ -14,7 +14,7 @@ use iltm::session::{self, Layout, OrderOptions, order};
 use iltm::verify;
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
-use iltm_tests::gates::Session;
+use iltm_tests::gates::GateSession;
 use iltm_tests::simulated::{self, simulation};
 use std::path::Path;
 use strum::IntoEnumIterator;
@@ -84,7 +84,7 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
         photographed(&simulation, &scene, &faults, &folder);
         let examined = capture::examine(&folder, &CaptureOptions::default(), &Silent);
         let gates = examined.unwrap().gates;
-        Session { fault, gates }
+        GateSession { fault, gates }
     };
     let good = examined(None, "good");
     let failed: Vec<_> = good.gates.iter().filter(|gate| gate.fails()).collect();
@@ -133,7 +133,7 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
     let camera = VirtualCamera::new(laboratory, &simulation, 11).unwrap();
     let session = fill_capture::UnfilledCapture::read(&folder, table.grid()).unwrap();
     session.take_missing(&camera, &Silent).unwrap();
-    let session = verify::Session::read(&folder, &table, &Silent).unwrap();
+    let session = verify::Readings::read(&folder, &table, &Silent).unwrap();
     let verdict = verify::judge(&folder, &table, &session, None).unwrap();
     (learned, verdict.error)
 }

@@ -8,7 +8,7 @@ use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Effect, Forced, VirtualCamera, fill_capture};
 use iltm::session::Layout;
-use iltm::verify::{Session, Verdict, VerifyError, WhiteChange, judge, write};
+use iltm::verify::{Readings, TableVerdict, VerifyError, WhiteChange, judge, write};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_tests::simulated::{self, cell_means, error, photograph, simulation};
@@ -21,7 +21,7 @@ fn scene(replaced: &[(&str, &str)]) -> Scene {
 }
 
 /// How white differs from what the table expects.
-fn white_of(verdict: &Verdict) -> &WhiteChange {
+fn white_of(verdict: &TableVerdict) -> &WhiteChange {
     verdict.drift.white.as_ref().unwrap()
 }
 
@@ -48,16 +48,16 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     session.take_missing(&camera, &Silent).unwrap();
 }
 
-fn verdict(learned: &BuiltTable, folder: &Path) -> Result<Verdict, VerifyError> {
+fn verdict(learned: &BuiltTable, folder: &Path) -> Result<TableVerdict, VerifyError> {
     let table = Table::check(&learned.compiled.image).unwrap();
-    let session = Session::read(folder, &table, &Silent)?;
+    let session = Readings::read(folder, &table, &Silent)?;
     judge(folder, &table, &session, None)
 }
 
 /// Mean errors of plain and compensated pictures on the wall, without noise.
 fn truth(learned: &BuiltTable, scene: &Scene, folder: &Path) -> [f64; 2] {
     let table = Table::check(&learned.compiled.image).unwrap();
-    let session = Session::read(folder, &table, &Silent).unwrap();
+    let session = Readings::read(folder, &table, &Silent).unwrap();
     let simulation = simulation(scene, Forced::default().with(Effect::Noise, false));
     [0, 1].map(|half| {
         let inputs: Vec<&Vec<f64>> = session.shown.iter().map(|s| &s.input[half][0]).collect();

@@ -60,7 +60,7 @@ pub use format::pattern_set::{columns, pattern_set};
 pub use format::photo_files::{find_photo, pictures_of_stem};
 pub use format::picture_file::FileFormat;
 pub use format::reference::{REFERENCE_FILE, ReferenceError, parse_reference, read_reference};
-pub use format::role::{Axis, Role};
+pub use format::role::{CodeAxis, Role};
 pub use format::sequence::{CaptureOptions, MIN_BERNOULLI};
 pub use format::settings::{
     CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings,

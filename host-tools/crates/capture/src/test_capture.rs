@@ -1,7 +1,7 @@
 //! Small simulated captures for tests: a flat grid in front of a camera that
 //! does not line up with it, with bounced light, ambient light and noise.
 
-use iltm_capture::{Axis, CaptureOptions, Code, Manifest, Measurements, Pattern, Role};
+use iltm_capture::{CaptureOptions, Code, CodeAxis, Manifest, Measurements, Pattern, Role};
 use iltm_picture::progress::Silent;
 use iltm_runtime::Grid;
 use image::{ExtendedColorType, ImageBuffer, Luma};
@@ -120,7 +120,7 @@ impl TestCapture {
         let codes = sides.map(|(cells, offset)| code(cells, offset));
         let mut roles = [Role::White, Role::Black].repeat(self.repeats);
         for inverse in [false, true] {
-            for (axis, code) in [Axis::Column, Axis::Row].into_iter().zip(codes) {
+            for (axis, code) in [CodeAxis::Column, CodeAxis::Row].into_iter().zip(codes) {
                 roles.extend((0..code.bits).map(|bit| axis.stripe(bit, inverse)));
             }
         }

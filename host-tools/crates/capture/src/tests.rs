@@ -472,7 +472,7 @@ fn patterns_of_more_cells_than_a_table_has_are_looked_at_in_blocks() {
     assert!(rows * cols > iltm_runtime::Grid::MAX_CELLS);
     fs::create_dir(folder.path().join("patterns")).unwrap();
     let mut roles = vec![Role::White, Role::Black];
-    let stripes = |bit| [Axis::Column, Axis::Row].map(|axis| axis.stripe(bit, false));
+    let stripes = |bit| [CodeAxis::Column, CodeAxis::Row].map(|axis| axis.stripe(bit, false));
     roles.extend((0..8).flat_map(stripes));
     let codes = [Code { bits: 8, offset: 0 }; 2];
     let shots = Manifest::numbered("patterns", (0..).zip(roles)).shots;

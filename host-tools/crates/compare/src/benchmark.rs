@@ -153,12 +153,12 @@ impl Meter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_solve::Method;
 
     #[test]
     fn without_noise_every_way_that_is_exact_finds_the_inverse() {
-        let scene = TestScene::panels(6, 8);
+        let scene = KnownScene::panels(6, 8);
         let truth = scene.truth();
         let row = photograph(&acquisition::BruteForce, &scene.rig, &truth, None);
         let done = row.result.unwrap();

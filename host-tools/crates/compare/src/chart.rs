@@ -1,18 +1,18 @@
 //! Charts of the paper's experiments, over logarithmic axes.
 
-use iltm_picture::chart::{Axis, Chart, PALETTE, RowName, Series};
+use iltm_picture::chart::{Chart, ChartAxis, PALETTE, RowName, Series};
 
 /// Width and height.
 const SIZE: (f64, f64) = (760.0, 440.0);
 
 /// Points with a name, joined by a line.
-pub(super) type Curve = (String, Vec<(f64, f64)>);
+pub(super) type ChartCurve = (String, Vec<(f64, f64)>);
 
 /// Curves over two logarithmic axes.
 pub(super) fn curves<'w>(
     title: &'w str,
     (x, y): (&'w str, &'w str),
-    curves: Vec<Curve>,
+    curves: Vec<ChartCurve>,
 ) -> Chart<'w> {
     let colours = PALETTE.into_iter().cycle();
     let series = curves.into_iter().zip(colours);
@@ -26,8 +26,8 @@ pub(super) fn curves<'w>(
     Chart {
         title,
         size: SIZE,
-        x: Axis::logarithmic(x),
-        y: Axis::logarithmic(y),
+        x: ChartAxis::logarithmic(x),
+        y: ChartAxis::logarithmic(y),
         series: series.collect(),
         ..Chart::default()
     }
@@ -84,10 +84,10 @@ pub(super) fn intervals<'w>(
     Chart {
         title,
         size: (SIZE.0, 110.0 + ROW * rows.len() as f64),
-        x: Axis::logarithmic(x),
-        y: Axis {
+        x: ChartAxis::logarithmic(x),
+        y: ChartAxis {
             range: Some((-(rows.len() as f64), 0.0)),
-            ..Axis::default()
+            ..ChartAxis::default()
         },
         rows,
         series,

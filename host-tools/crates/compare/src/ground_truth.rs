@@ -134,11 +134,11 @@ impl GroundTruth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_scene::coaxial::{CoaxialScene, Panels};
 
     fn truth() -> GroundTruth {
-        TestScene::panels(6, 8).truth()
+        KnownScene::panels(6, 8).truth()
     }
 
     #[test]

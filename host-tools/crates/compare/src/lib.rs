@@ -23,13 +23,13 @@ pub mod benchmark_scene;
 mod chart;
 mod ground_truth;
 pub mod inversion;
+#[cfg(test)]
+mod known_scene;
 mod method;
 pub mod page;
 pub mod paper;
 mod rig;
 pub mod table;
-#[cfg(test)]
-mod test_scene;
 
 pub use benchmark::Meter;
 pub use ground_truth::{Errors, GroundTruth};

@@ -133,7 +133,7 @@ impl Shape {
     }
 
     /// From pixels to input coefficients, one channel.
-    fn analysis(&self, levels: &[Level]) -> f64 {
+    fn analysis(&self, levels: &[LevelCost]) -> f64 {
         let Some((finest, coarser)) = levels.split_first() else {
             return 0.0;
         };
@@ -154,9 +154,9 @@ impl Shape {
     }
 
     /// From input coefficients' sums to corrections of the cells, one channel.
-    fn synthesis(&self, levels: &[Level]) -> f64 {
+    fn synthesis(&self, levels: &[LevelCost]) -> f64 {
         let copies = if self.channels == 1 { 0.0 } else { 1.0 };
-        let level = |level: &Level| {
+        let level = |level: &LevelCost| {
             156.6
                 + 9.71 * level.plain
                 + 58.1 * level.halves
@@ -194,8 +194,8 @@ impl Shape {
 
     /// From means of the cells to input coefficients, and copies of the corrections, one
     /// channel.
-    fn cells(&self, levels: &[Level]) -> f64 {
-        let level = |level: &Level| {
+    fn cells(&self, levels: &[LevelCost]) -> f64 {
+        let level = |level: &LevelCost| {
             290.8
                 + 20.0 * level.plain
                 + 125.6 * level.halves
@@ -231,7 +231,7 @@ pub fn stages(table: &Table<'_>, tier: u8, size: FrameSize) -> Stages {
 
 /// How a level's nodes merge, by what the loops make of them.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-struct Level {
+struct LevelCost {
     /// Nodes of four equal quarters.
     plain: f64,
     /// Nodes of two halves, or of one alone.
@@ -246,7 +246,7 @@ struct Level {
 
 /// The nodes along one axis: `full` cells each, the last one `last`.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct AxisCost {
     nodes: usize,
     full: usize,
     last: usize,
@@ -260,7 +260,7 @@ struct Pairs {
     alone: f64,
 }
 
-impl Axis {
+impl AxisCost {
     const fn of_cells(cells: usize) -> Self {
         Self {
             nodes: cells,
@@ -295,8 +295,11 @@ impl Axis {
 }
 
 /// The levels of a grid's basis, finest first.
-fn levels(grid: Grid) -> Vec<Level> {
-    let (mut rows, mut cols) = (Axis::of_cells(grid.rows()), Axis::of_cells(grid.cols()));
+fn levels(grid: Grid) -> Vec<LevelCost> {
+    let (mut rows, mut cols) = (
+        AxisCost::of_cells(grid.rows()),
+        AxisCost::of_cells(grid.cols()),
+    );
     let mut levels = Vec::new();
     while rows.nodes > 1 || cols.nodes > 1 {
         let (down, along) = (rows.pairs(), cols.pairs());
@@ -305,7 +308,7 @@ fn levels(grid: Grid) -> Vec<Level> {
         let halves =
             all(down) * all(along) - (down.equal + down.unequal) * (along.equal + along.unequal);
         let whole = all(down) * all(along) - plain < 0.5;
-        levels.push(Level {
+        levels.push(LevelCost {
             plain,
             halves,
             weighted: all(down) * all(along) - plain - halves,

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Frames without an end.
 #[derive(Debug)]
-pub struct FrameSource {
+pub struct FrameFeed {
     kind: Kind,
     size: FrameSize,
     channels: u8,
@@ -35,7 +35,7 @@ enum Kind {
     },
 }
 
-impl FrameSource {
+impl FrameFeed {
     /// The moving test scene, `rate` frames a second, each of `channels` (1 or 3)
     /// samples a pixel.
     #[must_use]
@@ -175,7 +175,7 @@ mod tests {
             stream.extend([code; 2]);
         }
         let (_folder, path) = in_file("v.y4m", &stream);
-        let mut frames = FrameSource::file(&path, None, None).expect("a good video");
+        let mut frames = FrameFeed::file(&path, None, None).expect("a good video");
         assert_eq!((frames.size().width(), frames.channels()), (2, 1));
         assert!((frames.rate() - 29.97).abs() < 0.001);
         let got: Vec<_> = (0..5)
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn a_video_without_frames_is_an_error_and_no_endless_loop() {
         let (_folder, path) = in_file("v.y4m", b"YUV4MPEG2 W2 H1 F25:1 Cmono\n");
-        let mut frames = FrameSource::file(&path, None, None).expect("a header");
+        let mut frames = FrameFeed::file(&path, None, None).expect("a header");
         assert!(frames.next_frame().is_err());
     }
 
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn the_scene_moves() {
         let size = FrameSize::new(16, 12).expect("small");
-        let mut frames = FrameSource::scene(size, 3, 25.0);
+        let mut frames = FrameFeed::scene(size, 3, 25.0);
         let first = frames.next_frame().expect("a frame");
         assert_eq!(first.len(), 16 * 12 * 3);
         let mut later = (1..100).map(|_| frames.next_frame().expect("a frame"));

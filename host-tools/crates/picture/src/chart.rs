@@ -35,7 +35,7 @@ const LINE: f64 = 20.0;
 
 /// One axis.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Axis<'a> {
+pub struct ChartAxis<'a> {
     /// What runs along it, with its unit.
     pub label: &'a str,
     /// Whether equal ratios are equally long.
@@ -44,7 +44,7 @@ pub struct Axis<'a> {
     pub range: Option<(f64, f64)>,
 }
 
-impl<'a> Axis<'a> {
+impl<'a> ChartAxis<'a> {
     /// An axis with equal differences equally long, as the data have it.
     #[must_use]
     pub const fn linear(label: &'a str) -> Self {
@@ -125,9 +125,9 @@ pub struct Chart<'a> {
     /// Width and height in its own units; a page scales it.
     pub size: (f64, f64),
     /// The axis across.
-    pub x: Axis<'a>,
+    pub x: ChartAxis<'a>,
     /// The axis upwards.
-    pub y: Axis<'a>,
+    pub y: ChartAxis<'a>,
     /// Names of rows; if there are any, the axis upwards has no numbers.
     pub rows: Vec<RowName>,
     /// A curve that the area below is shaded of.
@@ -144,8 +144,8 @@ impl Default for Chart<'_> {
             title: "",
             notes: Vec::new(),
             size: (560.0, 320.0),
-            x: Axis::default(),
-            y: Axis::default(),
+            x: ChartAxis::default(),
+            y: ChartAxis::default(),
             rows: Vec::new(),
             shaded: Vec::new(),
             limit: None,
@@ -164,7 +164,7 @@ struct Scale {
 }
 
 impl Scale {
-    fn new(axis: Axis<'_>, values: impl Iterator<Item = f64>, ends: (f64, f64)) -> Self {
+    fn new(axis: ChartAxis<'_>, values: impl Iterator<Item = f64>, ends: (f64, f64)) -> Self {
         let drawn = values.filter(|value| has_place(axis, *value));
         let (low, high) = drawn.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
             (low.min(value), high.max(value))
@@ -215,7 +215,7 @@ impl Scale {
     }
 }
 
-fn has_place(axis: Axis<'_>, value: f64) -> bool {
+fn has_place(axis: ChartAxis<'_>, value: f64) -> bool {
     value.is_finite() && (value > 0.0 || !axis.logarithmic)
 }
 
@@ -385,7 +385,7 @@ mod tests {
             ..Series::default()
         };
         let chart = Chart {
-            x: Axis::logarithmic("x"),
+            x: ChartAxis::logarithmic("x"),
             series: vec![series],
             ..Chart::default()
         };
@@ -406,7 +406,11 @@ mod tests {
 
     #[test]
     fn a_short_logarithmic_axis_has_ticks_between_the_powers_of_ten() {
-        let scale = Scale::new(Axis::logarithmic(""), [0.02, 0.09].into_iter(), (0.0, 1.0));
+        let scale = Scale::new(
+            ChartAxis::logarithmic(""),
+            [0.02, 0.09].into_iter(),
+            (0.0, 1.0),
+        );
         assert_eq!(scale.ticks(), [0.02, 0.05, 0.1]);
     }
 

@@ -22,14 +22,14 @@ pub struct CoefficientMap {
     pub scale: ColourScale,
     /// Where each level begins along both axes, 0 to 1, coarsest first, with the
     /// side of its functions in cells.
-    pub levels: Vec<Level>,
+    pub levels: Vec<MapLevel>,
     /// How many coefficients there are, zeros included.
     pub coefficients: usize,
 }
 
 /// Coefficients of one level.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Level {
+pub struct MapLevel {
     /// Where they begin, 0 to 1.
     pub start: f64,
     /// Cells along a side of their functions.
@@ -77,14 +77,14 @@ fn largest_in(magnitudes: &DMatrix<f64>, row: usize, col: usize, side: usize) ->
 }
 
 /// The levels, from the fineness of each coefficient in its own order.
-fn levels(fineness: &[f64]) -> Vec<Level> {
+fn levels(fineness: &[f64]) -> Vec<MapLevel> {
     let finest = fineness.first().copied().unwrap_or(0.0);
-    let mut levels: Vec<Level> = Vec::new();
+    let mut levels: Vec<MapLevel> = Vec::new();
     let mut last = f64::NEG_INFINITY;
     for (index, level) in fineness.iter().rev().enumerate() {
         if *level > last {
             last = *level;
-            levels.push(Level {
+            levels.push(MapLevel {
                 start: index as f64 / fineness.len() as f64,
                 side: 2 << ((finest - level) as u32).min(30),
             });

@@ -5,7 +5,7 @@ use iltm_capture::{Evidence, Gate, Verdict};
 use iltm_picture::{
     ColourScale, Palette,
     canvas::{Canvas, QUIET},
-    chart::{Axis, Chart, PALETTE, Series},
+    chart::{Chart, ChartAxis, PALETTE, Series},
     html::{capitalised, colour_bar, document, img},
     png,
 };
@@ -110,13 +110,13 @@ fn chart(x: &str, y: &str, points: &[(f64, f64)], limit: Option<f64>, joined: bo
     let chart = Chart {
         title: y,
         size: (560.0, 220.0),
-        x: Axis {
+        x: ChartAxis {
             range: Some(range(points.iter().map(|p| p.0))),
-            ..Axis::linear(x)
+            ..ChartAxis::linear(x)
         },
-        y: Axis {
+        y: ChartAxis {
             range: Some(range(points.iter().map(|p| p.1).chain(limit))),
-            ..Axis::default()
+            ..ChartAxis::default()
         },
         limit: limit.map(|limit| (limit, "limit")),
         series: vec![Series {

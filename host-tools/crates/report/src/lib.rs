@@ -34,7 +34,7 @@ pub mod stills;
 mod test_scene;
 pub mod tradeoff;
 
-pub use coefficient_map::{CoefficientMap, Level};
+pub use coefficient_map::{CoefficientMap, MapLevel};
 pub use comparison::Comparison;
 pub use example::{Example, TreatedImage, Treatment, Wanted};
 pub use ladder::{TierCost, TimedTier, ladder, microseconds, microseconds_at, tier_costs};

@@ -3,7 +3,7 @@
 use super::facts::facts;
 use super::{Example, Report, TimedTier, TreatedImage, Treatment};
 use iltm_picture::{
-    chart::{Axis, Chart, Series},
+    chart::{Chart, ChartAxis, Series},
     html::{colour_bar, document, grouped, img_named, number, percent},
 };
 use iltm_solve::{Compensation, Prediction};
@@ -291,8 +291,8 @@ impl Report<'_> {
         };
         let chart = Chart {
             title: "What each tier leaves out against the time it takes",
-            x: Axis::linear("microseconds a frame, one core of this machine"),
-            y: Axis::logarithmic("left out (relative error)"),
+            x: ChartAxis::linear("microseconds a frame, one core of this machine"),
+            y: ChartAxis::logarithmic("left out (relative error)"),
             limit: Some((own, "error of the inverse itself")),
             series: vec![series],
             ..Chart::default()
@@ -345,8 +345,8 @@ impl Report<'_> {
         };
         let chart = Chart {
             title: "Misfit of held-out photographs by the weight of sparsity",
-            x: Axis::logarithmic("weight of sparsity \u{3bb}"),
-            y: Axis::linear("misfit of held-out photographs, %"),
+            x: ChartAxis::logarithmic("weight of sparsity \u{3bb}"),
+            y: ChartAxis::linear("misfit of held-out photographs, %"),
             series: vec![series],
             ..Chart::default()
         };

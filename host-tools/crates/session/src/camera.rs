@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Takes photographs of what is shown.
-pub trait Camera {
+pub trait CameraDriver {
     /// Takes one and gives its file, in `folder`, which is empty and for this one
     /// photograph.
     ///
@@ -49,7 +49,7 @@ impl<'a> CommandCamera<'a> {
     }
 }
 
-impl Camera for CommandCamera<'_> {
+impl CameraDriver for CommandCamera<'_> {
     fn shoot(&mut self, planned: &Planned, folder: &Path) -> Result<PathBuf, SessionError> {
         let refuse = |reason: String| SessionError::Camera {
             index: planned.index,
@@ -133,7 +133,7 @@ impl<'a> WatchedFolder<'a> {
     }
 }
 
-impl Camera for WatchedFolder<'_> {
+impl CameraDriver for WatchedFolder<'_> {
     fn shoot(&mut self, planned: &Planned, folder: &Path) -> Result<PathBuf, SessionError> {
         let refuse = |reason: String| SessionError::Camera {
             index: planned.index,

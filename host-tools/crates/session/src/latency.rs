@@ -52,7 +52,7 @@ pub enum Flash {
 }
 
 /// What the measurement needs of projector and camera.
-pub trait Rig {
+pub trait LatencyProbe {
     /// Shows white or black.
     ///
     /// # Errors
@@ -71,7 +71,10 @@ pub trait Rig {
 /// # Errors
 /// [`SessionError::Latency`] if white and black look alike or photographs do not
 /// settle, or what showing and photographing give.
-pub fn measure(rig: &mut dyn Rig, stop: &dyn Fn() -> bool) -> Result<Latency, SessionError> {
+pub fn measure(
+    rig: &mut dyn LatencyProbe,
+    stop: &dyn Fn() -> bool,
+) -> Result<Latency, SessionError> {
     rig.show(Flash::Black)?;
     let mut black = 0.0;
     for _ in 0..FIRST {
@@ -126,7 +129,7 @@ pub fn measure(rig: &mut dyn Rig, stop: &dyn Fn() -> bool) -> Result<Latency, Se
 /// Shows white and photographs at growing delays until it stands: its level, and
 /// after what time the first photograph was begun that shows all of it.
 fn rise(
-    rig: &mut dyn Rig,
+    rig: &mut dyn LatencyProbe,
     black: f64,
     stop: &dyn Fn() -> bool,
 ) -> Result<(f64, Duration), SessionError> {
@@ -208,7 +211,7 @@ mod tests {
         }
     }
 
-    impl Rig for Fake {
+    impl LatencyProbe for Fake {
         fn show(&mut self, flash: Flash) -> Result<(), SessionError> {
             let level = match flash {
                 Flash::White => 0.3,
@@ -247,7 +250,7 @@ mod tests {
     #[test]
     fn a_camera_that_sees_no_projector_is_told_so() {
         struct Blind;
-        impl Rig for Blind {
+        impl LatencyProbe for Blind {
             fn show(&mut self, _: Flash) -> Result<(), SessionError> {
                 Ok(())
             }

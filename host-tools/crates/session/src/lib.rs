@@ -33,7 +33,7 @@ mod tests;
 pub mod verify;
 
 pub use calibration_pictures::ramp_levels;
-pub use camera::{Camera, CommandCamera, WatchedFolder};
+pub use camera::{CameraDriver, CommandCamera, WatchedFolder};
 pub use error::{PatternsError, SessionError};
 pub use folder::{Made, SLIDES_FOLDER, slide_name, write};
 pub use latency::{Latency, measure};
@@ -41,4 +41,4 @@ pub use layout::Layout;
 pub use order::{OrderOptions, Purpose, Slide, order};
 pub use plan::{Planned, State, planned, ranges, states};
 pub use screen::{CommandScreen, Screen, with_window};
-pub use shoot::{Event, Session, SessionOptions, Summary};
+pub use shoot::{CaptureSession, SessionOptions, ShootEvent, Summary};

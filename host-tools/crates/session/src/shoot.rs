@@ -1,9 +1,9 @@
 //! A session: slide by slide, shown, waited for, photographed, looked at.
 
-use super::latency::{Flash, Rig};
+use super::latency::{Flash, LatencyProbe};
 use super::plan::{self, Planned, State, endings, unlike};
 use super::shell;
-use super::{Camera, Latency, Screen, SessionError, measure, states};
+use super::{CameraDriver, Latency, Screen, SessionError, measure, states};
 use iltm_capture::{PhotoStats, Role};
 use iltm_picture::progress::Progress;
 use std::fs;
@@ -24,7 +24,7 @@ pub struct SessionOptions {
 
 /// Something that happened.
 #[derive(Clone, Debug)]
-pub enum Event<'a> {
+pub enum ShootEvent<'a> {
     /// The session begins, or goes on.
     Begun {
         /// Photographs to take.
@@ -72,13 +72,13 @@ pub struct Summary {
 
 /// What is to be photographed, and what of it is there.
 #[derive(Debug)]
-pub struct Session {
+pub struct CaptureSession {
     folder: PathBuf,
     list: Vec<Planned>,
     states: Vec<State>,
 }
 
-impl Session {
+impl CaptureSession {
     /// Opens a capture folder and looks at the photographs that are there.
     ///
     /// # Errors
@@ -106,13 +106,13 @@ impl Session {
         &mut self,
         options: &SessionOptions,
         screen: &mut dyn Screen,
-        camera: &mut dyn Camera,
+        camera: &mut dyn CameraDriver,
         stop: &dyn Fn() -> bool,
-        tell: &mut dyn FnMut(&Event<'_>),
+        tell: &mut dyn FnMut(&ShootEvent<'_>),
     ) -> Result<Summary, SessionError> {
         let todo = self.todo(&options.again)?;
         let (missing, all) = (todo.len(), self.list.len());
-        tell(&Event::Begun { missing, all });
+        tell(&ShootEvent::Begun { missing, all });
         if todo.is_empty() {
             return Ok(Summary {
                 taken: 0,
@@ -130,11 +130,11 @@ impl Session {
             // A person looks before pressing the button.
             None if !shooting.camera.is_prompt() => Latency::default(),
             None => {
-                tell(&Event::Measuring);
+                tell(&ShootEvent::Measuring);
                 shooting.latency(&self.list, &self.folder)?
             }
         };
-        tell(&Event::Latency(latency));
+        tell(&ShootEvent::Latency(latency));
         for (done, at) in todo.into_iter().enumerate() {
             let planned = &self.list[at];
             let like = self.like(at);
@@ -144,12 +144,12 @@ impl Session {
                     Err(SessionError::Camera { reason, .. }) if attempt < options.retries => {
                         attempt += 1;
                         let reason = &reason;
-                        tell(&Event::Failed { planned, reason });
+                        tell(&ShootEvent::Failed { planned, reason });
                     }
                     other => break other?,
                 }
             };
-            tell(&Event::Taken {
+            tell(&ShootEvent::Taken {
                 planned,
                 photo: &photo,
                 exposed,
@@ -203,7 +203,7 @@ impl Session {
 /// Screen and camera at work.
 struct Shooting<'a> {
     screen: &'a mut dyn Screen,
-    camera: &'a mut dyn Camera,
+    camera: &'a mut dyn CameraDriver,
     stop: &'a dyn Fn() -> bool,
 }
 
@@ -221,7 +221,7 @@ impl Shooting<'_> {
         planned: &Planned,
         latency: Latency,
         like: Option<&PhotoStats>,
-        tell: &mut dyn FnMut(&Event<'_>),
+        tell: &mut dyn FnMut(&ShootEvent<'_>),
     ) -> Result<(PathBuf, PhotoStats), SessionError> {
         self.stopped()?;
         self.screen.show(planned)?;
@@ -232,7 +232,7 @@ impl Shooting<'_> {
             let folder = beside(&planned.photo)?;
             self.camera.shoot(planned, folder.path())?;
         }
-        tell(&Event::Shown(planned));
+        tell(&ShootEvent::Shown(planned));
         let folder = beside(&planned.photo)?;
         let (taken, exposed) = self.whole(planned, folder.path())?;
         if let Some(why) = like.and_then(|like| unlike(&exposed, like)) {
@@ -294,7 +294,7 @@ struct Flashing<'f, 'a, 'l> {
     shown: &'l Planned,
 }
 
-impl Rig for Flashing<'_, '_, '_> {
+impl LatencyProbe for Flashing<'_, '_, '_> {
     fn show(&mut self, flash: Flash) -> Result<(), SessionError> {
         self.shooting.stopped()?;
         self.shown = match flash {

@@ -71,8 +71,8 @@ impl Rig {
         CommandCamera::new(&self.here(command), Duration::from_secs(20), &NEVER)
     }
 
-    fn open(&self) -> Session {
-        Session::open(&self.capture(), &Silent).unwrap()
+    fn open(&self) -> CaptureSession {
+        CaptureSession::open(&self.capture(), &Silent).unwrap()
     }
 
     /// Runs a session with this camera and counts its photographs.
@@ -87,7 +87,7 @@ impl Rig {
             &mut self.screen(),
             &mut self.camera(camera),
             &NEVER,
-            &mut |event| taken += usize::from(matches!(event, Event::Taken { .. })),
+            &mut |event| taken += usize::from(matches!(event, ShootEvent::Taken { .. })),
         );
         (summary, taken)
     }
@@ -129,7 +129,9 @@ fn an_interrupted_session_goes_on_where_it_stopped() {
         &mut rig.screen(),
         &mut rig.camera(GOOD),
         &stop,
-        &mut |event| taken.set(taken.get() + usize::from(matches!(event, Event::Taken { .. }))),
+        &mut |event| {
+            taken.set(taken.get() + usize::from(matches!(event, ShootEvent::Taken { .. })));
+        },
     );
     assert!(matches!(stopped, Err(SessionError::Stopped)), "{stopped:?}");
     assert_eq!(

@@ -10,7 +10,7 @@
 //! kind of the input.
 
 use super::bands::{Bands, Interleaved};
-use super::engine::{Engine, FrameJob};
+use super::engine::{Engine, EngineJob};
 use super::live::Live;
 use super::{Input, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
@@ -219,7 +219,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
 
     /// What is to be done to frames of this size and number of colours, if that is
     /// possible.
-    pub(super) fn job(&self, size: FrameSize, colours: usize) -> Result<FrameJob, VideoError> {
+    pub(super) fn job(&self, size: FrameSize, colours: usize) -> Result<EngineJob, VideoError> {
         if colours < usize::from(self.table.channels()) {
             return Err(VideoError::GreyFrame);
         }
@@ -229,7 +229,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 grid: self.table.grid(),
             });
         }
-        Ok(FrameJob {
+        Ok(EngineJob {
             size,
             colours,
             tier: self.tier,
@@ -238,7 +238,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
     }
 
     /// A single frame in place; how many samples were clipped.
-    fn one<P: Bands>(&self, job: FrameJob, frame: &mut P) -> Result<u64, VideoError> {
+    fn one<P: Bands>(&self, job: EngineJob, frame: &mut P) -> Result<u64, VideoError> {
         match self.table.channels() {
             1 => self.engine::<P, 1>(job)?.compensate(frame),
             _ => self.engine::<P, 3>(job)?.compensate(frame),
@@ -247,7 +247,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
 
     pub(super) fn engine<P: Bands, const C: usize>(
         &self,
-        job: FrameJob,
+        job: EngineJob,
     ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
         Engine::new(self.table, &self.threads, job).map_err(VideoError::Runtime)
     }

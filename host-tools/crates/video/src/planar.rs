@@ -219,13 +219,8 @@ impl Band for PlanarBand<'_> {
 
     #[inline(always)]
     fn unpack(&self, strip: usize, rows: &mut ChromaRows, colours: &mut [u8]) {
-        let PlaneLayout {
-            width,
-            chroma_width,
-            sampling,
-            conversion,
-            ..
-        } = self.layout;
+        let layout = self.layout;
+        let (width, sampling, conversion) = (layout.width, layout.sampling, layout.conversion);
         let (luma, chroma) = self.starts(strip);
         let lumas = self.luma[luma..].chunks_exact(width);
         if sampling == ChromaSampling::Mono {
@@ -234,9 +229,9 @@ impl Band for PlanarBand<'_> {
             }
             return;
         }
-        rows.fit(&self.layout);
-        let mut us = self.u[chroma..].chunks_exact(chroma_width);
-        let mut vs = self.v[chroma..].chunks_exact(chroma_width);
+        rows.fit(&layout);
+        let mut us = self.u[chroma..].chunks_exact(layout.chroma_width);
+        let mut vs = self.v[chroma..].chunks_exact(layout.chroma_width);
         for (row, (luma, colours)) in lumas.zip(colours.chunks_exact_mut(3 * width)).enumerate() {
             if sampling == ChromaSampling::Chroma444 || row == 0 {
                 let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
@@ -260,13 +255,8 @@ impl Band for PlanarBand<'_> {
 
     #[inline(always)]
     fn pack(&mut self, strip: usize, rows: &mut ChromaRows, colours: &[u8]) {
-        let PlaneLayout {
-            width,
-            chroma_width,
-            sampling,
-            conversion,
-            ..
-        } = self.layout;
+        let layout = self.layout;
+        let (width, sampling, conversion) = (layout.width, layout.sampling, layout.conversion);
         let (luma, chroma) = self.starts(strip);
         let lumas = self.luma[luma..].chunks_exact_mut(width);
         if sampling == ChromaSampling::Mono {
@@ -275,9 +265,9 @@ impl Band for PlanarBand<'_> {
             }
             return;
         }
-        rows.fit(&self.layout);
-        let mut us = self.u[chroma..].chunks_exact_mut(chroma_width);
-        let mut vs = self.v[chroma..].chunks_exact_mut(chroma_width);
+        rows.fit(&layout);
+        let mut us = self.u[chroma..].chunks_exact_mut(layout.chroma_width);
+        let mut vs = self.v[chroma..].chunks_exact_mut(layout.chroma_width);
         for (luma, colours) in lumas.zip(colours.chunks_exact(3 * width)) {
             conversion.luma_row(separate(colours, width), luma);
             if sampling == ChromaSampling::Chroma444 {

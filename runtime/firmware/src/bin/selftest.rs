@@ -14,7 +14,7 @@ use cortex_m_semihosting::debug;
 use iltm_firmware::board::{Board, Clock};
 use iltm_firmware::boards::{Chosen, psram};
 use iltm_firmware::device::start;
-use iltm_firmware::hooks::{FrameHooks, Outcome};
+use iltm_firmware::hooks::{FrameHooks, FrameOutcome};
 use iltm_firmware::stack;
 use iltm_firmware::telemetry::Telemetry;
 use iltm_runtime::FrameSize;
@@ -245,7 +245,7 @@ impl FrameHooks for Orders {
         self.outside(clock.ticks());
     }
 
-    fn after_frame(&mut self, outcome: Outcome, telemetry: &Telemetry) {
+    fn after_frame(&mut self, outcome: FrameOutcome, telemetry: &Telemetry) {
         self.add(finding::OVER, u32::from(outcome.over));
         let frames = telemetry.frame_counts();
         self.words.store(finding::LATE, frames.late);

@@ -18,7 +18,7 @@ pub(super) use op::OP;
 
 use super::files::{Owner, files};
 use crate::flash_simulator::{NorSimulator, Violations};
-use crate::slots::{Layout, SimDevice};
+use crate::slots::{SimDevice, SlotLayout};
 use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
 use iltm_runtime::store::Slot;
 use model::{Model, Record, Sizes};
@@ -76,7 +76,7 @@ struct Trial<const W: usize, const E: usize> {
     models: Vec<Model>,
     /// Every record that there may have been.
     records: Vec<Option<Record>>,
-    layout: Layout,
+    layout: SlotLayout,
     sequence: u16,
     greeted: bool,
     noise: Noise,
@@ -101,7 +101,7 @@ struct Held {
 
 impl<const W: usize, const E: usize> Trial<W, E> {
     fn new(slot: usize, weak: bool) -> Self {
-        let layout = Layout { slot, sector: E };
+        let layout = SlotLayout { slot, sector: E };
         let flash = NorSimulator::new(layout.sectors(), 1);
         let flash = if weak { flash.with_weak_bits() } else { flash };
         let device = SimDevice::start(flash, layout);

@@ -1,7 +1,7 @@
 //! Coverage: cells that no light reaches, that reflect none, that the camera does not see,
 //! or that the surface covers in part.
 
-use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -62,7 +62,7 @@ fn spread(cell: usize) -> bool {
     cell % 27 == 5 && cell < 270
 }
 
-fn black(seeds: u64) -> Outcome {
+fn black(seeds: u64) -> CaseOutcome {
     let mut scene = textured();
     for (cell, albedo) in scene.albedo.iter_mut().enumerate() {
         if spread(cell) {
@@ -72,7 +72,7 @@ fn black(seeds: u64) -> Outcome {
     named(&scene, seeds, spread, WhyLeftOut::Black)
 }
 
-fn unlit(seeds: u64) -> Outcome {
+fn unlit(seeds: u64) -> CaseOutcome {
     let mut scene = textured();
     for light in scene.irradiance.iter_mut().take(21) {
         *light = 0.0;
@@ -82,7 +82,12 @@ fn unlit(seeds: u64) -> Outcome {
 
 /// The closed loop over the other cells, and whether all of `wanted` and no
 /// others are left out for the right reason.
-fn named(scene: &CoaxialScene, seeds: u64, wanted: fn(usize) -> bool, why: WhyLeftOut) -> Outcome {
+fn named(
+    scene: &CoaxialScene,
+    seeds: u64,
+    wanted: fn(usize) -> bool,
+    why: WhyLeftOut,
+) -> CaseOutcome {
     let demand = Demand {
         noise: 1e-3,
         ..Demand::default()
@@ -103,7 +108,7 @@ fn named(scene: &CoaxialScene, seeds: u64, wanted: fn(usize) -> bool, why: WhyLe
     outcome
 }
 
-fn unseen(seeds: u64) -> Outcome {
+fn unseen(seeds: u64) -> CaseOutcome {
     let scene = textured();
     // A block of 4 x 5 cells at a valley.
     let hidden = |cell: usize| (4..8).contains(&(cell / 21)) && (3..8).contains(&(cell % 21));
@@ -127,7 +132,7 @@ fn partly_covered() -> CoaxialScene {
 }
 
 /// Judged in the first channel.
-fn colour(seeds: u64) -> Outcome {
+fn colour(seeds: u64) -> CaseOutcome {
     let scene = partly_covered();
     let others = [3, 4].map(|texture| scene.clone().textured(0.2, 0.8, texture));
     let demand = Demand {
@@ -147,7 +152,7 @@ fn colour(seeds: u64) -> Outcome {
 }
 
 /// Cells covered to less than `least` are too small for the camera.
-fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> Outcome {
+fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> CaseOutcome {
     let scene = partly_covered();
     let noise = decibels.map_or(0.0, |decibels| 10_f64.powf(-decibels / 20.0));
     let demand = Demand {

@@ -1,6 +1,6 @@
 //! Grids of odd sizes.
 
-use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
 use super::super::grid;
 use super::super::observations::Capture;
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -46,7 +46,7 @@ pub(super) const CASES: [Case; 6] = [
     },
 ];
 
-fn wedge(seeds: u64, size: (u16, u16), bernoulli: usize) -> Outcome {
+fn wedge(seeds: u64, size: (u16, u16), bernoulli: usize) -> CaseOutcome {
     let grid = grid(size);
     let scene = CoaxialScene::new(grid, &Panels::corner(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
     let demand = Demand {
@@ -58,7 +58,7 @@ fn wedge(seeds: u64, size: (u16, u16), bernoulli: usize) -> Outcome {
     })
 }
 
-fn one_cell(_: u64) -> Outcome {
+fn one_cell(_: u64) -> CaseOutcome {
     let grid = grid((1, 1));
     let scene = CoaxialScene::new(
         grid,
@@ -73,17 +73,17 @@ fn one_cell(_: u64) -> Outcome {
         Ok((found, report)) => {
             let gain = found.channels[0].gain[0];
             let right = (gain - 2.0).abs() < 1e-6 && found.shared.amax() == 0.0;
-            Outcome::new(
+            CaseOutcome::new(
                 right,
                 "gain 2, no operator",
                 format!("gain {gain:.6}, {}", report.compensation),
             )
         }
-        Err(error) => Outcome::new(false, "an inverse", error.to_string()),
+        Err(error) => CaseOutcome::new(false, "an inverse", error.to_string()),
     }
 }
 
-fn column(seeds: u64) -> Outcome {
+fn column(seeds: u64) -> CaseOutcome {
     let grid = grid((33, 1));
     let panels = Panels {
         folds: vec![0.0, 1.0],

@@ -1,6 +1,6 @@
 //! NaN: not a number, infinity and denormals wherever a number may come in.
 
-use super::super::case::{Case, Outcome};
+use super::super::case::{Case, CaseOutcome};
 use super::super::grid;
 use super::super::observations::Capture;
 use iltm::capture::Settings;
@@ -58,10 +58,10 @@ fn capture() -> Capture {
 }
 
 /// All must be refused; measured is the first message.
-fn all_refused(results: Vec<Result<(), String>>) -> Outcome {
+fn all_refused(results: Vec<Result<(), String>>) -> CaseOutcome {
     let count = results.len();
     let messages: Vec<String> = results.into_iter().filter_map(Result::err).collect();
-    Outcome {
+    CaseOutcome {
         holds: messages.len() == count,
         refused: true,
         bound: format!("{count} of {count} refused"),
@@ -73,7 +73,7 @@ fn all_refused(results: Vec<Result<(), String>>) -> Outcome {
     }
 }
 
-fn observations(_: u64) -> Outcome {
+fn observations(_: u64) -> CaseOutcome {
     let spoil: [fn(&mut Capture, f64); 5] = [
         |capture, value| capture.light[0][(7, 5)] = value,
         |capture, value| capture.patterns[(7, 5)] = value,
@@ -97,7 +97,7 @@ fn observations(_: u64) -> Outcome {
     all_refused(results)
 }
 
-fn options(_: u64) -> Outcome {
+fn options(_: u64) -> CaseOutcome {
     let capture = capture();
     let solve = |options: SolveOptions| {
         let solved = solve_observed(&capture.observed(), &options, &Silent);
@@ -115,7 +115,7 @@ fn options(_: u64) -> Outcome {
         }));
     }
     let Ok((inverse, _)) = capture.solve() else {
-        return Outcome::new(false, "an inverse", "none");
+        return CaseOutcome::new(false, "an inverse", "none");
     };
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e300] {
         results.push(compiled(
@@ -151,9 +151,9 @@ fn compiled(inverse: &InverseTransport, options: &CompileOptions) -> Result<(), 
         .map_err(|error| error.to_string())
 }
 
-fn inverses(_: u64) -> Outcome {
+fn inverses(_: u64) -> CaseOutcome {
     let Ok((inverse, _)) = capture().solve() else {
-        return Outcome::new(false, "an inverse", "none");
+        return CaseOutcome::new(false, "an inverse", "none");
     };
     let spoil: [fn(&mut InverseTransport, f64); 5] = [
         |inverse, value| inverse.shared[(3, 4)] = value,
@@ -178,7 +178,7 @@ fn inverses(_: u64) -> Outcome {
     all_refused(results)
 }
 
-fn settings(_: u64) -> Outcome {
+fn settings(_: u64) -> CaseOutcome {
     let mut results = Vec::new();
     for value in ["nan", "inf", "-inf", "-1", "1e300", "true"] {
         for text in [
@@ -198,10 +198,10 @@ fn settings(_: u64) -> Outcome {
 }
 
 /// An inverse must be the one of light near 1, or be refused.
-fn scaled(factor: f64) -> Outcome {
+fn scaled(factor: f64) -> CaseOutcome {
     let bound = "the same table as for light near 1, or a refusal";
     let Ok((plain, _)) = capture().solve() else {
-        return Outcome::new(false, bound, "no inverse");
+        return CaseOutcome::new(false, bound, "no inverse");
     };
     let small = capture().map(|light| light * factor);
     match small.solve() {
@@ -211,7 +211,7 @@ fn scaled(factor: f64) -> Outcome {
                 .map(|(a, b)| (a * factor / b - 1.0).abs())
                 .fold(0.0, f64::max);
             let table = compiled(&found, &CompileOptions::default());
-            Outcome {
+            CaseOutcome {
                 holds: change < 1e-6 || table.is_err(),
                 refused: table.is_err(),
                 bound: bound.to_owned(),
@@ -221,9 +221,9 @@ fn scaled(factor: f64) -> Outcome {
                 },
             }
         }
-        Err(error) => Outcome {
+        Err(error) => CaseOutcome {
             refused: true,
-            ..Outcome::new(true, bound, error.to_string())
+            ..CaseOutcome::new(true, bound, error.to_string())
         },
     }
 }

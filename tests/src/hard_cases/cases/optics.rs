@@ -1,6 +1,6 @@
 //! Optics: what projector, camera and surface do to light besides Lambert's law.
 
-use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
 use super::super::observations::{Capture, out_of_focus};
 use super::super::{GRID, grid};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -89,7 +89,7 @@ fn uniform() -> CoaxialScene {
     CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7)
 }
 
-fn noiseless(scene: &CoaxialScene, seeds: u64, required: Option<f64>) -> Outcome {
+fn noiseless(scene: &CoaxialScene, seeds: u64, required: Option<f64>) -> CaseOutcome {
     let demand = Demand {
         required,
         ..Demand::default()
@@ -97,7 +97,7 @@ fn noiseless(scene: &CoaxialScene, seeds: u64, required: Option<f64>) -> Outcome
     closed_loop(scene, seeds, demand, |seed| Capture::new(scene, 60, seed))
 }
 
-fn no_harm(scene: &CoaxialScene, seeds: u64) -> Outcome {
+fn no_harm(scene: &CoaxialScene, seeds: u64) -> CaseOutcome {
     let demand = Demand {
         no_harm_only: true,
         ..Demand::default()
@@ -107,7 +107,7 @@ fn no_harm(scene: &CoaxialScene, seeds: u64) -> Outcome {
     })
 }
 
-fn blurred(seeds: u64, deviation: f64, required: Option<f64>) -> Outcome {
+fn blurred(seeds: u64, deviation: f64, required: Option<f64>) -> CaseOutcome {
     let scene = out_of_focus(uniform(), deviation);
     let demand = Demand {
         required,

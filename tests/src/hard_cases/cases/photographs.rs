@@ -1,10 +1,10 @@
 //! Capture files: what the camera does to the light of whole captures.
 
-use super::super::case::{Case, Outcome};
+use super::super::case::{Case, CaseOutcome};
 use super::super::closed_loop::errors;
 use super::super::grid;
 use super::super::observations::out_of_focus;
-use super::super::photographs::Camera;
+use super::super::photographs::TestCamera;
 use iltm::build_table::{BuiltTable, build_table};
 use iltm::capture::CaptureOptions;
 use iltm::progress::Silent;
@@ -16,7 +16,7 @@ pub(super) const CASES: [Case; 8] = [
         name: "16 bits, well exposed",
         reason: "what the others are compared with",
         theory: "pixels average: noise / sqrt(36 pixels), as 66 dB",
-        run: |_| exact(Camera::default(), "", 0.01),
+        run: |_| exact(TestCamera::default(), "", 0.01),
     },
     Case {
         name: "8 bits",
@@ -24,9 +24,9 @@ pub(super) const CASES: [Case; 8] = [
         theory: "quantisation adds 1/(12 255^2) to each pixel's variance",
         run: |_| {
             exact(
-                Camera {
+                TestCamera {
                     full_scale: 255,
-                    ..Camera::default()
+                    ..TestCamera::default()
                 },
                 "",
                 0.01,
@@ -38,10 +38,10 @@ pub(super) const CASES: [Case; 8] = [
         reason: "steps are coarse where it is bright",
         theory: "quantisation at full scale is 2.2 / 255 wide",
         run: |_| {
-            let camera = Camera {
+            let camera = TestCamera {
                 full_scale: 255,
                 gamma: 2.2,
-                ..Camera::default()
+                ..TestCamera::default()
             };
             exact(camera, "[camera]\nresponse = 2.2\n", 0.015)
         },
@@ -52,7 +52,12 @@ pub(super) const CASES: [Case; 8] = [
         theory: "T^-1 = B^-1 T0^-1; images are those that a blurred projector can make",
         run: |_| {
             let scene = out_of_focus(scene(), 0.5);
-            of_scene(&scene, Camera::default(), "[projector]\nblur = 0.5\n", 0.01)
+            of_scene(
+                &scene,
+                TestCamera::default(),
+                "[projector]\nblur = 0.5\n",
+                0.01,
+            )
         },
     },
     Case {
@@ -66,10 +71,10 @@ pub(super) const CASES: [Case; 8] = [
         reason: "light does not add up: superposition fails",
         theory: "superposition must hold to 3 %",
         run: |_| {
-            let camera = Camera {
+            let camera = TestCamera {
                 gamma: 2.2,
                 full_scale: 255,
-                ..Camera::default()
+                ..TestCamera::default()
             };
             refused(camera, "light does not add up")
         },
@@ -80,9 +85,9 @@ pub(super) const CASES: [Case; 8] = [
         theory: "at most 10 % of the lit pixels may be saturated",
         run: |_| {
             refused(
-                Camera {
+                TestCamera {
                     exposure: 1.6,
-                    ..Camera::default()
+                    ..TestCamera::default()
                 },
                 "overexposed",
             )
@@ -94,10 +99,10 @@ pub(super) const CASES: [Case; 8] = [
         theory: "a cell needs pixels that follow its pattern",
         run: |_| {
             refused(
-                Camera {
+                TestCamera {
                     exposure: 0.002,
                     noise: 0.01,
-                    ..Camera::default()
+                    ..TestCamera::default()
                 },
                 "cells were found",
             )
@@ -110,15 +115,15 @@ fn scene() -> CoaxialScene {
     CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.3, 0.9, 1)
 }
 
-fn flat() -> Outcome {
+fn flat() -> CaseOutcome {
     let mut scene = scene();
     scene.form_factors.fill(0.0);
     let bound = "a table with no operator entries";
-    match table(&scene, Camera::default(), "") {
+    match table(&scene, TestCamera::default(), "") {
         Ok(learned) => {
             let entries = learned.compiled.ladder.entries.len();
             let chosen = learned.report.compensation;
-            Outcome::new(
+            CaseOutcome::new(
                 entries == 0,
                 bound,
                 format!(
@@ -127,11 +132,11 @@ fn flat() -> Outcome {
                 ),
             )
         }
-        Err(error) => Outcome::new(false, bound, error),
+        Err(error) => CaseOutcome::new(false, bound, error),
     }
 }
 
-fn table(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<BuiltTable, String> {
+fn table(scene: &CoaxialScene, camera: TestCamera, settings: &str) -> Result<BuiltTable, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     camera
         .write(scene, folder.path(), settings)
@@ -148,7 +153,7 @@ fn table(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<BuiltTa
 }
 
 /// Error of the closed loop of what was learned, or why nothing was.
-fn learned(scene: &CoaxialScene, camera: Camera, settings: &str) -> Result<(f64, f64), String> {
+fn learned(scene: &CoaxialScene, camera: TestCamera, settings: &str) -> Result<(f64, f64), String> {
     let learned = table(scene, camera, settings)?;
     let flood = scene.transport().column_sum().max();
     let errors = errors(
@@ -171,22 +176,22 @@ fn in_scene_units(mut inverse: InverseTransport, exposure: f64) -> InverseTransp
     inverse
 }
 
-fn exact(camera: Camera, settings: &str, bound: f64) -> Outcome {
+fn exact(camera: TestCamera, settings: &str, bound: f64) -> CaseOutcome {
     of_scene(&scene(), camera, settings, bound)
 }
 
-fn of_scene(scene: &CoaxialScene, camera: Camera, settings: &str, bound: f64) -> Outcome {
+fn of_scene(scene: &CoaxialScene, camera: TestCamera, settings: &str, bound: f64) -> CaseOutcome {
     match learned(scene, camera, settings) {
-        Ok((error, gain_only)) => Outcome::new(
+        Ok((error, gain_only)) => CaseOutcome::new(
             error <= bound.min(gain_only),
             format!("{bound}"),
             format!("{error:.4}; gain alone {gain_only:.4}"),
         ),
-        Err(error) => Outcome::new(false, format!("{bound}"), error),
+        Err(error) => CaseOutcome::new(false, format!("{bound}"), error),
     }
 }
 
-fn refused(camera: Camera, words: &str) -> Outcome {
+fn refused(camera: TestCamera, words: &str) -> CaseOutcome {
     let what = |(error, gain): (f64, f64)| format!("a table: {error:.4}; gain alone {gain:.4}");
-    Outcome::refusal(learned(&scene(), camera, "").map(what), words)
+    CaseOutcome::refusal(learned(&scene(), camera, "").map(what), words)
 }

@@ -1,6 +1,6 @@
 //! Noise, and photographs that say less than they should.
 
-use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -83,7 +83,7 @@ fn scene() -> CoaxialScene {
     CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.25, 0.95, 1)
 }
 
-fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> Outcome {
+fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> CaseOutcome {
     let scene = scene();
     let demand = Demand {
         noise: 10_f64.powf(-decibels / 20.0),
@@ -95,7 +95,7 @@ fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> Outcome {
     })
 }
 
-fn no_harm(seeds: u64, make: impl Fn(&CoaxialScene, u64) -> Capture) -> Outcome {
+fn no_harm(seeds: u64, make: impl Fn(&CoaxialScene, u64) -> Capture) -> CaseOutcome {
     let scene = scene();
     let demand = Demand {
         no_harm_only: true,
@@ -104,7 +104,7 @@ fn no_harm(seeds: u64, make: impl Fn(&CoaxialScene, u64) -> Capture) -> Outcome 
     closed_loop(&scene, seeds, demand, |seed| make(&scene, seed))
 }
 
-fn few(seeds: u64, bernoulli: usize) -> Outcome {
+fn few(seeds: u64, bernoulli: usize) -> CaseOutcome {
     no_harm(seeds, |scene, seed| {
         Capture::new(scene, bernoulli, seed).noisy(50.0, seed)
     })
@@ -121,10 +121,10 @@ fn kept(mut capture: Capture, filter: impl Fn(usize) -> bool) -> Capture {
     capture
 }
 
-fn five(_: u64) -> Outcome {
+fn five(_: u64) -> CaseOutcome {
     let capture = kept(Capture::new(&scene(), 20, 1), |k| k % 8 == 0);
     let result = capture.solve().map(|_| "an inverse".to_owned());
-    Outcome::refusal(
+    CaseOutcome::refusal(
         result.map_err(|error| error.to_string()),
         "it needs at least 8",
     )
@@ -146,7 +146,7 @@ fn taken(
 /// White, Gray code and its inverse.
 const CODED: usize = 19;
 
-fn repeated(seeds: u64) -> Outcome {
+fn repeated(seeds: u64) -> CaseOutcome {
     no_harm(seeds, |scene, seed| {
         let repeat = |patterns: &mut DMatrix<f64>| {
             for k in CODED..patterns.ncols() {
@@ -158,7 +158,7 @@ fn repeated(seeds: u64) -> Outcome {
     })
 }
 
-fn dependent(seeds: u64) -> Outcome {
+fn dependent(seeds: u64) -> CaseOutcome {
     no_harm(seeds, |scene, seed| {
         let block = |patterns: &mut DMatrix<f64>| {
             for k in CODED..patterns.ncols() {
@@ -173,7 +173,7 @@ fn dependent(seeds: u64) -> Outcome {
     })
 }
 
-fn white_only(seeds: u64) -> Outcome {
+fn white_only(seeds: u64) -> CaseOutcome {
     no_harm(seeds, |scene, seed| {
         taken(scene, seed, 10, |patterns| patterns.fill(1.0)).noisy(50.0, seed)
     })

@@ -1,6 +1,6 @@
 //! Light transport that is strong, ill-conditioned or singular.
 
-use super::super::case::{Case, Demand, Outcome, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid, theory};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -51,7 +51,7 @@ pub(super) const CASES: [Case; 7] = [
     },
 ];
 
-fn white_wedge(seeds: u64) -> Outcome {
+fn white_wedge(seeds: u64) -> CaseOutcome {
     let grid = grid(GRID);
     let scene = CoaxialScene::new(grid, &Panels::corner(grid, 30.0), 0.99);
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
@@ -60,7 +60,7 @@ fn white_wedge(seeds: u64) -> Outcome {
     with_condition(&scene, 6.0, outcome)
 }
 
-fn dim_wedge(seeds: u64) -> Outcome {
+fn dim_wedge(seeds: u64) -> CaseOutcome {
     let grid = grid(GRID);
     let scene = CoaxialScene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.02);
     let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
@@ -69,7 +69,7 @@ fn dim_wedge(seeds: u64) -> Outcome {
     with_condition(&scene, 100.0, outcome)
 }
 
-fn sphere(seeds: u64) -> Outcome {
+fn sphere(seeds: u64) -> CaseOutcome {
     let grid = grid(GRID);
     let mut scene = CoaxialScene::new(grid, &Panels::corner(grid, 90.0), 0.995);
     scene.form_factors.fill(1.0 / grid.cells() as f64);
@@ -90,14 +90,14 @@ fn sphere(seeds: u64) -> Outcome {
     outcome
 }
 
-fn with_condition(scene: &CoaxialScene, least: f64, mut outcome: Outcome) -> Outcome {
+fn with_condition(scene: &CoaxialScene, least: f64, mut outcome: CaseOutcome) -> CaseOutcome {
     let condition = theory::condition(&scene.transport(), &scene.covered());
     outcome.holds &= condition > least;
     outcome.measured = format!("condition {condition:.0}: {}", outcome.measured);
     outcome
 }
 
-fn doubled_light(seeds: u64) -> Outcome {
+fn doubled_light(seeds: u64) -> CaseOutcome {
     let grid = grid(GRID);
     let mut scene =
         CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
@@ -121,20 +121,20 @@ fn doubled_light(seeds: u64) -> Outcome {
     outcome
 }
 
-fn flat(seeds: u64) -> Outcome {
+fn flat(seeds: u64) -> CaseOutcome {
     chosen(0.25, seeds, Compensation::GainOnly)
 }
 
-fn even(seeds: u64) -> Outcome {
+fn even(seeds: u64) -> CaseOutcome {
     let outcome = chosen(0.95, seeds, Compensation::Nothing);
-    Outcome {
+    CaseOutcome {
         refused: outcome.holds,
         ..outcome
     }
 }
 
 /// What is chosen for a flat scene with albedos from `least` to .95, at 40 dB.
-fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
+fn chosen(least: f64, seeds: u64, wanted: Compensation) -> CaseOutcome {
     let grid = grid(GRID);
     let mut scene =
         CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(least, 0.95, 1);
@@ -158,10 +158,10 @@ fn chosen(least: f64, seeds: u64, wanted: Compensation) -> Outcome {
         }
     }
     let all = names.len() as u64 == seeds && names.iter().all(|name| *name == wanted);
-    Outcome::new(all, format!("{wanted} chosen"), errors)
+    CaseOutcome::new(all, format!("{wanted} chosen"), errors)
 }
 
-fn shifted(_: u64) -> Outcome {
+fn shifted(_: u64) -> CaseOutcome {
     let grid = grid(GRID);
     let scene = CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7);
     let mut capture = Capture::new(&scene, 60, 1);
@@ -174,7 +174,7 @@ fn shifted(_: u64) -> Outcome {
     let result = capture
         .solve()
         .map(|(_, report)| format!("{:?}", report.prediction));
-    Outcome::refusal(
+    CaseOutcome::refusal(
         result.map_err(|error| error.to_string()),
         "check that the patterns belong",
     )

@@ -130,10 +130,7 @@ fn every_kind_of_fault_comes_as_often_as_its_rate() {
 
 #[test]
 fn dropped_frames_are_missing_and_no_others() {
-    let (counts, heard) = damaged(FaultRates {
-        drop: 100,
-        ..FaultRates::default()
-    });
+    let (counts, heard) = damaged(FaultRates::only(|rates| rates.drop = 100));
     assert!(is_rate(counts.dropped, 100, COUNT) && counts.faulty() == counts.dropped);
     assert_eq!(
         pieces(&heard).len() as u64,
@@ -144,10 +141,7 @@ fn dropped_frames_are_missing_and_no_others() {
 
 #[test]
 fn duplicated_frames_come_twice_and_no_others() {
-    let (counts, heard) = damaged(FaultRates {
-        duplicate: 150,
-        ..FaultRates::default()
-    });
+    let (counts, heard) = damaged(FaultRates::only(|rates| rates.duplicate = 150));
     assert!(is_rate(counts.duplicated, 150, COUNT) && counts.faulty() == counts.duplicated);
     let mut came = pieces(&heard);
     assert_eq!(came.len() as u64, u64::from(COUNT) + counts.duplicated);
@@ -162,13 +156,7 @@ fn reordered_and_delayed_frames_all_arrive() {
         delay_by: SECOND / 2,
         ..FaultRates::default()
     };
-    for rates in [
-        delayed,
-        FaultRates {
-            reorder: 200,
-            ..FaultRates::default()
-        },
-    ] {
+    for rates in [delayed, FaultRates::only(|rates| rates.reorder = 200)] {
         let (counts, heard) = damaged(rates);
         assert!(is_rate(
             counts.delayed + counts.reordered,
@@ -184,10 +172,7 @@ fn reordered_and_delayed_frames_all_arrive() {
 
 #[test]
 fn cut_frames_run_into_the_next() {
-    let (counts, heard) = damaged(FaultRates {
-        cut: 120,
-        ..FaultRates::default()
-    });
+    let (counts, heard) = damaged(FaultRates::only(|rates| rates.cut = 120));
     assert!(is_rate(counts.cut, 120, COUNT) && counts.faulty() == counts.cut);
     let whole = pieces(&heard)
         .iter()
@@ -204,10 +189,7 @@ fn cut_frames_run_into_the_next() {
 
 #[test]
 fn corrupted_frames_have_other_bytes_and_as_many() {
-    let (counts, heard) = damaged(FaultRates {
-        corrupt: 50,
-        ..FaultRates::default()
-    });
+    let (counts, heard) = damaged(FaultRates::only(|rates| rates.corrupt = 50));
     assert!(is_rate(counts.corrupted, 50, COUNT) && counts.faulty() == counts.corrupted);
     let sent = frames(COUNT);
     assert_eq!(heard.len(), sent.len());
@@ -220,10 +202,7 @@ fn corrupted_frames_have_other_bytes_and_as_many() {
 
 #[test]
 fn frames_that_are_all_reordered_arrive_all_the_same() {
-    let rates = FaultRates {
-        reorder: 1_000,
-        ..FaultRates::default()
-    };
+    let rates = FaultRates::only(|rates| rates.reorder = 1_000);
     let mut line = fast(Faults::both_ways(rates, 1));
     assert_eq!(sent(&mut line, 50), frames(50));
     // One alone waits for a companion, and not for ever.
@@ -241,10 +220,7 @@ fn frames_that_are_all_reordered_arrive_all_the_same() {
 
 #[test]
 fn a_reordered_frame_changes_places_with_the_next() {
-    let rates = FaultRates {
-        reorder: 300,
-        ..FaultRates::default()
-    };
+    let rates = FaultRates::only(|rates| rates.reorder = 300);
     let mut line = fast(Faults::both_ways(rates, 3));
     let heard = sent(&mut line, 1_000);
     let all = frames(1_000);

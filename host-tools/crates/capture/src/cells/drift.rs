@@ -94,21 +94,21 @@ pub(crate) fn assess(sequence: &Sequence, live: &[bool], channels: &[DMatrix<f64
             LeaveOneOut::fit(sequence, live, light, dark)
         })
         .collect();
-    let curves: Vec<Curve> = if models.len() == channels.len() {
+    let curves: Vec<DriftCurve> = if models.len() == channels.len() {
         models
             .iter()
-            .map(|model| Curve::of_model(sequence, model))
+            .map(|model| DriftCurve::of_model(sequence, model))
             .collect()
     } else {
         (channels.iter().enumerate())
-            .map(|(channel, light)| Curve::of_white(sequence, light, channel, &drift))
+            .map(|(channel, light)| DriftCurve::of_white(sequence, light, channel, &drift))
             .collect()
     };
     let changes = curves.iter().any(|curve| curve.size > curve.least);
     if changes {
         drift.gains = curves.iter().map(|curve| curve.all.clone()).collect();
     }
-    let mean = |of: fn(&Curve) -> &Vec<f64>, at: usize| {
+    let mean = |of: fn(&DriftCurve) -> &Vec<f64>, at: usize| {
         curves.iter().map(|curve| of(curve)[at]).sum::<f64>() / curves.len() as f64
     };
     let shots = curves
@@ -132,7 +132,7 @@ pub(crate) fn assess(sequence: &Sequence, live: &[bool], channels: &[DMatrix<f64
 }
 
 /// Gains of one channel over the session.
-struct Curve {
+struct DriftCurve {
     shots: Vec<usize>,
     gains: Vec<f64>,
     errors: Vec<f64>,
@@ -145,7 +145,7 @@ struct Curve {
     excess: f64,
 }
 
-impl Curve {
+impl DriftCurve {
     /// From the gains of a model. How bright white is against the others says
     /// whether light adds up and not how the session went, so that it is taken out.
     fn of_model(sequence: &Sequence, model: &LeaveOneOut) -> Self {

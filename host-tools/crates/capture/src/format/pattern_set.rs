@@ -1,7 +1,7 @@
 //! Pattern set: the patterns of a capture, in the order in which they are shown.
 
 use super::pattern::Pattern;
-use super::role::{Axis, Role};
+use super::role::{CodeAxis, Role};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
@@ -27,7 +27,7 @@ pub fn pattern_set(grid: Grid, bernoulli: usize, seed: u64) -> Vec<(Role, Patter
     let bits = |cells: usize| cells.next_power_of_two().trailing_zeros() as u8;
     let (column_bits, row_bits) = (bits(grid.cols()), bits(grid.rows()));
     let mut roles = vec![Role::White, Role::Black];
-    for (axis, bits) in [(Axis::Column, column_bits), (Axis::Row, row_bits)] {
+    for (axis, bits) in [(CodeAxis::Column, column_bits), (CodeAxis::Row, row_bits)] {
         roles.extend((0..bits).flat_map(|bit| [false, true].map(|i| axis.stripe(bit, i))));
     }
     let coded = roles.into_iter().filter_map(|role| {

@@ -5,14 +5,14 @@ use std::fmt;
 /// One axis of the grid, in the order in which arrays of both have them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, strum::Display)]
 #[strum(serialize_all = "lowercase")]
-pub enum Axis {
+pub enum CodeAxis {
     /// Columns, counted from the left.
     Column,
     /// Rows, counted from the top.
     Row,
 }
 
-impl Axis {
+impl CodeAxis {
     /// The role of a Gray code stripe along it.
     #[must_use]
     pub const fn stripe(self, bit: u8, inverse: bool) -> Role {
@@ -91,10 +91,10 @@ impl Role {
 
     /// Axis, bit and whether it is the inverse, of a Gray code stripe; `None` for others.
     #[must_use]
-    pub const fn as_stripe(self) -> Option<(Axis, u8, bool)> {
+    pub const fn as_stripe(self) -> Option<(CodeAxis, u8, bool)> {
         match self {
-            Self::Column { bit, inverse } => Some((Axis::Column, bit, inverse)),
-            Self::Row { bit, inverse } => Some((Axis::Row, bit, inverse)),
+            Self::Column { bit, inverse } => Some((CodeAxis::Column, bit, inverse)),
+            Self::Row { bit, inverse } => Some((CodeAxis::Row, bit, inverse)),
             Self::White | Self::Black | Self::Bernoulli => None,
         }
     }

@@ -8,7 +8,7 @@ use super::manifest::{MANIFEST_FILE, Shot};
 use super::pattern::Pattern;
 use super::photo_files::{PhotoFiles, find_all};
 use super::picture_file::Source;
-use super::role::{Axis, Role};
+use super::role::{CodeAxis, Role};
 use crate::gate::GateName;
 use iltm_runtime::Grid;
 use rayon::prelude::*;
@@ -160,7 +160,7 @@ impl Sequence {
         check_levels(&shots, &manifest)?;
         let mut patterns = read_patterns(folder, &shots, coarsen)?;
         let (rows, cols) = common_size(folder, &shots, &patterns)?;
-        let sides = [(Axis::Column, cols), (Axis::Row, rows)];
+        let sides = [(CodeAxis::Column, cols), (CodeAxis::Row, rows)];
         let mut given = [0; 2];
         for (given, (axis, _)) in given.iter_mut().zip(sides) {
             *given = code_bits(axis, &shots, &manifest)?;
@@ -414,12 +414,12 @@ fn grid_of(folder: &Path, shots: &[Shot], patterns: &[Pattern]) -> Result<Grid, 
 }
 
 /// The Gray code patterns of one axis, along it.
-fn stripes(axis: Axis, shots: &[Shot], patterns: &[Pattern]) -> Vec<Stripes> {
+fn stripes(axis: CodeAxis, shots: &[Shot], patterns: &[Pattern]) -> Vec<Stripes> {
     let of_shot = |(shot, pattern): (&Shot, &Pattern)| {
         let (along, bit, inverse) = shot.role.as_stripe()?;
         let step = match axis {
-            Axis::Column => 1,
-            Axis::Row => pattern.cols,
+            CodeAxis::Column => 1,
+            CodeAxis::Row => pattern.cols,
         };
         let cells = pattern.lit.iter().step_by(step);
         let count = [pattern.cols, pattern.rows][axis as usize];
@@ -446,7 +446,7 @@ fn keep<T>(items: &mut Vec<T>, wanted: &[bool]) {
 
 /// Bits of the Gray code of one axis that were photographed, as a pattern or as its
 /// inverse.
-fn code_bits(axis: Axis, shots: &[Shot], manifest: &Path) -> Result<u8, CaptureError> {
+fn code_bits(axis: CodeAxis, shots: &[Shot], manifest: &Path) -> Result<u8, CaptureError> {
     let mut seen = [false; Role::MAX_BITS as usize];
     for (along, bit, _) in shots.iter().filter_map(|shot| shot.role.as_stripe()) {
         seen[usize::from(bit)] |= along == axis;

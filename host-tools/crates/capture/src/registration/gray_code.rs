@@ -7,7 +7,7 @@
 use super::cell_map::NO_CELL;
 use crate::format::code::binary;
 use crate::format::error::CaptureError;
-use crate::format::role::Axis;
+use crate::format::role::CodeAxis;
 use crate::format::sequence::Sequence;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::{Photographs, channel_sum};
@@ -58,7 +58,10 @@ pub(crate) fn decode(
     let middle: Vec<f32> = middle.collect();
     let mut margin = vec![f32::INFINITY; middle.len()];
     let mut codes = [vec![0_u32; middle.len()], vec![0_u32; middle.len()]];
-    for (axis, code) in [Axis::Column, Axis::Row].into_iter().zip(&mut codes) {
+    for (axis, code) in [CodeAxis::Column, CodeAxis::Row]
+        .into_iter()
+        .zip(&mut codes)
+    {
         for bit in 0..sequence.codes[axis as usize].bits {
             let difference = bit_difference(sequence, photographs, axis, bit, &middle, progress)?;
             for &pixel in &lit {
@@ -94,7 +97,7 @@ pub(crate) fn decode(
 fn bit_difference(
     sequence: &Sequence,
     photographs: &mut Photographs<'_>,
-    axis: Axis,
+    axis: CodeAxis,
     bit: u8,
     middle: &[f32],
     progress: &dyn Progress,

@@ -197,7 +197,7 @@ fn compatible(blocks: &[LightBlock]) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::{forward, m_scene, rig};
+    use crate::known_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
     use nalgebra::DVector;

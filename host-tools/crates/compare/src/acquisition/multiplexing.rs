@@ -124,7 +124,7 @@ fn code(prime: usize) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::{forward, m_scene, rig};
+    use crate::known_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
 

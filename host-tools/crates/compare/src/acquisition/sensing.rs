@@ -163,7 +163,7 @@ fn coefficient_noise(rig: &Rig, haar: &Haar, light: &DMatrix<f64>) -> Vec<f64> {
 mod tests {
     use super::super::{Acquisition, CompressiveDual, CompressiveSensing};
     use crate::Unfit;
-    use crate::test_scene::{forward, rig};
+    use crate::known_scene::{forward, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
     use iltm_solve::Haar;

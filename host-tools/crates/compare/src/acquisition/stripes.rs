@@ -76,7 +76,7 @@ fn stripes(grid: Grid) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::{forward, m_scene, rig};
+    use crate::known_scene::{forward, m_scene, rig};
     use iltm_capture::NoiseModel;
 
     #[test]

@@ -1,7 +1,7 @@
 //! What every way to photograph has in common, and a table of all.
 
 use super::*;
-use crate::test_scene::{m_scene, rig};
+use crate::known_scene::{m_scene, rig};
 use iltm_capture::NoiseModel;
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};

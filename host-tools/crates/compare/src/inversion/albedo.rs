@@ -130,7 +130,7 @@ impl Inversion for AlbedoAlone {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_runtime::Grid;
     use iltm_scene::coaxial::{CoaxialScene, Panels};
 
@@ -140,7 +140,7 @@ mod tests {
     }
 
     fn found(scene: &CoaxialScene, irradiance: Option<&DVector<f64>>) -> Albedo {
-        let before = TestScene::scene(scene);
+        let before = KnownScene::scene(scene);
         albedo(
             &inverted(&before.transport, &before.live).unwrap(),
             irradiance,
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn without_light_between_cells_only_one_bound_is_left() {
-        let before = TestScene::flat(3, 4);
+        let before = KnownScene::flat(3, 4);
         let inverse = inverted(&before.transport, &before.live).unwrap();
         let found = albedo(&inverse, None);
         assert!(found.most.is_infinite());

@@ -171,7 +171,7 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_solve::inverted;
 
     /// Least squares with every choice of cells at 0, at 1 and free, the feasible best.
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn tiny_frames_are_as_an_exhaustive_search_finds_them() {
-        let before = TestScene::textured(2, 3);
+        let before = KnownScene::textured(2, 3);
         let mut random = fastrand::Rng::with_seed(3);
         for _ in 0..20 {
             // Brighter than white here, darker than black there.
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn within_range_it_is_the_inverse() {
-        let before = TestScene::textured(5, 8);
+        let before = KnownScene::textured(5, 8);
         let input = DVector::from_fn(40, |cell, _| 0.1 + 0.1 * ((cell * 5) % 9) as f64);
         let wanted = &before.transport * &input;
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn no_clipped_inverse_shows_images_better() {
-        let before = TestScene::textured(8, 12);
+        let before = KnownScene::textured(8, 12);
         let truth = before.truth();
         let bounded = truth.judge(&before.answer(&Bounded)).compensation;
         let clipped = truth.judge(&Answer::Inverse(truth.inverse.clone()));

@@ -117,11 +117,11 @@ fn strongest(members: &[Vec<usize>], light: &DMatrix<f64>, limit: usize) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     #[test]
     fn every_cell_is_in_one_cluster_and_none_is_too_large() {
-        let before = TestScene::textured(6, 9);
+        let before = KnownScene::textured(6, 9);
         for limit in [1, 7, 54] {
             let clusters = clusters(&before.transport, limit);
             assert!(clusters.iter().all(|cluster| cluster.len() <= limit));
@@ -134,7 +134,7 @@ mod tests {
     /// The valleys of an M do not see each other: half of the cells is enough.
     #[test]
     fn valleys_that_do_not_see_each_other_are_two_exact_clusters() {
-        let before = TestScene::panels(5, 8);
+        let before = KnownScene::panels(5, 8);
         for lumped in [false, true] {
             assert!(before.error(&Clustered { limit: 20, lumped }) < 1e-12);
             assert!(before.error(&Clustered { limit: 10, lumped }) > 1e-3);
@@ -144,7 +144,7 @@ mod tests {
     /// `T 1` is what white shows.
     #[test]
     fn with_other_light_as_a_cells_own_what_white_shows_needs_white() {
-        let before = TestScene::textured(5, 8);
+        let before = KnownScene::textured(5, 8);
         let white = before.transport.column_sum();
         let off = |lumped| {
             let drive = before.drive(&Clustered { limit: 6, lumped }, &white);

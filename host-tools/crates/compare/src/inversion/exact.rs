@@ -95,7 +95,7 @@ fn operator(inverse: &DMatrix<f64>, live: &[bool]) -> Result<DMatrix<f64>, Unfit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_runtime::Grid;
     use iltm_scene::coaxial::{CoaxialScene, Panels};
     use nalgebra::DVector;
@@ -106,7 +106,7 @@ mod tests {
         let grid = Grid::new(5, 8).unwrap();
         let scene =
             CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.3, 0.9, 2);
-        let before = TestScene::scene(&scene);
+        let before = KnownScene::scene(&scene);
         let inverse = inverted(&before.transport, &before.live).unwrap();
         let cancel = operator(&inverse, &before.live).unwrap();
         let pattern = DVector::from_fn(40, |cell, _| (cell % 3) as f64 / 2.0);
@@ -117,13 +117,13 @@ mod tests {
 
     #[test]
     fn cancellation_and_gains_are_the_inverse() {
-        assert!(TestScene::textured(5, 8).error(&Cancellation) < 1e-12);
+        assert!(KnownScene::textured(5, 8).error(&Cancellation) < 1e-12);
     }
 
     /// Of a sphere's light under white, the part `r` is not direct.
     #[test]
     fn the_share_of_a_spheres_light_that_is_cancelled_is_its_albedo() {
-        let before = TestScene::sphere(3, 4, 0.7);
+        let before = KnownScene::sphere(3, 4, 0.7);
         // The diagonal form factor stays with the first bounce: 1/g = r / (1 - r/12).
         let wanted = 1.0 - 0.3 / (1.0 - 0.7 / 12.0);
         let said = Cancellation.invert(before.known()).unwrap().remark;

@@ -89,12 +89,12 @@ pub(super) fn diagonal(live: &LiveTransport, gain: &DVector<f64>, remark: String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     /// Even light on a sphere needs `(1 - r) / r` whatever the method.
     #[test]
     fn even_light_is_right_without_knowing_of_interreflection() {
-        let before = TestScene::sphere(3, 4, 0.6);
+        let before = KnownScene::sphere(3, 4, 0.6);
         let even = DVector::from_element(12, 0.9);
         for drive in [
             before.drive(&FloodGain, &even),

@@ -152,11 +152,11 @@ impl Inversion for StoredElements {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     #[test]
     fn with_everything_kept_both_are_the_inverse() {
-        let before = TestScene::textured(5, 7);
+        let before = KnownScene::textured(5, 7);
         assert!(before.error(&StoredElements { columns: 35 }) < 1e-12);
         let wanted = DVector::from_fn(35, |cell, _| 0.2 + 0.1 * ((cell * 7) % 5) as f64);
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
@@ -167,7 +167,7 @@ mod tests {
     /// An even picture is one coefficient.
     #[test]
     fn one_coefficient_is_enough_for_an_even_picture() {
-        let before = TestScene::panels(5, 7);
+        let before = KnownScene::panels(5, 7);
         let even = DVector::from_element(35, 0.4);
         let drive = before.drive(&LargestInputs { count: 1 }, &even);
         assert!((&before.transport * drive - &even).norm() < 1e-12);
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn more_elements_show_natural_images_better() {
-        let before = TestScene::panels(8, 12);
+        let before = KnownScene::panels(8, 12);
         let truth = before.truth();
         let error = |method: &dyn Inversion| truth.judge(&before.answer(method)).compensation;
         assert!(error(&StoredElements { columns: 16 }) < error(&StoredElements { columns: 0 }));
@@ -185,7 +185,7 @@ mod tests {
     /// What is known of images beforehand is worth more than what one image shows.
     #[test]
     fn at_equal_multiplications_stored_elements_show_natural_images_better() {
-        let before = TestScene::panels(8, 12);
+        let before = KnownScene::panels(8, 12);
         let truth = before.truth();
         let cost = |method: &dyn Inversion| {
             let found = method.invert(before.known()).unwrap();

@@ -138,7 +138,7 @@ fn gmres(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_solve::inverted;
 
     fn wanted(cells: usize) -> DVector<f64> {
@@ -148,7 +148,7 @@ mod tests {
     /// A Krylov space of `N` dimensions holds every answer.
     #[test]
     fn without_noise_as_many_steps_as_cells_are_exact() {
-        let before = TestScene::textured(4, 6);
+        let before = KnownScene::textured(4, 6);
         let wanted = wanted(24);
         let exact = inverted(&before.transport, &before.live).unwrap() * &wanted;
         for scaled in [false, true] {
@@ -160,7 +160,7 @@ mod tests {
     /// A sphere's transport has two eigenvalues: two steps are enough.
     #[test]
     fn two_steps_are_exact_on_a_sphere() {
-        let before = TestScene::sphere(3, 4, 0.8);
+        let before = KnownScene::sphere(3, 4, 0.8);
         let wanted = wanted(12);
         let (steps, scaled) = (2, false);
         let optical = Optical { steps, scaled };
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn photographs_of_a_frame_are_those_that_are_counted() {
-        let before = TestScene::textured(4, 6);
+        let before = KnownScene::textured(4, 6);
         let (steps, scaled) = (3, false);
         let optical = Optical { steps, scaled };
         let counted = optical.invert(before.known()).unwrap().photographs;
@@ -184,9 +184,9 @@ mod tests {
         let wanted = wanted(24);
         let (steps, scaled) = (8, true);
         let optical = Optical { steps, scaled };
-        let quiet = TestScene::panels(4, 6);
-        let noisy = TestScene::panels(4, 6).noisy(1e-4);
-        let error = |before: &TestScene| {
+        let quiet = KnownScene::panels(4, 6);
+        let noisy = KnownScene::panels(4, 6).noisy(1e-4);
+        let error = |before: &KnownScene| {
             let light = &before.transport * before.drive(&optical, &wanted);
             (light - &wanted).norm() / wanted.norm()
         };

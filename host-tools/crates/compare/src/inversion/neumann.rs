@@ -136,13 +136,13 @@ impl Stratified {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     /// Cells of a sphere get `r / (1 - r)` times their own light from all others.
     #[test]
     fn the_radius_is_that_of_a_spheres_closed_form_and_half_of_the_light_is_its_limit() {
         for (albedo, word) in [(0.4, "converges"), (0.6, "diverges")] {
-            let before = TestScene::sphere(4, 5, albedo);
+            let before = KnownScene::sphere(4, 5, albedo);
             let bounced = albedo / (1.0 - albedo) / 20.0;
             let wanted = 19.0 * bounced / (1.0 + bounced);
             let own = before.transport.diagonal();
@@ -156,7 +156,7 @@ mod tests {
     /// constant image is the slowest.
     #[test]
     fn each_term_brings_a_convergent_series_nearer_by_its_radius() {
-        let before = TestScene::sphere(4, 5, 0.4);
+        let before = KnownScene::sphere(4, 5, 0.4);
         let radius = radius(&before.transport, &before.transport.diagonal());
         let errors: Vec<f64> = [1, 3, 8, 40]
             .map(|order| before.error(&Neumann { order }))
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn with_nothing_dropped_strata_are_the_terms_of_the_series() {
-        let before = TestScene::textured(5, 8);
+        let before = KnownScene::textured(5, 8);
         let strata = before.matrix(&Stratified {
             strata: 3,
             threshold: 0.0,
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_threshold_buys_sparsity_with_accuracy() {
-        let before = TestScene::panels(6, 8);
+        let before = KnownScene::panels(6, 8);
         let with = |threshold| Stratified {
             strata: 8,
             threshold,

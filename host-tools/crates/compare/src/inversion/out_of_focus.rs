@@ -72,7 +72,7 @@ fn strongest_others(transport: &DMatrix<f64>) -> f64 {
 mod tests {
     use super::super::{Bounded, Exact, Neumann, Tikhonov};
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use nalgebra::DVector;
 
     fn through(method: impl Inversion + 'static) -> OutOfFocus {
@@ -86,7 +86,7 @@ mod tests {
     /// border, where light falls beside the frame.
     #[test]
     fn light_that_the_lens_lets_through_is_shown_exactly() {
-        let before = TestScene::panels(9, 12);
+        let before = KnownScene::panels(9, 12);
         let input = DVector::from_fn(108, |cell, _| 0.5 + 0.2 * ((cell % 12) as f64 / 4.0).sin());
         let wanted = &before.transport * blur(before.grid, 0.7) * &input;
         let light = &before.transport * before.drive(&through(Exact), &wanted);
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn the_series_diverges_and_bounds_beat_regularisation_beats_clipping() {
-        let before = TestScene::panels(9, 12);
+        let before = KnownScene::panels(9, 12);
         let truth = before.truth();
         let error = |method: OutOfFocus| {
             let inverted = method.invert(before.known()).unwrap();

@@ -118,10 +118,10 @@ fn greedy(exchange: &DMatrix<f64>, least: f64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use iltm_solve::inverted;
 
-    fn error(before: &TestScene, colours: usize) -> f64 {
+    fn error(before: &KnownScene, colours: usize) -> f64 {
         let gains = before.matrix(&Probing { colours }).diagonal();
         let exact = inverted(&before.transport, &before.live)
             .unwrap()
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_colour_for_each_cell_is_exact_and_more_colours_are_nearer() {
-        let before = TestScene::panels(6, 8);
+        let before = KnownScene::panels(6, 8);
         assert!(error(&before, 48) < 1e-12);
         assert!(error(&before, 24) < error(&before, 8));
         assert!(error(&before, 8) < error(&before, 1));
@@ -140,14 +140,14 @@ mod tests {
     /// `T^-1 = (I - r 11^T / N) / r`: with one colour each cell loses what all throw.
     #[test]
     fn with_one_colour_a_spheres_gains_are_those_of_even_light() {
-        let before = TestScene::sphere(3, 4, 0.6);
+        let before = KnownScene::sphere(3, 4, 0.6);
         let gains = before.matrix(&Probing { colours: 1 }).diagonal();
         assert!(gains.iter().all(|gain| (gain - 0.4 / 0.6).abs() < 1e-12));
     }
 
     #[test]
     fn colours_keep_the_strongest_exchanges_apart_and_are_not_more_than_allowed() {
-        let before = TestScene::textured(6, 8);
+        let before = KnownScene::textured(6, 8);
         for limit in [1, 3, 10, 48] {
             let colours = colouring(&before.transport, limit);
             assert!(colours.iter().all(|colour| *colour < limit));

@@ -157,7 +157,7 @@ pub(super) fn regularised(gram: &DMatrix<f64>, mu: f64) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     #[test]
     fn odd_rows_and_dead_cells_leave_cells_of_their_own() {
@@ -170,7 +170,7 @@ mod tests {
     /// light.
     #[test]
     fn with_fewer_lights_what_is_left_over_is_orthogonal_to_every_light() {
-        let before = TestScene::textured(4, 7);
+        let before = KnownScene::textured(4, 7);
         let method = PseudoInverse {
             fewer: Fewer::Lights,
         };
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn with_fewer_camera_cells_the_camera_sees_what_is_wanted() {
-        let before = TestScene::textured(4, 7);
+        let before = KnownScene::textured(4, 7);
         let method = PseudoInverse {
             fewer: Fewer::CameraCells,
         };

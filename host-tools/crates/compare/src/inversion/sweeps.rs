@@ -114,11 +114,11 @@ impl SweepSplit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     #[test]
     fn sweeps_converge_to_the_inverse_and_gauss_seidel_does_sooner() {
-        let before = TestScene::textured(6, 8);
+        let before = KnownScene::textured(6, 8);
         let error = |order, count| before.error(&Sweeps { order, count });
         for count in [1, 3, 8] {
             let (jacobi, newest) = (
@@ -135,7 +135,7 @@ mod tests {
     /// Loan, *Matrix Computations*, theorem 11.2.3), Jacobi only up to an albedo of 1/2.
     #[test]
     fn gauss_seidel_converges_on_a_sphere_where_jacobi_does_not() {
-        let before = TestScene::sphere(4, 5, 0.7);
+        let before = KnownScene::sphere(4, 5, 0.7);
         let radius = |order| SweepSplit::new(&before.transport, order).radius();
         assert!(radius(SweepOrder::Jacobi) > 1.0);
         assert!(radius(SweepOrder::GaussSeidel) < 1.0);

@@ -3,15 +3,15 @@
 use super::{Cancellation, Clustered, Exact, Inversion, KnownTransport, StoredElements, all};
 use crate::Unfit;
 use crate::benchmark::invert;
-use crate::test_scene::TestScene;
+use crate::known_scene::KnownScene;
 use iltm_solve::inverted;
 use nalgebra::{DMatrix, DVector};
 
 /// `T^-1 = (I - r 11^T / N) / r` inside of a sphere.
 #[test]
 fn ways_that_are_exact_find_a_spheres_inverse() {
-    let before = TestScene::sphere(4, 5, 0.7);
-    let wanted = TestScene::sphere_inverse(20, 0.7);
+    let before = KnownScene::sphere(4, 5, 0.7);
+    let wanted = KnownScene::sphere_inverse(20, 0.7);
     let exact: [&dyn Inversion; 4] = [
         &Exact,
         &Cancellation,
@@ -43,7 +43,7 @@ const NOT_EXACT: [&str; 5] = [
 
 #[test]
 fn cells_that_do_not_light_each_other_are_divided_by_their_light() {
-    let before = TestScene::flat(3, 5);
+    let before = KnownScene::flat(3, 5);
     let exact = inverted(&before.transport, &before.live).unwrap();
     let wanted = DVector::from_fn(15, |cell, _| {
         if before.live[cell] {
@@ -66,7 +66,7 @@ fn cells_that_do_not_light_each_other_are_divided_by_their_light() {
 
 #[test]
 fn a_single_cell_is_a_division() {
-    let before = TestScene::new(1, 1, DMatrix::from_element(1, 1, 0.5), vec![true]);
+    let before = KnownScene::new(1, 1, DMatrix::from_element(1, 1, 0.5), vec![true]);
     for method in all() {
         if method.name().starts_with("out of focus") {
             continue;
@@ -81,7 +81,7 @@ fn a_single_cell_is_a_division() {
 fn dead_cells_stay_dark_on_every_grid() {
     for (rows, cols) in [(1, 7), (3, 5), (5, 2)] {
         let cells = usize::from(rows) * usize::from(cols);
-        let full = TestScene::panels(rows, cols).transport;
+        let full = KnownScene::panels(rows, cols).transport;
         let live: Vec<bool> = (0..cells)
             .map(|cell| cell != 1 && cell != cells - 1)
             .collect();
@@ -93,7 +93,7 @@ fn dead_cells_stay_dark_on_every_grid() {
             }
         };
         let transport = DMatrix::from_fn(cells, cells, seen);
-        let before = TestScene::new(rows, cols, transport, live.clone());
+        let before = KnownScene::new(rows, cols, transport, live.clone());
         let wanted = DVector::from_element(cells, 0.3);
         for method in all() {
             let drive = before.drive(method.as_ref(), &wanted);
@@ -108,9 +108,9 @@ fn dead_cells_stay_dark_on_every_grid() {
 /// and the largest numbers: an answer or a reason, never a panic.
 #[test]
 fn transports_that_have_no_inverse_are_answered_or_refused() {
-    let mut unseen = TestScene::panels(2, 3).transport;
+    let mut unseen = KnownScene::panels(2, 3).transport;
     unseen.row_mut(2).fill(0.0);
-    let mut alike = TestScene::panels(2, 3).transport;
+    let mut alike = KnownScene::panels(2, 3).transport;
     let copy = alike.row(0).into_owned();
     alike.set_row(3, &copy);
     let hard = [
@@ -118,13 +118,13 @@ fn transports_that_have_no_inverse_are_answered_or_refused() {
         DMatrix::from_element(6, 6, 0.1),
         DMatrix::from_element(6, 6, f64::MAX),
         DMatrix::from_element(6, 6, f64::MIN_POSITIVE),
-        -TestScene::panels(2, 3).transport,
+        -KnownScene::panels(2, 3).transport,
         unseen,
         alike,
     ];
     let wanted = DVector::from_element(6, 0.2);
     for transport in hard {
-        let scene = TestScene::new(2, 3, transport, vec![true; 6]);
+        let scene = KnownScene::new(2, 3, transport, vec![true; 6]);
         let known = scene.known();
         for method in all() {
             match method.invert(known) {
@@ -152,7 +152,7 @@ fn transports_that_have_no_inverse_are_answered_or_refused() {
 /// light between cells, as long as his series converges.
 #[test]
 fn on_a_moderate_scene_every_method_is_between_floor_and_ceiling() {
-    let before = TestScene::panels(8, 12);
+    let before = KnownScene::panels(8, 12);
     let truth = before.truth();
     let compensation = |name: &str| {
         let method = all().into_iter().find(|method| method.name() == name);

@@ -136,14 +136,14 @@ fn wanted(known: &KnownTransport<'_>, live: &LiveTransport, seen: &NoisyTranspor
 mod tests {
     use super::super::{Exact, FloodGain};
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
     use crate::{Answer, GroundTruth};
     use iltm_runtime::Grid;
     use iltm_scene::coaxial::{CoaxialScene, Panels};
 
     #[test]
     fn where_nothing_is_hard_next_to_nothing_is_given_up() {
-        let before = TestScene::panels(5, 8);
+        let before = KnownScene::panels(5, 8);
         assert!(
             before.error(&Tikhonov) < 1e-3,
             "{}",
@@ -155,7 +155,7 @@ mod tests {
     /// is mostly noise is worth little, but never less than that photograph.
     #[test]
     fn with_noise_it_is_better_than_the_inverse_and_no_worse_than_gains() {
-        let before = TestScene::panels(8, 12);
+        let before = KnownScene::panels(8, 12);
         let truth = before.truth();
         let noisy = before.noisy(1e-4);
         let each = DMatrix::identity(96, 96);
@@ -176,8 +176,8 @@ mod tests {
     fn behind_a_blur_it_shows_images_better_than_the_inverse() {
         let grid = Grid::new(9, 12).unwrap();
         let panels = Panels::m_shape(grid, 75.0);
-        let sharp = TestScene::scene(&CoaxialScene::new(grid, &panels, 0.7));
-        let blurred = TestScene::scene(
+        let sharp = KnownScene::scene(&CoaxialScene::new(grid, &panels, 0.7));
+        let blurred = KnownScene::scene(
             &CoaxialScene::new(grid, &panels, 0.7).blurred(iltm_solve::blur(grid, 0.7)),
         );
         let images = sharp.truth().images;

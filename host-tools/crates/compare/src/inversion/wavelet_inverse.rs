@@ -115,17 +115,17 @@ fn fitted(transformed: &DMatrix<f64>, patterns: &[Vec<usize>]) -> Result<DMatrix
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::TestScene;
+    use crate::known_scene::KnownScene;
 
     #[test]
     fn a_full_pattern_is_the_inverse() {
-        let before = TestScene::textured(4, 8);
+        let before = KnownScene::textured(4, 8);
         assert!(before.error(&WaveletInverse { entries: 31 }) < 1e-9);
     }
 
     #[test]
     fn more_elements_bring_it_nearer() {
-        let before = TestScene::panels(7, 9);
+        let before = KnownScene::panels(7, 9);
         let errors = [0, 4, 16, 62].map(|entries| before.error(&WaveletInverse { entries }));
         assert!(
             errors.windows(2).all(|pair| pair[1] < pair[0]),
@@ -136,7 +136,7 @@ mod tests {
     /// In Haar a sphere's transport is diagonal: only the constant image differs.
     #[test]
     fn a_spheres_transport_needs_the_diagonal_alone() {
-        let before = TestScene::sphere(4, 8, 0.8);
+        let before = KnownScene::sphere(4, 8, 0.8);
         assert!(before.error(&WaveletInverse { entries: 0 }) < 1e-12);
     }
 }

@@ -7,7 +7,7 @@ use super::seeds::{self, DrawErrors, Mean, SEEDS};
 use super::sparsity::{self, Counted};
 use super::{File, claims, second_bounce, sections};
 use crate::benchmark::BenchmarkRow;
-use crate::chart::{Curve, Interval, curves, intervals};
+use crate::chart::{ChartCurve, Interval, curves, intervals};
 use iltm_picture::{Picture, chart::PALETTE, png, progress::Progress};
 use iltm_report::{
     bounces::{self, BouncesOptions},
@@ -157,7 +157,7 @@ fn of_methods(
     timed: &[Timed],
     chosen: impl Fn(&Timed) -> bool,
     point: impl Fn(&Timed) -> (f64, f64),
-) -> Vec<Curve> {
+) -> Vec<ChartCurve> {
     let of = |method: Method| {
         let own = timed.iter().filter(|t| t.method == method && chosen(t));
         let mut points: Vec<(f64, f64)> = own.map(&point).collect();

@@ -2,7 +2,7 @@
 
 use super::{Point, Sweep, Tradeoff};
 use iltm_compile::cost::{BUDGET, CLOCK, RATE};
-use iltm_picture::chart::{Axis, Chart, INK, PALETTE, Series};
+use iltm_picture::chart::{Chart, ChartAxis, INK, PALETTE, Series};
 
 /// One step of an 8-bit code.
 const STEP: f64 = 1.0 / 255.0;
@@ -76,8 +76,8 @@ impl Tradeoff {
             title: &title,
             notes: wrapped(&self.advice(), 128),
             size: (960.0, 640.0),
-            x: Axis::logarithmic(&x),
-            y: Axis::logarithmic("predicted error, relative, %"),
+            x: ChartAxis::logarithmic(&x),
+            y: ChartAxis::logarithmic("predicted error, relative, %"),
             limit: near.then_some((100.0 * STEP, "1/255")),
             series,
             ..Chart::default()

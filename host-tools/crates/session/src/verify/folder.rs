@@ -32,7 +32,7 @@ const BERNOULLI: usize = 32;
 const SEED: u64 = 0x5EE;
 
 /// A picture to project.
-struct Slide {
+struct VerifySlide {
     role: VerifyRole,
     /// One pixel a cell.
     cells: Picture,
@@ -95,14 +95,14 @@ fn slides(
     table: &Table<'_>,
     layout: &Layout,
     images: &[TestImage],
-) -> Result<Vec<Slide>, VerifyError> {
+) -> Result<Vec<VerifySlide>, VerifyError> {
     let curves = ProjectorCurves::new(table);
     let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
     let within = Layout::new(table.grid(), layout.inner(), 0)?;
-    let code = |(role, pattern): &(Role, Pattern)| -> Result<Slide, VerifyError> {
+    let code = |(role, pattern): &(Role, Pattern)| -> Result<VerifySlide, VerifyError> {
         let lit = |cell: usize, _| 255 * u8::from(pattern.lit[cell]);
         let cells = Picture::of_codes(FrameSize::of_grid(table.grid()), 1, lit);
-        Ok(Slide {
+        Ok(VerifySlide {
             role: VerifyRole::Code(*role),
             full: layout.slide(&cells)?,
             cells,
@@ -121,12 +121,12 @@ fn slides(
         let Some(full) = layout.framed(&full) else {
             unreachable!("slides have 8 bits and the size of the cells");
         };
-        slides.push(Slide {
+        slides.push(VerifySlide {
             role: VerifyRole::Plain(image),
             full: layout.slide(&plain)?,
             cells: plain,
         });
-        slides.push(Slide {
+        slides.push(VerifySlide {
             role: VerifyRole::Compensated(image),
             cells: test.compensated.clone(),
             full,

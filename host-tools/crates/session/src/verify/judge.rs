@@ -7,7 +7,7 @@
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
 use super::session::Shown;
-use super::{Expected, Session, VerifyError};
+use super::{Expected, Readings, VerifyError};
 use iltm_capture::CellPlanes;
 use iltm_picture::LightPicture;
 use iltm_report::{Comparison, tier_costs};
@@ -110,7 +110,7 @@ pub struct WorstCell {
 
 /// The answer.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Verdict {
+pub struct TableVerdict {
     /// Whether the table keeps its promise.
     pub passed: bool,
     /// Mean error of the images without and with compensation.
@@ -135,9 +135,9 @@ pub struct Verdict {
 pub fn judge(
     folder: &Path,
     table: &Table<'_>,
-    session: &Session,
+    session: &Readings,
     bound: Option<f64>,
-) -> Result<Verdict, VerifyError> {
+) -> Result<TableVerdict, VerifyError> {
     let mut expected = Expected::new(table);
     let known = expected.live().iter().filter(|live| **live).count();
     let lit = LiveCells::new(&session.live);
@@ -171,7 +171,7 @@ pub fn judge(
     let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
     let viewpoint = shape.min(MOST_VIEWPOINT);
     let bound = self::bound(table, session, &images, (error[0], bound), viewpoint, &lit);
-    Ok(Verdict {
+    Ok(TableVerdict {
         passed: error[1] <= bound.limit,
         error,
         bound,
@@ -258,7 +258,7 @@ fn at_scale(seen: &CellPlanes, wanted: &CellPlanes, scale: f64, lit: &LiveCells)
 /// What the error is held against.
 fn bound(
     table: &Table<'_>,
-    session: &Session,
+    session: &Readings,
     images: &[ImageVerdict],
     (before, given): (f64, Option<f64>),
     viewpoint: f64,
@@ -295,7 +295,7 @@ fn bound(
 
 /// Error that noise makes in each compensated photograph, from what photographs of white
 /// differ by; `None` with a single one.
-fn noise(session: &Session, lit: &LiveCells) -> Option<Vec<f64>> {
+fn noise(session: &Readings, lit: &LiveCells) -> Option<Vec<f64>> {
     let white = &session.revisited.white;
     let (first, others) = white.split_first()?;
     let first = lit.light(first);
@@ -323,7 +323,7 @@ fn norm(picture: &LightPicture) -> f64 {
 /// Refuses photographs that show another picture than their own.
 fn check_order(
     folder: &Path,
-    session: &Session,
+    session: &Readings,
     models: &[[CellPlanes; 2]],
     lit: &LiveCells,
 ) -> Result<(), VerifyError> {
@@ -359,7 +359,12 @@ fn check_order(
 }
 
 /// White now against the white that the table expects, and against its first photograph.
-fn drift(session: &Session, expected: &mut Expected<'_, '_>, white: f64, lit: &LiveCells) -> Drift {
+fn drift(
+    session: &Readings,
+    expected: &mut Expected<'_, '_>,
+    white: f64,
+    lit: &LiveCells,
+) -> Drift {
     let seen = &session.revisited.white;
     let total = |light: &CellPlanes| {
         light
@@ -377,7 +382,12 @@ fn drift(session: &Session, expected: &mut Expected<'_, '_>, white: f64, lit: &L
     }
 }
 
-fn white_change(session: &Session, flood: &CellPlanes, white: f64, lit: &LiveCells) -> WhiteChange {
+fn white_change(
+    session: &Readings,
+    flood: &CellPlanes,
+    white: f64,
+    lit: &LiveCells,
+) -> WhiteChange {
     let seen = &session.revisited.white;
     let mut level = Vec::new();
     let mut change = vec![0.0; lit.0.len()];

@@ -2,7 +2,7 @@
 //! them.
 
 use super::judge::over_images;
-use super::{Session, Verdict};
+use super::{Readings, TableVerdict};
 use iltm_capture::CellPlanes;
 use iltm_picture::{
     ColourScale, LightPicture, Palette, Picture,
@@ -19,7 +19,7 @@ const UNKNOWN: [u8; 3] = [88, 92, 100];
 /// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `drift`, and
 /// of each test image `K-wanted`, `K-before`, `K-after`.
 #[must_use]
-pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<PictureFile> {
+pub fn pictures(table: &Table<'_>, session: &Readings, verdict: &TableVerdict) -> Vec<PictureFile> {
     let grid = table.grid();
     let errors = |half| {
         map(
@@ -52,13 +52,13 @@ pub fn pictures(table: &Table<'_>, session: &Session, verdict: &Verdict) -> Vec<
 
 /// Colours of the map of errors with (1) or without (0) compensation: each has its own, or
 /// nothing would be seen of what is left.
-pub(super) fn error_scale(verdict: &Verdict, half: usize) -> ColourScale {
+pub(super) fn error_scale(verdict: &TableVerdict, half: usize) -> ColourScale {
     let errors = over_images(&verdict.images, half).into_iter().flatten();
     ColourScale::linear(Palette::Magma, rounded(errors.fold(0.0, f64::max)))
 }
 
 /// Colours of the map of changes.
-pub(super) fn drift_scale(verdict: &Verdict) -> ColourScale {
+pub(super) fn drift_scale(verdict: &TableVerdict) -> ColourScale {
     let white = verdict.drift.white.iter();
     let cells = white.flat_map(|white| white.cells.iter().flatten());
     let largest = cells.fold(0.0_f64, |a, b| a.max(b.abs()));

@@ -1,7 +1,7 @@
 //! Page of a verdict: one HTML file with everything inside.
 
 use super::maps::{drift_scale, error_scale};
-use super::{ImageVerdict, TestImage, Verdict};
+use super::{ImageVerdict, TableVerdict, TestImage};
 use iltm_picture::html::{PictureFile, colour_bar, document, img_named, percent};
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
@@ -11,7 +11,7 @@ use maud::{Markup, html};
 #[must_use]
 pub fn html(
     table: &Table<'_>,
-    verdict: &Verdict,
+    verdict: &TableVerdict,
     images: &[TestImage],
     files: &[PictureFile],
 ) -> String {
@@ -31,7 +31,7 @@ pub fn html(
     document(answer, include_str!("page.css"), &body)
 }
 
-fn opening(answer: &str, verdict: &Verdict) -> Markup {
+fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
     let [before, after] = verdict.error;
     let bound = &verdict.bound;
     html! { header {
@@ -59,7 +59,7 @@ fn opening(answer: &str, verdict: &Verdict) -> Markup {
 const UNTOLD: &str = "not known: the table does not tell what light comes of an input";
 
 /// What the bound is made of, name and value.
-fn expectation(verdict: &Verdict) -> Vec<(&'static str, String)> {
+fn expectation(verdict: &TableVerdict) -> Vec<(&'static str, String)> {
     let bound = &verdict.bound;
     let known =
         |value: Option<f64>, otherwise: &str| value.map_or_else(|| otherwise.to_owned(), percent);
@@ -92,7 +92,7 @@ fn expectation(verdict: &Verdict) -> Vec<(&'static str, String)> {
 
 /// Why it passed or failed, a sentence or two.
 #[must_use]
-pub fn reason(verdict: &Verdict) -> String {
+pub fn reason(verdict: &TableVerdict) -> String {
     let [before, after] = verdict.error;
     let drift = &verdict.drift;
     if verdict.passed {
@@ -140,7 +140,7 @@ pub fn reason(verdict: &Verdict) -> String {
     format!("{harm}{changed}")
 }
 
-fn pictures(verdict: &Verdict, images: &[TestImage], files: &[PictureFile]) -> Markup {
+fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile]) -> Markup {
     let title = |image: &ImageVerdict| {
         images
             .get(usize::from(image.image))
@@ -168,7 +168,7 @@ fn pictures(verdict: &Verdict, images: &[TestImage], files: &[PictureFile]) -> M
     } }
 }
 
-fn worst(verdict: &Verdict, files: &[PictureFile]) -> Markup {
+fn worst(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
     html! { section {
         h2 { "Where it is worst" }
         p { "Error of every cell over all test images, relative to reference white. Grey cells could not be compared." }
@@ -183,7 +183,7 @@ fn worst(verdict: &Verdict, files: &[PictureFile]) -> Markup {
     } }
 }
 
-fn drift(verdict: &Verdict, files: &[PictureFile]) -> Markup {
+fn drift(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
     let session = percent(verdict.drift.session);
     let Some(white) = &verdict.drift.white else {
         return html! { section {

@@ -33,7 +33,7 @@ pub struct Shown {
 
 /// Everything that the photographs of a verification folder say.
 #[derive(Clone, Debug)]
-pub struct Session {
+pub struct Readings {
     /// The test images, by number.
     pub shown: Vec<Shown>,
     /// The cells, white and black.
@@ -45,7 +45,7 @@ pub struct Session {
 /// Share of the table's cells that must be found.
 const LEAST_FOUND: f64 = 0.5;
 
-impl Session {
+impl Readings {
     /// Reads the folder that was made with `table`.
     ///
     /// # Errors

@@ -38,7 +38,7 @@ mod sensing;
 #[cfg(test)]
 mod tests;
 
-pub use report::{Recovery, Verdict};
+pub use report::{Isometry, Recovery};
 pub use search::Sampling;
 pub use sensing::Sensing;
 
@@ -52,7 +52,7 @@ pub const LIMIT: f64 = SQRT_2 + 1.0;
 
 /// A number that is not known, from below and from above.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Bounds {
+pub struct IsometryBounds {
     /// It is at least this, at least 1; infinite if it is known to be.
     pub lower: f64,
     /// It is at most this; infinite if nothing better is known.
@@ -65,15 +65,15 @@ pub struct RecoveryBounds {
     /// Coefficients a row.
     pub k: usize,
     /// Bounds of `kappa_2k`.
-    pub kappa: Bounds,
+    pub kappa: IsometryBounds,
     /// Bounds of `gamma_2k`.
-    pub gamma: Bounds,
+    pub gamma: IsometryBounds,
     /// Bounds of `kappa_2k^2 gamma_2k`, which the theorem compares with [`LIMIT`].
-    pub product: Bounds,
+    pub product: IsometryBounds,
     /// Bounds of what that product bounds: the largest over the smallest
     /// `||C^T W h||^2 / ||h||^2` of 2k-sparse `h`. The theorem needs no more than this
     /// below [`LIMIT`].
-    pub ratio: Bounds,
+    pub ratio: IsometryBounds,
     /// Supports that the lower bounds are from.
     pub supports: usize,
 }

@@ -58,7 +58,7 @@ pub struct Recovery {
 
 /// What the bounds decide.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Verdict {
+pub enum Isometry {
     /// The theorem's condition holds.
     Holds,
     /// Neither bound decides.
@@ -70,13 +70,13 @@ pub enum Verdict {
 impl Recovery {
     /// What the bounds decide.
     #[must_use]
-    pub fn verdict(&self) -> Verdict {
+    pub fn verdict(&self) -> Isometry {
         if self.product_at_most < LIMIT {
-            Verdict::Holds
+            Isometry::Holds
         } else if self.product_at_least >= LIMIT {
-            Verdict::Fails
+            Isometry::Fails
         } else {
-            Verdict::Open
+            Isometry::Open
         }
     }
 
@@ -91,7 +91,7 @@ impl Recovery {
         let asks = format!("the theorem asks for less than {LIMIT:.2}");
         let verdict = self.verdict();
         let why = match verdict {
-            Verdict::Holds => {
+            Isometry::Holds => {
                 let most = number(self.product_at_most);
                 format!("kappa^2 gamma is at most {most} (Gershgorin), {asks}:")
             }
@@ -110,12 +110,12 @@ impl Recovery {
             }
         };
         let so = match (verdict, self.k_may_hold) {
-            (Verdict::Holds, _) => "without noise, plain l1 finds such rows exactly".to_owned(),
-            (Verdict::Open, _) => "not decided; held-out photographs judge instead".to_owned(),
-            (Verdict::Fails, 0) => {
+            (Isometry::Holds, _) => "without noise, plain l1 finds such rows exactly".to_owned(),
+            (Isometry::Open, _) => "not decided; held-out photographs judge instead".to_owned(),
+            (Isometry::Fails, 0) => {
                 "it promises nothing here, for no k; held-out photographs judge instead".to_owned()
             }
-            (Verdict::Fails, most) => format!(
+            (Isometry::Fails, most) => format!(
                 "it promises nothing here beyond k = {most}; held-out photographs judge instead"
             ),
         };

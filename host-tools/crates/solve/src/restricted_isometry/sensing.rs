@@ -3,7 +3,7 @@
 use super::super::forward::{Inverse, product};
 use super::super::haar::Haar;
 use super::search::{Extremes, Sampling, search};
-use super::{Bounds, RecoveryBounds};
+use super::{IsometryBounds, RecoveryBounds};
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Coefficients of a grid up to which all of them are looked at.
@@ -65,15 +65,15 @@ impl Sensing {
     pub fn bounds(&self, k: usize, sampling: Sampling) -> RecoveryBounds {
         let size = (2 * k).clamp(1, self.cells);
         let (found, supports) = search(self, size, sampling);
-        let mut ratio = Bounds {
+        let mut ratio = IsometryBounds {
             lower: found.sensed.ratio(),
             upper: self.upper(&self.sensed, size),
         };
-        let mut kappa = Bounds {
+        let mut kappa = IsometryBounds {
             lower: found.forward.ratio().sqrt(),
             upper: self.upper(&self.forward, size).sqrt().min(self.condition),
         };
-        let mut gamma = Bounds {
+        let mut gamma = IsometryBounds {
             lower: found.pencil.ratio(),
             // ||L^T x|| / ||x|| is one ratio over another.
             upper: ratio.upper * kappa.upper.powi(2),
@@ -90,7 +90,7 @@ impl Sensing {
             k,
             kappa,
             gamma,
-            product: Bounds {
+            product: IsometryBounds {
                 lower: kappa.lower.powi(2) * gamma.lower,
                 upper: kappa.upper.powi(2) * gamma.upper,
             },

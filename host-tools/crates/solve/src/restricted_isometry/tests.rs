@@ -197,7 +197,7 @@ fn a_capture_reports_what_its_transport_and_patterns_give() {
     // The mean of patterns of 0 and 1 alone: a constant image against any other.
     assert!(report.gamma_as_shown_at_least > 10.0, "{report:?}");
     assert!(report.coherence > 0.2 && report.coherence < 1.0);
-    assert_eq!(report.verdict(), Verdict::Fails);
+    assert_eq!(report.verdict(), Isometry::Fails);
     assert_eq!((report.k_may_hold, report.k_holds), (0, 0));
     let said = report.lines().concat();
     assert!(said.contains("promises nothing here, for no k"), "{said}");
@@ -215,7 +215,7 @@ fn many_more_photographs_than_cells_are_promised_something() {
     let shown = patterns(8, 3000);
     let report = of_direct(&[&inverse], &haar, &shown, &flood).unwrap();
     assert_eq!(report.k, 1);
-    assert_eq!(report.verdict(), Verdict::Holds, "{report:?}");
+    assert_eq!(report.verdict(), Isometry::Holds, "{report:?}");
     assert!(
         report.k_holds >= 1 && report.k_may_hold >= report.k_holds,
         "{report:?}"
@@ -228,5 +228,5 @@ fn large_grids_are_bounded_by_some_of_their_coefficients() {
     let (report, _) = corner_report((18, 24), 20);
     assert!(report.kappa_at_most.is_infinite());
     assert!(report.product_at_least >= LIMIT);
-    assert_eq!(report.verdict(), Verdict::Fails);
+    assert_eq!(report.verdict(), Isometry::Fails);
 }

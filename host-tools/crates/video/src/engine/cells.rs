@@ -2,7 +2,7 @@
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;
-use super::{FrameJob, OperatorMemory};
+use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, GridPipeline},
@@ -18,7 +18,7 @@ pub(super) struct Cells<'t, 'a, S, const C: usize> {
 }
 
 impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
-    pub(super) fn new(table: &'t Table<'a>, job: &FrameJob) -> Result<Self, FrameError> {
+    pub(super) fn new(table: &'t Table<'a>, job: &EngineJob) -> Result<Self, FrameError> {
         let cells = table.grid().cells();
         Ok(Self {
             pipeline: GridPipeline::new(table)?,
@@ -31,7 +31,7 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate<P: Bands<Code = S>>(
         &mut self,
-        job: &FrameJob,
+        job: &EngineJob,
         operator: &mut OperatorMemory,
         frame: &mut P,
     ) -> Result<u64, FrameError> {

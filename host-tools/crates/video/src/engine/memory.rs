@@ -1,7 +1,7 @@
 //! Memory that is sized once and used for every frame.
 
 use super::super::bands::STRIP;
-use super::FrameJob;
+use super::EngineJob;
 use iltm_runtime::{
     image::Table,
     pipeline::{RowBuffers, Workspace},
@@ -85,13 +85,13 @@ impl RowMemory {
 pub(super) struct Memories<S, M> {
     free: Mutex<Vec<BandMemory<S, M>>>,
     line: usize,
-    job: FrameJob,
+    job: EngineJob,
     cells: usize,
 }
 
 impl<S: Copy + Default, M: Default> Memories<S, M> {
     /// For rows whose [`RowBuffers::line`] needs `line` elements.
-    pub(super) fn new(line: usize, cells: usize, job: FrameJob) -> Self {
+    pub(super) fn new(line: usize, cells: usize, job: EngineJob) -> Self {
         Self {
             free: Mutex::default(),
             line,

@@ -29,14 +29,14 @@ use rows::FullFrames;
 
 /// Compensates frames of type `P` with a table of `C` channels.
 pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
-    job: FrameJob,
+    job: EngineJob,
     operator: OperatorMemory,
-    path: FramePath<'t, 'a, P, C>,
+    path: EnginePath<'t, 'a, P, C>,
 }
 
 /// What frames there will be and what is to be done to them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FrameJob {
+pub(super) struct EngineJob {
     pub(super) size: FrameSize,
     /// Colours of a pixel: as many as the table has channels, or three for a table
     /// of one, which is then used for each of them.
@@ -45,14 +45,14 @@ pub(super) struct FrameJob {
     pub(super) encoding: Encoding,
 }
 
-impl FrameJob {
+impl EngineJob {
     /// Samples of a frame.
     pub(super) const fn samples(&self) -> usize {
         self.size.pixels() * self.colours
     }
 }
 
-enum FramePath<'t, 'a, P: Bands, const C: usize> {
+enum EnginePath<'t, 'a, P: Bands, const C: usize> {
     /// One pixel a cell.
     Cells(Cells<'t, 'a, P::Code, C>),
     /// More.
@@ -68,12 +68,12 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
     pub(super) fn new(
         table: &'t Table<'a>,
         threads: &'t ThreadPool,
-        job: FrameJob,
+        job: EngineJob,
     ) -> Result<Self, FrameError> {
         let path = if job.size == FrameSize::of_grid(table.grid()) {
-            FramePath::Cells(Cells::new(table, &job)?)
+            EnginePath::Cells(Cells::new(table, &job)?)
         } else {
-            FramePath::Full(Box::new(FullFrames::new(table, threads, &job)?))
+            EnginePath::Full(Box::new(FullFrames::new(table, threads, &job)?))
         };
         Ok(Self {
             job,
@@ -91,8 +91,8 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate(&mut self, frame: &mut P) -> Result<u64, VideoError> {
         let clipped = match &mut self.path {
-            FramePath::Cells(cells) => cells.compensate(&self.job, &mut self.operator, frame),
-            FramePath::Full(full) => full.compensate(&self.job, &mut self.operator, frame),
+            EnginePath::Cells(cells) => cells.compensate(&self.job, &mut self.operator, frame),
+            EnginePath::Full(full) => full.compensate(&self.job, &mut self.operator, frame),
         };
         clipped.map_err(VideoError::Runtime)
     }

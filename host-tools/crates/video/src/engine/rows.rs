@@ -8,7 +8,7 @@
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
 use super::memory::{BandMemory, Memories, RowMemory};
-use super::{FrameJob, OperatorMemory};
+use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, FullPipeline},
@@ -50,7 +50,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     pub(super) fn new(
         table: &'t Table<'a>,
         threads: &'t ThreadPool,
-        job: &FrameJob,
+        job: &EngineJob,
     ) -> Result<Self, FrameError> {
         let pipeline = FullPipeline::new(table, job.size)?;
         let (cells, pixels) = (table.grid().cells(), job.size.pixels());
@@ -73,7 +73,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     /// Compensates a frame in place; returns how many samples were clipped.
     pub(super) fn compensate(
         &mut self,
-        job: &FrameJob,
+        job: &EngineJob,
         operator: &mut OperatorMemory,
         frame: &mut P,
     ) -> Result<u64, FrameError> {

@@ -69,7 +69,7 @@ impl Separation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene::{m_scene, rig};
+    use crate::known_scene::{m_scene, rig};
     use iltm_capture::NoiseModel;
     use iltm_runtime::Grid;
 

@@ -9,14 +9,14 @@ use iltm_scene::coaxial::{CoaxialScene, Panels};
 use iltm_solve::inverted;
 use nalgebra::{DMatrix, DVector};
 
-pub(crate) struct TestScene {
+pub(crate) struct KnownScene {
     pub(crate) grid: Grid,
     pub(crate) live: Vec<bool>,
     pub(crate) transport: DMatrix<f64>,
     pub(crate) rig: Rig,
 }
 
-impl TestScene {
+impl KnownScene {
     pub(crate) fn new(rows: u16, cols: u16, transport: DMatrix<f64>, live: Vec<bool>) -> Self {
         let grid = Grid::new(rows, cols).unwrap();
         let noise = NoiseModel::default();
@@ -122,7 +122,7 @@ impl TestScene {
 
 /// The M-shaped panels: transport and live cells.
 pub(crate) fn m_scene(grid: Grid) -> (DMatrix<f64>, Vec<bool>) {
-    let scene = TestScene::panels(grid.rows() as u16, grid.cols() as u16);
+    let scene = KnownScene::panels(grid.rows() as u16, grid.cols() as u16);
     (scene.transport, scene.live)
 }
 
