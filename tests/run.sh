@@ -63,9 +63,6 @@ for component in rustfmt clippy; do
     fi
 done
 
-# The first build is done once: keeping what makes a second one short takes longer.
-[ -d target/debug/incremental ] || export CARGO_INCREMENTAL=0
-
 firmware=runtime/firmware
 say "firmware"
 # Where this fails, the tests that need the firmware fail and say why.
