@@ -85,7 +85,9 @@ fn errors() -> io::Result<String> {
         let _ = writeln!(text, "| {code} | `{name}` | {meaning} |");
     }
     text.push_str(
-        "\nWords in braces stand for a path, a line or a number. Messages of the gates before a \
+        "\nCode 134 (101 in a development build) means a mistake in iltm itself; please \
+         report it with what was printed.\n\n\
+         Words in braces stand for a path, a line or a number. Messages of the gates before a \
          solve have [their own page](gates.md).\n",
     );
     for house in ["host-tools/crates", "host-tools/src", "runtime/src"] {
