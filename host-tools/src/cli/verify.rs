@@ -90,14 +90,14 @@ fn verdict(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
-    let session = Readings::read(folder, table, bars)?;
-    let verdict = judge(folder, table, &session, arguments.bound)?;
+    let readings = Readings::read(folder, table, bars)?;
+    let verdict = judge(folder, table, &readings, arguments.bound)?;
     let images = test_images(table)?;
     let out = arguments
         .report
         .clone()
         .unwrap_or_else(|| folder.join("verdict"));
-    let page = report(table, &session, &verdict, &images, &out)?;
+    let page = report(table, &readings, &verdict, &images, &out)?;
     bars.end();
     let data = data(arguments, folder, &verdict, &images, &page);
     let text = text(&verdict, &images, &page);
@@ -123,13 +123,13 @@ fn verdict(
 /// Writes the page and its pictures; the page.
 fn report(
     table: &Table<'_>,
-    session: &Readings,
+    readings: &Readings,
     verdict: &TableVerdict,
     images: &[TestImage],
     out: &Path,
 ) -> Result<PathBuf, Failure> {
     make_folder(out)?;
-    let files = pictures(table, session, verdict);
+    let files = pictures(table, readings, verdict);
     for file in &files {
         write_file(&out.join(&file.name).with_extension("png"), &file.png)?;
     }

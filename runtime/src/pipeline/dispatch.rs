@@ -22,12 +22,22 @@ pub fn compensate_cells(
     input: &mut [u8],
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
-    if table.channels() == 1 {
-        let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
-        return GridPipeline::<1>::new(table)?.compensate(tier, encoding, wanted, input, workspace);
+    match table.channels() {
+        1 => cells::<1>(table, tier, encoding, wanted, input, workspace),
+        _ => cells::<3>(table, tier, encoding, wanted, input, workspace),
     }
+}
+
+fn cells<const C: usize>(
+    table: &Table<'_>,
+    tier: u8,
+    encoding: Encoding,
+    wanted: &[u8],
+    input: &mut [u8],
+    workspace: &mut Workspace<'_>,
+) -> Result<u32, FrameError> {
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
-    GridPipeline::<3>::new(table)?.compensate(tier, encoding, wanted, input, workspace)
+    GridPipeline::<C>::new(table)?.compensate(tier, encoding, wanted, input, workspace)
 }
 
 /// What is done to a frame larger than the grid.

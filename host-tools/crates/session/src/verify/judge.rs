@@ -6,7 +6,7 @@
 //! known: the table's own predicted error, what the projector's range and its 8-bit codes
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
-use super::session::Shown;
+use super::readings::Shown;
 use super::{Expected, Readings, VerifyError};
 use iltm_capture::CellPlanes;
 use iltm_picture::LightPicture;
@@ -135,13 +135,13 @@ pub struct TableVerdict {
 pub fn judge(
     folder: &Path,
     table: &Table<'_>,
-    session: &Readings,
+    readings: &Readings,
     bound: Option<f64>,
 ) -> Result<TableVerdict, VerifyError> {
     let mut expected = Expected::new(table);
     let known = expected.live().iter().filter(|live| **live).count();
-    let lit = LiveCells::new(&session.live);
-    let models: Option<Vec<[CellPlanes; 2]>> = (session.shown.iter())
+    let lit = LiveCells::new(&readings.live);
+    let models: Option<Vec<[CellPlanes; 2]>> = (readings.shown.iter())
         .map(|shown| {
             let [plain, compensated] = &shown.input;
             Some([
@@ -151,10 +151,10 @@ pub fn judge(
         })
         .collect();
     if let Some(models) = &models {
-        check_order(folder, session, models, &lit)?;
+        check_order(folder, readings, models, &lit)?;
     }
     let white = table.reference_white().to_num::<f64>();
-    let images: Vec<ImageVerdict> = session
+    let images: Vec<ImageVerdict> = readings
         .shown
         .iter()
         .enumerate()
@@ -167,10 +167,10 @@ pub fn judge(
         images.iter().map(of).sum::<f64>() / images.len().max(1) as f64
     };
     let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
-    let drift = drift(session, &mut expected, white, &lit);
+    let drift = drift(readings, &mut expected, white, &lit);
     let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
     let viewpoint = shape.min(MOST_VIEWPOINT);
-    let bound = self::bound(table, session, &images, (error[0], bound), viewpoint, &lit);
+    let bound = self::bound(table, readings, &images, (error[0], bound), viewpoint, &lit);
     Ok(TableVerdict {
         passed: error[1] <= bound.limit,
         error,
@@ -258,7 +258,7 @@ fn at_scale(seen: &CellPlanes, wanted: &CellPlanes, scale: f64, lit: &LiveCells)
 /// What the error is held against.
 fn bound(
     table: &Table<'_>,
-    session: &Readings,
+    readings: &Readings,
     images: &[ImageVerdict],
     (before, given): (f64, Option<f64>),
     viewpoint: f64,
@@ -267,7 +267,7 @@ fn bound(
     let own = table.inverse_error().to_num::<f64>();
     let predicted = tier_costs(table).last().map(|step| step.total);
     let predicted = predicted.filter(|_| own > 0.0);
-    let noise = noise(session, lit);
+    let noise = noise(readings, lit);
     let count = images.len().max(1) as f64;
     let mean = |of: &dyn Fn(usize) -> f64| (0..images.len()).map(of).sum::<f64>() / count;
     let noise_of = |image: usize| noise.as_ref().map_or(0.0, |noise| noise[image]);
@@ -295,8 +295,8 @@ fn bound(
 
 /// Error that noise makes in each compensated photograph, from what photographs of white
 /// differ by; `None` with a single one.
-fn noise(session: &Readings, lit: &LiveCells) -> Option<Vec<f64>> {
-    let white = &session.revisited.white;
+fn noise(readings: &Readings, lit: &LiveCells) -> Option<Vec<f64>> {
+    let white = &readings.revisited.white;
     let (first, others) = white.split_first()?;
     let first = lit.light(first);
     let norm = norm(&first);
@@ -309,7 +309,7 @@ fn noise(session: &Readings, lit: &LiveCells) -> Option<Vec<f64>> {
     let square: f64 = relative.iter().map(|error| error * error).sum();
     let white = (square / relative.len() as f64).sqrt() * norm;
     let of_image = |shown: &Shown| white / self::norm(&lit.light(&shown.seen[1])).max(1e-12);
-    Some(session.shown.iter().map(of_image).collect())
+    Some(readings.shown.iter().map(of_image).collect())
 }
 
 fn norm(picture: &LightPicture) -> f64 {
@@ -323,7 +323,7 @@ fn norm(picture: &LightPicture) -> f64 {
 /// Refuses photographs that show another picture than their own.
 fn check_order(
     folder: &Path,
-    session: &Readings,
+    readings: &Readings,
     models: &[[CellPlanes; 2]],
     lit: &LiveCells,
 ) -> Result<(), VerifyError> {
@@ -331,7 +331,7 @@ fn check_order(
         let role = [super::VerifyRole::Plain, super::VerifyRole::Compensated][half];
         role(image).to_string()
     };
-    for (own, shown) in session.shown.iter().enumerate() {
+    for (own, shown) in readings.shown.iter().enumerate() {
         for half in 0..2 {
             let error = |model: &CellPlanes| lit.compare(model, &shown.seen[half]).error;
             let of_own = error(&models[own][half]);
@@ -349,7 +349,7 @@ fn check_order(
             if let Some((other, other_half, _)) = best.filter(|best| best.2 < EXCHANGED * of_own) {
                 return Err(VerifyError::Order {
                     path: folder.join(&shown.photos[half]),
-                    shows: named(session.shown[other].image, other_half),
+                    shows: named(readings.shown[other].image, other_half),
                     own: named(shown.image, half),
                 });
             }
@@ -360,12 +360,12 @@ fn check_order(
 
 /// White now against the white that the table expects, and against its first photograph.
 fn drift(
-    session: &Readings,
+    readings: &Readings,
     expected: &mut Expected<'_, '_>,
     white: f64,
     lit: &LiveCells,
 ) -> Drift {
-    let seen = &session.revisited.white;
+    let seen = &readings.revisited.white;
     let total = |light: &CellPlanes| {
         light
             .iter()
@@ -374,21 +374,21 @@ fn drift(
     };
     let first = seen.first().map_or(0.0, total).max(1e-12);
     let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
-    let ones = vec![vec![1.0; session.live.len()]; session.revisited.channels];
+    let ones = vec![vec![1.0; readings.live.len()]; readings.revisited.channels];
     let flood = expected.photograph(&ones);
     Drift {
-        white: flood.map(|flood| white_change(session, &flood, white, lit)),
+        white: flood.map(|flood| white_change(readings, &flood, white, lit)),
         session: changes.fold(0.0, f64::max),
     }
 }
 
 fn white_change(
-    session: &Readings,
+    readings: &Readings,
     flood: &CellPlanes,
     white: f64,
     lit: &LiveCells,
 ) -> WhiteChange {
-    let seen = &session.revisited.white;
+    let seen = &readings.revisited.white;
     let mut level = Vec::new();
     let mut change = vec![0.0; lit.0.len()];
     let mut square = 0.0;
@@ -410,7 +410,7 @@ fn white_change(
     WhiteChange {
         level,
         shape: (square / (lit.0.len() * flood.len()).max(1) as f64).sqrt(),
-        cells: lit.among(session.live.len(), &change),
+        cells: lit.among(readings.live.len(), &change),
     }
 }
 

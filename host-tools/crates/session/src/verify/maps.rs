@@ -19,7 +19,11 @@ const UNKNOWN: [u8; 3] = [88, 92, 100];
 /// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `drift`, and
 /// of each test image `K-wanted`, `K-before`, `K-after`.
 #[must_use]
-pub fn pictures(table: &Table<'_>, session: &Readings, verdict: &TableVerdict) -> Vec<PictureFile> {
+pub fn pictures(
+    table: &Table<'_>,
+    readings: &Readings,
+    verdict: &TableVerdict,
+) -> Vec<PictureFile> {
     let grid = table.grid();
     let errors = |half| {
         map(
@@ -37,9 +41,9 @@ pub fn pictures(table: &Table<'_>, session: &Readings, verdict: &TableVerdict) -
         let change = map(grid, &drift_scale(verdict), &change);
         files.push(picture_file("drift", &change));
     }
-    for (shown, image) in session.shown.iter().zip(&verdict.images) {
+    for (shown, image) in readings.shown.iter().zip(&verdict.images) {
         let number = image.image;
-        let wall = |half: usize| as_seen(grid, &shown.seen[half], &shown.wanted, &session.live);
+        let wall = |half: usize| as_seen(grid, &shown.seen[half], &shown.wanted, &readings.live);
         files.push(picture_file(
             &format!("{number}-wanted"),
             &lit(grid, &shown.wanted),

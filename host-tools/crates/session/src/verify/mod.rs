@@ -21,8 +21,8 @@ mod judge;
 mod manifest;
 mod maps;
 mod page;
+mod readings;
 mod response;
-mod session;
 #[cfg(test)]
 #[path = "../../../compile/src/test_scene.rs"]
 mod test_scene;
@@ -35,5 +35,5 @@ pub use judge::{Bound, Drift, ImageVerdict, TableVerdict, WhiteChange, WorstCell
 pub use manifest::{VerifyManifest, VerifyRole, VerifyShot};
 pub use maps::pictures;
 pub use page::{html, reason};
+pub use readings::{Readings, Shown};
 pub use response::ProjectorCurves;
-pub use session::{Readings, Shown};

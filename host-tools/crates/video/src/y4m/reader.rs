@@ -124,10 +124,7 @@ impl<R: Read> Reader<R> {
     }
 
     fn read_samples(&mut self, frame: u64, samples: &mut Vec<u8>) -> Result<(), Y4mError> {
-        let needed = self.header.frame_bytes();
-        if samples.len() != needed {
-            *samples = vec![0; needed];
-        }
+        samples.resize(self.header.frame_bytes(), 0);
         let mut filled = 0;
         while filled < samples.len() {
             match self.input.read(&mut samples[filled..]) {
