@@ -17,7 +17,7 @@ use std::time::Duration;
 #[derive(Debug, Parser)]
 #[command(name = "iltm", version, about, after_help = Kind::table())]
 pub(super) struct Arguments {
-    /// Print one JSON object on standard output and nothing else there
+    /// Print the result as a JSON object, or what happens as an object a line
     #[arg(long, global = true)]
     pub(super) json: bool,
     #[command(subcommand)]

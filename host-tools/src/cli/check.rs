@@ -2,7 +2,7 @@
 
 use super::args::Check;
 use super::failure::{Failure, Kind};
-use super::output::{Output, make_folder, write_file};
+use super::output::{Output, write_files};
 use super::progress::progress;
 use super::summary::gates;
 use crate::capture::{self, CaptureOptions, Examined, Gate, Verdict};
@@ -28,10 +28,9 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let examined = examined?;
     let failed = failed(&examined.gates);
     let page = arguments.output.as_deref().map(|folder| {
-        make_folder(folder)?;
-        let page = folder.join(PAGE_FILE);
         let html = report::gates::page(&name(&arguments.capture), &examined.gates);
-        write_file(&page, html.as_bytes()).map(|()| page)
+        write_files(folder, &[(PAGE_FILE, html)])?;
+        Ok::<_, Failure>(folder.join(PAGE_FILE))
     });
     let page = page.transpose()?;
     let data = json!({
@@ -49,7 +48,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         output.result(&data, &text);
         return Ok(());
     }
-    output.people(&text);
+    output.findings(&text);
     let failure = refusal(&arguments.capture.display().to_string(), &failed);
     Err(failure.with_result(data))
 }

@@ -2,7 +2,7 @@
 
 use super::args::Compare;
 use super::failure::{Failure, Kind, cannot_write};
-use super::output::{Output, make_folder, write_file};
+use super::output::{Output, make_folder, write_files};
 use super::progress::progress;
 use crate::compare::benchmark::{self, BenchmarkRow};
 use crate::compare::benchmark_scene::{BenchmarkScene, BenchmarkSceneError};
@@ -11,6 +11,7 @@ use crate::compare::paper::{self, Condition, File};
 use crate::compare::{Meter, table};
 use crate::demo;
 use iltm_picture::progress::Progress;
+use iltm_picture::unfinished::TemporaryFolder;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -36,11 +37,10 @@ pub(super) fn run(
         mut text,
         mut data,
     } = compared?;
-    for file in &files {
-        write_file(&folder.join(&file.name), &file.bytes)?;
-    }
+    let files: Vec<_> = files.iter().map(|file| (&file.name, &file.bytes)).collect();
+    write_files(folder, &files)?;
     let seconds = start.elapsed().as_secs_f64();
-    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     data["output"] = json!(folder.display().to_string());
     data["files"] = json!(names);
     data["seconds"] = json!(seconds);
@@ -133,7 +133,8 @@ fn of_paper(
             contests.push((condition.name(), photographed, inverted));
         }
     }
-    let room = tempfile::tempdir().map_err(|error| cannot_write(&std::env::temp_dir(), &error))?;
+    let room =
+        TemporaryFolder::new().map_err(|error| cannot_write(&std::env::temp_dir(), &error))?;
     let sample = room.path().join("m-panels-colour");
     demo::sample::write(&sample)?;
     let mut files = paper::files(&contests, &sample, progress).map_err(|error| {

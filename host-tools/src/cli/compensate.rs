@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     let input = opened(&arguments.input)?;
     let bars = progress(output);
     let start = Instant::now();
-    let (summary, live) = written(&arguments.output, |out| {
+    let (summary, live) = written(&arguments.output, output, |out| {
         if watch.is_none() && arguments.budget.is_none() {
             let summary = compensator.stream(input, out, bars.as_ref())?;
             return Ok((summary, None));
@@ -84,9 +84,11 @@ fn opened(input: &Path) -> Result<Box<dyn Read + Send>, Failure> {
 /// What `write` writes, on standard output, or in a file that is there whole or not at all.
 fn written<T>(
     path: &Path,
+    output: &Output,
     write: impl FnOnce(&mut (dyn Write + Send)) -> Result<T, VideoError>,
 ) -> Result<T, Failure> {
     if is_pipe(path) {
+        output.give_frames();
         let stdout = standard_output().map_err(|source| Y4mError::Write { frame: 0, source });
         let mut stdout = stdout.map_err(VideoError::from)?;
         return Ok(write(&mut stdout)?);

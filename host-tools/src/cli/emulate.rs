@@ -69,14 +69,9 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     }
     if interrupt::stopped() {
         let counts = playback.counts();
-        if !output.is_json() {
-            let _ = writeln!(
-                io::stderr(),
-                "{} frames given, {} shown",
-                counts.given,
-                counts.shown
-            );
-        }
+        let data = json!({ "event": "end", "given": counts.given, "shown": counts.shown });
+        let text = format!("{} frames given, {} shown\n", counts.given, counts.shown);
+        output.result(&data, &text);
         return Ok(());
     }
     played
@@ -217,6 +212,7 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
     let mut out = io::stdout();
     let _ = if output.is_json() {
         let data = json!({
+            "event": "started",
             "port": emulator.port(),
             "board": arguments.board.name(),
             "firmware": shown(firmware),

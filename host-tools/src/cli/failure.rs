@@ -1,6 +1,7 @@
 //! Failures of a command: words for people, an exit code for scripts.
 
 use super::active::Active;
+use super::output::printable;
 use super::summary::gates;
 use crate::build_table::BuildError;
 use crate::capture::CaptureError;
@@ -203,8 +204,8 @@ impl Failure {
     ) -> Self {
         Self {
             kind,
-            message: message.to_string(),
-            next_step: next_step.into(),
+            message: printable(&message.to_string()).into_owned(),
+            next_step: printable(&next_step.into()).into_owned(),
             active: None,
             data: None,
         }
@@ -315,15 +316,7 @@ impl From<CompileError> for Failure {
 impl From<DemoError> for Failure {
     fn from(error: DemoError) -> Self {
         match error {
-            DemoError::Folder { ref source, .. } => {
-                let next_step = match source.kind() {
-                    io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => {
-                        "a file is in its place: move it away, or choose another folder with --out"
-                    }
-                    _ => "choose a folder that you may write to with --out",
-                };
-                Self::new(Kind::Write, error, next_step)
-            }
+            DemoError::Folder(error) => error.into(),
             DemoError::Write(error) => cannot_write(&error.path, &error.source),
             DemoError::Build(error) => error.into(),
             DemoError::Video(error) => error.into(),

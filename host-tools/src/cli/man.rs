@@ -2,7 +2,7 @@
 
 use super::args::{Arguments, Completions, Man};
 use super::failure::{Failure, cannot_write};
-use super::output::{Output, make_folder, write_file};
+use super::output::{Output, write_files};
 use clap::CommandFactory;
 use serde_json::json;
 use std::io::{self, Write};
@@ -10,12 +10,9 @@ use std::io::{self, Write};
 /// Writes a manual page for `iltm` and one for each command, in section 1.
 pub(super) fn run(arguments: &Man, output: &Output) -> Result<(), Failure> {
     let folder = &arguments.output;
-    make_folder(folder)?;
     let mut pages = Vec::new();
     collect(super::command(), "", &mut pages).map_err(|error| cannot_write(folder, &error))?;
-    for (name, page) in &pages {
-        write_file(&folder.join(name), page)?;
-    }
+    write_files(folder, &pages)?;
     let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
     let data = json!({ "folder": folder.display().to_string(), "pages": names });
     let text = format!("{}: {} manual pages\n", folder.display(), names.len());

@@ -1,8 +1,8 @@
 //! The command line. Thin: arguments in, library calls, words and codes out.
 //!
-//! People read standard error; standard output carries data: a video stream, or
-//! with `--json` one JSON object and nothing else. What goes on until it is
-//! stopped prints a JSON object a line.
+//! Results go to standard output: words for people, or with `--json` one object or lines of
+//! objects, the last of which says so. Progress, remarks and errors go to standard error. Where
+//! frames go to standard output, all else goes to standard error.
 
 mod active;
 mod args;
@@ -40,7 +40,9 @@ mod words;
 use crate::compare::Meter;
 use args::{Arguments, Command};
 use clap::{CommandFactory, Parser};
+use failure::{Failure, Kind};
 use output::Output;
+use std::env;
 use std::process::ExitCode;
 
 /// The command line as clap knows it: names, options, words.
@@ -59,8 +61,12 @@ pub fn exit_codes() -> Vec<(u8, &'static str, &'static str)> {
 /// allocator, if that counts.
 #[must_use]
 pub fn run(meter: Option<Meter>) -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return refused(&error),
+    };
     let output = Output::new(arguments.json);
+    interrupt::begin(&output);
     let result = match &arguments.command {
         Command::Demo(demo) => demo::run(demo, &output),
         Command::Simulate(simulate) => simulate::run(simulate, &output),
@@ -91,8 +97,29 @@ pub fn run(meter: Option<Meter>) -> ExitCode {
         #[cfg(unix)]
         Command::Emulate(emulate) => emulate::run(emulate, &output),
     };
+    interrupt::wait_if_ending();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => output.failure(&failure),
+    }
+}
+
+/// Says that the command line cannot be understood, or prints the help that it asks for.
+fn refused(error: &clap::Error) -> ExitCode {
+    let before_files = env::args_os().take_while(|word| word != "--");
+    let is_json = before_files.into_iter().any(|word| word == "--json");
+    if error.use_stderr() && is_json {
+        let said = error.to_string();
+        let message = said.lines().next().unwrap_or_default();
+        let message = message.trim_start_matches("error: ");
+        let next_step = "Run the command with --help.";
+        return Output::new(true).failure(&Failure::new(Kind::Usage, message, next_step));
+    }
+    // Help that cannot be written is of no use to anybody.
+    let _ = error.print();
+    if error.use_stderr() {
+        ExitCode::from(Kind::Usage.code())
+    } else {
+        ExitCode::SUCCESS
     }
 }

@@ -1,67 +1,99 @@
 //! Output of a command: words for people, JSON for programs, files whole or not at all.
 
 use super::active::Active;
-use super::failure::{Failure, cannot_read, cannot_write};
-use iltm_picture::whole_file;
+use super::failure::{Failure, Kind, cannot_read, cannot_write};
+use iltm_picture::{html::PictureFile, unfinished, whole_file, whole_folder};
 use serde_json::{Value, json};
+use std::borrow::Cow;
 use std::fs;
-use std::io::{self, IsTerminal, Write};
-use std::path::Path;
+use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Version of the objects that `--json` prints: it rises when a field goes or changes its
+/// meaning. `docs/json/` has their schemas.
+const JSON_VERSION: u8 = 1;
 
 /// Standard output and standard error as a command sees them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Output {
     json: bool,
     /// Whether somebody watches standard error.
     pub(super) terminal: bool,
+    /// Whether frames go to standard output, and all words to standard error.
+    frames: Arc<AtomicBool>,
 }
 
 impl Output {
     pub(super) fn new(json: bool) -> Self {
-        let terminal = io::stderr().is_terminal();
-        Self { json, terminal }
+        Self {
+            json,
+            terminal: io::stderr().is_terminal(),
+            frames: Arc::default(),
+        }
     }
 
     pub(super) const fn is_json(&self) -> bool {
         self.json
     }
 
-    /// The result of a command: JSON for programs or text for people. A reader
-    /// that went away is no failure of the command.
-    pub(super) fn result(&self, data: &Value, text: &str) {
-        if self.json {
-            let _ = writeln!(io::stdout(), "{data}");
+    /// From now on standard output carries frames; results go to standard error.
+    pub(super) fn give_frames(&self) {
+        self.frames.store(true, Ordering::SeqCst);
+    }
+
+    /// Where results go. A reader that went away is no failure of the command.
+    fn write(&self, text: &str) {
+        if self.frames.load(Ordering::SeqCst) {
+            let _ = io::stderr().write_all(text.as_bytes());
         } else {
-            let _ = write!(io::stderr(), "{text}");
+            let mut out = io::stdout().lock();
+            let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
         }
     }
 
-    /// What people read while a command goes on, or before its failure; programs get it as
-    /// events, or with the failure.
+    /// The result of a command: JSON for programs or text for people.
+    pub(super) fn result(&self, data: &Value, text: &str) {
+        if self.json {
+            self.write(&last(data.clone()));
+        } else {
+            self.write(&printable(text));
+        }
+    }
+
+    /// The result of a command that fails by what it has found, for people; programs get it with
+    /// the failure.
+    pub(super) fn findings(&self, text: &str) {
+        if !self.json {
+            self.write(&printable(text));
+        }
+    }
+
+    /// What people read while a command goes on; programs get it as events.
     pub(super) fn people(&self, text: &str) {
         if !self.json {
-            let _ = write!(io::stderr(), "{text}");
+            let _ = write!(io::stderr(), "{}", printable(text));
         }
     }
 
     /// A remark for people, where there are some.
     pub(super) fn remark(&self, text: &str) {
         if self.terminal && !self.json {
-            let _ = writeln!(io::stderr(), "{text}");
+            let _ = writeln!(io::stderr(), "{}", printable(text));
         }
     }
 
     /// An event of long work, for programs: an object a line.
     pub(super) fn event(&self, data: &Value) {
         if self.json {
-            let mut out = io::stdout();
-            let _ = writeln!(out, "{data}");
-            let _ = out.flush();
+            self.write(&format!("{data}\n"));
         }
     }
 
     pub(super) fn failure(&self, failure: &Failure) -> ExitCode {
+        unfinished::remove_empty_folders();
         if self.json {
             let mut data = failure
                 .data
@@ -75,7 +107,7 @@ impl Output {
                 "next_step": failure.next_step,
                 "active": failure.active.as_ref().map(Active::data),
             });
-            let _ = writeln!(io::stdout(), "{data}");
+            self.write(&last(data));
         }
         let mut text = String::new();
         let width = console::Term::stderr().size().1.into();
@@ -95,6 +127,37 @@ impl Output {
     }
 }
 
+/// The text without what a terminal obeys: names in a stranger's files and from a device's line
+/// may hold control characters.
+pub(super) fn printable(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if !text.contains(obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        if obeyed(c) {
+            safe.extend(c.escape_debug());
+        } else {
+            safe.push(c);
+        }
+    }
+    Cow::Owned(safe)
+}
+
+/// The names and contents of pictures as files.
+pub(super) fn pictures(pictures: &[PictureFile]) -> Vec<(PathBuf, &[u8])> {
+    let file = |it: &PictureFile| Path::new(&it.name).with_extension("png");
+    pictures.iter().map(|it| (file(it), &*it.png)).collect()
+}
+
+/// The last object of a command as a line.
+fn last(mut data: Value) -> String {
+    data["json"] = json!(JSON_VERSION);
+    data["last"] = json!(true);
+    format!("{data}\n")
+}
+
 /// Writes a file whole or not at all: beside its place, then renamed.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     whole_file::write(path, bytes).map_err(|error| cannot_write(&error.path, &error.source))
@@ -106,5 +169,23 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// Makes a folder and those that it lies in.
 pub(super) fn make_folder(folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))
+    unfinished::make_folder(folder).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => Failure::new(
+            Kind::Write,
+            format!(
+                "{}: cannot be made: a file is in its place",
+                folder.display()
+            ),
+            "Move it away, or choose another folder.",
+        ),
+        _ => cannot_write(folder, &error),
+    })
+}
+
+/// Writes files into a folder, all of them or none; the folder is made if it is not there.
+pub(super) fn write_files(
+    folder: &Path,
+    files: &[(impl AsRef<Path>, impl AsRef<[u8]>)],
+) -> Result<(), Failure> {
+    whole_folder::put(folder, files).map_err(|error| cannot_write(&error.path, &error.source))
 }

@@ -2,7 +2,7 @@
 
 use super::args::Solve;
 use super::failure::{Failure, Kind};
-use super::output::{Output, make_folder, write_file};
+use super::output::{Output, pictures, write_file, write_files};
 use super::progress::progress;
 use super::summary::{summary, text};
 use super::tables::seal;
@@ -108,6 +108,9 @@ fn content(files: &[PathBuf], bars: &dyn Progress) -> Result<Vec<Content>, Failu
     content
 }
 
+/// The page's name in the folder that `--report` gives.
+const PAGE: &str = "report.html";
+
 /// Writes the report; its page.
 fn report(
     built: &BuiltTable,
@@ -124,11 +127,8 @@ fn report(
             "Check the content, or leave --report away: the table has been written.",
         )
     })?;
-    make_folder(folder)?;
-    for file in &report.files {
-        write_file(&folder.join(&file.name).with_extension("png"), &file.png)?;
-    }
-    let page = folder.join("report.html");
-    write_file(&page, report.page.as_bytes())?;
-    Ok(page)
+    let mut files = pictures(&report.files);
+    files.push((PAGE.into(), report.page.as_bytes()));
+    write_files(folder, &files)?;
+    Ok(folder.join(PAGE))
 }

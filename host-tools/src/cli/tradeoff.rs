@@ -1,15 +1,14 @@
 //! `iltm tradeoff`
 
 use super::args::Tradeoff as Arguments;
-use super::failure::{Failure, Kind, cannot_read, cannot_write};
-use super::output::{Output, read_file, write_file};
+use super::failure::{Failure, Kind, cannot_read};
+use super::output::{Output, make_folder, read_file, write_files};
 use super::progress::progress;
 use super::tables::check;
 use crate::tradeoff::{Tradeoff, TradeoffError};
 use serde_json::json;
 use std::fmt::Write;
 use std::fs;
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// The files, by what they hold.
@@ -36,31 +35,19 @@ pub(super) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
     };
     let place = |name: &str| arguments.output.join(name);
     let picture = found.svg();
-    write_file(&place(PAGE), found.html().as_bytes())?;
-    if let Some(picture) = &picture {
-        write_file(&place(PICTURE), picture.as_bytes())?;
-    }
-    write_file(&place(LIST), &found.csv())?;
+    let mut files = vec![(PAGE, found.html().into_bytes()), (LIST, found.csv())];
+    files.extend(
+        picture
+            .as_ref()
+            .map(|svg| (PICTURE, svg.clone().into_bytes())),
+    );
+    write_files(&arguments.output, &files)?;
     let mut data = found.data();
     data["page"] = json!(place(PAGE).display().to_string());
     data["picture"] = json!(picture.map(|_| place(PICTURE).display().to_string()));
     data["list"] = json!(place(LIST).display().to_string());
     output.result(&data, &text(&found, &place(PAGE)));
     Ok(())
-}
-
-fn make_folder(folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists | ErrorKind::NotADirectory => Failure::new(
-            Kind::Write,
-            format!(
-                "{}: cannot be made: a file is in its place",
-                folder.display()
-            ),
-            "Move it away, or choose another folder with -o.",
-        ),
-        _ => cannot_write(folder, &error),
-    })
 }
 
 fn failed(error: TradeoffError) -> Failure {

@@ -2,7 +2,7 @@
 
 use super::args::Verify;
 use super::failure::{Failure, Kind};
-use super::output::{Output, make_folder, read_file, write_file};
+use super::output::{self, Output, read_file, write_files};
 use super::progress::progress;
 use super::tables::check;
 use crate::compile::Provenance;
@@ -105,7 +105,7 @@ fn verdict(
         output.result(&data, &text);
         return Ok(());
     }
-    output.people(&text);
+    output.findings(&text);
     let message = format!(
         "{} does not keep its promise: error {:.4}, at most {:.4} passes",
         arguments.table.display(),
@@ -120,6 +120,9 @@ fn verdict(
     Err(Failure::new(Kind::Verdict, message, next_step).with_result(data))
 }
 
+/// The page's name in its folder.
+const PAGE: &str = "verdict.html";
+
 /// Writes the page and its pictures; the page.
 fn report(
     table: &Table<'_>,
@@ -128,14 +131,12 @@ fn report(
     images: &[TestImage],
     out: &Path,
 ) -> Result<PathBuf, Failure> {
-    make_folder(out)?;
-    let files = pictures(table, readings, verdict);
-    for file in &files {
-        write_file(&out.join(&file.name).with_extension("png"), &file.png)?;
-    }
-    let page = out.join("verdict.html");
-    write_file(&page, html(table, verdict, images, &files).as_bytes())?;
-    Ok(page)
+    let drawn = pictures(table, readings, verdict);
+    let page = html(table, verdict, images, &drawn);
+    let mut files = output::pictures(&drawn);
+    files.push((PAGE.into(), page.as_bytes()));
+    write_files(out, &files)?;
+    Ok(out.join(PAGE))
 }
 
 fn title<'i>(images: &'i [TestImage], image: &ImageVerdict) -> &'i str {

@@ -14,7 +14,7 @@ use crate::capture::CaptureOptions;
 use crate::report::{Example, Report, ReportError, Wanted, stills};
 use crate::solve::SolveOptions;
 use crate::video::{FrameTotals, VideoError};
-use iltm_picture::{FileError, progress::Progress};
+use iltm_picture::{FileError, FolderError, WholeFolder, progress::Progress};
 use iltm_runtime::FrameSize;
 use sample::{make_folder, write_bytes};
 use std::path::{Path, PathBuf};
@@ -31,13 +31,8 @@ const VIDEO: (u16, u16) = (480, 320);
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
     /// A folder could not be made.
-    #[error("{}: cannot be made: {source}", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What the operating system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// A file could not be written.
     #[error("{}: cannot be written: {}", .0.path.display(), .0.source)]
     Write(#[from] FileError),
@@ -101,14 +96,14 @@ pub struct DemoOutcome {
 }
 
 /// Does the whole job into `out`, which is made if it is not there. Files of an
-/// earlier run are replaced, each in one step; others are left alone.
+/// earlier run are replaced when all are done; others are left alone.
 ///
 /// # Errors
-/// [`DemoError`]; files that are not whole are not left behind.
+/// [`DemoError`]; nothing is left behind then.
 pub fn run(out: &Path, progress: &dyn Progress) -> Result<DemoOutcome, DemoError> {
-    let paths = Paths::new(out);
+    let work = WholeFolder::beside(out)?;
+    let paths = Paths::new(work.path());
     let mut clock = Clock::new();
-    make_folder(out)?;
     progress.begin("writing the sample capture", 0);
     sample::write(&paths.capture)?;
     progress.end();
@@ -130,6 +125,7 @@ pub fn run(out: &Path, progress: &dyn Progress) -> Result<DemoOutcome, DemoError
     write_pictures(&report, &paths.pictures)?;
     progress.end();
     clock.lap("writing the report");
+    work.finish_over()?;
     let errors = |example: &Example| {
         let mut errors = [0.0; 3];
         for (error, shown) in errors.iter_mut().zip(&example.shown) {
@@ -139,7 +135,7 @@ pub fn run(out: &Path, progress: &dyn Progress) -> Result<DemoOutcome, DemoError
     };
     let images = report.examples.iter().map(errors).collect();
     Ok(DemoOutcome {
-        paths,
+        paths: Paths::new(out),
         images,
         video,
         report_bytes: page.len(),

@@ -1,7 +1,7 @@
 //! Sample capture that the program carries with it.
 
 use super::DemoError;
-use iltm_picture::whole_file;
+use iltm_picture::{FolderError, whole_file};
 use include_dir::{Dir, File, include_dir};
 use std::fs;
 use std::path::Path;
@@ -46,10 +46,7 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), DemoError> {
 
 /// Makes a folder and those that it lies in.
 pub(super) fn make_folder(folder: &Path) -> Result<(), DemoError> {
-    fs::create_dir_all(folder).map_err(|source| DemoError::Folder {
-        path: folder.to_owned(),
-        source,
-    })
+    Ok(fs::create_dir_all(folder).map_err(FolderError::io(folder))?)
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ use std::time::{Duration, Instant};
 /// Exit code and what people read of a command to a port, whose name is taken out.
 fn said(command: &str, port: &str) -> String {
     let ended = User::new().run(&format!("{command} --port {port}"));
-    assert_eq!(ended.out, "");
     ended.with_code().replace(port, "PORT")
 }
 

@@ -8,6 +8,8 @@ mod compare;
 mod device;
 mod emulate;
 mod flash;
+#[cfg(target_os = "linux")]
+mod interruption;
 mod live;
 mod session;
 mod simulate;

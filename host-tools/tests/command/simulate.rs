@@ -168,9 +168,15 @@ fn words_that_are_no_effect_and_scenes_that_are_not_there_have_codes_of_their_ow
 /// With a capture `c` of the small scene whose photographs are in `taken`.
 fn without_photographs() -> User {
     let user = user(&[]);
-    user.says("simulate scene.toml -o c --photos 12");
-    user.rename("c/photos", "taken");
+    without_photographs_in(&user, "c");
     user
+}
+
+/// Makes a capture of the small scene whose photographs are in `taken`.
+pub(crate) fn without_photographs_in(user: &User, capture: &str) {
+    user.write("scene.toml", CORNER);
+    user.says(&format!("simulate scene.toml -o {capture} --photos 12"));
+    user.rename(&format!("{capture}/photos"), "taken");
 }
 
 const PHOTOGRAPH: &str = "simulate scene.toml --photograph c";

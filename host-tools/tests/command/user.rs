@@ -151,9 +151,10 @@ impl User {
 pub(crate) struct Ended {
     /// Its exit code.
     pub(crate) code: i32,
-    /// What programs read.
+    /// What came on standard output: the result.
     pub(crate) out: String,
-    /// What people read.
+    /// What people read, in the order in which it comes: remarks and the result, or what was
+    /// found and the error.
     pub(crate) said: String,
 }
 
@@ -161,10 +162,19 @@ impl Ended {
     /// Waits for the end.
     pub(crate) fn of(child: Child) -> Self {
         let output = child.wait_with_output().expect("a child");
+        let code = output.status.code().expect("not killed");
+        let for_programs = [b"{".as_slice(), b"YUV4MPEG2"];
+        let is_for_people = !for_programs.iter().any(|it| output.stdout.starts_with(it));
+        let words = if is_for_people { &*output.stdout } else { &[] };
+        let mut parts = [&*output.stderr, words];
+        if code != 0 {
+            parts.reverse();
+        }
+        let said = String::from_utf8_lossy(&parts.concat()).into_owned();
         Self {
-            code: output.status.code().expect("not killed"),
+            code,
             out: String::from_utf8_lossy(&output.stdout).into_owned(),
-            said: String::from_utf8_lossy(&output.stderr).into_owned(),
+            said,
         }
     }
 

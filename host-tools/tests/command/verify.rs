@@ -22,7 +22,7 @@ fn photographed() -> &'static User {
 }
 
 /// The same in a folder that may be harmed.
-fn copy() -> User {
+pub(crate) fn copy() -> User {
     let user = User::new();
     user.write("t.iltm", photographed().read("t.iltm"));
     for part in ["v", "v/patterns", "v/photos", "v/wanted"] {

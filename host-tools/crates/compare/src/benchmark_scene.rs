@@ -12,6 +12,7 @@ use iltm_capture::{
     read_reference,
 };
 use iltm_picture::progress::Progress;
+use iltm_picture::unfinished::TemporaryFolder;
 use iltm_runtime::Grid;
 use iltm_scene::{
     Simulation, SimulationError, SimulationOptions, VirtualCamera,
@@ -123,7 +124,7 @@ impl BenchmarkScene {
         let scene = Scene::read(file)?;
         check_size(scene.projector.grid)?;
         let simulation = Simulation::new(&scene, &SimulationOptions::default(), progress)?;
-        let room = tempfile::tempdir()?;
+        let room = TemporaryFolder::new()?;
         let folder = room.path().join("capture");
         let patterns = pattern_set(simulation.grid(), REGISTRATION, seed);
         let camera = VirtualCamera::new(&scene, &simulation, seed)?;

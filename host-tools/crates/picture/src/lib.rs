@@ -13,6 +13,7 @@
 //! | HTML pages | [`html`] |
 //! | arrays as `NumPy` files | [`npy`] |
 //! | files and folders that are there whole or not at all | [`WholeFile`], [`WholeFolder`] |
+//! | temporary files, gone when the process is stopped | [`unfinished`] |
 //! | how far long work is | [`progress`] |
 
 pub mod canvas;
@@ -30,8 +31,9 @@ pub mod png;
 pub mod progress;
 mod response;
 pub mod statistics;
+pub mod unfinished;
 pub mod whole_file;
-mod whole_folder;
+pub mod whole_folder;
 
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
 pub use contact_sheet::{ContactSheet, Tile};

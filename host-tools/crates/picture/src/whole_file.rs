@@ -1,7 +1,8 @@
 //! Atomic files: written under another name, then renamed, so that a file is there whole or not at all.
 
-use std::fs::File;
-use std::io::Write;
+use crate::unfinished::{Listed, step};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -12,10 +13,10 @@ pub struct FileError {
     /// The file.
     pub path: PathBuf,
     /// What the operating system says.
-    pub source: std::io::Error,
+    pub source: io::Error,
 }
 
-impl From<FileError> for std::io::Error {
+impl From<FileError> for io::Error {
     fn from(error: FileError) -> Self {
         error.source
     }
@@ -37,47 +38,65 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 
 /// A file that is written under a temporary name beside its own.
 ///
-/// [`finish`](Self::finish) gives it its name, in one step, over a file that may
-/// be there. Dropped before that, it leaves nothing behind and the other file as
-/// it was.
+/// [`finish`](Self::finish) gives it its name, in one step, over a file that may be there.
+/// Dropped before that, it leaves nothing behind and the other file as it was. A symbolic link
+/// is followed. What is no regular file, a device or a named pipe, is never replaced: it is
+/// written into at once.
 #[derive(Debug)]
 pub struct WholeFile {
     path: PathBuf,
-    file: NamedTempFile,
+    target: Target,
+}
+
+#[derive(Debug)]
+enum Target {
+    Temporary(NamedTempFile, Listed),
+    Device(File),
 }
 
 impl WholeFile {
     /// Begins a file that is to be called `path`.
     ///
     /// # Errors
-    /// [`FileError`] if nothing can be created in its folder.
+    /// [`FileError`] if nothing can be created in its folder, if `path` is a folder, or if what
+    /// is there cannot be written into.
     pub fn create(path: &Path) -> Result<Self, FileError> {
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
+        let failed = |source: io::Error| FileError {
+            path: path.to_owned(),
+            source,
         };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".iltm-").suffix(".part");
-        // As for any file, the process's mask decides who may read it; temporary
-        // files are otherwise for their owner only.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        match builder.tempfile_in(folder) {
-            Ok(file) => Ok(Self {
-                path: path.to_owned(),
-                file,
-            }),
-            // The temporary name that the error carries helps nobody.
-            Err(error) => Err(FileError {
-                path: path.to_owned(),
-                source: error.kind().into(),
-            }),
+        let followed = followed(path);
+        match fs::metadata(&followed) {
+            Ok(there) if there.is_dir() => Err(failed(io::ErrorKind::IsADirectory.into())),
+            Ok(there) if !there.is_file() => {
+                let opened = OpenOptions::new().write(true).open(&followed);
+                Ok(Self {
+                    path: followed,
+                    target: Target::Device(opened.map_err(failed)?),
+                })
+            }
+            _ => {
+                let folder = match followed.parent() {
+                    Some(folder) if !folder.as_os_str().is_empty() => folder,
+                    _ => Path::new("."),
+                };
+                // The temporary name that the error carries helps nobody.
+                let made = Listed::make(|| temporary(folder), NamedTempFile::path);
+                let (file, listed) = made.map_err(|error| failed(error.kind().into()))?;
+                Ok(Self {
+                    path: followed,
+                    target: Target::Temporary(file, listed),
+                })
+            }
         }
     }
 
     /// What is to be written to.
     pub fn file(&mut self) -> &mut File {
-        self.file.as_file_mut()
+        match &mut self.target {
+            Target::Temporary(file, _) => file.as_file_mut(),
+            Target::Device(file) => file,
+        }
     }
 
     /// Gives the file its name; it stays open.
@@ -85,14 +104,45 @@ impl WholeFile {
     /// # Errors
     /// [`FileError`] if that fails; nothing is left behind then.
     pub fn finish(self) -> Result<File, FileError> {
-        match self.file.persist(&self.path) {
-            Ok(file) => Ok(file),
-            Err(error) => Err(FileError {
-                path: self.path,
-                source: error.error,
+        let Self { path, target } = self;
+        match target {
+            Target::Device(file) => Ok(file),
+            Target::Temporary(file, listed) => step(|| {
+                let named = file.persist(&path);
+                drop(listed);
+                named.map_err(|error| FileError {
+                    path,
+                    source: error.error,
+                })
             }),
         }
     }
+}
+
+fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".iltm-").suffix(".part");
+    // As for any file, the process's mask decides who may read it; temporary
+    // files are otherwise for their owner only.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// Most symbolic links that lead to one another, as Linux has it.
+const MOST_LINKS: usize = 40;
+
+/// The place that symbolic links lead to, whether something is there or not.
+pub(crate) fn followed(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&path) {
+            // An absolute target replaces the whole path.
+            Ok(target) => path = path.parent().unwrap_or(Path::new("")).join(target),
+            Err(_) => break,
+        }
+    }
+    path
 }
 
 #[cfg(test)]
@@ -114,6 +164,41 @@ mod tests {
         file.finish().unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_a_named_pipe_is_written_into() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir(at("there")).unwrap();
+        symlink("there/file", at("dangling")).unwrap();
+        symlink("dangling", at("link")).unwrap();
+        for text in ["new", "newer"] {
+            write(&at("link"), text.as_bytes()).unwrap();
+            assert_eq!(std::fs::read_to_string(at("there/file")).unwrap(), text);
+            assert!(at("link").is_symlink() && at("dangling").is_symlink());
+        }
+        let made = std::process::Command::new("mkfifo")
+            .arg(at("pipe"))
+            .status();
+        assert!(made.unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = at("pipe");
+            move || std::fs::read(pipe).unwrap()
+        });
+        write(&at("pipe"), b"frames").unwrap();
+        assert_eq!(reader.join().unwrap(), b"frames");
+        let kind = std::fs::metadata(at("pipe")).unwrap().file_type();
+        assert!(kind.is_fifo());
+    }
+
+    #[test]
+    fn a_folder_in_the_place_of_a_file_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = WholeFile::create(folder.path()).unwrap_err();
+        assert_eq!(error.source.kind(), io::ErrorKind::IsADirectory);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Atomic folders: written under another name, then renamed, so that a folder is there
 //! whole or not at all.
 
-use crate::{Picture, png};
+use crate::unfinished::{Listed, make_folder, step};
+use crate::whole_file::{self, followed};
+use crate::{FileError, Picture, png};
 use std::ffi::OsString;
 use std::fs;
 use std::io;
@@ -43,6 +45,7 @@ impl FolderError {
 pub struct WholeFolder {
     out: PathBuf,
     beside: TempDir,
+    listed: Listed,
 }
 
 impl WholeFolder {
@@ -52,16 +55,29 @@ impl WholeFolder {
     /// [`FolderError`] if something is in its place or nothing can be made beside it.
     pub fn create(out: &Path) -> Result<Self, FolderError> {
         check_free(out)?;
+        Self::beside(out)
+    }
+
+    /// Begins a folder that is to be called `out`, whatever is there.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`] if nothing can be made beside it.
+    pub fn beside(out: &Path) -> Result<Self, FolderError> {
+        let out = followed(out);
         let parent = match out.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
         };
         let mut prefix = OsString::from(".");
         prefix.push(out.file_name().unwrap_or_default());
-        let made = tempfile::Builder::new().prefix(&prefix).tempdir_in(parent);
+        let mut builder = tempfile::Builder::new();
+        let make = || builder.prefix(&prefix).tempdir_in(parent);
+        let (beside, listed) =
+            Listed::make(make, TempDir::path).map_err(FolderError::io(parent))?;
         Ok(Self {
-            out: out.to_owned(),
-            beside: made.map_err(FolderError::io(parent))?,
+            out,
+            beside,
+            listed,
         })
     }
 
@@ -106,14 +122,65 @@ impl WholeFolder {
     /// # Errors
     /// [`FolderError::Io`]; nothing is left behind then.
     pub fn finish(self) -> Result<(), FolderError> {
-        open_to_all(self.beside.path()).map_err(FolderError::io(&self.out))?;
-        // An empty folder in its place gives way to the rename.
-        let kept = self.beside.keep();
-        fs::rename(&kept, &self.out).map_err(|source| {
-            let _ = fs::remove_dir_all(&kept);
-            FolderError::io(&self.out)(source)
+        let Self {
+            out,
+            beside,
+            listed,
+        } = self;
+        open_to_all(beside.path()).map_err(FolderError::io(&out))?;
+        step(|| {
+            // An empty folder in its place gives way to the rename.
+            let kept = beside.keep();
+            let renamed = fs::rename(&kept, &out).map_err(|source| {
+                let _ = fs::remove_dir_all(&kept);
+                FolderError::io(&out)(source)
+            });
+            drop(listed);
+            renamed
         })
     }
+
+    /// Puts the files where the folder is to be: files of the same names are replaced, others
+    /// are left alone.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`].
+    pub fn finish_over(self) -> Result<(), FolderError> {
+        if check_free(&self.out).is_ok() {
+            return self.finish();
+        }
+        step(|| move_over(self.beside.path(), &self.out))
+    }
+}
+
+fn move_over(from: &Path, to: &Path) -> Result<(), FolderError> {
+    fs::create_dir_all(to).map_err(FolderError::io(to))?;
+    for entry in fs::read_dir(from).map_err(FolderError::io(from))? {
+        let entry = entry.map_err(FolderError::io(from))?;
+        let place = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            move_over(&entry.path(), &place)?;
+        } else {
+            fs::rename(entry.path(), &place).map_err(FolderError::io(&place))?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes files into a folder, which is made if it is not there; each replaces one of its name.
+/// A process that is stopped has written all of them or none.
+///
+/// # Errors
+/// [`FileError`].
+pub fn put(folder: &Path, files: &[(impl AsRef<Path>, impl AsRef<[u8]>)]) -> Result<(), FileError> {
+    step(|| {
+        make_folder(folder).map_err(|source| FileError {
+            path: folder.to_owned(),
+            source,
+        })?;
+        let mut files = files.iter();
+        files.try_for_each(|(name, bytes)| whole_file::write(&folder.join(name), bytes.as_ref()))
+    })
 }
 
 /// Refuses a place that has something in it.

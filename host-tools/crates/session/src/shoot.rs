@@ -6,6 +6,7 @@ use super::shell;
 use super::{CameraDriver, Latency, Screen, SessionError, measure, states};
 use iltm_capture::{PhotoStats, Role};
 use iltm_picture::progress::Progress;
+use iltm_picture::unfinished::TemporaryFolder;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -313,11 +314,11 @@ impl LatencyProbe for Flashing<'_, '_, '_> {
 }
 
 /// An empty folder beside a photograph's place, gone when it is dropped.
-fn beside(photo: &Path) -> Result<tempfile::TempDir, SessionError> {
+fn beside(photo: &Path) -> Result<TemporaryFolder, SessionError> {
     let parent = photo.parent().unwrap_or(Path::new("."));
     let make = || {
         fs::create_dir_all(parent)?;
-        tempfile::Builder::new().prefix(".shot-").tempdir_in(parent)
+        TemporaryFolder::within(parent, ".shot-")
     };
     make().map_err(|source| SessionError::Write {
         path: parent.to_owned(),

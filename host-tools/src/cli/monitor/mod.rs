@@ -22,6 +22,7 @@ use crate::device::logs::Logs;
 use crate::device::{Client, DeviceError, Incoming, Patience, Port};
 use event::MonitorEvent;
 use iltm_runtime::link::{Channel, Refusal};
+use serde_json::json;
 use std::io;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -65,7 +66,10 @@ pub(super) fn run(arguments: &Monitor, output: &Output) -> Result<(), Failure> {
         Box::new(lines::Plain::default())
     };
     match watch(first, line, period, logs.as_ref(), show.as_mut()) {
-        Ok(()) => Ok(()),
+        Ok(()) => {
+            output.result(&json!({ "event": "end" }), "");
+            Ok(())
+        }
         // Whoever read has read enough, as `head` does.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => {
