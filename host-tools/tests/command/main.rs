@@ -11,6 +11,7 @@ mod flash;
 #[cfg(target_os = "linux")]
 mod interruption;
 mod live;
+mod schema;
 mod session;
 mod simulate;
 mod tradeoff;
