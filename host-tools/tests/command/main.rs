@@ -11,6 +11,7 @@ mod flash;
 mod live;
 mod session;
 mod simulate;
+mod table_words;
 mod tradeoff;
 mod user;
 mod verify;

@@ -1,6 +1,7 @@
 //! Tables replaced while a stream runs, and tiers that follow a budget.
 
 use super::*;
+use crate::Input;
 use crate::live::{Live, LiveEvent, LiveSummary};
 use crate::watch::FileWatch;
 use crate::y4m::Header;
@@ -80,6 +81,7 @@ fn live(
         },
         said: &mut events_of,
     };
+    let input = Input::of(input).unwrap();
     let summary = compensator.live(live, input, &mut output, &Silent);
     (output, summary.unwrap(), events)
 }
