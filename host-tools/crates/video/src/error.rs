@@ -63,7 +63,7 @@ pub enum VideoError {
     #[error("the table does not say how large its projector is, so there is nothing to fit to")]
     NothingToFit,
     /// A newer table would put the frames elsewhere on the projector.
-    #[error("it is for another projector or border: frames would change their size")]
+    #[error("it is for another projector or border, and frames would change their size")]
     Elsewhere,
     /// A stream ends before its first frame.
     #[error("the stream has a header and no frame")]

@@ -126,6 +126,13 @@ impl PlacedFrames {
         self.area
     }
 
+    /// Whether frames come out in the same size and at the same place; their cells may lie
+    /// elsewhere.
+    pub(super) fn moves_like(&self, other: &Self) -> bool {
+        let all_but_cells = |it: &Self| (it.given, it.shown, it.left, it.top);
+        all_but_cells(self) == all_but_cells(other)
+    }
+
     /// Whether frames come out as large as they came in.
     fn keeps(&self) -> bool {
         self.given == self.shown

@@ -191,7 +191,8 @@ impl Run<'_, '_> {
         frames: &mut FrameQueue,
     ) -> Result<Option<Vec<u8>>, VideoError> {
         let layout = self.layout;
-        let job = compensator.job(&self.placed, layout.colours())?;
+        let placed = compensator.place(self.given.size())?;
+        let job = compensator.job(&placed, layout.colours())?;
         let mut engine = compensator.engine::<Planar, C>(job)?;
         let budget = self.live.budget.map(microseconds);
         let mut governor =
@@ -258,10 +259,11 @@ impl Run<'_, '_> {
         let content = unseal(bytes)?.0;
         let table = Table::check(content)?;
         let newer = compensator.with_table(&table)?;
-        if newer.place(self.given.size())? != self.placed {
+        let placed = newer.place(self.given.size())?;
+        if !placed.moves_like(&self.placed) {
             return Err(VideoError::Elsewhere.into());
         }
-        newer.job(&self.placed, self.layout.colours())?;
+        newer.job(&placed, self.layout.colours())?;
         Ok((content.to_vec(), table.id()))
     }
 }
