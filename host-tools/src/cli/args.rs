@@ -8,6 +8,7 @@ use crate::capture::GateName;
 use crate::device::emulator::Board;
 use crate::scene::{CaptureFault, Effect, InjectedFault};
 use crate::solve::Method;
+use crate::video::Fit;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
@@ -102,8 +103,18 @@ pub(super) enum Command {
     Emulate(Emulate),
 }
 
+/// Whether a command says all that it knows of a table.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Detail {
+    /// Say everything: photographs, devices, theory, tiers, where the table comes from
+    #[arg(long, short)]
+    pub(super) verbose: bool,
+}
+
 #[derive(Debug, Args)]
 pub(super) struct Demo {
+    #[command(flatten)]
+    pub(super) detail: Detail,
     /// Folder to write into; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "iltm-demo")]
     pub(super) out: PathBuf,
@@ -146,7 +157,13 @@ pub(super) struct Simulate {
     #[arg(long)]
     pub(super) ablate: bool,
     /// Bernoulli photographs, beside white, black and the Gray code
-    #[arg(long, value_name = "M", default_value_t = 150)]
+    #[arg(
+        long,
+        value_name = "M",
+        default_value_t = 150,
+        conflicts_with = "photograph",
+        requires = "output"
+    )]
     pub(super) photos: usize,
     /// Seed of the patterns and of the noise
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -215,20 +232,25 @@ pub(super) struct Patterns {
 
 /// What `iltm capture --help` ends with.
 const CAMERAS: &str = "\
-Commands are run by the shell. These words are replaced, quoted where the shell needs it:
-  {photo}     file to write      {stem}  the same without its ending, for another one
-  {slide}     file that is shown {index} its number    {role}  what it is shown for
+Commands are run by the shell. These words are replaced, quoted where the shell
+needs it:
+  {photo}     file to write      {stem}   the same without its ending
+  {slide}     file that is shown {index}  its number
+  {role}      what it is shown for
   {exposure}  the fifth column of capture.csv, if there is one
 
 Cameras, each with exposure, white balance and focus set by hand before:
-  --camera 'gphoto2 --force-overwrite --capture-image-and-download --filename {stem}.jpg'
-  --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 --awbgains 2,2 -o {photo}'
-  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 --stream-to={stem}.jpg'
-  --watch ~/Pictures/tethered      whatever fills that folder, or a person at the release
+  --camera 'gphoto2 --force-overwrite --capture-image-and-download \\
+            --filename {stem}.jpg'
+  --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 \\
+            --awbgains 2,2 -o {photo}'
+  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 \\
+            --stream-to={stem}.jpg'
+  --watch ~/Pictures/tethered      whatever fills that folder
 
-Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command returns
-when the slide is shown. Escape on the slide, or ctrl-C, ends a session; the same command
-goes on with what is missing.";
+Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command
+returns when the slide is shown. Escape on the slide, or ctrl-C, ends a session;
+the same command goes on with what is missing.";
 
 #[derive(Debug, Args)]
 #[allow(clippy::struct_field_names, reason = "it is what stands there")]
@@ -261,12 +283,14 @@ pub(super) struct Capture {
     #[arg(long, value_name = "INDEX", num_args = 1.., value_delimiter = ',', value_parser = indices)]
     pub(super) again: Vec<RangeInclusive<u32>>,
     /// Say what is missing, and take nothing
-    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency"])]
+    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency", "timeout", "retries"])]
     pub(super) list: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Solve {
+    #[command(flatten)]
+    pub(super) detail: Detail,
     /// Folder with `capture.csv`, patterns and photographs
     pub(super) capture: PathBuf,
     /// Table to write
@@ -295,6 +319,10 @@ pub(super) struct Solve {
     /// brightest that cuts no more of it than --clip-share; may be repeated
     #[arg(long, value_name = "FILE")]
     pub(super) content: Vec<PathBuf>,
+    /// What becomes of content whose aspect is not the projector's, which is refused
+    /// otherwise: letterbox, crop or stretch, as for `iltm compensate`
+    #[arg(long, value_name = "HOW", requires = "content")]
+    pub(super) fit: Option<Fit>,
     /// Share of the content's samples that may be cut at the projector's white
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.001, requires = "content")]
     pub(super) clip_share: f64,
@@ -326,13 +354,13 @@ pub(super) struct Bounces {
 #[derive(Debug, Args)]
 pub(super) struct SealTerms {
     /// Version of the table; a device does not go back to a lower one by itself
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "key")]
     pub(super) table_version: u32,
     /// Number of the only device that the table is for; any if left out
-    #[arg(long, value_name = "NUMBER", value_parser = device_number)]
+    #[arg(long, value_name = "NUMBER", value_parser = device_number, requires = "key")]
     pub(super) for_device: Option<u64>,
     /// Once the table is confirmed, versions below this never run again on the device
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "key")]
     pub(super) revoke_below: u32,
 }
 
@@ -464,6 +492,8 @@ pub(super) struct Completions {
 
 #[derive(Debug, Args)]
 pub(super) struct Inspect {
+    #[command(flatten)]
+    pub(super) detail: Detail,
     /// Table to read
     pub(super) table: PathBuf,
     /// Key to verify its signature with
@@ -485,7 +515,8 @@ pub(super) struct Tradeoff {
 pub(super) struct Compensate {
     /// Table to compensate with
     pub(super) table: PathBuf,
-    /// PNG or Y4M, of the grid's size or larger; `-` reads a Y4M from standard input
+    /// PNG or Y4M in the projector's aspect, of the size inside its border, or of one pixel
+    /// a cell; `-` reads from standard input
     pub(super) input: PathBuf,
     /// Where to write, in the input's format; `-` is standard output
     #[arg(short, long, value_name = "OUTPUT")]
@@ -494,6 +525,10 @@ pub(super) struct Compensate {
     /// projector's response out
     #[arg(long)]
     pub(super) linear: bool,
+    /// What becomes of frames whose aspect is not the projector's, which are refused
+    /// otherwise: letterbox (black bars), crop (edges cut off) or stretch (shown stretched)
+    #[arg(long, value_name = "HOW")]
+    pub(super) fit: Option<Fit>,
     /// Tier of the table's accuracy ladder; the most accurate if left out
     #[arg(long, value_name = "TIER", conflicts_with = "budget")]
     pub(super) tier: Option<u8>,

@@ -1,7 +1,7 @@
 //! `iltm emulate`
 
 use super::args::Emulate;
-use super::failure::{Failure, Kind, cannot_read, cannot_write};
+use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
 use super::output::{Output, read_file};
 use super::tables::check;
@@ -12,7 +12,6 @@ use crate::device::memory::BoardMemory;
 use crate::device::playback::{Playback, PlaybackError};
 use crate::user::Folders;
 use crate::user::emulated::register;
-use crate::video::VideoError;
 use iltm_runtime::{
     FrameSize,
     frame_buffers::{Format, psram},
@@ -127,24 +126,25 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameFeed, F
     let channels = table.map(Table::channels);
     if let Some(path) = &arguments.frames {
         let frames = FrameFeed::file(path, channels, arguments.fps);
-        return frames.map_err(|error| match error {
-            VideoError::File { path, source } => cannot_read(&path, &source),
-            error => error.into(),
-        });
+        return Ok(frames?);
     }
     let size = arguments.size.unwrap_or_else(|| scene_size(table));
     let rate = arguments.fps.unwrap_or(RATE);
     Ok(FrameFeed::scene(size, channels.unwrap_or(3), rate))
 }
 
-/// A size that the emulated board can keep up with.
+/// A size that the emulated board can keep up with, in the aspect of the table's projector.
 fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
     let grid = table.map(|table| FrameSize::of_grid(table.grid()));
     let side = |least: u16, side: fn(FrameSize) -> usize| {
         grid.map_or(least, |grid| least.max(side(grid) as u16))
     };
     let width = side(128, FrameSize::width);
-    FrameSize::new(width, side(96, FrameSize::height)).expect("neither side is zero")
+    let height = side(96, FrameSize::height);
+    let size = FrameSize::new(width, height).expect("neither side is zero");
+    let projector = table.and_then(Table::projector);
+    let around = projector.and_then(|projector| projector.around(size));
+    around.unwrap_or(size)
 }
 
 fn format(frames: &FrameFeed) -> Result<Format, Failure> {

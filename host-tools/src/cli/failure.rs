@@ -306,7 +306,7 @@ impl From<SolveError> for Failure {
 impl From<CompileError> for Failure {
     fn from(error: CompileError) -> Self {
         let kind = match error {
-            CompileError::ReferenceWhite { .. } => Kind::Usage,
+            CompileError::ReferenceWhite { .. } | CompileError::BeyondReach { .. } => Kind::Usage,
             _ => Kind::Solve,
         };
         Self::new(kind, &error, error.next_step())
@@ -379,14 +379,16 @@ impl From<VerifyError> for Failure {
 impl From<VideoError> for Failure {
     fn from(error: VideoError) -> Self {
         let kind = match &error {
-            VideoError::NoSuchTier { .. } | VideoError::Threads { .. } | VideoError::Still => {
-                Kind::Usage
-            }
+            VideoError::NoSuchTier { .. }
+            | VideoError::Threads { .. }
+            | VideoError::Still
+            | VideoError::NothingToFit => Kind::Usage,
             VideoError::Table(_) => Kind::Table,
             VideoError::File { .. }
             | VideoError::Y4m(Y4mError::Write { .. })
             | VideoError::Png(PngError::Write { .. }) => Kind::Write,
-            VideoError::Read { .. }
+            VideoError::Open { .. }
+            | VideoError::Read { .. }
             | VideoError::Y4m(Y4mError::Read { .. })
             | VideoError::Png(PngError::Read { .. }) => Kind::Read,
             _ => Kind::Frames,

@@ -3,6 +3,7 @@
 use super::args::Inspect;
 use super::failure::Failure;
 use super::output::{Output, read_file};
+use super::table_words;
 use super::tables::check_sealed;
 use super::words::{key_id, lines};
 use crate::compile::Provenance;
@@ -32,15 +33,18 @@ pub(super) fn run(arguments: &Inspect, output: &Output) -> Result<(), Failure> {
         )?;
     }
     let mut data = data(&table);
-    let mut text = text(&arguments.table, &table);
+    for (name, value) in table_words::data(&table).as_object().into_iter().flatten() {
+        data[name] = value.clone();
+    }
+    let mut text = table_words::lines(&arguments.table, &table);
+    text += &seal_text(seal.as_ref(), arguments.key.is_some());
+    if arguments.detail.verbose {
+        let _ = write!(text, "\n{}", self::text(&table));
+    }
     data["file_bytes"] = json!(file.len());
     data["seal"] = json!(
         seal.as_ref()
             .map(|seal| seal_data(seal, arguments.key.is_some()))
-    );
-    text.insert_str(
-        text.find('\n').map_or(0, |end| end + 1),
-        &seal_text(seal.as_ref(), arguments.key.is_some()),
     );
     output.result(&data, &text);
     Ok(())
@@ -84,7 +88,7 @@ fn seal_data(seal: &Seal, verified: bool) -> Value {
 
 fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
     let Some(seal) = seal else {
-        return "signed           no: only devices without a key take it\n".to_owned();
+        return "signed      no: only devices without a key take it\n".to_owned();
     };
     let verified = if verified {
         "verified"
@@ -100,7 +104,7 @@ fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
         oldest => format!(", revokes versions below {oldest}"),
     };
     format!(
-        "version          {}, for {device}{revokes}\nsigned           with key {} ({verified})\n",
+        "version     {}, for {device}{revokes}\nsigned      with key {} ({verified})\n",
         seal.version,
         key_id(&seal.key)
     )
@@ -159,20 +163,8 @@ fn data(table: &Table<'_>) -> Value {
     })
 }
 
-fn text(path: &Path, table: &Table<'_>) -> String {
+fn text(table: &Table<'_>) -> String {
     let mut text = String::new();
-    let colour = if table.channels() == 1 {
-        "grey"
-    } else {
-        "colour"
-    };
-    let _ = writeln!(
-        text,
-        "{}: {} cells, {colour}, {} bytes",
-        path.display(),
-        table.grid(),
-        table.bytes()
-    );
     let _ = writeln!(text, "effects          {}", effects(table).join(", "));
     if let Some(fine) = table.fine_gain() {
         let _ = writeln!(text, "fine gain        {}", fine.size());

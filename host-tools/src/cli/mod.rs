@@ -32,6 +32,7 @@ mod solve;
 mod status;
 mod summary;
 mod support_bundle;
+mod table_words;
 mod tables;
 mod tradeoff;
 mod trial;

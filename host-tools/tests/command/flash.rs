@@ -458,7 +458,7 @@ fn a_key_is_made_installed_and_tables_signed_with_it_are_taken() {
     user.fails(21, &device.at("flash a.iltm"));
     user.says("sign a.iltm --key iltm.key --table-version 3 --for-device 9");
     let said = user.says("inspect a.iltm --key iltm.key");
-    let version = "version          3, for device 0000000000000009 only";
+    let version = "3, for device 0000000000000009 only";
     contains(&said, &[version, "(verified)"]);
     user.says(&device.at("flash a.iltm --confirm"));
 

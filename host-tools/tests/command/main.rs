@@ -14,6 +14,7 @@ mod live;
 mod schema;
 mod session;
 mod simulate;
+mod table_words;
 mod tradeoff;
 mod user;
 mod verify;

@@ -5,6 +5,7 @@ use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells, compensate_pixels};
+use iltm_runtime::placement::PixelArea;
 use iltm_runtime::{FrameSize, features};
 
 /// What is done to the frames of a format.
@@ -14,8 +15,8 @@ pub enum FramePath {
     PassThrough(PassThrough),
     /// They have one pixel a cell.
     Grid(Encoding),
-    /// They are larger than the grid.
-    Full(Encoding, FrameSize),
+    /// They are larger than the grid, and cells cover this area of them.
+    Full(Encoding, FrameSize, PixelArea),
 }
 
 impl FramePath {
@@ -39,10 +40,13 @@ impl FramePath {
         if !features::Stage::FullResolution.is_built() {
             return Self::PassThrough(PassThrough::OtherFrames);
         }
+        let Some(area) = table.area(size) else {
+            return Self::PassThrough(PassThrough::OtherFrames);
+        };
         if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
             return Self::PassThrough(PassThrough::Memory);
         }
-        Self::Full(format.encoding(), size)
+        Self::Full(format.encoding(), size, area)
     }
 
     /// Makes the projector's input of a wanted frame with the table that the stage
@@ -69,16 +73,18 @@ impl FramePath {
                 let mut workspace = memory.workspace();
                 compensate_cells(table, tier, encoding, wanted, input, &mut workspace)
             }
-            (Self::Full(encoding, size), Some(table)) => {
+            (Self::Full(encoding, size, area), Some(table)) => {
                 let job = FrameJob {
                     table,
                     size,
+                    area,
                     prepared: memory.is_prepared(table, size),
                     tier,
                     encoding,
                 };
                 let (channels, cells) = (table.channels().into(), table.grid().cells());
-                let (mut pixels, mut workspace) = memory.full(channels, cells, size.width());
+                let width = area.size.width();
+                let (mut pixels, mut workspace) = memory.full(channels, cells, width);
                 compensate_pixels(&job, wanted, input, &mut pixels, &mut workspace)
             }
         }

@@ -1,7 +1,7 @@
 //! Check of an image: what its sections say, and that no frame can overflow.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
-use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, tier};
+use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, projector, tier};
 use super::sections::{Section, Whole};
 use super::table::curve;
 use super::{FineGain, ImageError, Meta, SectionProblem, Table, TierInfo};
@@ -9,6 +9,7 @@ use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::layout::MAX_SEGMENTS;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use crate::placement::ProjectorPixels;
 use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
 use crate::units::Light;
 use crate::yield_budget::{YieldBudget, cost};
@@ -29,6 +30,7 @@ pub struct Checked<'a> {
     codes: &'a [[u8; CODES]],
     fine_gain: Option<FineGain<'a>>,
     provenance: &'a [u8],
+    projector: Option<ProjectorPixels>,
 }
 
 impl<'a> Checked<'a> {
@@ -68,6 +70,10 @@ impl<'a> Checked<'a> {
             provenance: whole
                 .optional(SectionKind::Provenance)
                 .map_or(Ok(&[][..]), |section| provenance(section, budget))?,
+            projector: whole
+                .optional(SectionKind::Projector)
+                .map(projector_pixels)
+                .transpose()?,
             codes: codes(
                 of_stage(Stage::Response, &whole, SectionKind::Codes),
                 response,
@@ -98,6 +104,7 @@ impl<'a> Checked<'a> {
                 None
             },
             provenance: self.provenance,
+            projector: self.projector,
             bytes: self.whole.image.len(),
             id: self.id(),
         }
@@ -214,6 +221,21 @@ fn fine_gains(section: Section<'_>, cells: Grid, channels: u8) -> Result<FineGai
         channels,
         gain,
     })
+}
+
+/// The projector, with a border that leaves pixels.
+fn projector_pixels(section: Section<'_>) -> Result<ProjectorPixels, ImageError> {
+    if section.bytes.len() != projector::SIZE {
+        return Err(section.length_error());
+    }
+    let field = |field| u16_at(section.bytes, field).unwrap_or(0);
+    if field(projector::RESERVED) != 0 {
+        return Err(section.field_error("reserved", projector::RESERVED.start));
+    }
+    let size = FrameSize::new(field(projector::WIDTH), field(projector::HEIGHT))
+        .ok_or(section.field_error("size", projector::WIDTH.start))?;
+    ProjectorPixels::new(size, field(projector::BORDER))
+        .ok_or(section.field_error("border", projector::BORDER.start))
 }
 
 /// A table with a stage that is not built is refused as a whole: half of its stages
@@ -344,4 +366,44 @@ fn provenance<'a>(
         budget.spend(piece.len(), cost::VALUE);
     }
     Ok(section.bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::made_up::{flat, image};
+    use super::*;
+    use std::vec::Vec;
+
+    fn with_projector(fields: &[u16]) -> Result<Option<ProjectorPixels>, ImageError> {
+        let bytes: Vec<u8> = fields
+            .iter()
+            .flat_map(|field| field.to_le_bytes())
+            .collect();
+        let mut sections = flat(2, 3);
+        sections.push((SectionKind::Projector, bytes));
+        Table::check(&image(&sections)).map(|table| table.projector())
+    }
+
+    #[test]
+    fn a_projector_has_a_size_and_a_border_that_leaves_pixels() {
+        let projector = with_projector(&[1280, 800, 100, 0]).unwrap().unwrap();
+        assert_eq!(
+            (projector.size().width(), projector.size().height()),
+            (1280, 800)
+        );
+        assert_eq!(projector.border(), 100);
+        let refused = [
+            (&[0, 800, 0, 0][..], "size"),
+            (&[1280, 0, 0, 0], "size"),
+            (&[1280, 800, 400, 0], "border"),
+            (&[1280, 800, u16::MAX, 0], "border"),
+            (&[1280, 800, 0, 1], "reserved"),
+            (&[1280, 800, 0], "length"),
+            (&[1280, 800, 0, 0, 0], "length"),
+        ];
+        for (fields, why) in refused {
+            let error = with_projector(fields).unwrap_err();
+            assert!(std::format!("{error}").contains(why), "{error}");
+        }
+    }
 }

@@ -102,6 +102,8 @@ pub enum SectionKind {
     Operator = 8,
     /// Where the table comes from: UTF-8 text for people and host tools.
     Provenance = 9,
+    /// The projector that the photographs were taken with; see [`projector`].
+    Projector = 10,
 }
 
 impl SectionKind {
@@ -118,6 +120,7 @@ impl SectionKind {
             7 => Self::FineGain,
             8 => Self::Operator,
             9 => Self::Provenance,
+            10 => Self::Projector,
             _ => return None,
         })
     }
@@ -135,6 +138,7 @@ impl SectionKind {
             Self::FineGain => "fine gain",
             Self::Operator => "operator",
             Self::Provenance => "provenance",
+            Self::Projector => "projector",
         }
     }
 }
@@ -182,6 +186,21 @@ pub mod tier {
     pub const MULTIPLICATIONS: Range<usize> = 8..12;
     /// Length of an entry.
     pub const SIZE: usize = 12;
+}
+
+/// The projector section, 8 bytes.
+pub mod projector {
+    use super::Range;
+    /// Pixels of its rows, `u16`.
+    pub const WIDTH: Range<usize> = 0..2;
+    /// Its rows, `u16`.
+    pub const HEIGHT: Range<usize> = 2..4;
+    /// Pixels on every side that no cell covers, `u16`.
+    pub const BORDER: Range<usize> = 4..6;
+    /// Zero.
+    pub const RESERVED: Range<usize> = 6..8;
+    /// Length of the section.
+    pub const SIZE: usize = 8;
 }
 
 /// The head of the fine gain section, 4 bytes; the gains follow as in

@@ -8,6 +8,7 @@ use super::stages::Workspace;
 use super::{FrameError, FullMemory};
 use crate::FrameSize;
 use crate::image::Table;
+use crate::placement::PixelArea;
 
 /// Compensates a frame of one pixel a cell at a tier; returns how many samples were
 /// clipped.
@@ -47,6 +48,8 @@ pub struct FrameJob<'t, 'a> {
     pub table: &'t Table<'a>,
     /// Its size.
     pub size: FrameSize,
+    /// Where in it the cells lie.
+    pub area: PixelArea,
     /// Whether the memory is prepared for table and size.
     pub prepared: bool,
     /// The tier that it goes through.
@@ -59,7 +62,7 @@ pub struct FrameJob<'t, 'a> {
 /// returns how many samples were clipped.
 ///
 /// # Errors
-/// As [`FullPipeline::new`] and [`FullPipeline::compensate`].
+/// As [`FullPipeline::within`] and [`FullPipeline::compensate`].
 pub fn compensate_pixels(
     job: &FrameJob<'_, '_>,
     wanted: &[u8],
@@ -80,7 +83,7 @@ fn pixels<const C: usize>(
     memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
-    let pipeline = FullPipeline::<C>::new(job.table, job.size)?;
+    let pipeline = FullPipeline::<C>::within(job.table, job.size, job.area)?;
     if !job.prepared {
         pipeline.prepare(memory)?;
     }

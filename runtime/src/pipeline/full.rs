@@ -12,11 +12,12 @@
 )]
 
 use super::FrameError;
-use super::stages::{Workspace, correct, drive_row, subtract_ambient};
+use super::stages::{ClippedInRow, Workspace, correct, drive_row, subtract_ambient};
 use crate::FrameSize;
 use crate::features::Stage;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
+use crate::placement::PixelArea;
 use crate::resample::area::AreaAverage;
 use crate::resample::interpolation::{Axis, blend, blend_rows};
 use crate::units::{Drive, Light};
@@ -27,11 +28,15 @@ const GAIN_GUARD_BITS: u32 = 12;
 /// Half of the last place that is kept of an interpolated gain.
 const GAIN_HALF: i32 = 1 << (GAIN_GUARD_BITS - 1);
 
-/// Compensates frames of one size, `C` channels.
+/// Compensates frames of one size, `C` channels. The cells cover all of a frame, or the
+/// area of it that [`within`](Self::within) names; rows and their pixels are those of the
+/// area.
 #[derive(Clone, Copy, Debug)]
 pub struct FullPipeline<'t, 'a, const C: usize> {
     table: &'t Table<'a>,
     frame: FrameSize,
+    whole: FrameSize,
+    area: PixelArea,
     average: AreaAverage,
     fine_gain: Option<FineGain<'a>>,
     cells: [Axis; 2],
@@ -63,6 +68,33 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         }
     }
 
+    /// A pipeline for frames of size `whole`, whose cells lie in `area`. What is outside
+    /// becomes black.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); [`FrameError::SmallerThanGrid`] also if the area leaves the
+    /// frame.
+    pub fn within(
+        table: &'t Table<'a>,
+        whole: FrameSize,
+        area: PixelArea,
+    ) -> Result<Self, FrameError> {
+        let pipeline = Self::new(table, area.size)?;
+        let right = area.left.saturating_add(area.size.width());
+        let bottom = area.top.saturating_add(area.size.height());
+        if right > whole.width() || bottom > whole.height() {
+            return Err(FrameError::SmallerThanGrid {
+                width: whole.width() as u16,
+                height: whole.height() as u16,
+            });
+        }
+        Ok(Self {
+            whole,
+            area,
+            ..pipeline
+        })
+    }
+
     fn sized(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
         if usize::from(table.channels()) != C {
             return Err(FrameError::Channels {
@@ -88,6 +120,8 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         Ok(Self {
             table,
             frame,
+            whole: frame,
+            area: PixelArea::all(frame),
             average: AreaAverage::new(grid, frame).ok_or(smaller)?,
             fine_gain,
             cells: axes(FrameSize::of_grid(grid)).ok_or(smaller)?,
@@ -101,10 +135,22 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.table
     }
 
-    /// The size of its frames.
+    /// The size of the area that cells cover: of the frame, unless that has a border.
     #[must_use]
     pub const fn frame(&self) -> FrameSize {
         self.frame
+    }
+
+    /// The size of its frames.
+    #[must_use]
+    pub const fn whole(&self) -> FrameSize {
+        self.whole
+    }
+
+    /// Where in a frame the cells lie.
+    #[must_use]
+    pub const fn area(&self) -> PixelArea {
+        self.area
     }
 
     /// Whether frames of `tier` go through the operator. Those of others need neither
@@ -274,7 +320,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         corrections: &[i32],
         row: &mut RowBuffers<'_>,
         drives: &mut [Drive],
-    ) -> u32 {
+    ) -> ClippedInRow {
         self.correct_row(y, corrections, row);
         let fraction = u32::from(self.table.gain_fraction());
         drive_row(light, gain, fraction, row.spread, drives)

@@ -18,7 +18,8 @@ use core::array::from_fn;
 /// Memory for frames of `W x H` pixels of `C` channels over `N` cells.
 #[derive(Debug)]
 pub struct FullMemory<'m> {
-    /// Gains of the pixels, channels of a pixel side by side, `W * H * C` elements.
+    /// Gains of the pixels that cells cover, channels of a pixel side by side,
+    /// `W * H * C` elements.
     pub gains: &'m mut [Halfword],
     /// Ambient light of the pixels in the same way; unused in a dark room.
     pub ambient: &'m mut [Halfword],
@@ -168,7 +169,13 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
-        let lines = input.chunks_exact_mut(width).take(self.frame().height());
+        self.blacken(input);
+        let area = self.area();
+        let lines = input.chunks_exact_mut(self.whole().width());
+        let lines = lines
+            .skip(area.top)
+            .filter_map(|line| line.get_mut(area.left..)?.get_mut(..width));
+        let lines = lines.take(self.frame().height());
         let (gains, _) = memory.gains.as_chunks();
         let (ambient, _) = memory.ambient.as_chunks();
         for (y, (line, gains)) in lines.zip(gains.chunks_exact(width)).enumerate() {
@@ -186,8 +193,30 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     }
 
     fn check_pixels(&self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
-        let needed = self.frame().pixels();
+        let needed = self.whole().pixels();
         ShortSlice::check(what, needed, given)
+    }
+
+    /// Makes the pixels black that no cell covers.
+    fn blacken<S: Sample>(&self, input: &mut [[S; C]]) {
+        let (area, whole) = (self.area(), self.whole());
+        if area.size == whole {
+            return;
+        }
+        let cells = area.top..area.top + area.size.height();
+        let right = area.left + area.size.width();
+        let lines = input.chunks_exact_mut(whole.width()).take(whole.height());
+        for (y, line) in lines.enumerate() {
+            let covered = if cells.contains(&y) {
+                area.left..right
+            } else {
+                0..0
+            };
+            let before = line.get_mut(..covered.start).unwrap_or_default();
+            before.fill([S::default(); C]);
+            let after = line.get_mut(covered.end..).unwrap_or_default();
+            after.fill([S::default(); C]);
+        }
     }
 
     /// One channel of the pixels from row `y` on.
@@ -199,15 +228,17 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         channel: usize,
         curves: S::Curves<'f>,
     ) -> Pixels<'f, S, C> {
-        let (table, start) = (self.table(), y * self.frame().width());
-        let ambient = table
+        let (width, area) = (self.frame().width(), self.area());
+        let start = (area.top + y) * self.whole().width() + area.left;
+        let ambient = self
+            .table()
             .ambient()
-            .map(|_| ambient.get(start..).unwrap_or_default());
+            .map(|_| ambient.get(y * width..).unwrap_or_default());
         Pixels {
             plane: Plane {
                 codes: wanted.get(start..).unwrap_or_default(),
                 ambient,
-                cols: self.frame().width(),
+                cols: width,
                 channel,
             },
             curves,

@@ -48,6 +48,15 @@ pub(super) fn clip(wanted: i32) -> (Drive, bool) {
     (Drive::from_bits(reached as u16), wanted != reached)
 }
 
+/// Samples that were clipped, by the end at which they were.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct ClippedInRow {
+    /// Drives below 0: more light arrives from elsewhere than is wanted.
+    pub black: u32,
+    /// Drives above 1.
+    pub white: u32,
+}
+
 /// A row of [`drive`]s between 0 and 1; returns how many were clipped.
 #[inline(always)]
 pub fn drive_row(
@@ -56,15 +65,22 @@ pub fn drive_row(
     gain_fraction: u32,
     corrections: &[i32],
     drives: &mut [Drive],
-) -> u32 {
+) -> ClippedInRow {
     let inputs = light.iter().zip(gain).zip(corrections);
-    let mut clipped = 0;
+    let mut clipped = ClippedInRow::default();
     for (slot, ((light, gain), correction)) in drives.iter_mut().zip(inputs) {
-        let (reached, was_clipped) = clip(drive(*light, *gain, gain_fraction, *correction));
-        *slot = reached;
-        clipped += u32::from(was_clipped);
+        let wanted = drive(*light, *gain, gain_fraction, *correction);
+        *slot = clip(wanted).0;
+        clipped.black += u32::from(wanted < 0);
+        clipped.white += u32::from(is_too_bright(wanted));
     }
     clipped
+}
+
+/// Whether a drive is above 1.
+#[inline(always)]
+pub(super) fn is_too_bright(wanted: i32) -> bool {
+    wanted > i32::from(Drive::ONE.to_bits())
 }
 
 /// Memory for the operator on a grid of `N` cells. Channels lie one after the

@@ -7,6 +7,7 @@ mod hard_cases;
 mod installation;
 mod paper;
 mod path_tracer;
+mod placed_simulated;
 mod reference;
 mod simulator;
 mod verify_simulated;

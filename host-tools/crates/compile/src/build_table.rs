@@ -96,6 +96,7 @@ pub fn build_table_from(
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), white)?;
     let options = CompileOptions {
         projector: measurements.devices.projector.clone(),
+        pixels: measurements.settings.projector.pixels(),
         reference_white: Some(white.light),
         inverse_error: report.predicted_error(),
         provenance: Provenance::new(capture, &measurements, &report, &white).to_text(),

@@ -1,5 +1,6 @@
 //! Provenance: where a table comes from, as the TOML text that it carries.
 
+use crate::brightness::Brightness;
 use crate::reference_white::ReferenceWhite;
 use iltm_capture::{Measurements, Settings};
 use iltm_solve::{Recovery, SolveReport};
@@ -55,6 +56,12 @@ pub struct Provenance {
     /// The reference white.
     #[serde(deserialize_with = "if_readable")]
     pub white: Option<ReferenceWhite>,
+    /// How bright its white is against the scene without it.
+    #[serde(
+        deserialize_with = "if_readable",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub brightness: Option<Brightness>,
     /// The `capture.toml` that it was made with.
     #[serde(deserialize_with = "if_readable")]
     pub capture: Option<Settings>,
@@ -123,6 +130,7 @@ impl Provenance {
             recovery: report.recovery,
             mixing: mixing.filter(|_| measurements.devices.unmixed),
             white: Some(*white),
+            brightness: Brightness::of(measurements, white.light),
             capture: Some(measurements.settings.clone()),
         }
     }

@@ -1,7 +1,7 @@
 //! Compiling: from an inverse to a checked image.
 
 use super::gain::FineGains;
-use super::image::{ImageWriter, halfwords, operator_sections};
+use super::image::{ImageWriter, halfwords, operator_sections, projector_section};
 use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
 use super::reference_white::uniform_white;
@@ -15,6 +15,7 @@ use iltm_runtime::{
         layout::{MAX_PROVENANCE, SectionKind},
     },
     operator::{Bounds, Channels, Operator, OperatorError, Segment},
+    placement::ProjectorPixels,
     units::Light,
 };
 use iltm_solve::{InverseTransport, natural_images};
@@ -26,6 +27,8 @@ use thiserror::Error;
 pub struct CompileOptions {
     /// The projector's response.
     pub projector: ProjectorResponse,
+    /// The projector's pixels, where its size is known.
+    pub pixels: Option<ProjectorPixels>,
     /// Light of reference white in camera units; by default the brightest uniform
     /// grey that every live cell reaches.
     pub reference_white: Option<f64>,
@@ -68,6 +71,16 @@ pub enum CompileError {
     ReferenceWhite {
         /// The light asked for.
         light: f64,
+    },
+    /// The reference white that was asked for is far from what the projector reaches.
+    #[error(
+        "a reference white of {light} is {:.1} times {uniform:.4}, the brightest even grey that the projector reaches", light / uniform
+    )]
+    BeyondReach {
+        /// The light asked for.
+        light: f64,
+        /// The brightest even grey that every live cell reaches.
+        uniform: f64,
     },
     /// Content to choose the reference white by is grey, and the scene has colours.
     #[error("the content is grey, but the table drives three colours")]
@@ -130,6 +143,9 @@ impl CompileError {
     pub const fn next_step(&self) -> &'static str {
         match self {
             Self::Dark => "Check that the flood photograph shows the projection.",
+            Self::BeyondReach { .. } => {
+                "Leave --white away, or give --content FILE: it finds the brightest white for what you show."
+            }
             Self::ReferenceWhite { .. } => "Leave the reference white to the default.",
             Self::GreyContent => {
                 "Convert it to colour: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`."
@@ -213,6 +229,9 @@ pub fn compile(
     }
     let provenance = options.provenance.clone().into_bytes();
     image.section(SectionKind::Provenance, 0, provenance);
+    if let Some(pixels) = options.pixels {
+        image.section(SectionKind::Projector, 0, projector_section(pixels));
+    }
     let image = image.finish();
     Table::check(&image).map_err(CompileError::Image)?;
     Ok(Compiled {

@@ -13,6 +13,7 @@ use iltm_runtime::{
     pipeline::{
         Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells, compensate_pixels,
     },
+    placement::PixelArea,
     units::Halfword,
 };
 use iltm_solve::natural_images;
@@ -158,6 +159,7 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
                 let job = FrameJob {
                     table,
                     size,
+                    area: PixelArea::all(size),
                     prepared,
                     tier,
                     encoding,

@@ -105,6 +105,21 @@ impl UnfilledCapture {
         })
     }
 
+    /// Places of the photographs that are not there yet.
+    ///
+    /// # Errors
+    /// [`FillCaptureError`] if two files could be one photograph.
+    pub fn missing(&self) -> Result<Vec<usize>, FillCaptureError> {
+        let mut missing = Vec::new();
+        for (at, photo) in self.photos.iter().enumerate() {
+            // A camera may have written it under another ending.
+            if find_photo(&self.folder, photo)?.is_none() {
+                missing.push(at);
+            }
+        }
+        Ok(missing)
+    }
+
     /// Takes every photograph that is not there yet; returns how many.
     ///
     /// # Errors
@@ -115,13 +130,7 @@ impl UnfilledCapture {
         progress: &dyn Progress,
     ) -> Result<usize, FillCaptureError> {
         let paths: Vec<PathBuf> = self.photos.iter().map(|p| self.folder.join(p)).collect();
-        let mut missing = Vec::new();
-        for (at, photo) in self.photos.iter().enumerate() {
-            // A camera may have written it under another ending.
-            if find_photo(&self.folder, photo)?.is_none() {
-                missing.push(at);
-            }
-        }
+        let missing = self.missing()?;
         progress.begin("taking photographs", missing.len() as u64);
         let taken = AtomicUsize::new(0);
         camera.take(&self.frames, &missing, |place, photograph| {

@@ -109,6 +109,7 @@ impl Base<'_> {
     fn options(&self) -> CompileOptions {
         CompileOptions {
             projector: self.learned.measurements.devices.projector.clone(),
+            pixels: None,
             reference_white: None,
             inverse_error: self.learned.report.predicted_error(),
             targets: None,
