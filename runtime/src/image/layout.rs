@@ -152,7 +152,7 @@ pub mod meta {
     pub const COLS: Range<usize> = 2..4;
     /// Colour channels, 1 or 3, `u8`.
     pub const CHANNELS: usize = 4;
-    /// Fraction bits of the gains, 0 to 15, `u8`.
+    /// Fraction bits of the gains, 1 to 15, `u8`.
     pub const GAIN_FRACTION: usize = 5;
     /// Zero.
     pub const RESERVED: Range<usize> = 6..8;

@@ -14,7 +14,7 @@ pub struct Meta {
     pub grid: Grid,
     /// Colour channels, 1 or 3.
     pub channels: u8,
-    /// Fraction bits of the gains, 0 to 15.
+    /// Fraction bits of the gains, 1 to 15.
     pub gain_fraction: u8,
     /// Light of reference white in camera units, not 0.
     pub reference_white: U8F24,
@@ -52,7 +52,8 @@ impl Meta {
             return Err(wrong("channels", meta::CHANNELS));
         }
         let gain_fraction = byte(meta::GAIN_FRACTION);
-        if gain_fraction > 15 {
+        // With none, light times gain less the correction could leave 32 bits.
+        if !(1..=15).contains(&gain_fraction) {
             return Err(wrong("gain fraction", meta::GAIN_FRACTION));
         }
         for reserved in [meta::RESERVED, meta::RESERVED_END] {

@@ -112,8 +112,14 @@ impl<'a> Segment<'a> {
         let mut least = 1;
         while !groups.words.is_empty() {
             let group = groups.next().ok_or(OperatorError::Group { segment })?;
-            let pairs = group.pairs.map_or(MAX_SHORT + 1, usize::from);
-            if pairs < least || pairs > MAX_SHORT + 1 || group.count == 0 {
+            // Longer rows share the group that states no number, and come last.
+            let longest = if group.pairs.is_some() {
+                MAX_SHORT
+            } else {
+                MAX_SHORT + 1
+            };
+            let pairs = group.pairs.map_or(longest, usize::from);
+            if pairs < least || pairs > longest || group.count == 0 {
                 return Err(OperatorError::Group { segment });
             }
             least = pairs + 1;

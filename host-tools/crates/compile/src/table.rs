@@ -115,7 +115,7 @@ pub enum CompileError {
     },
     /// A gain is above what the table can hold.
     #[error(
-        "the gain of cell {cell} is {gain:.1} times reference white; at most 65,535 can be stored"
+        "the gain of cell {cell} is {gain:.1} times reference white; at most 32,767 can be stored"
     )]
     Gain {
         /// The cell.
@@ -404,7 +404,7 @@ impl Gains {
             .fold(0.0_f64, |a, b| a.max(*b))
             * white;
         let fits = |fraction: &u8| largest * f64::from(*fraction).exp2() <= f64::from(u16::MAX);
-        let Some(fraction) = (0..=15).rev().find(fits) else {
+        let Some(fraction) = (1..=15).rev().find(fits) else {
             let own = cells.iter().flat_map(|gain| gain.iter().enumerate());
             let cell = own
                 .max_by(|a, b| a.1.total_cmp(b.1))
