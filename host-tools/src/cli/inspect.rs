@@ -76,7 +76,7 @@ fn seal_data(seal: &Seal, verified: bool) -> Value {
     json!({
         "version": seal.version,
         "revokes_below": seal.oldest,
-        "device": (seal.device != 0).then(|| format!("{:016x}", seal.device)),
+        "device": (seal.device != 0).then(|| seal.device.to_string()),
         "key": key_id(&seal.key),
         "verified": verified,
     })
@@ -93,7 +93,7 @@ fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
     };
     let device = match seal.device {
         0 => "any device".to_owned(),
-        device => format!("device {device:016x} only"),
+        device => format!("device {device} only"),
     };
     let revokes = match seal.oldest {
         0 => String::new(),
@@ -139,6 +139,8 @@ fn data(table: &Table<'_>) -> Value {
     });
     let bounds = table.operator().map(Operator::bounds);
     json!({
+        "id": format!("{:08x}", table.id()),
+        "name": table.label().name(),
         "rows": table.grid().rows(),
         "cols": table.grid().cols(),
         "channels": table.channels(),
@@ -172,6 +174,12 @@ fn text(path: &Path, table: &Table<'_>) -> String {
         path.display(),
         table.grid(),
         table.bytes()
+    );
+    let _ = writeln!(
+        text,
+        "table            {}, {:08x}",
+        table.label(),
+        table.id()
     );
     let _ = writeln!(text, "effects          {}", effects(table).join(", "));
     if let Some(fine) = table.fine_gain() {

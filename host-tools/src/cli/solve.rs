@@ -6,8 +6,8 @@ use super::output::{Output, make_folder, write_file};
 use super::progress::progress;
 use super::summary::{summary, text};
 use super::tables::seal;
-use crate::build_table::{BuiltTable, build_table};
-use crate::capture::CaptureOptions;
+use crate::build_table::{BuiltTable, build_table_from};
+use crate::capture::{self, CaptureOptions};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
 use crate::solve::SolveOptions;
@@ -47,9 +47,13 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
             share: arguments.clip_share,
         }),
     };
-    let built = build_table(
+    let mut measurements = capture::read(&arguments.capture, &photographs, bars.as_ref())?;
+    if let Some(name) = &arguments.name {
+        measurements.settings.scene.name = Some(name.clone());
+    }
+    let built = build_table_from(
+        measurements,
         &arguments.capture,
-        &photographs,
         &options,
         white,
         bars.as_ref(),

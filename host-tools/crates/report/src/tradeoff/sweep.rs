@@ -108,6 +108,7 @@ pub(super) fn of_capture(
 impl Base<'_> {
     fn options(&self) -> CompileOptions {
         CompileOptions {
+            label: iltm_runtime::image::Label::default(),
             projector: self.learned.measurements.devices.projector.clone(),
             reference_white: None,
             inverse_error: self.learned.report.predicted_error(),
