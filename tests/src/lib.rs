@@ -32,6 +32,7 @@ use iltm::compile::{CompileOptions, compile};
 use iltm::picture::Response;
 use iltm::solve::{ChannelInverse, InverseTransport};
 use iltm_runtime::Grid;
+use iltm_runtime::image::Label;
 use nalgebra::DMatrix;
 
 /// A grid of these sides.
@@ -123,6 +124,16 @@ pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
 /// The table image of [`wedge`] for an sRGB projector.
 pub fn wedge_table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
     wedge_table_for(Response::Srgb, rows, cols, channels)
+}
+
+/// A small grey table image with this name and day.
+pub fn named_table(name: &str, date: u32) -> Vec<u8> {
+    let options = CompileOptions {
+        label: Label::new(name, date),
+        ..CompileOptions::default()
+    };
+    let compiled = compile(&wedge(grid(4, 6), 1), None, &options);
+    compiled.expect("the wedge is a plain scene").image
 }
 
 /// The table image of [`wedge`].

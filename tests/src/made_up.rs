@@ -9,7 +9,7 @@ use iltm::picture::Response;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::SectionKind;
-use iltm_runtime::image::{Meta, TierInfo};
+use iltm_runtime::image::{Label, Meta, TierInfo};
 use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
 use iltm_runtime::placement::ProjectorPixels;
 use std::collections::BTreeSet;
@@ -184,6 +184,7 @@ impl MadeUp {
             inverse_error: U0F32::ZERO,
             bounds: operator.map_or(Bounds::default(), Operator::bounds),
             channel_scales: self.scales,
+            label: Label::default(),
         }
     }
 }

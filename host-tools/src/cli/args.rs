@@ -82,9 +82,9 @@ pub(super) enum Command {
     /// Bring a table to a device, which uses it on trial
     Flash(Flash),
     /// Keep the table that is on trial
-    Confirm(SerialLine),
+    Confirm(Decide),
     /// Go back to the table before
-    Rollback(SerialLine),
+    Rollback(Decide),
     /// Say how a device is
     Status(Status),
     /// Watch a device: frame rate, tier, time budget, events, log
@@ -329,6 +329,10 @@ pub(super) struct Solve {
     /// Folder for a report of the scene: a page with pictures; made if it is not there
     #[arg(long, value_name = "DIR")]
     pub(super) report: Option<PathBuf>,
+    /// Name of the table, which devices show; by default that of the scene, or of the
+    /// capture's folder
+    #[arg(long, value_name = "NAME")]
+    pub(super) name: Option<String>,
     /// Sign the table with this key
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
@@ -353,15 +357,16 @@ pub(super) struct Bounces {
 
 #[derive(Debug, Args)]
 pub(super) struct SealTerms {
-    /// Version of the table; a device does not go back to a lower one by itself
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "key")]
-    pub(super) table_version: u32,
-    /// Number of the only device that the table is for; any if left out
-    #[arg(long, value_name = "NUMBER", value_parser = device_number, requires = "key")]
+    /// Version of the signed table; devices with the key take none below the highest that
+    /// was confirmed there; minutes since 1970 if left out
+    #[arg(long, value_name = "N", requires = "key", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) table_version: Option<u32>,
+    /// Number of the only device that the signed table is for; any if left out
+    #[arg(long, value_name = "NUMBER", requires = "key", value_parser = device_number)]
     pub(super) for_device: Option<u64>,
     /// Once the table is confirmed, versions below this never run again on the device
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "key")]
-    pub(super) revoke_below: u32,
+    #[arg(long, value_name = "N", requires = "key")]
+    pub(super) revoke_below: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -423,6 +428,18 @@ pub(super) struct Flash {
     /// Say what would be sent and change nothing
     #[arg(long)]
     pub(super) dry_run: bool,
+    /// Site's or technician's key that shows a device with a key the right to do so
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Decide {
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+    /// Site's or technician's key that shows a device with a key the right to do so
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -446,6 +463,24 @@ pub(super) enum KeyCommand {
     },
     /// Give a device that has none its public key, for good
     Install(Install),
+    /// Make a technician's key: it flashes tables that the site signed, and signs none
+    Technician(Technician),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Technician {
+    /// The site's private key
+    pub(super) site: PathBuf,
+    /// File to write; never one that is there already
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Number of the only device that it is for; any if left out
+    #[arg(long, value_name = "NUMBER", value_parser = device_number, default_value = "0", hide_default_value = true)]
+    pub(super) device: u64,
+    /// Void on devices that confirmed a table with a higher --revoke-below; minutes since
+    /// 1970 if left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) version: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -460,6 +495,9 @@ pub(super) struct Install {
     /// Do not ask whether this is meant
     #[arg(long)]
     pub(super) yes: bool,
+    /// Also where the table in use would be refused from the device's next start on
+    #[arg(long)]
+    pub(super) lose_table: bool,
 }
 
 #[derive(Debug, Args)]
@@ -632,14 +670,11 @@ pub(super) struct Emulate {
 
 /// A number, or the 16 hexadecimal digits that `iltm status` shows.
 fn device_number(text: &str) -> Result<u64, String> {
-    let digits = text
-        .strip_prefix("0x")
-        .or((text.len() == 16).then_some(text));
-    let number = match digits {
+    let number = match text.strip_prefix("0x") {
         Some(digits) => u64::from_str_radix(digits, 16),
         None => text.parse(),
     };
-    number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
+    number.map_err(|_| "a device's number is decimal, or hexadecimal with 0x before it".to_owned())
 }
 
 /// A response as `capture.toml` has it.

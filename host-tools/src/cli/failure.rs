@@ -99,6 +99,10 @@ pub(super) enum Kind {
     Camera = 32,
     #[strum(message = "slides cannot be shown")]
     Display = 33,
+    #[strum(message = "a device shows frames as they are instead of compensating them")]
+    PassThrough = 35,
+    #[strum(message = "a device with a key was not shown the right to do that")]
+    NoRight = 36,
 }
 
 impl From<&Rejected> for Kind {
@@ -128,7 +132,8 @@ impl From<&DeviceError> for Kind {
                 Refusal::Table(rejected) => rejected.into(),
                 Refusal::TooLong { .. } => Self::TooLarge,
                 Refusal::OnTrial => Self::OnTrial,
-                Refusal::Flash { .. } => Self::Flash,
+                Refusal::Flash { .. } | Refusal::Wear { .. } => Self::Flash,
+                Refusal::NoRight(_) => Self::NoRight,
                 Refusal::NoTransfer | Refusal::Incomplete | Refusal::Chunk => Self::Transfer,
                 Refusal::NotInUse { .. } | Refusal::NoOther => Self::NoTable,
                 Refusal::HasKey => Self::HasKey,

@@ -80,7 +80,7 @@ fn seal_data(seal: &Seal, verified: bool) -> Value {
     json!({
         "version": seal.version,
         "revokes_below": seal.oldest,
-        "device": (seal.device != 0).then(|| format!("{:016x}", seal.device)),
+        "device": (seal.device != 0).then(|| seal.device.to_string()),
         "key": key_id(&seal.key),
         "verified": verified,
     })
@@ -97,7 +97,7 @@ fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
     };
     let device = match seal.device {
         0 => "any device".to_owned(),
-        device => format!("device {device:016x} only"),
+        device => format!("device {device} only"),
     };
     let revokes = match seal.oldest {
         0 => String::new(),
@@ -143,6 +143,8 @@ fn data(table: &Table<'_>) -> Value {
     });
     let bounds = table.operator().map(Operator::bounds);
     json!({
+        "id": format!("{:08x}", table.id()),
+        "name": table.label().name(),
         "rows": table.grid().rows(),
         "cols": table.grid().cols(),
         "channels": table.channels(),

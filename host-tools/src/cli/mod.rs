@@ -16,6 +16,7 @@ mod demo;
 #[cfg(unix)]
 mod emulate;
 mod failure;
+mod fit;
 mod flash;
 mod inspect;
 mod interrupt;

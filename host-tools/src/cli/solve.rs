@@ -7,8 +7,8 @@ use super::progress::progress;
 use super::summary::{self, remarks, summary};
 use super::table_words;
 use super::tables::{check, seal};
-use crate::build_table::{BuildError, BuiltTable, build_table_from};
-use crate::capture::{CaptureOptions, Measurements};
+use crate::build_table::{BuiltTable, build_table_from};
+use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
 use crate::solve::SolveOptions;
@@ -42,8 +42,10 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     };
     let bars = progress(output);
     let content = content(&arguments.content, bars.as_ref())?;
-    let measurements = crate::capture::read(&arguments.capture, &photographs, bars.as_ref())
-        .map_err(BuildError::from)?;
+    let mut measurements = capture::read(&arguments.capture, &photographs, bars.as_ref())?;
+    if let Some(name) = &arguments.name {
+        measurements.settings.scene.name = Some(name.clone());
+    }
     let content = placed(content, &measurements, arguments.fit)?;
     let frames: Vec<LightPicture> = content.iter().flat_map(Content::light).collect();
     let white = match arguments.white {

@@ -5,7 +5,7 @@ use super::connect::connect;
 use super::failure::Failure;
 use super::output::Output;
 use super::words::{
-    clipped_share, duration, identity, milliseconds, number, serial, slot_lines, slot_states,
+    clipped_share, duration, identity, milliseconds, mode, number, serial, slot_lines, slot_states,
     slots_data, status_data, table_in_use, trust, watchdog,
 };
 use crate::device::DeviceError;
@@ -42,6 +42,7 @@ fn text(port: &str, status: &Status, device: &Hello, slots: Option<&Slots>) -> S
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<12} {value}");
     };
+    line("mode", mode(status, slots));
     line(
         "device",
         format!(
@@ -52,8 +53,7 @@ fn text(port: &str, status: &Status, device: &Hello, slots: Option<&Slots>) -> S
             duration(status.uptime_ms)
         ),
     );
-    line("mode", status.mode.to_string());
-    line("table", table_in_use(status));
+    line("table", table_in_use(status, slots));
     match slots {
         Some(slots) => {
             for (index, slot) in slot_lines(slots).into_iter().enumerate() {

@@ -107,11 +107,6 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
     } else {
         "colour"
     };
-    let name = if provenance.scene.is_empty() {
-        String::new()
-    } else {
-        format!("\"{}\", ", provenance.scene.escape_debug())
-    };
     let projector = table.projector().map_or_else(String::new, |projector| {
         let (width, height) = (projector.size().width(), projector.size().height());
         let border = match projector.border() {
@@ -122,7 +117,9 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
     });
     let _ = writeln!(
         text,
-        "table       {name}{} cells{projector}, {colour}, {} bytes",
+        "table       {}, {:08x}: {} cells{projector}, {colour}, {} bytes",
+        table.label(),
+        table.id(),
         table.grid(),
         table.bytes()
     );

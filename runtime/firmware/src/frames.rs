@@ -169,6 +169,7 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
 
     fn start(&mut self, format: Format) {
         self.sink.start(format);
+        self.telemetry.set_input(format);
         let lateness = Lateness::new(ticks::<B::Clock>(format.period_us()));
         self.stage(format, lateness);
         defmt::info!(

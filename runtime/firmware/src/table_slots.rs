@@ -28,7 +28,38 @@ fn put(place: &mut Option<Table<'static>>, checked: &Checked<'static>) {
     *place = Some(checked.table());
 }
 
+impl<B: Board, H: FrameHooks> Frames<B, H> {
+    /// Not inlined: it is called twice.
+    #[inline(never)]
+    fn check(
+        &mut self,
+        flash: &B::Flash,
+        slot: Slot,
+        length: Option<u32>,
+        terms: &Terms,
+    ) -> Result<(Checked<'static>, Accepted), Rejected> {
+        let bytes = flash.slot(slot);
+        let file = match length {
+            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
+            None => content(bytes),
+        };
+        examine(file, terms, &mut || {
+            self.round();
+        })
+    }
+}
+
 impl<B: Board, H: FrameHooks> TableSlots<B::Flash> for Frames<B, H> {
+    fn examine(
+        &mut self,
+        flash: &B::Flash,
+        slot: Slot,
+        length: Option<u32>,
+        terms: &Terms,
+    ) -> Result<Accepted, Rejected> {
+        Ok(self.check(flash, slot, length, terms)?.1)
+    }
+
     fn load(
         &mut self,
         flash: &B::Flash,
@@ -37,14 +68,7 @@ impl<B: Board, H: FrameHooks> TableSlots<B::Flash> for Frames<B, H> {
         terms: &Terms,
     ) -> Result<Accepted, Rejected> {
         *slot.of_mut(self.tables) = None;
-        let bytes = flash.slot(slot);
-        let file = match length {
-            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
-            None => content(bytes),
-        };
-        let (checked, accepted) = examine(file, terms, &mut || {
-            self.round();
-        })?;
+        let (checked, accepted) = self.check(flash, slot, length, terms)?;
         put(slot.of_mut(self.tables), &checked);
         Ok(accepted)
     }

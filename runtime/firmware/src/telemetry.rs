@@ -3,9 +3,9 @@
 use crate::board::{Board, Clock};
 use crate::retained::{Cause, Restart};
 use crate::stack;
-use iltm_runtime::frame_buffers::InputCounts;
+use iltm_runtime::frame_buffers::{Format, InputCounts};
 use iltm_runtime::link::{
-    Clipping, Fault, FrameCounts, FrameTime, Mode, Name, PassThrough, SerialCounts, SlotState,
+    Clipping, Fault, FrameCounts, FrameKind, FrameTime, Mode, Name, PassThrough, SerialCounts, SlotState,
     Stack, Status, Version,
 };
 
@@ -46,6 +46,7 @@ impl Telemetry {
                 stack: Stack::default(),
                 watchdog_resets: restart.watchdog_resets,
                 serial: SerialCounts::default(),
+                input: None,
             },
             ticks_per_microsecond: (B::Clock::HERTZ / 1_000_000).max(1),
             mean: 0,
@@ -64,6 +65,15 @@ impl Telemetry {
         self.status.top_tier = top_tier;
         self.status.clipping.samples = samples;
         self.status.frame_time.budget_us = budget / self.ticks_per_microsecond;
+    }
+
+    /// Frames of this format come in.
+    pub fn set_input(&mut self, format: Format) {
+        self.status.input = Some(FrameKind {
+            width: format.size().width() as u16,
+            height: format.size().height() as u16,
+            channels: format.channels(),
+        });
     }
 
     /// A frame was worked on in this many ticks.

@@ -107,6 +107,7 @@ impl<'a> Checked<'a> {
             projector: self.projector,
             bytes: self.whole.image.len(),
             id: self.id(),
+            label: self.meta.label,
         }
     }
 
@@ -114,6 +115,12 @@ impl<'a> Checked<'a> {
     #[must_use]
     pub fn id(&self) -> u32 {
         u32_at(self.whole.image, header::CRC).unwrap_or(0)
+    }
+
+    /// What its meta section says.
+    #[must_use]
+    pub const fn meta(&self) -> &Meta {
+        &self.meta
     }
 }
 

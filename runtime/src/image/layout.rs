@@ -143,7 +143,7 @@ impl SectionKind {
     }
 }
 
-/// The meta section, 32 bytes.
+/// The meta section, 68 bytes.
 pub mod meta {
     use super::Range;
     /// Rows of the grid, `u16`.
@@ -171,8 +171,24 @@ pub mod meta {
     /// Predicted closed-loop error of the inverse itself, before any tier leaves
     /// entries out, `u32` with 32 fraction bits.
     pub const INVERSE_ERROR: Range<usize> = 28..32;
+    /// Name and date; see [`label`](super::label).
+    pub const LABEL: Range<usize> = 32..68;
     /// Length of the section.
-    pub const SIZE: usize = 32;
+    pub const SIZE: usize = 68;
+}
+
+/// What people call a table, 36 bytes at the end of the meta section.
+pub mod label {
+    use super::Range;
+    /// Longest name, bytes.
+    pub const NAME_BYTES: usize = 32;
+    /// The name, UTF-8, filled up with zeros.
+    pub const NAME: Range<usize> = 0..NAME_BYTES;
+    /// The day when the table was made as a decimal number, `u32`: 20261123 for
+    /// 2026-11-23; 0 if unknown.
+    pub const DATE: Range<usize> = 32..36;
+    /// Length of the label.
+    pub const SIZE: usize = 36;
 }
 
 /// One entry of the tiers section, 12 bytes.

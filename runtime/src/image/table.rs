@@ -2,7 +2,7 @@
 
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
-use super::{Checked, ImageError, TierInfo};
+use super::{Checked, ImageError, Label, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
@@ -35,6 +35,7 @@ pub struct Table<'a> {
     pub(super) projector: Option<ProjectorPixels>,
     pub(super) bytes: usize,
     pub(super) id: u32,
+    pub(super) label: Label,
 }
 
 /// Gains on a grid finer than the cells, for frames larger than the grid.
@@ -139,6 +140,12 @@ impl<'a> Table<'a> {
     #[must_use]
     pub const fn id(&self) -> u32 {
         self.id
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub const fn label(&self) -> &Label {
+        &self.label
     }
 
     /// Bytes of the image.

@@ -40,6 +40,12 @@ impl Transfer {
         Ok(())
     }
 
+    /// Whether the chunk at this offset has its sector erased first.
+    pub(super) fn erases(&mut self, map: &Map, offset: u32) -> bool {
+        let flag = self.flag(offset / map.sector());
+        flag.is_some_and(|(word, bit)| *word & bit == 0)
+    }
+
     /// Has the flash hold a chunk that was [`check`](Self::check)ed. Returns how many sectors were erased for it.
     ///
     /// A sector is erased before the first chunk that goes there, whatever it holds:

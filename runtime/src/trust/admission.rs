@@ -48,6 +48,9 @@ pub fn examine<'a>(
         version: seal.map_or(0, |seal| seal.version),
         oldest,
         length: file.len() as u32,
+        grid: checked.meta().grid,
+        channels: checked.meta().channels,
+        label: checked.meta().label,
     };
     Ok((checked, accepted))
 }

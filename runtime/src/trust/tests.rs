@@ -72,6 +72,9 @@ fn a_table_signed_for_the_device_is_admitted_with_what_its_seal_states() {
         version: 5,
         oldest: 4,
         length: file.len() as u32,
+        grid: table.grid(),
+        channels: 1,
+        label: *table.label(),
     };
     assert_eq!((table.bytes(), accepted), (image.len(), expected));
 }

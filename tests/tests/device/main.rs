@@ -9,5 +9,6 @@ mod identity;
 mod link;
 mod power_cuts;
 mod protocol;
+mod rights;
 mod slots;
 mod upload;

@@ -1,13 +1,15 @@
 //! Protocol: that `docs/protocol.md` says what host and device say: its byte examples and
 //! limits.
 
+use ed25519_dalek::{Signer, SigningKey};
+use iltm_runtime::image::Label;
 use iltm_runtime::link::{
-    Channel, Device as _, Digest, Event, Fault, FaultyFrame, InUse, LinkFrame, MAX_ENCODED,
-    MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState,
-    Slots, TableName, TableReason, TierReason,
+    Channel, Device as _, Digest, EndedTrial, Event, Fault, FaultyFrame, FrameKind, InUse,
+    LinkFrame, MAX_ENCODED, MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response,
+    Sectors, SlotInfo, SlotState, Slots, TableAbout, TableName, TableReason, TierReason,
 };
 use iltm_runtime::store::MAX_CHUNK;
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::trust::{Deed, Rejected};
 use iltm_tests::fake_device::FakeDevice;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -58,6 +60,12 @@ impl Examples {
         self.message(name, Channel::Event, sequence, event);
     }
 }
+
+/// The secret key of RFC 8032, section 7.1, test 1.
+const SECRET: [u8; 32] = [
+    0x9D, 0x61, 0xB1, 0x9D, 0xEF, 0xFD, 0x5A, 0x60, 0xBA, 0x84, 0x4A, 0xF4, 0x92, 0xEC, 0x2C, 0xC4,
+    0x44, 0x49, 0xC5, 0x69, 0x7B, 0x32, 0x69, 0x19, 0x70, 0x3B, 0xAC, 0x03, 0x1C, 0xAE, 0x7F, 0x60,
+];
 
 /// What is said whatever the tables.
 fn conversation(examples: &mut Examples) {
@@ -111,6 +119,14 @@ fn update(examples: &mut Examples) {
         table,
         length,
         erases: 40,
+        about: table.map(|_| TableAbout {
+            label: Label::new("foyer", 20_261_123),
+            frames: FrameKind {
+                width: 16,
+                height: 12,
+                channels: 1,
+            },
+        }),
     };
     let slots = Slots {
         slots: [
@@ -124,6 +140,12 @@ fn update(examples: &mut Examples) {
         device: 0x0102_0304_0506_0708,
         sector: 4_096,
         record_erases: 3,
+        sequence: 12,
+        ended: Some(EndedTrial {
+            table: new.id,
+            reason: TableReason::TrialOver,
+            ago_ms: 2_000,
+        }),
     };
     examples.response("slots-response", 5, &Response::Slots(slots));
     let (length, first) = (5_000, 0);
@@ -131,7 +153,15 @@ fn update(examples: &mut Examples) {
     let crcs = [0x1020_3040, 0xFFFF_FFFF].into_iter().collect();
     let sectors = Response::Sectors(Sectors { first, crcs });
     examples.response("sectors-response", 6, &sectors);
-    examples.request("begin-request", 7, &Request::Begin { length, digest });
+    examples.request(
+        "begin-request",
+        7,
+        &Request::Begin {
+            length,
+            digest,
+            right: &[],
+        },
+    );
     let receiving = Response::Receiving(Receiving {
         slot: 1,
         chunk: 512,
@@ -163,7 +193,14 @@ fn update(examples: &mut Examples) {
         frame: 2_000,
     };
     examples.event("table-event", 2, &event);
-    examples.request("confirm-request", 10, &Request::Confirm { table: new.id });
+    examples.request(
+        "confirm-request",
+        10,
+        &Request::Confirm {
+            table: new.id,
+            right: &[],
+        },
+    );
     let used = |table| {
         Response::InUse(InUse {
             table: Some(table),
@@ -171,7 +208,15 @@ fn update(examples: &mut Examples) {
         })
     };
     examples.response("confirm-response", 10, &used(new));
-    let back = Request::Rollback { table: new.id };
+    let signer = SigningKey::from_bytes(&SECRET);
+    let deed = Deed::Rollback { table: new.id };
+    let right = signer
+        .sign(&deed.message(0x0102_0304_0506_0708, 12))
+        .to_bytes();
+    let back = Request::Rollback {
+        table: new.id,
+        right: &right,
+    };
     examples.request("rollback-request", 11, &back);
     examples.response("rollback-response", 11, &used(old));
     let older = Rejected::Older {
@@ -186,7 +231,15 @@ fn update(examples: &mut Examples) {
         0x51, 0x1A,
     ];
     let device = 42;
-    examples.request("provision-request", 13, &Request::Provision { key, device });
+    examples.request(
+        "provision-request",
+        13,
+        &Request::Provision {
+            key,
+            device,
+            even_so: false,
+        },
+    );
     examples.response("provision-response", 13, &Response::Provisioned);
 }
 

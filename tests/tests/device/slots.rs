@@ -44,13 +44,6 @@ fn with_first() -> (Device, Vec<u8>, Vec<u8>) {
     (device, first, second)
 }
 
-fn slots(device: &mut Device) -> Slots {
-    match device.ask(Request::Slots) {
-        Response::Slots(slots) => slots,
-        other => panic!("{other:?}"),
-    }
-}
-
 fn roll_back(device: &mut Device) -> Result<(), Refusal> {
     device.carry_out(&[], &Step::Rollback)
 }
@@ -70,7 +63,7 @@ fn a_confirmed_table_counts_after_a_restart_and_one_on_trial_does_not() {
     assert!(device.runs(&first));
     assert_eq!(
         device.updater.states(),
-        [SlotState::Active, SlotState::Valid]
+        [SlotState::Active, SlotState::Unconfirmed]
     );
 }
 
@@ -78,7 +71,7 @@ fn a_confirmed_table_counts_after_a_restart_and_one_on_trial_does_not() {
 fn a_trial_ends_by_itself_by_rollback_or_by_confirmation() {
     let (mut device, first, second) = with_first();
     device.update(&second, false).expect("a good table");
-    assert_eq!(slots(&mut device).trial_ms, u32::from(TRIAL_S) * 1_000);
+    assert_eq!(device.slots().trial_ms, u32::from(TRIAL_S) * 1_000);
     device.wait(u64::from(TRIAL_S) * 1_000 - 1);
     assert!(device.runs(&second));
     device.wait(1);
@@ -140,7 +133,10 @@ fn requests_that_come_twice_do_no_more_than_once() {
     }
     assert!(device.runs(&second));
     let id = device.updater.table().expect("in use").id;
-    let back = Request::Rollback { table: id };
+    let back = Request::Rollback {
+        table: id,
+        right: &[],
+    };
     assert!(matches!(device.ask(back), Response::InUse(_)));
     assert!(device.runs(&first));
     let again = device.ask(back);
@@ -212,6 +208,7 @@ fn a_file_that_has_not_come_whole_or_is_too_long_is_refused() {
     let long = Request::Begin {
         length: device.updater.map().slot_bytes() + 1,
         digest: digest(&file),
+        right: &[],
     };
     let limit = device.updater.map().slot_bytes();
     assert_eq!(
@@ -361,12 +358,12 @@ fn erases_are_counted_and_the_counts_outlive_a_restart() {
     let sectors = file.len().div_ceil(256) as u32;
     let mut device = Device::new(SLOT, 1);
     device.update(&file, true).expect("good");
-    let before = slots(&mut device);
+    let before = device.slots();
     assert_eq!(before.slots[0].erases, sectors);
     assert_eq!(before.slots[1].erases, 0);
     assert!(before.record_erases > 0);
     let mut device = device.restarted();
-    let after = slots(&mut device);
+    let after = device.slots();
     assert_eq!(after.slots.map(|slot| slot.erases), [sectors, 0]);
     assert_eq!(after.record_erases, before.record_erases);
     let counted: u32 = (0..SLOT)

@@ -3,6 +3,7 @@
 use crate::brightness::Brightness;
 use crate::reference_white::ReferenceWhite;
 use iltm_capture::{Measurements, Settings};
+use iltm_runtime::image::Label;
 use iltm_solve::{Recovery, SolveReport};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -141,6 +142,13 @@ impl Provenance {
         toml::from_str(text).unwrap_or_default()
     }
 
+    /// What people call the table: its scene, and the day when it was made.
+    pub(crate) fn label(&self) -> Label {
+        let scene: String = self.scene.split(char::is_control).collect();
+        let day = self.date.get(..10).unwrap_or_default().replace('-', "");
+        Label::new(&scene, day.parse().unwrap_or(0))
+    }
+
     /// The text for a table.
     pub(crate) fn to_text(&self) -> String {
         // A struct of numbers and strings always has a TOML form.
@@ -157,6 +165,18 @@ fn if_readable<'de, T: DeserializeOwned, D: Deserializer<'de>>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_is_called_after_its_scene_and_the_day_when_it_was_made() {
+        let provenance = Provenance {
+            scene: "Großer\u{1b} Saal".to_owned(),
+            date: "2026-11-23 10:30:00 UTC".to_owned(),
+            ..Provenance::default()
+        };
+        let label = provenance.label();
+        assert_eq!((label.name(), label.date()), ("Großer Saal", 20_261_123));
+        assert_eq!(Provenance::default().label(), Label::default());
+    }
 
     #[test]
     fn bounds_of_the_recovery_theorem_survive_and_what_cannot_be_read_is_left_out() {

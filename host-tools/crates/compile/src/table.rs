@@ -11,7 +11,7 @@ use iltm_picture::ProjectorResponse;
 use iltm_runtime::{
     haar::Basis,
     image::{
-        ImageError, Meta, Table, TierInfo,
+        ImageError, Label, Meta, Table, TierInfo,
         layout::{MAX_PROVENANCE, SectionKind},
     },
     operator::{Bounds, Channels, Operator, OperatorError, Segment},
@@ -39,6 +39,8 @@ pub struct CompileOptions {
     pub targets: Option<Vec<f64>>,
     /// Where the table comes from: text for people, at most 64 KiB.
     pub provenance: String,
+    /// What people call the table.
+    pub label: Label,
 }
 
 /// What the image can hold as the light of reference white, camera units.
@@ -207,6 +209,7 @@ pub fn compile(
         inverse_error: U0F32::saturating_from_num(options.inverse_error.max(0.0)),
         bounds: operator.bounds,
         channel_scales: operator.scales,
+        label: options.label,
     };
     image.section(SectionKind::Meta, 0, head.emit().to_vec());
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));

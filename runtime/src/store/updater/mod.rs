@@ -13,6 +13,7 @@ mod state;
 use super::journal::Journal;
 use super::record::Identity;
 use super::transfer::Transfer;
+use super::wear::WearLimit;
 use super::{Map, Slot, TableSlots};
 use crate::link::{Fault, Refusal, Request, Response, SlotState, TableName, TableReason};
 use crate::trust::{Accepted, Trust};
@@ -34,6 +35,8 @@ pub struct Updater<F> {
     in_use: Option<Slot>,
     transfer: Option<Transfer>,
     trial: Option<Trial>,
+    ended: Option<Ended>,
+    wear: WearLimit,
     fault: Option<Fault>,
     change: Option<TableChange>,
 }
@@ -45,6 +48,14 @@ struct Trial {
     transfer: u32,
     /// What frames go through when it ends.
     before: Option<Slot>,
+}
+
+/// A trial that ended without confirmation.
+#[derive(Clone, Copy, Debug)]
+struct Ended {
+    table: u32,
+    reason: TableReason,
+    at_ms: u64,
 }
 
 /// Another table in use.
@@ -72,18 +83,26 @@ impl<F: NorFlash> Updater<F> {
             }
             Request::Slots => Ok(Response::Slots(self.slots(now_ms))),
             Request::Sectors { length, first } => self.sectors(length, first, slots),
-            Request::Begin { length, digest } => self.begin(length, digest),
+            Request::Begin {
+                length,
+                digest,
+                right,
+            } => self.begin(length, digest, right, slots),
             Request::Write {
                 transfer,
                 offset,
                 bytes,
-            } => self.write(transfer, offset, bytes, slots),
+            } => self.write(transfer, offset, bytes, now_ms, slots),
             Request::Activate { transfer, trial_s } => {
                 self.activate(transfer, trial_s, now_ms, slots)
             }
-            Request::Confirm { table } => self.confirm(table, now_ms),
-            Request::Rollback { table } => self.roll_back(table, now_ms, slots),
-            Request::Provision { key, device } => self.provision(Identity { key, device }, slots),
+            Request::Confirm { table, right } => self.confirm(table, right, now_ms, slots),
+            Request::Rollback { table, right } => self.roll_back(table, right, now_ms, slots),
+            Request::Provision {
+                key,
+                device,
+                even_so,
+            } => self.provision(Identity { key, device }, even_so, slots),
             // The session answers these.
             Request::Hello { .. } | Request::Status | Request::Subscribe { .. } => {
                 Err(Refusal::Unknown)
@@ -95,7 +114,7 @@ impl<F: NorFlash> Updater<F> {
     /// Ends a trial whose time is over.
     pub fn poll(&mut self, now_ms: u64, slots: &mut impl TableSlots<F>) {
         if let Some(trial) = self.trial.filter(|trial| now_ms >= trial.ends_ms) {
-            self.end_trial(trial, TableReason::TrialOver, slots);
+            self.end_trial(trial, TableReason::TrialOver, now_ms, slots);
         }
     }
 
@@ -160,7 +179,7 @@ impl<F: NorFlash> Updater<F> {
             } else if slot.of(&self.tables).is_none() {
                 SlotState::Empty
             } else if self.in_use != Some(slot) {
-                SlotState::Valid
+                self.state_of_other(slot)
             } else if self.trial.is_some() {
                 SlotState::Trial
             } else {

@@ -6,6 +6,7 @@ use crate::link::{Fault, PassThrough};
 use crate::store::identity::Found;
 use crate::store::journal::Journal;
 use crate::store::record::{Commit, Identity};
+use crate::store::wear::WearLimit;
 use crate::store::{Map, Slot, TableSlots, flash, identity};
 use crate::trust::{Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
@@ -37,6 +38,8 @@ impl<F: NorFlash> Updater<F> {
             in_use: None,
             transfer: None,
             trial: None,
+            ended: None,
+            wear: WearLimit::new(map.slot_bytes() / map.sector().max(1)),
             fault: None,
             change: None,
         };

@@ -16,13 +16,15 @@ mod wire;
 
 pub(super) use op::OP;
 
-use super::files::{Owner, files};
+use super::files::{Owner, files, keys, signer};
 use crate::flash_simulator::{NorSimulator, Violations};
 use crate::slots::{SimDevice, SlotLayout};
+use ed25519_dalek::{Signer, SigningKey};
 use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
 use iltm_runtime::store::Slot;
+use iltm_runtime::trust::{Certificate, Deed};
 use model::{Model, Record, Sizes};
-use op::{MAX_OPS, Op, Twist, Which};
+use op::{MAX_OPS, Op, Proof, Twist, Which};
 use wire::{Noise, Said, Wire, framed, payload};
 
 /// What happens to a device: the first byte says what its flash is like, every four
@@ -144,22 +146,32 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             Op::Slots => self.request(&Request::Slots),
             Op::Subscribe { period_ms } => self.request(&Request::Subscribe { period_ms }),
             Op::Sectors { length, first } => self.request(&Request::Sectors { length, first }),
-            Op::Begin { file, more } => self.begin(file, more),
+            Op::Begin { file, more, proof } => self.begin(file, more, proof),
             Op::Write { file, chunk, twist } => self.write(file, chunk, twist),
             Op::Send { file, sparing } => self.send(file, sparing),
             Op::Activate { file, trial_s } => {
                 let transfer = files()[file].digest.transfer();
                 self.request(&Request::Activate { transfer, trial_s });
             }
-            Op::Confirm { table } => {
+            Op::Confirm { table, proof } => {
                 let table = self.which(table);
-                self.request(&Request::Confirm { table });
+                let right = &self.right(&Deed::Confirm { table }, proof);
+                self.request(&Request::Confirm { table, right });
             }
-            Op::Rollback { table } => {
+            Op::Rollback { table, proof } => {
                 let table = self.which(table);
-                self.request(&Request::Rollback { table });
+                let right = &self.right(&Deed::Rollback { table }, proof);
+                self.request(&Request::Rollback { table, right });
             }
-            Op::Provision { key, device } => self.request(&Request::Provision { key, device }),
+            Op::Provision {
+                key,
+                device,
+                even_so,
+            } => self.request(&Request::Provision {
+                key,
+                device,
+                even_so,
+            }),
             Op::Again => self.again(fresh),
             Op::Together { count } => {
                 self.flush();
@@ -212,12 +224,61 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         }
     }
 
-    fn begin(&mut self, file: usize, more: i32) {
+    fn begin(&mut self, file: usize, more: i32, proof: Proof) {
         let file = &files()[file];
+        let length = (file.bytes.len() as u32).saturating_add_signed(more);
+        let digest = file.digest;
+        let right = &self.right(&Deed::Begin { length, digest }, proof);
         self.request(&Request::Begin {
-            length: (file.bytes.len() as u32).saturating_add_signed(more),
-            digest: file.digest,
+            length,
+            digest,
+            right,
         });
+    }
+
+    /// What the device wants to see signed next.
+    fn sequence(&mut self) -> u32 {
+        match self.wire().device.ask(Request::Slots) {
+            Response::Slots(slots) => slots.sequence,
+            other => panic!("not to a question for the slots: {other:?}"),
+        }
+    }
+
+    /// A right, or something like it, to do this on the device as it is now.
+    fn right(&mut self, deed: &Deed, proof: Proof) -> Vec<u8> {
+        let sequence = self.sequence();
+        let Some(owner) = self.model().owner else {
+            return vec![7; 64];
+        };
+        // Nobody has the third key.
+        let site = signer((keys()[1] == owner.key).into());
+        let stranger = signer(4);
+        let by = |key: &SigningKey, sequence| {
+            let signature = key.sign(&deed.message(owner.device, sequence));
+            signature.to_bytes().to_vec()
+        };
+        let certified = |by: &SigningKey, device, version| {
+            let mut certificate = Certificate {
+                key: stranger.verifying_key().to_bytes(),
+                device,
+                version,
+                signature: [0; 64],
+            };
+            certificate.signature = by.sign(&certificate.message()).to_bytes();
+            certificate.emit().to_vec()
+        };
+        match proof {
+            Proof::Owner => by(&site, sequence),
+            Proof::Technician { device, version } => {
+                [by(&stranger, sequence), certified(&site, device, version)].concat()
+            }
+            Proof::Stranger { certified: false } => by(&stranger, sequence),
+            Proof::Stranger { certified: true } => {
+                [by(&stranger, sequence), certified(&stranger, 0, 9)].concat()
+            }
+            Proof::Stale => by(&site, sequence.wrapping_sub(1)),
+            Proof::None { length } => by(&site, sequence)[..length].to_vec(),
+        }
     }
 
     fn chunk(&mut self) -> usize {
@@ -250,7 +311,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
     }
 
     fn send(&mut self, file: usize, sparing: bool) {
-        self.begin(file, 0);
+        self.begin(file, 0, Proof::Owner);
         let size = self.chunk();
         let sector = self.wire().device.updater.map().sector() as usize;
         let file = &files()[file];
@@ -303,10 +364,14 @@ impl<const W: usize, const E: usize> Trial<W, E> {
                 length: 300,
                 first: 1,
             },
-            Request::Confirm { table: 77 },
+            Request::Confirm {
+                table: 77,
+                right: &[],
+            },
             Request::Provision {
                 key: [9; 32],
                 device: 1 << 60,
+                even_so: true,
             },
         ];
         let mut payload = payload(&requests[usize::from(request) % requests.len()]);
@@ -405,6 +470,10 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         let mut expected = Vec::new();
         let before = self.models.clone();
         let now = self.wire().device.now_ms;
+        let sequence = self.sequence();
+        for model in &mut self.models {
+            model.sequence = Some(sequence);
+        }
         for held in &held {
             bytes.extend(framed(Channel::Request, held.sequence, &held.payload));
             if self.noise.frame() {
@@ -487,7 +556,12 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             // How often it was erased since it was made is known after a cut only
             // roughly.
             slots.record_erases = 0;
-            slots.slots.iter_mut().for_each(|slot| slot.erases = 0);
+            for slot in &mut slots.slots {
+                slot.erases = 0;
+                // What a table is called is for `tests/tests/device/slots.rs`.
+                slot.about = None;
+            }
+            slots.sequence = 0;
         }
         match predicted {
             Predicted::All(wanted) => assert_eq!(response, wanted, "a response"),

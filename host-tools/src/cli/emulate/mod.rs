@@ -1,4 +1,11 @@
 //! `iltm emulate`
+//!
+//! | what | file |
+//! |---|---|
+//! | the board: its memory, firmware and port | here |
+//! | frames that go through it | [`film`] |
+
+mod film;
 
 use super::args::Emulate;
 use super::failure::{Failure, Kind, cannot_write};
@@ -9,9 +16,11 @@ use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameFeed;
 use crate::device::memory::BoardMemory;
-use crate::device::playback::{Playback, PlaybackError};
+use crate::device::playback::PlaybackError;
 use crate::user::Folders;
 use crate::user::emulated::register;
+use crate::video::VideoError;
+use film::Film;
 use iltm_runtime::{
     FrameSize,
     frame_buffers::{Format, psram},
@@ -44,13 +53,13 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     if let (Some(path), Some(image)) = (&arguments.table, &image) {
         put_table(&memory, path, image)?;
     }
-    let mut frames = frames(arguments, table.as_ref())?;
-    let format = format(&frames)?;
+    let frames = frames(arguments, table.as_ref())?;
     let firmware = match &arguments.firmware {
         Some(firmware) => firmware.clone(),
         None => build(arguments.board, output)?,
     };
-    let mut playback = Playback::new(&memory, format).map_err(|error| playback_failure(&error))?;
+    let follows = arguments.frames.is_none() && arguments.size.is_none();
+    let mut film = Film::new(&memory, frames, follows)?;
     interrupt::catch();
     let started = Emulator::start(arguments.board, &firmware, &memory);
     let mut emulator = started.map_err(|error| emulator_failure(&error))?;
@@ -61,13 +70,13 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
         output.remark(&format!("`iltm ports` will not find this board: {error}"));
     }
     report(arguments, &emulator, &firmware, output);
-    let played = play(&mut emulator, &mut playback, &mut frames);
+    let played = play(&mut emulator, &mut film);
     // Ctrl-C goes to the emulator as well, which may be the first to notice.
     if !interrupt::stopped() {
         thread::sleep(Duration::from_millis(100));
     }
     if interrupt::stopped() {
-        let counts = playback.counts();
+        let counts = film.counts();
         let data = json!({ "event": "end", "given": counts.given, "shown": counts.shown });
         let text = format!("{} frames given, {} shown\n", counts.given, counts.shown);
         output.result(&data, &text);
@@ -236,23 +245,15 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 }
 
 /// Frames at their rate, until somebody stops it or the board ends.
-fn play(
-    emulator: &mut Emulator,
-    playback: &mut Playback<'_>,
-    frames: &mut FrameFeed,
-) -> Result<(), Failure> {
-    let period = Duration::from_secs_f64(1.0 / frames.rate());
+fn play(emulator: &mut Emulator, film: &mut Film<'_>) -> Result<(), Failure> {
+    let period = Duration::from_secs_f64(1.0 / film.rate());
     let mut due = Instant::now();
     while !interrupt::stopped() {
         emulator.check().map_err(|error| emulator_failure(&error))?;
-        let frame = frames.next_frame()?;
         wait_until(due);
         // After a pause, go on from now rather than make up for it in a burst.
         due = (due + period).max(Instant::now());
-        let passed = playback
-            .give(&frame)
-            .and_then(|()| playback.show(|_, _| ()));
-        passed.map_err(|error| playback_failure(&error))?;
+        film.turn()?;
     }
     Ok(())
 }
