@@ -77,7 +77,13 @@ const SCALES: [f64; 13] = [
 ];
 
 /// Shifts that are tried, in cells, to each side.
-const SHIFTS: [f64; 6] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.5];
+const SHIFTS: [f64; 7] = [0.0, 0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
+
+/// Steps by which the one that fits best is improved: cells of a shift, twentieths of a size.
+const REFINED: [f64; 3] = [0.2, 0.1, 0.05];
+
+/// Places and sizes that fit one image best and are compared in all.
+const FINALISTS: usize = 4;
 
 /// From a place in the slide to one in the projector's picture, both in cells, row by row.
 #[derive(Clone, Copy)]
@@ -106,7 +112,8 @@ impl Warp {
             place
         };
         let value = |col: f64, row: f64| {
-            let inside = col >= 0.0 && row >= 0.0 && col < sides[0] as f64 && row < sides[1] as f64;
+            let within = |place: f64, side: usize| place >= 0.0 && place < side as f64;
+            let inside = within(col, sides[0]) && within(row, sides[1]);
             let at = row as usize * sides[0] + col as usize;
             inside
                 .then(|| plane.get(at).copied())
@@ -128,6 +135,21 @@ impl Warp {
         planes
             .map(|plane| self.sampled(grid, plane, back))
             .collect()
+    }
+
+    /// Those beside it, by a step of what it already does.
+    fn around(self, step: f64) -> Vec<Self> {
+        let moved = |axis: usize, by: f64| {
+            let mut warp = self;
+            if matches!(self.fault(), ChainFault::Shifted { .. }) {
+                warp.shift[axis] += by;
+            } else {
+                warp.scale[axis] += by / 5.0;
+            }
+            warp
+        };
+        let both = |axis| [moved(axis, step), moved(axis, -step)];
+        [both(0), both(1)].concat()
     }
 
     fn fault(self) -> ChainFault {
@@ -155,15 +177,17 @@ pub(super) fn find(
     let curves = ProjectorCurves::new(table);
     let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
     let grid = table.grid();
+    // Mean over the first of the images.
     let mut misfit = |inputs: &[CellPlanes], warp: Option<Warp>| -> f64 {
         let shown = readings.shown.iter().zip(inputs);
         let error = |(shown, input): (&super::Shown, &CellPlanes)| {
             let light = match warp {
                 None => expected.photograph(input),
-                Some(warp) => {
-                    let light = expected.photograph(&warp.planes(grid, input, true));
-                    light.map(|light| warp.planes(grid, &light, false))
-                }
+                Some(warp) => expected.photograph_elsewhere(
+                    input,
+                    |planes| warp.planes(grid, planes, true),
+                    |planes| warp.planes(grid, planes, false),
+                ),
             };
             light.map_or(1.0, |light| lit.compare(&light, &shown.seen[1]).error)
         };
@@ -218,7 +242,24 @@ pub(super) fn find(
         let moves = warp.shift.iter().any(|shift| shift.abs() > 0.0);
         moves || warp.scale.iter().any(|scale| (scale - 1.0).abs() > 0.0)
     });
-    for warp in warps {
+    // Most are told apart by one image.
+    let mut tried: Vec<(f64, Warp)> = (warps.into_iter())
+        .map(|warp| (misfit(&right[..1.min(right.len())], Some(warp)), warp))
+        .collect();
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(mut nearest) = tried.first().copied() {
+        for step in REFINED {
+            let around = nearest.1.around(step);
+            for warp in around {
+                let left = misfit(&right[..1.min(right.len())], Some(warp));
+                if left < nearest.0 {
+                    nearest = (left, warp);
+                }
+            }
+        }
+        tried.insert(0, nearest);
+    }
+    for (_, warp) in tried.into_iter().take(FINALISTS) {
         offer(misfit(&right, Some(warp)), warp.fault());
     }
     Ok(best.1)

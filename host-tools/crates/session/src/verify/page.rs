@@ -207,8 +207,14 @@ pub fn reason(verdict: &TableVerdict) -> String {
     };
     let why = match verdict.cause {
         None => {
+            let of = if verdict.wanted {
+                "The chain that was photographed compensates"
+            } else {
+                "Slides that this program compensated; player and device were not verified"
+            };
             return format!(
-                "The error is {:.1} times smaller than without the table.",
+                "The error is {}, {:.1} times smaller than without the table. {of}.",
+                percent(after),
                 before / after.max(1e-9)
             );
         }
