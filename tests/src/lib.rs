@@ -25,6 +25,7 @@ pub mod reference_pages;
 pub mod simulated;
 pub mod slots;
 pub mod stages;
+pub mod verdicts;
 
 use ed25519_dalek::SigningKey;
 use iltm::compile::sign::{SealTerms, sign};

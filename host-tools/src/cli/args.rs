@@ -2,6 +2,7 @@
 
 use super::failure::Kind;
 use super::named::Named;
+use super::simulate_chain::Chain;
 use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
@@ -145,6 +146,20 @@ pub(super) struct Simulate {
         requires = "output"
     )]
     pub(super) shot: Option<u32>,
+    /// Show the folder's slides through a chain that compensates with --table, to practise
+    /// `iltm verify --wanted`: once as it should be, or off, twice, mirrored, shifted=PIXELS,
+    /// scaled=FACTOR
+    #[arg(
+        long,
+        value_name = "CHAIN",
+        requires = "photograph",
+        requires = "table",
+        conflicts_with = "shot"
+    )]
+    pub(super) chain: Option<Chain>,
+    /// Table of the chain
+    #[arg(long, value_name = "TABLE.iltm", requires = "chain")]
+    pub(super) table: Option<PathBuf>,
     /// Let something go wrong, to practise: gamma, auto-exposure, tripod, swapped,
     /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
     /// larger than usual; may be repeated
@@ -594,6 +609,10 @@ pub(super) struct Verify {
     /// Folder to make, with the pictures to project
     #[arg(short, long, value_name = "FOLDER")]
     pub(super) output: Option<PathBuf>,
+    /// Write the test images as they should look, for the player or the device that will
+    /// compensate them: the verdict is then on the chain that really runs
+    #[arg(long, requires = "output")]
+    pub(super) wanted: bool,
     /// Resolution of the projector; by default as the patterns of the scene had it, which
     /// the table remembers, or 1920x1080
     #[arg(long, value_name = "WxH", value_parser = frame_size, requires = "output")]
@@ -607,6 +626,10 @@ pub(super) struct Verify {
     /// Folder for the page and the maps; by default `verdict` in FOLDER
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub(super) report: Option<PathBuf>,
+    /// Serial port of the device that is handed over: the page names its board, its firmware
+    /// and the table that it uses
+    #[arg(long, value_name = "PORT", conflicts_with = "output")]
+    pub(super) port: Option<String>,
 }
 
 #[derive(Clone, Debug, Args)]

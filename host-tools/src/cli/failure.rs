@@ -99,10 +99,14 @@ pub(super) enum Kind {
     Camera = 32,
     #[strum(message = "slides cannot be shown")]
     Display = 33,
+    #[strum(message = "photographs cannot tell whether a table keeps its promise")]
+    Inconclusive = 34,
     #[strum(message = "a device shows frames as they are instead of compensating them")]
     PassThrough = 35,
     #[strum(message = "a device with a key was not shown the right to do that")]
     NoRight = 36,
+    #[strum(message = "photographs or a folder belong to another table")]
+    OtherTable = 37,
 }
 
 impl From<&Rejected> for Kind {
@@ -370,7 +374,11 @@ impl From<VerifyError> for Failure {
             VerifyError::Slides(_) => Kind::Usage,
             VerifyError::NoManifest { .. } => Kind::Read,
             VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,
-            VerifyError::OtherTable { .. } | VerifyError::Grid { .. } => Kind::Verdict,
+            VerifyError::OtherTable { .. }
+            | VerifyError::NotOfTable { .. }
+            | VerifyError::Grid { .. } => Kind::OtherTable,
+            VerifyError::Untold { .. } => Kind::Table,
+            VerifyError::Overexposed { .. } => Kind::Inconclusive,
             VerifyError::Missing { .. }
             | VerifyError::Unpaired { .. }
             | VerifyError::NoImages { .. }

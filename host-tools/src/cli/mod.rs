@@ -29,6 +29,7 @@ mod patterns;
 mod ports;
 mod progress;
 mod simulate;
+mod simulate_chain;
 mod solve;
 mod status;
 mod summary;

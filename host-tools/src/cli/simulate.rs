@@ -2,8 +2,9 @@
 
 use super::args::Simulate;
 use super::failure::{Failure, Kind};
-use super::output::Output;
+use super::output::{Output, read_file};
 use super::progress::progress;
+use super::simulate_chain::ChainedSlides;
 use crate::capture::pattern_set;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::Scene;
@@ -155,7 +156,7 @@ fn shoot<'a>(
     let camera = || VirtualCamera::new(scene, simulation, arguments.seed);
     let camera = || camera().map(|camera| camera.with_faults(&arguments.fault));
     if let Some((folder, session)) = session {
-        let taken = photograph(arguments, &session, &camera()?, progress).map_err(not_taken)?;
+        let taken = photograph(arguments, folder, session, (scene, &camera()?), progress)?;
         return Ok(Shot::Missing(folder, taken));
     }
     let Some(out) = &arguments.output else {
@@ -169,14 +170,28 @@ fn shoot<'a>(
 /// Takes what a folder calls for; returns how many photographs.
 fn photograph(
     arguments: &Simulate,
-    session: &UnfilledCapture,
-    camera: &VirtualCamera<'_>,
+    folder: &Path,
+    mut session: UnfilledCapture,
+    (scene, camera): (&Scene, &VirtualCamera<'_>),
     progress: &dyn Progress,
-) -> Result<usize, FillCaptureError> {
-    match (arguments.shot, &arguments.output) {
+) -> Result<usize, Failure> {
+    if let (Some(chain), Some(path)) = (arguments.chain, &arguments.table) {
+        let slides = ChainedSlides {
+            folder,
+            chain,
+            table: &read_file(path)?,
+            path,
+            grid: camera.grid(),
+            response: scene.projector.response,
+        };
+        let codes = slides.codes(&session.indices())?;
+        session = session.showing(codes);
+    }
+    let taken = match (arguments.shot, &arguments.output) {
         (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),
         _ => session.take_missing(camera, progress),
-    }
+    };
+    taken.map_err(not_taken)
 }
 
 fn not_taken(error: FillCaptureError) -> Failure {

@@ -127,7 +127,14 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
         ..Settings::default()
     };
     let folder = place.join("verify");
-    verify::write(&table, &layout, &settings, &folder, &Silent).unwrap();
+    verify::write(
+        &table,
+        &layout,
+        (&settings, verify::Slides::Both),
+        &folder,
+        &Silent,
+    )
+    .unwrap();
     let quiet = Forced::default().with(Effect::Noise, false);
     let simulation = simulation(laboratory, quiet);
     let camera = VirtualCamera::new(laboratory, &simulation, 11).unwrap();

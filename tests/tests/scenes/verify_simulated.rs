@@ -8,7 +8,10 @@ use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{Effect, Forced, VirtualCamera, fill_capture};
 use iltm::session::Layout;
-use iltm::verify::{Readings, TableVerdict, VerifyError, WhiteChange, judge, write};
+use iltm::verify::{
+    Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, VerifyManifest, VerifyRole,
+    WhiteChange, judge, write,
+};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_tests::simulated::{self, cell_means, error, photograph, simulation};
@@ -41,7 +44,7 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
         camera: learned.measurements.settings.camera.clone(),
         ..Settings::default()
     };
-    write(&table, &layout, &settings, folder, &Silent).unwrap();
+    write(&table, &layout, (&settings, Slides::Both), folder, &Silent).unwrap();
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
     let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();
@@ -93,7 +96,7 @@ fn a_good_table_passes_with_the_errors_that_are_really_there_wherever_the_camera
             white_of(&verdict).level,
             white_of(&verdict).shape
         );
-        assert!(verdict.passed, "{name}");
+        assert_eq!(verdict.outcome, Outcome::Passed, "{name}: {verdict:?}");
         assert!(
             verdict.cells.0 * 100 >= verdict.cells.1 * 95,
             "{:?}",
@@ -137,7 +140,13 @@ fn a_table_of_another_scene_fails_and_white_says_that_the_scene_is_another() {
     let folder = place.path().join("other");
     photographed(&learned, &painted, &folder);
     let verdict = verdict(&learned, &folder).unwrap();
-    assert!(!verdict.passed, "{:?} {:?}", verdict.error, verdict.bound);
+    let said = (verdict.outcome, verdict.cause);
+    assert_eq!(
+        said,
+        (Outcome::Failed, Some(Cause::Scene)),
+        "{:?}",
+        verdict.bound
+    );
     assert!(white_of(&verdict).shape > 0.1, "{:?}", verdict.drift);
     // The worst cells are on the panel that was painted, or on the one that it lights:
     // columns 5 to 15 of 21 are the inner two.

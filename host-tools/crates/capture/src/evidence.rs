@@ -4,7 +4,7 @@
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
-use crate::devices::{Devices, MeasuredDevices};
+use crate::devices::{ColourMixingMatrix, Devices, MeasuredDevices};
 use crate::format::error::CaptureError;
 use crate::format::picture_file::FileFormat;
 use crate::format::sequence::Sequence;
@@ -37,7 +37,7 @@ pub(crate) struct CaptureEvidence {
 }
 
 impl CaptureEvidence {
-    /// Goes through all phases.
+    /// Reads the photographs and goes through all phases.
     ///
     /// # Errors
     /// A photograph's own error, or a phase's.
@@ -49,11 +49,29 @@ impl CaptureEvidence {
     ) -> Result<Self, CaptureError> {
         let reading = settings.camera.reading();
         let mut linear = LinearPhotographs::read(folder, sequence, &reading, progress)?;
+        Self::find(folder, sequence, (settings, None), &mut linear, progress)
+    }
+
+    /// Goes through all phases. With `mixing`, of camera channels by projector channels, and
+    /// also where it is measured, `linear` is afterwards in the projector's channels.
+    ///
+    /// # Errors
+    /// A photograph's own error, or a phase's.
+    pub(crate) fn find(
+        folder: &Path,
+        sequence: &Sequence,
+        (settings, mixing): (&Settings, Option<&ColourMixingMatrix>),
+        linear: &mut LinearPhotographs<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Self, CaptureError> {
         // In the camera's own channels, where a ceiling is one value.
-        let clipped = clipping::find(sequence, &mut linear, progress)?;
-        let devices = MeasuredDevices::measure(folder, sequence, settings, &mut linear, progress)?;
+        let clipped = clipping::find(sequence, linear, progress)?;
+        let devices = MeasuredDevices::measure(folder, sequence, settings, linear, progress)?;
+        if let Some(inverse) = mixing.and_then(ColourMixingMatrix::inverse) {
+            linear.unmix(inverse, sequence, progress)?;
+        }
         let sampled = Sampled::take(&mut linear.photographs, sequence.shots.len(), progress)?;
-        let registered = registration::register(sequence, &mut linear, progress)?;
+        let registered = registration::register(sequence, linear, progress)?;
         let registration = &registered.registration;
         let pixels = CellPixels::choose(registration, &linear.saturated);
         let photographs = &mut linear.photographs;
@@ -71,7 +89,7 @@ impl CaptureEvidence {
         let cells = found.then(measure).transpose()?;
         let format = &linear.photographs.format;
         let files = (format.file, format.bits);
-        let flood = linear.into_flood();
+        let flood = linear.flood_without_black();
         let blur = settings.projector.blur;
         Ok(Self {
             files,

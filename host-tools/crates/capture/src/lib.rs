@@ -43,6 +43,7 @@ pub use cells::cell_pixels::{LeftOut, Why};
 pub use cells::fine_flood::FineFlood;
 pub use cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 pub use cells::noise::{NoiseModel, NoiseSource};
+pub use cells::nonlinearity::Nonlinearity;
 pub use devices::{
     CameraFit, CameraSource, ColourMixingMatrix, Devices, Fall, Probe, Ramp, RampPoint,
 };

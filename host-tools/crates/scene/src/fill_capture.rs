@@ -120,6 +120,22 @@ impl UnfilledCapture {
         Ok(missing)
     }
 
+    /// Indices of what is shown, in its order.
+    #[must_use]
+    pub fn indices(&self) -> Vec<u32> {
+        self.indices.clone()
+    }
+
+    /// The same with other input codes of every cell for each photograph, in the order of the
+    /// indices; what has none stays.
+    #[must_use]
+    pub fn showing(mut self, codes: Vec<Vec<[u8; 3]>>) -> Self {
+        for (frame, codes) in self.frames.iter_mut().zip(codes) {
+            frame.codes = codes;
+        }
+        self
+    }
+
     /// Takes every photograph that is not there yet; returns how many.
     ///
     /// # Errors

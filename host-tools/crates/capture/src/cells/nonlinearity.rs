@@ -23,7 +23,7 @@ const OUTSHINE: f64 = 1.03;
 
 /// Why light does not add up.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum Nonlinearity {
+pub enum Nonlinearity {
     /// The light that was read follows this power of the true light's inverse.
     Curve {
         /// Light would add up if it were raised to this power.

@@ -6,16 +6,22 @@
 //! known: the table's own predicted error, what the projector's range and its 8-bit codes
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
+use super::outcome::decide;
 use super::readings::Shown;
-use super::{Expected, Readings, VerifyError};
-use iltm_capture::CellPlanes;
+use super::{Cause, ChainFault, Expected, Outcome, Readings, VerifyError};
+use iltm_capture::{CellPlanes, Gate};
 use iltm_picture::LightPicture;
 use iltm_report::{Comparison, tier_costs};
 use iltm_runtime::{FrameSize, image::Table};
 use std::path::Path;
 
 /// How much larger than expected an error may be.
-const MARGIN: f64 = 1.5;
+pub(super) const MARGIN: f64 = 1.5;
+
+/// Most that the photographs' own faults may add to what the table promises, as a multiple of
+/// it. See `verified` in the documentation of accuracy: good sessions stay below, and the
+/// smallest bump of a tripod that spoils an error is above.
+pub(super) const MOST_ADDED: f64 = 1.5;
 
 /// Largest change of white from cell to cell that a camera standing elsewhere explains.
 pub(super) const MOST_VIEWPOINT: f64 = 0.01;
@@ -49,8 +55,17 @@ pub struct Bound {
     /// camera elsewhere sees other parts of; at most 1 %, beyond which it is
     /// a change of the scene.
     pub viewpoint: f64,
-    /// All of them together: root of the sum of squares, mean over the images.
+    /// Error that the table promises on this projector: what it predicts and what range and
+    /// codes leave. Where it predicts none, that of the limit without its margin.
+    pub promise: f64,
+    /// Error that the photographs themselves make: noise and viewpoint.
+    pub added: f64,
+    /// Promise and as much of the latter as may be added: root of the sum of squares; `None`
+    /// if the table predicts none.
     pub expected: Option<f64>,
+    /// The largest error that the promise and all faults of the photographs explain: what is
+    /// beyond it is on the wall. At least the limit.
+    pub doubt: f64,
 }
 
 /// A test image on the wall.
@@ -99,20 +114,40 @@ pub struct WhiteChange {
 /// A cell with a large error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct WorstCell {
-    /// Its row, from 0.
+    /// Its row, from 0 at the top.
     pub row: usize,
-    /// Its column, from 0.
+    /// Its column, from 0 at the left.
     pub col: usize,
     /// Error with compensation, relative to reference white: root mean square over images
     /// and channels.
     pub error: f64,
 }
 
+/// A curve of camera or projector that nobody declared.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Curve {
+    /// The power that the light of the photographs is best raised to; 1 for none.
+    pub power: f64,
+    /// Mean error of the compensated images that it leaves.
+    pub left: f64,
+}
+
 /// The answer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TableVerdict {
     /// Whether the table keeps its promise.
-    pub passed: bool,
+    pub outcome: Outcome,
+    /// Why it did not pass.
+    pub cause: Option<Cause>,
+    /// The power of light that the compensated photographs would fit best with.
+    pub curve: Curve,
+    /// What the chain that was to compensate did instead.
+    pub chain: Option<ChainFault>,
+    /// Whether such a chain was verified; then the errors without compensation are what the
+    /// table expects.
+    pub wanted: bool,
+    /// What a capture's gates say of the photographs.
+    pub gates: Vec<Gate>,
     /// Mean error of the images without and with compensation.
     pub error: [f64; 2],
     /// What the latter is held against.
@@ -121,6 +156,9 @@ pub struct TableVerdict {
     pub images: Vec<ImageVerdict>,
     /// What has changed.
     pub drift: Drift,
+    /// Light of wanted white on the wall, of that under the projector's own white; mean over
+    /// the cells and colours.
+    pub brightness: f64,
     /// The worst cells, the worst first.
     pub worst: Vec<WorstCell>,
     /// Cells compared, and cells that the table knows.
@@ -171,19 +209,61 @@ pub fn judge(
     let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
     let viewpoint = shape.min(MOST_VIEWPOINT);
     let bound = self::bound(table, readings, &images, (error[0], bound), viewpoint, &lit);
+    let curve = curve(readings, &lit);
+    let found = (&readings.revisited, &drift, curve);
+    let (mut outcome, mut cause) = decide(error[1], &bound, found);
+    let search = readings.wanted && outcome != Outcome::Passed;
+    let chain = if search && !cause.is_some_and(|cause| cause.spoils_pictures()) {
+        let images = super::test_images(table)?;
+        super::chain::find(table, &images, readings, &mut expected, &lit)?
+    } else {
+        None
+    };
+    if chain.is_some() {
+        (outcome, cause) = (Outcome::Failed, Some(Cause::Chain));
+    }
     Ok(TableVerdict {
-        passed: error[1] <= bound.limit,
+        curve,
+        chain,
+        wanted: readings.wanted,
+        outcome,
+        cause,
+        gates: readings.revisited.gates.clone(),
         error,
         bound,
         drift,
+        brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),
         cells: (lit.0.len(), known),
         images,
     })
 }
 
+/// The power of light with which the compensated photographs fit best.
+fn curve(readings: &Readings, lit: &LiveCells) -> Curve {
+    let left = |power: f64| {
+        let error = |shown: &Shown| {
+            let raise = |light: &f64| light.max(0.0).powf(power);
+            let planes = shown.seen[1].iter();
+            let raised = planes.map(|plane| plane.iter().map(raise).collect());
+            lit.compare(&raised.collect(), &shown.wanted).error
+        };
+        readings.shown.iter().map(error).sum::<f64>() / readings.shown.len().max(1) as f64
+    };
+    let powers = (-60..=60).map(|step| (f64::from(step) * 0.01).exp());
+    let tried = powers.map(|power| Curve {
+        power,
+        left: left(power),
+    });
+    let best = tried.min_by(|a, b| a.left.total_cmp(&b.left));
+    best.unwrap_or(Curve {
+        power: 1.0,
+        left: 1.0,
+    })
+}
+
 /// The cells that are compared.
-struct LiveCells(Vec<usize>);
+pub(super) struct LiveCells(Vec<usize>);
 
 impl LiveCells {
     fn new(live: &[bool]) -> Self {
@@ -201,7 +281,7 @@ impl LiveCells {
         }
     }
 
-    fn compare(&self, seen: &CellPlanes, wanted: &CellPlanes) -> Comparison {
+    pub(super) fn compare(&self, seen: &CellPlanes, wanted: &CellPlanes) -> Comparison {
         Comparison::new(&self.light(seen), &self.light(wanted))
     }
 
@@ -273,23 +353,30 @@ fn bound(
     let noise_of = |image: usize| noise.as_ref().map_or(0.0, |noise| noise[image]);
     let range_of = |image: usize| images[image].modelled.map_or(0.0, |modelled| modelled[1]);
     let modelled = images.iter().all(|image| image.modelled.is_some());
-    let expected = predicted.map(|predicted| {
-        mean(&|image| {
-            predicted
-                .hypot(range_of(image))
-                .hypot(noise_of(image))
-                .hypot(viewpoint)
-        })
+    let unpredicted = given.unwrap_or(UNPREDICTED * before) / MARGIN;
+    let promise_of = |image: usize| match (given, predicted) {
+        (None, Some(predicted)) => predicted.hypot(range_of(image)),
+        _ => unpredicted,
+    };
+    let added_of = |image: usize| noise_of(image).hypot(viewpoint);
+    let expected = mean(&|image| {
+        let promise = promise_of(image);
+        promise.hypot(added_of(image).min(MOST_ADDED * promise))
     });
-    let limit = given.or(expected.map(|expected| MARGIN * expected));
+    let expected = predicted.filter(|_| given.is_none()).map(|_| expected);
+    let limit = expected.map_or(MARGIN * unpredicted, |expected| MARGIN * expected);
+    let explained = mean(&|image| promise_of(image).hypot(added_of(image)));
     Bound {
-        limit: limit.unwrap_or(UNPREDICTED * before),
+        limit,
         given: given.is_some(),
         predicted,
         range: modelled.then(|| mean(&range_of)),
         viewpoint,
         noise: noise.is_some().then(|| mean(&noise_of)),
+        promise: mean(&promise_of),
+        added: mean(&added_of),
         expected,
+        doubt: (MARGIN * explained).max(limit),
     }
 }
 
@@ -328,13 +415,21 @@ fn check_order(
     lit: &LiveCells,
 ) -> Result<(), VerifyError> {
     let named = |image: u8, half: usize| {
-        let role = [super::VerifyRole::Plain, super::VerifyRole::Compensated][half];
+        let role = if readings.wanted {
+            super::VerifyRole::Wanted
+        } else {
+            [super::VerifyRole::Plain, super::VerifyRole::Compensated][half]
+        };
         role(image).to_string()
     };
     for (own, shown) in readings.shown.iter().enumerate() {
-        for half in 0..2 {
+        for half in usize::from(readings.wanted)..2 {
             let error = |model: &CellPlanes| lit.compare(model, &shown.seen[half]).error;
-            let of_own = error(&models[own][half]);
+            let mut of_own = error(&models[own][half]);
+            if readings.wanted {
+                // Perhaps nothing compensates.
+                of_own = of_own.min(error(&models[own][0]));
+            }
             // Plain and compensated pictures of one image differ by too little to tell
             // them apart where the table may be wrong.
             let others = models.iter().enumerate().filter(|(other, _)| *other != own);
@@ -374,8 +469,7 @@ fn drift(
     };
     let first = seen.first().map_or(0.0, total).max(1e-12);
     let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
-    let ones = vec![vec![1.0; readings.live.len()]; readings.revisited.channels];
-    let flood = expected.photograph(&ones);
+    let flood = expected.photograph(&readings.flood);
     Drift {
         white: flood.map(|flood| white_change(readings, &flood, white, lit)),
         session: changes.fold(0.0, f64::max),
@@ -411,6 +505,40 @@ fn white_change(
         level,
         shape: (square / (lit.0.len() * flood.len()).max(1) as f64).sqrt(),
         cells: lit.among(readings.live.len(), &change),
+    }
+}
+
+/// How bright wanted white is, of the projector's own.
+fn brightness(
+    readings: &Readings,
+    images: &[ImageVerdict],
+    expected: &mut Expected<'_, '_>,
+    lit: &LiveCells,
+) -> f64 {
+    let ones = vec![vec![1.0; readings.live.len()]; readings.revisited.channels];
+    // Where the projector's own white was not photographed, the table says it.
+    let own = readings
+        .wanted
+        .then(|| expected.photograph(&ones))
+        .flatten();
+    if let Some(own) = own {
+        let light = own.iter().flat_map(|plane| lit.of(plane));
+        let (sum, count) = light.fold((0.0, 0_usize), |(sum, n), light| (sum + light, n + 1));
+        return count as f64 / sum.max(1e-12);
+    }
+    let mut whites: Vec<f64> = images.iter().map(|image| image.white).collect();
+    whites.sort_by(f64::total_cmp);
+    let wanted = whites.get(whites.len() / 2).copied().unwrap_or(0.0);
+    let flood = readings.revisited.white.iter().flatten();
+    let (mut own, mut count) = (0.0, 0_usize);
+    for light in flood.flat_map(|plane| lit.of(plane)) {
+        own += light;
+        count += 1;
+    }
+    if own > 0.0 {
+        wanted * count as f64 / own
+    } else {
+        0.0
     }
 }
 
