@@ -157,6 +157,7 @@ fn device(arguments: &Verify, output: &Output) -> Result<Vec<(String, String)>, 
     let mut connection = connect(&line, output)?;
     let status = connection.client.status();
     let status = status.map_err(|error| connection.failed(&error))?;
+    let slots = connection.client.slots().ok();
     let device = connection.client.device();
     let who = format!(
         "{}, {}, firmware {}, at {}",
@@ -167,7 +168,10 @@ fn device(arguments: &Verify, output: &Output) -> Result<Vec<(String, String)>, 
     );
     Ok(vec![
         ("device".to_owned(), who),
-        ("its table".to_owned(), table_in_use(&status)),
+        (
+            "its table".to_owned(),
+            table_in_use(&status, slots.as_ref()),
+        ),
         ("its mode".to_owned(), status.mode.to_string()),
     ])
 }

@@ -2,21 +2,24 @@
 //! bytes instead of 1 KiB, which a device's flash has better uses for.
 
 /// The remainders of all half bytes.
-static REMAINDERS: [u32; 16] = {
-    let mut table = [0; 16];
-    let mut index = 0;
-    while index < 16 {
-        let mut remainder = index as u32;
-        let mut bit = 0;
-        while bit < 4 {
-            remainder = (remainder >> 1) ^ (0xEDB8_8320 * (remainder & 1));
-            bit += 1;
-        }
-        table[index] = remainder;
-        index += 1;
-    }
-    table
-};
+static REMAINDERS: [u32; 16] = [
+    0x0000_0000,
+    0x1db7_1064,
+    0x3b6e_20c8,
+    0x26d9_30ac,
+    0x76dc_4190,
+    0x6b6b_51f4,
+    0x4db2_6158,
+    0x5005_713c,
+    0xedb8_8320,
+    0xf00f_9344,
+    0xd6d6_a3e8,
+    0xcb61_b38c,
+    0x9b64_c2b0,
+    0x86d3_d2d4,
+    0xa00a_e278,
+    0xbdbd_f21c,
+];
 
 /// A CRC-32 of bytes that come piece by piece.
 #[derive(Clone, Copy, Debug)]

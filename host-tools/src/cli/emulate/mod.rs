@@ -19,7 +19,6 @@ use crate::device::memory::BoardMemory;
 use crate::device::playback::PlaybackError;
 use crate::user::Folders;
 use crate::user::emulated::register;
-use crate::video::VideoError;
 use film::Film;
 use iltm_runtime::{
     FrameSize,
