@@ -169,8 +169,11 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
-        self.blacken(input);
         let area = self.area();
+        if area.size != self.whole() {
+            // What no cell covers stays black.
+            input.fill([S::default(); C]);
+        }
         let lines = input.chunks_exact_mut(self.whole().width());
         let lines = lines
             .skip(area.top)
@@ -195,28 +198,6 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     fn check_pixels(&self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
         let needed = self.whole().pixels();
         ShortSlice::check(what, needed, given)
-    }
-
-    /// Makes the pixels black that no cell covers.
-    fn blacken<S: Sample>(&self, input: &mut [[S; C]]) {
-        let (area, whole) = (self.area(), self.whole());
-        if area.size == whole {
-            return;
-        }
-        let cells = area.top..area.top + area.size.height();
-        let right = area.left + area.size.width();
-        let lines = input.chunks_exact_mut(whole.width()).take(whole.height());
-        for (y, line) in lines.enumerate() {
-            let covered = if cells.contains(&y) {
-                area.left..right
-            } else {
-                0..0
-            };
-            let before = line.get_mut(..covered.start).unwrap_or_default();
-            before.fill([S::default(); C]);
-            let after = line.get_mut(covered.end..).unwrap_or_default();
-            after.fill([S::default(); C]);
-        }
     }
 
     /// One channel of the pixels from row `y` on.
