@@ -169,15 +169,12 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
-        let area = self.area();
-        if area.size != self.whole() {
+        if self.frame() != self.whole() {
             // What no cell covers stays black.
-            input.fill([S::default(); C]);
+            input.as_flattened_mut().fill(S::default());
         }
-        let lines = input.chunks_exact_mut(self.whole().width());
-        let lines = lines
-            .skip(area.top)
-            .filter_map(|line| line.get_mut(area.left..)?.get_mut(..width));
+        let input = input.get_mut(self.start()..).unwrap_or_default();
+        let lines = input.chunks_mut(self.whole().width());
         let lines = lines.take(self.frame().height());
         let (gains, _) = memory.gains.as_chunks();
         let (ambient, _) = memory.ambient.as_chunks();
@@ -200,6 +197,12 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         ShortSlice::check(what, needed, given)
     }
 
+    /// The first pixel that a cell covers.
+    const fn start(&self) -> usize {
+        let area = self.area();
+        area.top * self.whole().width() + area.left
+    }
+
     /// One channel of the pixels from row `y` on.
     fn pixels<'f, S: Sample>(
         &'f self,
@@ -209,8 +212,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         channel: usize,
         curves: S::Curves<'f>,
     ) -> Pixels<'f, S, C> {
-        let (width, area) = (self.frame().width(), self.area());
-        let start = (area.top + y) * self.whole().width() + area.left;
+        let width = self.frame().width();
+        let start = self.start() + y * self.whole().width();
         let ambient = self
             .table()
             .ambient()
