@@ -54,9 +54,10 @@ impl ProjectorPixels {
     /// Whether a frame has the projector's aspect, within one pixel of a side.
     #[must_use]
     pub const fn has_aspect_of(self, frame: FrameSize) -> bool {
-        let (width, height) = (self.size.width() as u64, self.size.height() as u64);
-        let across = frame.width() as u64 * height;
-        let down = frame.height() as u64 * width;
+        // Products of sides fit 32 bits.
+        let (width, height) = (self.size.width() as u32, self.size.height() as u32);
+        let across = frame.width() as u32 * height;
+        let down = frame.height() as u32 * width;
         let longer = if width > height { width } else { height };
         across.abs_diff(down) < longer
     }
@@ -111,10 +112,10 @@ impl ProjectorPixels {
     }
 }
 
-/// `side * to / from` to the nearest.
+/// `side * to / from` to the nearest, of sides, which are `u16`s: 32 bits are enough.
 const fn nearest(side: usize, to: usize, from: usize) -> usize {
-    let twice = 2 * side as u64 * to as u64 + from as u64;
-    (twice / (2 * from as u64)) as usize
+    let from = from as u32;
+    ((side as u32 * to as u32 + from / 2) / from) as usize
 }
 
 /// A rectangle of a frame's pixels.
@@ -169,6 +170,20 @@ mod tests {
             assert_eq!(area.size.width() + 2 * area.left, usize::from(width));
             assert_eq!(area.size.height() + 2 * area.top, usize::from(height));
         }
+    }
+
+    #[test]
+    fn the_largest_sides_do_not_overflow() {
+        let largest = size(u16::MAX, u16::MAX);
+        let projector = ProjectorPixels::new(largest, 32_767).unwrap();
+        assert!(projector.has_aspect_of(largest));
+        let area = projector.area(largest).unwrap();
+        assert_eq!(
+            (area.left, area.top, area.size),
+            (32_767, 32_767, size(1, 1))
+        );
+        assert!(!projector.has_aspect_of(size(u16::MAX, 1)));
+        assert_eq!(projector.around(size(u16::MAX, 1)), Some(largest));
     }
 
     #[test]

@@ -674,7 +674,8 @@ pub(super) struct Emulate {
     /// PNG or Y4M to play over and over, instead of a moving test scene
     #[arg(long, value_name = "INPUT")]
     pub(super) frames: Option<PathBuf>,
-    /// Size of the test scene; by default 128x96, or the grid's where that is larger
+    /// Size of the test scene; by default 128x96 or the grid's where that is larger, in the
+    /// aspect of the table's projector
     #[arg(long, value_name = "WxH", value_parser = frame_size, conflicts_with = "frames")]
     pub(super) size: Option<FrameSize>,
     /// Frames a second; by default the video's own rate, or 25

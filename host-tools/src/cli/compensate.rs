@@ -182,7 +182,7 @@ fn totals(summary: &FrameTotals, seconds: f64) -> (Value, String) {
                  enough for it\n";
     }
     if summary.cut_short {
-        text += "         the program that takes the frames has ended: those after it are lost\n";
+        text += "         the program that takes the frames ended before the last one: the rest is lost\n";
     }
     (data, text)
 }

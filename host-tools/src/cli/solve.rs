@@ -11,7 +11,7 @@ use crate::build_table::{BuiltTable, build_table_from};
 use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
-use crate::solve::SolveOptions;
+use crate::solve::{Method, SolveOptions};
 use crate::solve_page::{self, Content};
 use crate::video::{Fit, PlacedFrames, VideoError, sampled_frames};
 use iltm_picture::{LightPicture, Picture, progress::Progress};
@@ -26,6 +26,13 @@ const FRAMES: usize = 48;
 
 pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
+    if arguments.lambda.is_some() && arguments.method != Method::Joint {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!("the method `{}` has no weight", arguments.method),
+            "Leave --lambda or --method away.",
+        ));
+    }
     // A key that cannot be read is known before the work, not after it.
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     // So is a place that cannot be written to.

@@ -156,7 +156,12 @@ fn what_is_cut_off_is_told_apart_and_advice_is_for_white() {
 #[test]
 fn options_that_would_be_dropped_are_refused() {
     let user = User::with_table();
-    for terms in ["--for-device 3", "--table-version 7", "--revoke-below 1"] {
+    for terms in [
+        "--for-device 3",
+        "--table-version 7",
+        "--revoke-below 1",
+        "--method direct --lambda 0.1",
+    ] {
         user.fails(2, &format!("solve SAMPLE -o u.iltm {terms}"));
     }
     user.write("scene.toml", super::simulate::CORNER);

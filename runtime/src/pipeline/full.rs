@@ -34,7 +34,6 @@ const GAIN_HALF: i32 = 1 << (GAIN_GUARD_BITS - 1);
 #[derive(Clone, Copy, Debug)]
 pub struct FullPipeline<'t, 'a, const C: usize> {
     table: &'t Table<'a>,
-    frame: FrameSize,
     whole: FrameSize,
     area: PixelArea,
     average: AreaAverage,
@@ -61,41 +60,29 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// than the grid, or this build takes no frames larger than it.
     #[inline]
     pub fn new(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
-        if Stage::FullResolution.is_built() {
-            Self::sized(table, frame)
-        } else {
-            Err(FrameError::NotBuilt(Stage::FullResolution))
-        }
+        Self::within(table, frame, PixelArea::all(frame))
     }
 
     /// A pipeline for frames of size `whole`, whose cells lie in `area`. What is outside
-    /// becomes black.
+    /// becomes black; what of the area is outside of the frame is not shown.
     ///
     /// # Errors
-    /// As [`new`](Self::new); [`FrameError::SmallerThanGrid`] also if the area leaves the
-    /// frame.
+    /// As [`new`](Self::new), of the area instead of the frame.
+    #[inline]
     pub fn within(
         table: &'t Table<'a>,
         whole: FrameSize,
         area: PixelArea,
     ) -> Result<Self, FrameError> {
-        let pipeline = Self::new(table, area.size)?;
-        let right = area.left.saturating_add(area.size.width());
-        let bottom = area.top.saturating_add(area.size.height());
-        if right > whole.width() || bottom > whole.height() {
-            return Err(FrameError::SmallerThanGrid {
-                width: whole.width() as u16,
-                height: whole.height() as u16,
-            });
+        if Stage::FullResolution.is_built() {
+            Self::sized(table, whole, area)
+        } else {
+            Err(FrameError::NotBuilt(Stage::FullResolution))
         }
-        Ok(Self {
-            whole,
-            area,
-            ..pipeline
-        })
     }
 
-    fn sized(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
+    fn sized(table: &'t Table<'a>, whole: FrameSize, area: PixelArea) -> Result<Self, FrameError> {
+        let frame = area.size;
         if usize::from(table.channels()) != C {
             return Err(FrameError::Channels {
                 table: table.channels(),
@@ -119,9 +106,8 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         };
         Ok(Self {
             table,
-            frame,
-            whole: frame,
-            area: PixelArea::all(frame),
+            whole,
+            area,
             average: AreaAverage::new(grid, frame).ok_or(smaller)?,
             fine_gain,
             cells: axes(FrameSize::of_grid(grid)).ok_or(smaller)?,
@@ -138,7 +124,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// The size of the area that cells cover: of the frame, unless that has a border.
     #[must_use]
     pub const fn frame(&self) -> FrameSize {
-        self.frame
+        self.area.size
     }
 
     /// The size of its frames.

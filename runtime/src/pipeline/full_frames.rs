@@ -169,12 +169,12 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
-        self.blacken(input);
-        let area = self.area();
-        let lines = input.chunks_exact_mut(self.whole().width());
-        let lines = lines
-            .skip(area.top)
-            .filter_map(|line| line.get_mut(area.left..)?.get_mut(..width));
+        if self.frame() != self.whole() {
+            // What no cell covers stays black.
+            input.as_flattened_mut().fill(S::default());
+        }
+        let input = input.get_mut(self.start()..).unwrap_or_default();
+        let lines = input.chunks_mut(self.whole().width());
         let lines = lines.take(self.frame().height());
         let (gains, _) = memory.gains.as_chunks();
         let (ambient, _) = memory.ambient.as_chunks();
@@ -197,26 +197,10 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         ShortSlice::check(what, needed, given)
     }
 
-    /// Makes the pixels black that no cell covers.
-    fn blacken<S: Sample>(&self, input: &mut [[S; C]]) {
-        let (area, whole) = (self.area(), self.whole());
-        if area.size == whole {
-            return;
-        }
-        let cells = area.top..area.top + area.size.height();
-        let right = area.left + area.size.width();
-        let lines = input.chunks_exact_mut(whole.width()).take(whole.height());
-        for (y, line) in lines.enumerate() {
-            let covered = if cells.contains(&y) {
-                area.left..right
-            } else {
-                0..0
-            };
-            let before = line.get_mut(..covered.start).unwrap_or_default();
-            before.fill([S::default(); C]);
-            let after = line.get_mut(covered.end..).unwrap_or_default();
-            after.fill([S::default(); C]);
-        }
+    /// The first pixel that a cell covers.
+    const fn start(&self) -> usize {
+        let area = self.area();
+        area.top * self.whole().width() + area.left
     }
 
     /// One channel of the pixels from row `y` on.
@@ -228,8 +212,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         channel: usize,
         curves: S::Curves<'f>,
     ) -> Pixels<'f, S, C> {
-        let (width, area) = (self.frame().width(), self.area());
-        let start = (area.top + y) * self.whole().width() + area.left;
+        let width = self.frame().width();
+        let start = self.start() + y * self.whole().width();
         let ambient = self
             .table()
             .ambient()

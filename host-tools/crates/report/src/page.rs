@@ -418,11 +418,9 @@ fn phone(shown: &TreatedImage) -> Markup {
 }
 
 fn clipping(shown: &TreatedImage) -> String {
-    match shown.treatment {
-        Treatment::None => "The wanted image".to_owned(),
-        _ => {
-            let [black, white] = shown.clipped.map(percent);
-            format!("{white} of the samples too bright for white, {black} darker than black")
-        }
+    if shown.treatment == Treatment::None {
+        return "The wanted image".to_owned();
     }
+    let [black, white] = shown.clipped.map(percent);
+    format!("{white} of the samples too bright for white, {black} darker than black")
 }

@@ -52,7 +52,7 @@ pub enum VideoError {
     },
     /// The frame has another aspect than the projector that the table was made with.
     #[error("the frame, {frame}, has another aspect than the projector that the table was \
-        made with, {}{}", projector.size(), border(projector))]
+        made with, {}{}", projector.size(), border(*projector))]
     Aspect {
         /// Size of the frame.
         frame: FrameSize,
@@ -102,7 +102,7 @@ pub enum VideoError {
 }
 
 /// What an error about an aspect says of a border.
-fn border(projector: &ProjectorPixels) -> String {
+fn border(projector: ProjectorPixels) -> String {
     match projector.border() {
         0 => String::new(),
         border => format!(" with a border of {border}"),

@@ -152,7 +152,7 @@ impl Live<'_> {
         });
         progress.end();
         run.done.frames.cut_short = !result?;
-        if run.done.frames.frames == 0 {
+        if run.done.frames.frames == 0 && !run.done.frames.cut_short {
             return Err(VideoError::NoFrames);
         }
         Ok(run.done)

@@ -5,7 +5,7 @@ use crate::test_scene::TestScene;
 use crate::y4m::{Header, Reader, Y4mError, YuvFrame};
 use iltm_picture::progress::Progress;
 use proptest::prelude::*;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A stream of frames of random bytes between two codes.
