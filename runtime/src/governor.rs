@@ -494,7 +494,9 @@ mod tests {
         let mut worst = [(0, 0, 0); 2];
         let [mut barred, mut cases] = [0; 2];
         // Every small period, and of the others one in 31: all of them take a minute.
-        let periods = (2..40).chain((40..=2_000).step_by(31)).chain([57, 60, 2_000]);
+        let periods = (2..40)
+            .chain((40..=2_000).step_by(31))
+            .chain([57, 60, 2_000]);
         for period in periods {
             for (index, times) in tables().iter().enumerate() {
                 // Some more ticks at each tier, some more at the upper ones only, and so
@@ -552,7 +554,9 @@ mod tests {
         let mut worst = 0.0_f64;
         for times in tables() {
             let top = times.len() as u8 - 1;
-            for rest in [0, 8, 9, 100, 2_040, 2_049, 4_100, 6_200, 8_300, 10_400, 12_500, 18_600] {
+            for rest in [
+                0, 8, 9, 100, 2_040, 2_049, 4_100, 6_200, 8_300, 10_400, 12_500, 18_600,
+            ] {
                 for strikes in [1, 2, 3, 5, 8, 16] {
                     for between in [1, 2, 9, 40] {
                         let mut governor = governor_of(&times);

@@ -9,7 +9,7 @@
 /// emulator; they need not be exact, only not far too low.
 pub(crate) mod cost {
     /// A byte through CRC-32.
-    pub(crate) const CRC_BYTE: usize = 10;
+    pub(crate) const CRC_BYTE: usize = 16;
     /// A byte through SHA-512.
     pub(crate) const HASH_BYTE: usize = 95;
     /// A sum of two points of the curve.

@@ -62,6 +62,7 @@ pub(super) fn status_data(status: &Status) -> Value {
         PassThrough::BrokenTable => "broken-table",
         PassThrough::OtherFrames => "other-frames",
         PassThrough::Memory => "memory",
+        PassThrough::CrashLoop => "crash-loop",
     };
     json!({
         "firmware": status.firmware.to_string(),

@@ -4,7 +4,7 @@ use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells, compensate_pixels};
+use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells};
 use iltm_runtime::{FrameSize, features};
 
 /// What is done to the frames of a format.
@@ -73,13 +73,10 @@ impl FramePath {
                 let job = FrameJob {
                     table,
                     size,
-                    prepared: memory.is_prepared(table, size),
                     tier,
                     encoding,
                 };
-                let (channels, cells) = (table.channels().into(), table.grid().cells());
-                let (mut pixels, mut workspace) = memory.full(channels, cells, size.width());
-                compensate_pixels(&job, wanted, input, &mut pixels, &mut workspace)
+                memory.compensate(&job, wanted, input)
             }
         }
     }

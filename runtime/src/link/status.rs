@@ -86,6 +86,8 @@ pub enum PassThrough {
     OtherFrames,
     /// The table needs more memory than the device has.
     Memory,
+    /// The device crashed or hung with the table at one start after the other.
+    CrashLoop,
 }
 
 impl fmt::Display for Mode {
@@ -104,6 +106,7 @@ impl fmt::Display for PassThrough {
             Self::BrokenTable => "the table cannot be used",
             Self::OtherFrames => "the table is for other frames",
             Self::Memory => "the table needs more memory than there is",
+            Self::CrashLoop => "the device crashed with the table three times in a row",
         })
     }
 }

@@ -70,6 +70,11 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
                 pipeline: C as u8,
             });
         }
+        Self::of_any(table, frame)
+    }
+
+    /// Without a look at the number of channels.
+    pub(super) fn of_any(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
         let smaller = FrameError::SmallerThanGrid {
             width: frame.width() as u16,
             height: frame.height() as u16,

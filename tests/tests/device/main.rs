@@ -3,6 +3,7 @@
 //! `cargo test -p iltm-tests --test device upload` runs the tests of one.
 
 mod firmware;
+mod firmware_trouble;
 mod firmware_update;
 mod found_by_fuzzing;
 mod identity;
@@ -11,3 +12,4 @@ mod power_cuts;
 mod protocol;
 mod slots;
 mod upload;
+mod worn;

@@ -132,6 +132,7 @@ fn from_device(event: &Event) -> Value {
                 TableReason::Confirmed => "confirmed",
                 TableReason::TrialOver => "trial-over",
                 TableReason::RolledBack => "rolled-back",
+                TableReason::Damaged => "damaged",
             },
             "frame": frame,
         }),
