@@ -111,6 +111,7 @@ pub mod word {
     pub const TEAR: usize = 11;
     pub const PANIC: usize = 12;
     pub const NEW_OUTPUT: usize = 13;
+    pub const HANGS: usize = 14;
     pub const SHOWN: usize = 32;
     pub const WRONG: usize = 33;
     pub const OVER: usize = 34;

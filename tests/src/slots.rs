@@ -83,6 +83,9 @@ impl<const W: usize, const E: usize> TableSlots<NorSimulator<W, E>> for SimTable
             Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
             None => content(bytes),
         };
+        let start = self.layout.slot(slot).start;
+        let read = start..start + length.map_or(bytes.len(), |length| length as usize);
+        assert!(flash.is_readable(read), "the processor faults");
         let pauses = &mut self.pauses;
         let (_, accepted) = admit(file, terms, &mut || *pauses += 1)?;
         Ok(accepted)
@@ -139,6 +142,10 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
 
     /// One that finds this in its flash when it starts.
     pub fn start(flash: NorSimulator<W, E>, layout: SlotLayout) -> Self {
+        Self::start_after(false, flash, layout)
+    }
+
+    fn start_after(crashes: bool, flash: NorSimulator<W, E>, layout: SlotLayout) -> Self {
         let mut tables = SimTables {
             layout,
             selected: Err(PassThrough::NoTable),
@@ -146,7 +153,7 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
             pauses: 0,
         };
         let map = layout.map(&flash);
-        let updater = Updater::start(flash, map, &mut tables);
+        let updater = Updater::start_after(crashes, flash, map, &mut tables);
         Self {
             updater,
             tables,
@@ -160,6 +167,16 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
         let mut flash = self.updater.into_flash();
         flash.power_on();
         Self::start(flash, self.layout)
+    }
+
+    /// The same after it has crashed again and again.
+    pub fn restarted_after_crashes(self) -> Self {
+        Self::start_after(true, self.updater.into_flash(), self.layout)
+    }
+
+    /// What it does where the table in use has rotted.
+    pub fn abandon(&mut self) {
+        self.updater.abandon(&mut self.tables);
     }
 
     /// Asks it something.

@@ -106,6 +106,7 @@ pub(super) fn status_data(status: &Status) -> Value {
         PassThrough::BrokenTable => "broken-table",
         PassThrough::OtherFrames => "other-frames",
         PassThrough::Memory => "memory",
+        PassThrough::CrashLoop => "crash-loop",
     };
     json!({
         "firmware": status.firmware.to_string(),
@@ -317,6 +318,7 @@ pub(super) const fn table_reason(reason: TableReason) -> &'static str {
         TableReason::Confirmed => "confirmed",
         TableReason::TrialOver => "trial-over",
         TableReason::RolledBack => "rolled-back",
+        TableReason::Damaged => "damaged",
     }
 }
 

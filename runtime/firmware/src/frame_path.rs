@@ -4,7 +4,7 @@ use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells, compensate_pixels};
+use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells};
 use iltm_runtime::placement::PixelArea;
 use iltm_runtime::{FrameSize, features};
 
@@ -49,6 +49,15 @@ impl FramePath {
         Self::Full(format.encoding(), size, area)
     }
 
+    /// Size of the area that cells cover, in frames larger than the grid.
+    #[must_use]
+    pub const fn area(&self) -> Option<FrameSize> {
+        match self {
+            Self::Full(_, _, area) => Some(area.size),
+            Self::PassThrough(_) | Self::Grid(_) => None,
+        }
+    }
+
     /// Makes the projector's input of a wanted frame with the table that the stage
     /// was made for; returns how many samples were clipped.
     ///
@@ -78,14 +87,10 @@ impl FramePath {
                     table,
                     size,
                     area,
-                    prepared: memory.is_prepared(table, size),
                     tier,
                     encoding,
                 };
-                let (channels, cells) = (table.channels().into(), table.grid().cells());
-                let width = area.size.width();
-                let (mut pixels, mut workspace) = memory.full(channels, cells, width);
-                compensate_pixels(&job, wanted, input, &mut pixels, &mut workspace)
+                memory.compensate(&job, wanted, input)
             }
         }
     }

@@ -3,7 +3,7 @@
 use crate::board::{Board, TableFlash};
 use crate::frames::Frames;
 use crate::hooks::FrameHooks;
-use iltm_runtime::image::{Checked, Table, content};
+use iltm_runtime::image::{Checked, Recheck, Table, content};
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::store::{Slot, TableSlots};
 use iltm_runtime::trust::{Accepted, Rejected, Terms, examine};
@@ -67,17 +67,33 @@ impl<B: Board, H: FrameHooks> TableSlots<B::Flash> for Frames<B, H> {
         length: Option<u32>,
         terms: &Terms,
     ) -> Result<Accepted, Rejected> {
-        *slot.of_mut(self.tables) = None;
-        let (checked, accepted) = self.check(flash, slot, length, terms)?;
+        self.unload(slot);
+        let bytes = flash.slot(slot);
+        let file = match length {
+            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
+            None => content(bytes),
+        };
+        let (checked, accepted) = examine(file, terms, &mut || {
+            self.round();
+        })?;
         put(slot.of_mut(self.tables), &checked);
+        let mut recheck = Recheck::new(file);
+        while recheck.step().is_none() {
+            self.round();
+        }
+        *slot.of_mut(&mut self.rechecks) = Some(recheck);
         Ok(accepted)
     }
 
     fn unload(&mut self, slot: Slot) {
         *slot.of_mut(self.tables) = None;
+        *slot.of_mut(&mut self.rechecks) = None;
     }
 
     fn select(&mut self, table: Result<Slot, PassThrough>) {
+        if let Ok(slot) = table {
+            self.prepare(slot);
+        }
         self.in_use = table;
         self.restage();
     }

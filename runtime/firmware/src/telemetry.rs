@@ -53,8 +53,13 @@ impl Telemetry {
         }
     }
 
-    /// The time.
+    /// The time. Once a second the stack is measured, which takes as long as a small frame.
     pub fn set_uptime(&mut self, milliseconds: u64) {
+        let seconds = |time: u64| time as u32 / 1_000;
+        let stack = &mut self.status.stack;
+        if stack.size == 0 || seconds(milliseconds) != seconds(self.status.uptime_ms) {
+            *stack = stack::depth();
+        }
         self.status.uptime_ms = milliseconds;
     }
 
@@ -118,9 +123,6 @@ impl Telemetry {
     /// All of it, but for what the store knows.
     #[must_use]
     pub fn status(&self) -> Status {
-        Status {
-            stack: stack::depth(),
-            ..self.status.clone()
-        }
+        self.status.clone()
     }
 }

@@ -45,7 +45,7 @@ impl Crc32 {
     }
 
     /// The CRC of all of them.
-    pub(crate) const fn finalize(self) -> u32 {
+    pub(crate) const fn finish(self) -> u32 {
         !self.0
     }
 }
@@ -61,7 +61,7 @@ mod tests {
             let mut crc = Crc32::new();
             crc.update(first);
             crc.update(second);
-            assert_eq!(crc.finalize(), 0xCBF4_3926);
+            assert_eq!(crc.finish(), 0xCBF4_3926);
         }
     }
 }

@@ -17,6 +17,7 @@ pub mod layout;
 #[cfg(test)]
 pub(crate) mod made_up;
 mod meta;
+mod recheck;
 pub mod seal;
 mod sections;
 mod table;
@@ -26,6 +27,7 @@ pub(crate) use crc32::Crc32;
 pub use error::{ImageError, SealError, SectionProblem};
 pub use label::Label;
 pub use meta::{Meta, TierInfo};
+pub use recheck::Recheck;
 pub use seal::{Seal, content, unseal};
 pub(crate) use sections::Whole;
 pub use table::{FineGain, Table};
@@ -41,7 +43,7 @@ pub fn crc32(bytes: &[&[u8]]) -> u32 {
     for part in bytes {
         digest.update(part);
     }
-    digest.finalize()
+    digest.finish()
 }
 
 /// The same of bytes that may be many.
@@ -52,5 +54,5 @@ fn checksum(bytes: &[&[u8]], budget: &mut YieldBudget<'_>) -> u32 {
         digest.update(piece);
         budget.spend(piece.len(), cost::CRC_BYTE);
     }
-    digest.finalize()
+    digest.finish()
 }

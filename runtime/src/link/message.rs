@@ -314,6 +314,8 @@ pub enum TableReason {
     TrialOver,
     /// A host went back to it.
     RolledBack,
+    /// The other one was damaged while it was in use.
+    Damaged,
 }
 
 impl fmt::Display for TableReason {
@@ -323,6 +325,7 @@ impl fmt::Display for TableReason {
             Self::Confirmed => "confirmed",
             Self::TrialOver => "nobody confirmed the other one",
             Self::RolledBack => "rolled back",
+            Self::Damaged => "the other one is damaged",
         })
     }
 }

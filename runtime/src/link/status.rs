@@ -114,6 +114,8 @@ pub enum PassThrough {
     OtherFrames,
     /// The table needs more memory than the device has.
     Memory,
+    /// The device crashed or hung with the table at one start after the other.
+    CrashLoop,
 }
 
 impl fmt::Display for Mode {
@@ -132,6 +134,7 @@ impl fmt::Display for PassThrough {
             Self::BrokenTable => "the table cannot be used",
             Self::OtherFrames => "the table is for other frames",
             Self::Memory => "the table needs more memory than there is",
+            Self::CrashLoop => "the device crashed with the table three times in a row",
         })
     }
 }

@@ -227,7 +227,9 @@ fn add<const C: usize>(
         count: group.count,
         words: group.words(),
     });
-    if kernel::gather::gather(rows, &scales, fresh, sums) {
+    // A tier's segment for all channels is its first, so the assembler has a loop for
+    // every segment of a checked table.
+    if kernel::gather::gather(rows, &scales, fresh, sums) || !kernel::IS_PLAIN {
         return;
     }
     for group in segment.groups() {

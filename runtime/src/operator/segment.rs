@@ -2,6 +2,7 @@
 
 use super::OperatorError;
 use super::layout::{MAX_SHORT, WORD, halves, pair_words};
+use crate::kernel;
 use crate::yield_budget::{YieldBudget, cost};
 
 /// Which channels a segment applies to.
@@ -64,8 +65,8 @@ impl<'a> Segment<'a> {
     /// checks them.
     ///
     /// # Errors
-    /// [`OperatorError::Words`] if the bytes are not whole words; `index` is the
-    /// place that the error names.
+    /// [`OperatorError::Words`] if the bytes are not whole words, or lie where the
+    /// assembler loops cannot read words; `index` is the place that the error names.
     pub fn new(
         index: usize,
         tier: u8,
@@ -73,7 +74,7 @@ impl<'a> Segment<'a> {
         bytes: &'a [u8],
     ) -> Result<Self, OperatorError> {
         let (words, rest) = bytes.as_chunks::<WORD>();
-        if !rest.is_empty() {
+        if !rest.is_empty() || !kernel::takes(words) {
             return Err(OperatorError::Words { segment: index });
         }
         Ok(Self {

@@ -7,6 +7,7 @@ use super::sample::Encoding;
 use super::stages::Workspace;
 use super::{FrameError, FullMemory};
 use crate::FrameSize;
+use crate::features::Stage;
 use crate::image::Table;
 use crate::placement::PixelArea;
 
@@ -50,16 +51,34 @@ pub struct FrameJob<'t, 'a> {
     pub size: FrameSize,
     /// Where in it the cells lie.
     pub area: PixelArea,
-    /// Whether the memory is prepared for table and size.
-    pub prepared: bool,
     /// The tier that it goes through.
     pub tier: u8,
     /// What its codes mean.
     pub encoding: Encoding,
 }
 
-/// Compensates a frame larger than the grid, preparing the memory first unless it is;
-/// returns how many samples were clipped.
+/// Prepares one row of the memory for frames larger than the grid whose cells lie in an area
+/// of this size; all its rows are to be, before a frame is compensated.
+///
+/// # Errors
+/// [`FrameError`] if the area is smaller than the grid, or this build takes none larger.
+/// Slices that are too short are filled as far as they go.
+pub fn prepare_pixels(
+    table: &Table<'_>,
+    area: FrameSize,
+    row: usize,
+    memory: &mut FullMemory<'_>,
+) -> Result<(), FrameError> {
+    if !Stage::FullResolution.is_built() {
+        return Err(FrameError::NotBuilt(Stage::FullResolution));
+    }
+    let pipeline = FullPipeline::<1>::of_any(table, area)?;
+    pipeline.prepare_row_of(table.channels().into(), row, memory);
+    Ok(())
+}
+
+/// Compensates a frame larger than the grid with memory that was
+/// [prepared](prepare_pixels) for table and area; returns how many samples were clipped.
 ///
 /// # Errors
 /// As [`FullPipeline::within`] and [`FullPipeline::compensate`].
@@ -84,9 +103,6 @@ fn pixels<const C: usize>(
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
     let pipeline = FullPipeline::<C>::within(job.table, job.size, job.area)?;
-    if !job.prepared {
-        pipeline.prepare(memory)?;
-    }
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     pipeline.compensate(job.tier, job.encoding, wanted, input, memory, workspace)
 }

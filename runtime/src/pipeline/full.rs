@@ -89,6 +89,15 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
                 pipeline: C as u8,
             });
         }
+        Ok(Self {
+            whole,
+            area,
+            ..Self::of_any(table, frame)?
+        })
+    }
+
+    /// Of frames that cells cover all of, without a look at the number of channels.
+    pub(super) fn of_any(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
         let smaller = FrameError::SmallerThanGrid {
             width: frame.width() as u16,
             height: frame.height() as u16,
@@ -106,8 +115,8 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         };
         Ok(Self {
             table,
-            whole,
-            area,
+            whole: frame,
+            area: PixelArea::all(frame),
             average: AreaAverage::new(grid, frame).ok_or(smaller)?,
             fine_gain,
             cells: axes(FrameSize::of_grid(grid)).ok_or(smaller)?,

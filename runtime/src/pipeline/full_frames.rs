@@ -66,32 +66,36 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     /// # Errors
     /// [`FrameError::Short`] if a slice is too short.
     pub fn prepare(&self, memory: &mut FullMemory<'_>) -> Result<(), FrameError> {
+        (0..self.frame().height()).try_for_each(|y| self.prepare_row(y, memory))
+    }
+
+    /// [`prepare`](Self::prepare) for one row of pixels.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn prepare_row(&self, y: usize, memory: &mut FullMemory<'_>) -> Result<(), FrameError> {
         self.check(memory)?;
-        let (width, height) = (self.frame().width(), self.frame().height());
-        let (gains, _) = memory.gains.as_chunks_mut::<C>();
-        for (y, line) in gains.chunks_exact_mut(width).take(height).enumerate() {
-            for channel in 0..C {
-                self.gain_row(y, channel, &mut memory.row, memory.values);
-                store(line, channel, memory.values);
-            }
-        }
-        let lit = if self.table().ambient().is_some() {
-            height
-        } else {
-            0
-        };
-        let (ambient, _) = memory.ambient.as_chunks_mut::<C>();
-        let lines = ambient.chunks_exact_mut(width).take(lit);
-        for (y, line) in lines.enumerate() {
-            for channel in 0..C {
-                if self.ambient_row(y, channel, &mut memory.row) {
-                    let values = memory.values.iter_mut().zip(memory.row.spread.iter());
-                    values.for_each(|(value, ambient)| *value = *ambient as u16);
-                    store(line, channel, memory.values);
-                }
-            }
-        }
+        self.prepare_row_of(C, y, memory);
         Ok(())
+    }
+
+    /// [`prepare_row`](Self::prepare_row) for `channels` channels, whatever `C` is: code
+    /// for one serves all.
+    pub(super) fn prepare_row_of(&self, channels: usize, y: usize, memory: &mut FullMemory<'_>) {
+        let width = self.frame().width() * channels;
+        for channel in 0..channels {
+            if let Some(line) = memory.gains.chunks_exact_mut(width).nth(y) {
+                self.gain_row(y, channel, &mut memory.row, memory.values);
+                store(line, channel, channels, memory.values);
+            }
+            if self.ambient_row(y, channel, &mut memory.row)
+                && let Some(line) = memory.ambient.chunks_exact_mut(width).nth(y)
+            {
+                let values = memory.values.iter_mut().zip(memory.row.spread.iter());
+                values.for_each(|(value, ambient)| *value = *ambient as u16);
+                store(line, channel, channels, memory.values);
+            }
+        }
     }
 
     /// Compensates one frame at `tier` with memory that was
@@ -231,10 +235,9 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
 }
 
 /// Stores a row of one channel.
-fn store<const C: usize>(line: &mut [[Halfword; C]], channel: usize, values: &[u16]) {
-    for (pixel, value) in line.iter_mut().zip(values) {
-        if let Some(slot) = pixel.get_mut(channel) {
-            *slot = value.to_le_bytes();
-        }
+fn store(line: &mut [Halfword], channel: usize, channels: usize, values: &[u16]) {
+    let line = line.iter_mut().skip(channel).step_by(channels.max(1));
+    for (slot, value) in line.zip(values) {
+        *slot = value.to_le_bytes();
     }
 }

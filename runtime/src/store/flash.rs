@@ -51,7 +51,7 @@ pub(super) fn crc<F: NorFlash>(
         digest.update(piece);
         true
     })?;
-    Ok(digest.finalize())
+    Ok(digest.finish())
 }
 
 /// Whether a part holds these bytes from `start` on.

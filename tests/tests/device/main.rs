@@ -3,6 +3,7 @@
 //! `cargo test -p iltm-tests --test device upload` runs the tests of one.
 
 mod firmware;
+mod firmware_trouble;
 mod firmware_update;
 mod found_by_fuzzing;
 mod identity;
@@ -12,3 +13,4 @@ mod protocol;
 mod rights;
 mod slots;
 mod upload;
+mod worn;

@@ -11,7 +11,8 @@ use iltm_runtime::{
     },
     operator::{Operator, Segment},
     pipeline::{
-        Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells, compensate_pixels,
+        Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells,
+        compensate_pixels, prepare_pixels,
     },
     placement::PixelArea,
     units::Halfword,
@@ -146,7 +147,9 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
     let mut memory = OperatorMemory::new(table);
     let mut frame = FrameMemory::new(table, size);
     let mut medians = Vec::new();
-    let mut prepared = false;
+    for row in (0..size.height()).take_while(|_| !of_grid) {
+        prepare_pixels(table, size, row, &mut frame.lent())?;
+    }
     for tier in 0..=table.top_tier() {
         let encoding = Encoding::Display;
         let mut runs = Vec::with_capacity(RUNS);
@@ -160,12 +163,10 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
                     table,
                     size,
                     area: PixelArea::all(size),
-                    prepared,
                     tier,
                     encoding,
                 };
                 compensate_pixels(&job, image, &mut input, &mut frame.lent(), &mut workspace)?;
-                prepared = true;
             }
             runs.push(start.elapsed().as_secs_f64() * 1e6);
         }

@@ -16,7 +16,7 @@ use super::transfer::Transfer;
 use super::wear::WearLimit;
 use super::{Map, Slot, TableSlots};
 use crate::link::{Fault, Refusal, Request, Response, SlotState, TableName, TableReason};
-use crate::trust::{Accepted, Trust};
+use crate::trust::{Accepted, Rejected, Trust};
 use embedded_storage::nor_flash::NorFlash;
 
 /// Both slots, the records, and what a host may do with them.
@@ -33,6 +33,10 @@ pub struct Updater<F> {
     tables: [Option<Accepted>; 2],
     broken: [bool; 2],
     in_use: Option<Slot>,
+    /// The slot of a table that is not used because the device crashed with it.
+    suspect: Option<Slot>,
+    /// When sectors were compared last.
+    compared_ms: Option<u64>,
     transfer: Option<Transfer>,
     trial: Option<Trial>,
     ended: Option<Ended>,
@@ -82,7 +86,7 @@ impl<F: NorFlash> Updater<F> {
                 Err(Refusal::KeyLost)
             }
             Request::Slots => Ok(Response::Slots(self.slots(now_ms))),
-            Request::Sectors { length, first } => self.sectors(length, first, slots),
+            Request::Sectors { length, first } => self.sectors(length, first, now_ms, slots),
             Request::Begin {
                 length,
                 digest,
@@ -116,6 +120,30 @@ impl<F: NorFlash> Updater<F> {
         if let Some(trial) = self.trial.filter(|trial| now_ms >= trial.ends_ms) {
             self.end_trial(trial, TableReason::TrialOver, now_ms, slots);
         }
+    }
+
+    /// The table in use is no longer what was checked: bits have rotted under it. Frames
+    /// go through the one that was confirmed before it, if that is still whole, or pass.
+    pub fn abandon(&mut self, slots: &mut impl TableSlots<F>) {
+        let Some(slot) = self.in_use else {
+            return;
+        };
+        self.trial = None;
+        self.transfer = None;
+        *slot.of_mut(&mut self.tables) = None;
+        *slot.of_mut(&mut self.broken) = true;
+        let cause = Rejected::Damaged;
+        self.fault = Some(Fault::Table {
+            slot: slot as u8,
+            cause,
+        });
+        let other = slot.other();
+        let there = *other.of(&self.tables);
+        let there = there.filter(|there| self.has_counted(other, there.id));
+        let terms = self.terms();
+        let taken = there.filter(|there| self.take(other, there.length, &terms, slots).is_ok());
+        self.use_slot(taken.map(|_| other), TableReason::Damaged, slots);
+        slots.unload(slot);
     }
 
     /// The last change that nobody has asked for yet.

@@ -22,7 +22,19 @@ impl<F: NorFlash> Updater<F> {
 
     /// The slot that the next table goes to: not the one in use.
     pub(super) fn target(&self) -> Slot {
-        self.in_use.map_or(Slot::A, Slot::other)
+        match (self.in_use, self.suspect) {
+            (Some(slot), _) => slot.other(),
+            (None, Some(suspect)) => suspect,
+            (None, None) => Slot::A,
+        }
+    }
+
+    /// Whether the table of this id in a slot was confirmed, last or before.
+    pub(super) fn has_counted(&self, slot: Slot, id: u32) -> bool {
+        self.journal.last().is_some_and(|last| match last.table {
+            Some((counts, table)) if counts == slot => table == id,
+            _ => last.other == Some(id),
+        })
     }
 
     /// The lowest version of a table that may come: not below the one in use, not below

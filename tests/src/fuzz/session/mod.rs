@@ -17,7 +17,7 @@ mod wire;
 pub(super) use op::OP;
 
 use super::files::{Owner, files, keys, signer};
-use crate::flash_simulator::{NorSimulator, Violations};
+use crate::flash_simulator::{NorSimulator, Violations, Wear};
 use crate::slots::{SimDevice, SlotLayout};
 use ed25519_dalek::{Signer, SigningKey};
 use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
@@ -89,6 +89,8 @@ struct Trial<const W: usize, const E: usize> {
     /// The last request was answered, and nothing has happened since.
     fresh: bool,
     weak: bool,
+    /// Records or the key's sector are worn: a request that writes there may be refused.
+    worn: bool,
     /// Steps of the flash in a request until the power fails.
     cut_after: Option<u64>,
 }
@@ -126,6 +128,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             last: None,
             fresh: false,
             weak,
+            worn: false,
             cut_after: None,
         }
     }
@@ -175,8 +178,8 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             Op::Again => self.again(fresh),
             Op::Together { count } => {
                 self.flush();
-                // Which of several requests was cut is hard to tell.
-                if self.cut_after.is_none() {
+                // Which of several requests was cut or refused is hard to tell.
+                if self.cut_after.is_none() && !self.worn {
                     self.together = count;
                 }
             }
@@ -194,6 +197,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             }
             Op::Rot { slot, at, bits } => self.rot(slot, at, bits),
             Op::RotRecords { bits } => self.rot_records(bits),
+            Op::Wear { sector, how } => self.wear(sector, how),
             Op::Put { slot, file } => self.put(slot, file),
         }
     }
@@ -497,7 +501,11 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         assert_eq!(numbers(&said), wanted, "one answer to each request");
         let said_last = wanted.last().copied();
         for ((_, mut response), (_, predicted)) in said.responses.into_iter().zip(expected) {
-            self.compare(&mut response, &predicted);
+            if self.was_too_worn(&held, &response) {
+                self.models = unchanged(&before, &self.models);
+            } else {
+                self.compare(&mut response, &predicted);
+            }
         }
         self.fresh = said_last == held.last().map(|held| held.sequence);
         self.agree("after a request");
@@ -510,7 +518,41 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             return false;
         };
         let request = Request::parse(&held.payload);
-        !self.weak || !matches!(request, Ok(Request::Write { .. }))
+        // What a cut leaves and what wear leaves are two questions.
+        !self.worn && (!self.weak || !matches!(request, Ok(Request::Write { .. })))
+    }
+
+    /// Whether a request was refused because its record or the key could not be written.
+    fn was_too_worn(&self, held: &[Held], response: &Response) -> bool {
+        let [held] = held else {
+            return false;
+        };
+        let writes = matches!(
+            Request::parse(&held.payload),
+            Ok(Request::Begin { .. }
+                | Request::Confirm { .. }
+                | Request::Rollback { .. }
+                | Request::Provision { .. })
+        );
+        let refusal = matches!(
+            response,
+            Response::Refused(Refusal::ReadOnly | Refusal::Flash { .. })
+        );
+        self.worn && writes && refusal
+    }
+
+    fn wear(&mut self, sector: usize, how: Wear) {
+        self.flush();
+        if self.worn {
+            return;
+        }
+        self.worn = true;
+        self.cut_after = None;
+        let first = self.layout.slot(Slot::B).end / self.layout.sector;
+        let flash = self.wire().device.updater.flash_mut();
+        let erases = flash.erases(first + sector).expect("there");
+        let worn = flash.wear_out(first + sector, erases, how);
+        worn.expect("there");
     }
 
     /// What each model says to a request.
@@ -610,16 +652,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         for (before, after) in before.iter_mut().zip(&after) {
             before.touched.clone_from(&after.touched);
         }
-        // The first record comes before a key: there may be the one without the other.
-        let mut noted = Vec::new();
-        for (before, after) in before.iter().zip(&after) {
-            if before.owner != after.owner {
-                let mut between = before.clone();
-                between.record = after.record;
-                noted.push(between);
-            }
-        }
-        before.extend(noted);
+        before = unchanged(&before, &after);
         before.extend(after);
         for model in &mut before {
             if let Some((slot, range)) = model.touched.clone() {
@@ -684,6 +717,9 @@ impl<const W: usize, const E: usize> Trial<W, E> {
 
     fn rot_records(&mut self, bits: usize) {
         self.flush();
+        if self.worn {
+            return;
+        }
         let start = self.layout.slot(Slot::B).end;
         let end = start + 2 * self.layout.sector;
         let models = std::mem::take(&mut self.models);
@@ -698,6 +734,20 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         }
         self.again_with(|flash| flash.rot(start as u32..end as u32, bits).expect("it fits"));
     }
+}
+
+/// Models after a request that was not carried out, from those before it and those after it
+/// was. The first record comes before a key: there may be the one without the other.
+fn unchanged(before: &[Model], after: &[Model]) -> Vec<Model> {
+    let mut all = before.to_vec();
+    for (before, after) in before.iter().zip(after) {
+        if before.owner != after.owner {
+            let mut between = before.clone();
+            between.record = after.record;
+            all.push(between);
+        }
+    }
+    all
 }
 
 /// What must come of a request.

@@ -1,5 +1,6 @@
 //! Session operations: what happens to a device, decoded from any bytes.
 
+use crate::flash_simulator::Wear;
 use crate::fuzz::files::{DEVICES, GOOD, files, keys};
 
 /// Bytes of an operation; what a mutation moves as one.
@@ -93,6 +94,12 @@ pub(super) enum Op {
     /// Bits of the records flip while the device is off.
     RotRecords {
         bits: usize,
+    },
+    /// A sector of the records, or that of the key, stands no further erase.
+    Wear {
+        /// Counted from the first of the records.
+        sector: usize,
+        how: Wear,
     },
     /// A file is put into a slot through the debug port, as in a factory.
     Put {
@@ -257,6 +264,10 @@ impl Op {
             38 => match a % 8 {
                 0 => Self::RotRecords {
                     bits: usize::from(b % 4),
+                },
+                1 | 2 => Self::Wear {
+                    sector: usize::from(b % 3),
+                    how: [Wear::StuckBits, Wear::LostBits, Wear::Refuses][usize::from(c % 3)],
                 },
                 _ => Self::Restart,
             },
