@@ -2,7 +2,7 @@
 
 use ed25519_dalek::SigningKey;
 use iltm::picture::Response as Projector;
-use iltm_runtime::link::{PassThrough, Refusal, Request, Response, SlotState, Slots};
+use iltm_runtime::link::{PassThrough, Refusal, Request, Response, SlotState};
 use iltm_runtime::store::{Map, MapError};
 use iltm_runtime::trust::Rejected;
 use iltm_tests::flash_simulator::NorSimulator;
