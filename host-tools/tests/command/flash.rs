@@ -723,20 +723,17 @@ fn a_version_that_nobody_chose_rises_with_the_time() {
 }
 
 #[test]
-fn who_holds_a_port_is_named_and_the_code_is_always_the_same() {
-    let (user, device) = (user(), Device::new());
-    let board = register(&user, &device, "one");
-    user.says("status");
-    let monitor = user.spawn(&device.at("monitor"));
-    let held = format!("iltm (process {}) has it open", monitor.id());
-    let end = Instant::now() + Duration::from_secs(20);
-    while user.run("status").code == 0 {
-        assert!(Instant::now() < end, "the port is never held");
+fn a_port_that_cannot_be_opened_has_one_code_named_or_found() {
+    let user = user();
+    user.write("no-port", "not a terminal");
+    let path = user.path("no-port").display().to_string();
+    let folders = Folders {
+        config: user.path("config"),
+        state: user.path("state"),
+    };
+    let _board = emulated::register(&folders, &path, "one").expect("writable");
+    let named = user.fails(10, &format!("status --port {path}"));
+    for said in [named, user.fails(10, "status")] {
+        contains(&said, &["the port cannot be opened"]);
     }
-    // Named, or remembered.
-    contains(&user.fails(10, &device.at("status")), &[&held]);
-    contains(&user.fails(10, "status"), &[&held]);
-    interrupt(&monitor);
-    Ended::of(monitor);
-    drop(board);
 }

@@ -10,7 +10,7 @@ use iltm_tests::{signed, signing_key, wedge_table};
 type Device = SimDevice<4, 512>;
 
 /// Sectors of a slot.
-const SLOT: usize = 12;
+const SLOT: usize = 24;
 
 const NUMBER: u64 = 42;
 

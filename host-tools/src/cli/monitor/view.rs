@@ -357,8 +357,10 @@ fn ladder(tier: u8, top: u8) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use iltm_runtime::link::{Device, Fault, FaultyFrame, Mode, PassThrough, TierReason};
-    use iltm_tests::fake_device::FakeDevice;
+    use iltm_runtime::link::{
+        Device, Fault, FaultyFrame, Mode, PassThrough, Request, Response, TierReason,
+    };
+    use iltm_tests::fake_device::{FakeDevice, FakeTables};
 
     /// The view without its times of day.
     fn shown(view: &View, width: usize, height: usize) -> String {
@@ -420,6 +422,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_of_a_trial_counts_down() {
+        let mut view = View::new("/dev/ttyACM0");
+        view.take(&MonitorEvent::Device(Event::Status(status(4_000))));
+        let mut device = FakeDevice::with_tables(FakeTables::default());
+        let Response::Slots(mut slots) = device.carry_out(Request::Slots, 0) else {
+            panic!("not to a question for the slots");
+        };
+        slots.trial_ms = 77_000;
+        view.take(&MonitorEvent::Slots(Box::new(slots.clone())));
+        assert!(view.lines(80, 24)[1].contains(", 77 s of trial left, up"));
+        slots.trial_ms = 0;
+        view.take(&MonitorEvent::Slots(Box::new(slots)));
+        assert!(!view.lines(80, 24)[1].contains("trial"));
+    }
+
+    #[test]
     fn a_lost_device_says_so_until_it_is_back() {
         let mut view = View::new("/dev/ttyACM0");
         let connected = MonitorEvent::Connected(FakeDevice::default().identity());
@@ -452,6 +470,6 @@ mod tests {
         status.mode = Mode::PassThrough(PassThrough::NoTable);
         status.table = None;
         view.take(&MonitorEvent::Device(Event::Status(status)));
-        assert!(view.lines(80, 24)[1].contains("pass-through: there is no table"));
+        assert!(view.lines(80, 24)[1].contains("NOT COMPENSATING, frames pass unchanged: there is no table"));
     }
 }
