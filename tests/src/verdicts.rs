@@ -249,7 +249,7 @@ fn as_jpeg(photos: &Path, quality: u8) {
 pub fn study(
     rig: &VerdictRig,
     gammas: &[f64],
-    others: &[(&str, Scene, Outcome)],
+    others: &[(&str, Scene, &[Outcome])],
 ) -> Vec<VerdictCase> {
     use CaptureFault as F;
     use Outcome::{Failed, Inconclusive, Passed};
@@ -294,7 +294,7 @@ pub fn study(
         }
     }
     for (name, scene, right) in others {
-        cases.push(rig.changed(name, scene.clone(), &[*right]));
+        cases.push(rig.changed(name, scene.clone(), right));
     }
     cases
 }

@@ -96,8 +96,8 @@ fn a_chain_that_compensates_once_passes_and_every_other_is_named() {
         ("off", 31, "does not compensate"),
         ("twice", 31, "compensates twice"),
         ("mirrored", 31, "is mirrored"),
-        ("shifted=24", 31, "The picture lies"),
-        ("scaled=0.9", 31, "The picture has"),
+        // One cell of the 21 that the projector's 634 pixels have.
+        ("shifted=30", 31, "The picture lies 1.00 to the right"),
     ] {
         fs::remove_dir_all(user.path("w/photos")).unwrap();
         user.says(&format!(

@@ -46,32 +46,32 @@ fn main() {
         (
             "good, camera put down 3 cm away",
             seen("2.23, 2.1, 2.9", "0.01, 0.75, 0.0"),
-            Outcome::Passed,
+            &[Outcome::Passed][..],
         ),
         (
             "good, camera put down 10 cm away",
             seen("2.12, 2.15, 2.95", "0.0, 0.77, 0.0"),
-            Outcome::Passed,
+            &[Outcome::Passed][..],
         ),
         (
             "good, camera put down 40 cm away",
             seen("1.9, 2.3, 3.1", "0.05, 0.75, 0.0"),
-            Outcome::Passed,
+            &[Outcome::Passed][..],
         ),
         (
             "right wall of albedo 0.68 instead of 0.7",
             of(&painted("0.68")),
-            Outcome::Failed,
+            &[Outcome::Failed, Outcome::Inconclusive][..],
         ),
         (
             "right wall of albedo 0.6 instead of 0.7",
             of(&painted("0.6")),
-            Outcome::Failed,
+            &[Outcome::Failed][..],
         ),
         (
             "right wall of albedo 0.4 instead of 0.7",
             of(&painted("0.4")),
-            Outcome::Failed,
+            &[Outcome::Failed][..],
         ),
     ];
     let mut wrong = 0;

@@ -6,7 +6,7 @@ use iltm::build_table::BuiltTable;
 use iltm::capture::Settings;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, VirtualCamera, fill_capture};
+use iltm::scene::{CaptureFault, Effect, Forced, VirtualCamera, fill_capture};
 use iltm::session::Layout;
 use iltm::verify::{
     Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, VerifyManifest, VerifyRole,
@@ -15,6 +15,7 @@ use iltm::verify::{
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_tests::simulated::{self, cell_means, error, photograph, simulation};
+use iltm_tests::verdicts::VerdictRig;
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -181,4 +182,30 @@ fn exchanged_photographs_are_named_and_missing_ones_listed() {
         text.contains("003.png") && text.contains(&format!("{first:03}.png")),
         "{text}"
     );
+}
+
+/// A short form of the study on `docs/verify.md`.
+#[test]
+fn what_passes_is_on_the_wall_and_no_fault_of_photographs_or_wall_passes() {
+    use CaptureFault as F;
+    use Outcome::{Failed, Inconclusive};
+    let rig = VerdictRig::new(simulated::scene("installation", &[]));
+    let wall = "[2.4, 0, 0], [0, 0, 0]]\nalbedo = 0.7";
+    let painted = wall.replace("0.7", "0.6");
+    let painted = simulated::scene("installation", &[(wall, &painted)]);
+    let cases = [
+        rig.good("no fault", 1),
+        rig.faulty(F::Tripod, 0.5, &[Inconclusive]),
+        rig.faulty(F::Tripod, 3.0, &[Inconclusive]),
+        rig.faulty(F::Flicker, 0.01, &[Inconclusive]),
+        rig.faulty(F::Gamma, 2.2, &[Inconclusive]),
+        rig.faulty(F::AutoExposure, 1.0, &[Inconclusive]),
+        rig.faulty(F::Vivid, 0.15, &[Failed]),
+        rig.changed("painted", painted, &[Failed]),
+    ];
+    for case in cases {
+        let session = rig.judge(case);
+        println!("{}", session.line());
+        assert!(session.is_right(), "{session:?}");
+    }
 }
