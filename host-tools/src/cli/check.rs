@@ -30,13 +30,14 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let page = arguments.output.as_deref().map(|folder| {
         make_folder(folder)?;
         let page = folder.join(PAGE_FILE);
-        let html = report::gates::page(&name(&arguments.capture), &examined.gates);
+        let html = report::gates::page(&name(&arguments.capture), &examined);
         write_file(&page, html.as_bytes()).map(|()| page)
     });
     let page = page.transpose()?;
     let data = json!({
         "capture": arguments.capture.display().to_string(),
         "pass": failed.is_empty(),
+        "not_judged": not_judged(&examined.gates),
         "gates": gates(&examined.gates),
         "cells": cells(&examined),
         "page": page.as_ref().map(|page| page.display().to_string()),
@@ -46,6 +47,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         let _ = writeln!(text, "{}: what each gate saw", page.display());
     }
     if failed.is_empty() {
+        text += &passed(&examined.gates);
         output.result(&data, &text);
         return Ok(());
     }
@@ -66,6 +68,25 @@ fn name(capture: &Path) -> String {
 /// The gates that fail.
 fn failed(gates: &[Gate]) -> Vec<&Gate> {
     gates.iter().filter(|gate| gate.fails()).collect()
+}
+
+/// Names of the gates that were not judged.
+fn not_judged(gates: &[Gate]) -> Vec<&'static str> {
+    let open = gates
+        .iter()
+        .filter(|gate| gate.verdict == Verdict::NotJudged);
+    open.map(|gate| gate.name.name()).collect()
+}
+
+/// The last line of a check that no gate fails.
+fn passed(gates: &[Gate]) -> String {
+    match not_judged(gates).as_slice() {
+        [] => "passed: these photographs can be used\n".to_owned(),
+        open => format!(
+            "passed, as far as it was judged: nothing is known of {}\n",
+            open.join(", ")
+        ),
+    }
 }
 
 /// What scripts get for a capture that does not pass.

@@ -186,13 +186,16 @@ fn corrected(balances: &Balances, plain: Response) -> Option<Curve> {
     };
     let base = Lookup::new(|value| plain.light(value));
     let (sums, light) = (balances.sums(&base), balances.light(&base));
-    let columns: Vec<Vec<f64>> = (0..TERMS)
-        .map(|k| balances.sums(&Lookup::new(|value| term(k, value))))
-        .collect();
-    let matrix = DMatrix::from_fn(sums.len(), TERMS, |g, k| columns[k][g] / light[g].max(1e-9));
+    let terms = (0..TERMS).map(|k| balances.sums(&Lookup::new(|value| term(k, value))));
+    // The last unknown is white's own factor, which no curve is to explain.
+    let columns: Vec<Vec<f64>> = terms.chain([balances.white(&base)]).collect();
+    let unknowns = columns.len();
+    let matrix = DMatrix::from_fn(sums.len(), unknowns, |g, k| {
+        columns[k][g] / light[g].max(1e-9)
+    });
     let wanted = DVector::from_fn(sums.len(), |g, _| -sums[g] / light[g].max(1e-9));
     // A slight preference for no correction where nothing speaks for one.
-    let normal = matrix.transpose() * &matrix + DMatrix::identity(TERMS, TERMS) * 1e-4;
+    let normal = matrix.transpose() * &matrix + DMatrix::identity(unknowns, unknowns) * 1e-4;
     let found = normal.cholesky()?.solve(&(matrix.transpose() * wanted));
     let light = |value: f64| {
         plain.light(value) + (0..TERMS).map(|k| found[k] * term(k, value)).sum::<f64>()

@@ -37,7 +37,7 @@ pub(super) fn judge(
     let what = match (verdict, bands) {
         (Verdict::Pass, _) => format!(
             "brightness jumps by {:.2} % from photograph to photograph",
-            100.0 * scatter
+            100.0 * number
         ),
         (
             _,
@@ -74,6 +74,7 @@ pub(super) fn judge(
                     .map(|(&shot, off)| (sequence.shots[shot].index, 100.0 * off))
                     .collect(),
                 limit: Some(100.0 * MOST),
+                from: None,
             },
         },
         ..Gate::of_share(name, verdict, (number, MOST), next_step)
