@@ -33,7 +33,7 @@ impl Output {
         if self.json {
             let _ = writeln!(io::stdout(), "{data}");
         } else {
-            let _ = write!(io::stderr(), "{text}");
+            let _ = write!(io::stderr(), "{}", printable(text));
         }
     }
 
@@ -41,14 +41,14 @@ impl Output {
     /// events, or with the failure.
     pub(super) fn people(&self, text: &str) {
         if !self.json {
-            let _ = write!(io::stderr(), "{text}");
+            let _ = write!(io::stderr(), "{}", printable(text));
         }
     }
 
     /// A remark for people, where there are some.
     pub(super) fn remark(&self, text: &str) {
         if self.terminal && !self.json {
-            let _ = writeln!(io::stderr(), "{text}");
+            let _ = writeln!(io::stderr(), "{}", printable(text));
         }
     }
 
@@ -95,6 +95,17 @@ impl Output {
     }
 }
 
+/// A text whose control characters, other than line ends, are spelled out: names in captures,
+/// tables and devices come from strangers, and a terminal obeys what it is sent.
+pub(super) fn printable(text: &str) -> String {
+    let one = |c: char| match c {
+        '\n' => vec![c],
+        c if c.is_control() => c.escape_default().collect(),
+        c => vec![c],
+    };
+    text.chars().flat_map(one).collect()
+}
+
 /// Writes a file whole or not at all: beside its place, then renamed.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     whole_file::write(path, bytes).map_err(|error| cannot_write(&error.path, &error.source))
@@ -107,4 +118,17 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
 /// Makes a folder and those that it lies in.
 pub(super) fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_is_sent_no_commands_of_strangers() {
+        assert_eq!(
+            printable("a\u{1b}]0;X\u{7}\nb\u{9b}"),
+            "a\\u{1b}]0;X\\u{7}\nb\\u{9b}"
+        );
+    }
 }
