@@ -1,6 +1,7 @@
 //! Failures of a command: words for people, an exit code for scripts.
 
 use super::active::Active;
+use super::output::printable;
 use super::summary::gates;
 use crate::build_table::BuildError;
 use crate::capture::CaptureError;
@@ -203,7 +204,7 @@ impl Failure {
     ) -> Self {
         Self {
             kind,
-            message: message.to_string(),
+            message: printable(&message.to_string()),
             next_step: next_step.into(),
             active: None,
             data: None,

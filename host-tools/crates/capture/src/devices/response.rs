@@ -275,6 +275,23 @@ mod tests {
         }
     }
 
+    /// Of an even screen, nearly all pixels are only black or white: a lamp that has lost light
+    /// since white was taken looked like a gamma of 0.3.
+    #[test]
+    fn a_lamp_that_loses_light_after_white_is_no_curve() {
+        let mut balances = pairs(|light| light, 0.004, 1.0 / 4095.0);
+        for (at, balance) in balances.iter_mut().enumerate() {
+            let [white, black] = [balance.values[2], balance.values[3]];
+            if at % 8 > 0 {
+                balance.values = [white, black, white, black];
+            }
+            balance.values[2] *= 1.08;
+        }
+        let found = fit(balances, Response::Linear);
+        assert!(!found.contradicts(), "{found:?}");
+        assert!(found.declared_misfit < 0.01, "{found:?}");
+    }
+
     #[test]
     fn a_curve_of_no_family_is_found_by_its_correction() {
         // An S: light = v^2 (3 - 2 v) mixed with v^2.

@@ -429,6 +429,16 @@ mod tests {
     }
 
     #[test]
+    fn semicolons_separate_too_and_a_backslash_is_named() {
+        let text = "index;role;pattern;photo;exposure\r\n0;white;p/0.png;f/0.png;0,5\r\n";
+        let shots = parse(text).unwrap().shots;
+        assert_eq!(shots[0].photo, Path::new("f/0.png"));
+        assert_eq!(shots[0].exposure, Some(0.5));
+        let said = refusal("0,white,p/0.png,f\\0.png\n");
+        assert!(said.contains("separates its folder by"), "{said}");
+    }
+
+    #[test]
     fn lines_are_ordered_by_index_and_know_their_place() {
         let text = "index,role,pattern,photo\r\n7,white,p/7.png,f/7.png\r\n\r\n2, row-1-inverse ,./p/2.png,f/2.png\r\n";
         let shots = parse(text).unwrap().shots;

@@ -7,8 +7,8 @@ use crate::format::calibration_role::RampChannel;
 use crate::gate::{Evidence, Gate, GateName, Verdict};
 
 /// Misfit of the declared camera response beyond that of the best one.
-const WARN: f64 = 0.01;
-const MOST: f64 = 0.03;
+const WARN: f64 = 0.006;
+const MOST: f64 = 0.012;
 
 /// Steps of 255 that the projector's measured response may be off the declared one.
 const WARN_STEPS: f64 = 2.5;
