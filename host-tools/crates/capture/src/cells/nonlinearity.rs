@@ -51,6 +51,15 @@ pub(crate) enum Nonlinearity {
 }
 
 impl Nonlinearity {
+    /// The cause once it is known whether single pixels add up better with another `curve` than
+    /// the declared one, whatever the exposure.
+    pub(crate) const fn given(self, curve: bool) -> Self {
+        match self {
+            Self::CurveOrExposure { gamma } if curve => Self::Curve { gamma },
+            cause => cause,
+        }
+    }
+
     /// Whether it says why brightness differs from photograph to photograph.
     pub(crate) const fn is_known(self) -> bool {
         !matches!(self, Self::Unknown)
@@ -104,13 +113,10 @@ pub(crate) fn find(
     // Where the scene is even a curve that brightens explains as much as a factor does; but it
     // leaves nothing brighter than white.
     let alike = middle > 1.0 && bent && follows;
-    let clearly = |one: f64, other: f64| one < CLEARLY * other;
-    if pairs.outshine() || follows && !bent || alike && clearly(followed, curved) {
+    if pairs.outshine() || follows && !alike && followed < 1.2 * curved {
         ambient(sequence, sampled)
-    } else if alike && !clearly(curved, followed) {
+    } else if alike && curved > CLEARLY * followed {
         Nonlinearity::CurveOrExposure { gamma }
-    } else if follows && followed < 1.2 * curved {
-        ambient(sequence, sampled)
     } else if bent {
         Nonlinearity::Curve { gamma }
     } else {

@@ -314,7 +314,7 @@ fn shot<R: ListedRole>(
     };
     let inside = |file: &str| {
         inside_folder(file).ok_or_else(|| {
-            if file.contains('\\') {
+            if inside_folder(&file.replace('\\', "/")).is_some() {
                 let reason = format!("{file:?} separates its folder by \\");
                 return (
                     reason,

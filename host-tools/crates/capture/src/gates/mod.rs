@@ -30,6 +30,7 @@ mod saturation;
 mod superposition;
 
 use crate::cells::nonlinearity::Nonlinearity;
+use crate::devices::CameraFit;
 use crate::evidence::CaptureEvidence;
 use crate::format::sequence::Sequence;
 use crate::gate::{Gate, GateName};
@@ -47,7 +48,13 @@ pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
         coverage::judge(sequence, &pixels.live, &counts, &pixels.left_out),
     ];
     if let Some(cells) = &found.cells {
-        let (steadiness, cause) = (&cells.steadiness, cells.nonlinearity);
+        let curve = found
+            .devices
+            .camera_fit
+            .as_ref()
+            .is_some_and(CameraFit::contradicts);
+        let cause = cells.nonlinearity.map(|cause| cause.given(curve));
+        let steadiness = &cells.steadiness;
         let sums = cells.sums.as_ref();
         gates.extend([
             movement::judge(sequence, found.moved.as_ref()),
