@@ -189,3 +189,16 @@ pub(super) fn write_files(
 ) -> Result<(), Failure> {
     whole_folder::put(folder, files).map_err(|error| cannot_write(&error.path, &error.source))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_is_sent_no_commands_of_strangers() {
+        assert_eq!(
+            printable("a\u{1b}]0;X\u{7}\nb\u{9b}"),
+            "a\\u{1b}]0;X\\u{7}\nb\\u{9b}"
+        );
+    }
+}

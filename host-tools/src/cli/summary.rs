@@ -177,10 +177,12 @@ pub(super) fn text(built: &BuiltTable) -> String {
     let report = &built.report;
     let mut text = String::new();
     let photographs = report.photographs;
+    let repeats = &built.measurements.repeats;
+    let white = repeats.get(Measurements::WHITE).copied().unwrap_or(1);
     let _ = writeln!(
         text,
         "photographs {} white, {} Gray code, {} Bernoulli",
-        photographs.white, photographs.gray_code, photographs.bernoulli
+        white, photographs.gray_code, photographs.bernoulli
     );
     // The default one needs no mention.
     if report.method != Method::Joint {
