@@ -5,8 +5,8 @@ use crate::retained::{Cause, Restart};
 use crate::stack;
 use iltm_runtime::frame_buffers::{Format, InputCounts};
 use iltm_runtime::link::{
-    Clipping, Fault, FrameCounts, FrameKind, FrameTime, Mode, Name, PassThrough, SerialCounts, SlotState,
-    Stack, Status, Version,
+    Clipping, Fault, FrameCounts, FrameKind, FrameTime, Mode, Name, PassThrough, SerialCounts,
+    SlotState, Stack, Status, Version,
 };
 
 /// Everything that a status says, kept up to date by the frame loop.

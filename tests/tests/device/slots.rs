@@ -2,9 +2,7 @@
 
 use ed25519_dalek::SigningKey;
 use iltm::picture::Response as Projector;
-use iltm_runtime::link::{
-    Fault, PassThrough, Refusal, Request, Response, SlotState, Slots, TableReason,
-};
+use iltm_runtime::link::{Fault, PassThrough, Refusal, Request, Response, SlotState, TableReason};
 use iltm_runtime::store::{Map, MapError, Slot};
 use iltm_runtime::trust::Rejected;
 use iltm_tests::flash_simulator::NorSimulator;

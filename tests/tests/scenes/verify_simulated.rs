@@ -9,8 +9,7 @@ use iltm::scene::description::Scene;
 use iltm::scene::{CaptureFault, Effect, Forced, VirtualCamera, fill_capture};
 use iltm::session::Layout;
 use iltm::verify::{
-    Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, VerifyManifest, VerifyRole,
-    WhiteChange, judge, write,
+    Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, WhiteChange, judge, write,
 };
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;

@@ -181,7 +181,10 @@ fn blamed(gate: &Gate, nonlinearity: Option<Nonlinearity>) -> Option<Cause> {
             Some(Nonlinearity::Curve { .. }) => Cause::CameraResponse,
             Some(Nonlinearity::Exposure) => Cause::AutoExposure,
             Some(Nonlinearity::Projector) => Cause::DynamicProjector,
-            Some(Nonlinearity::Either | Nonlinearity::Unknown) | None => Cause::Superposition,
+            Some(
+                Nonlinearity::Either | Nonlinearity::CurveOrExposure { .. } | Nonlinearity::Unknown,
+            )
+            | None => Cause::Superposition,
         },
         // What these measure is in the noise of the photographs and the cells that are compared.
         GateName::Complete | GateName::Format | GateName::Coverage | GateName::Noise => {
