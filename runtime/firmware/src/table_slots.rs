@@ -28,6 +28,14 @@ fn put(place: &mut Option<Table<'static>>, checked: &Checked<'static>) {
     *place = Some(checked.table());
 }
 
+/// The bytes of a slot that are a table's file, by its length where that is known.
+fn file(bytes: &[u8], length: Option<u32>) -> &[u8] {
+    match length {
+        Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
+        None => content(bytes),
+    }
+}
+
 impl<B: Board, H: FrameHooks> Frames<B, H> {
     /// Not inlined: it is called twice.
     #[inline(never)]
@@ -38,14 +46,11 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         length: Option<u32>,
         terms: &Terms,
     ) -> Result<(Checked<'static>, Accepted), Rejected> {
-        let bytes = flash.slot(slot);
-        let file = match length {
-            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
-            None => content(bytes),
-        };
-        examine(file, terms, &mut || {
+        // Of one type for all checks, which are compiled once, here, and small.
+        let yield_now: &mut dyn FnMut() = &mut || {
             self.round();
-        })
+        };
+        examine(file(flash.slot(slot), length), terms, yield_now)
     }
 }
 
@@ -68,16 +73,9 @@ impl<B: Board, H: FrameHooks> TableSlots<B::Flash> for Frames<B, H> {
         terms: &Terms,
     ) -> Result<Accepted, Rejected> {
         self.unload(slot);
-        let bytes = flash.slot(slot);
-        let file = match length {
-            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
-            None => content(bytes),
-        };
-        let (checked, accepted) = examine(file, terms, &mut || {
-            self.round();
-        })?;
+        let (checked, accepted) = self.check(flash, slot, length, terms)?;
         put(slot.of_mut(self.tables), &checked);
-        let mut recheck = Recheck::new(file);
+        let mut recheck = Recheck::new(file(flash.slot(slot), length));
         while recheck.step().is_none() {
             self.round();
         }

@@ -38,13 +38,19 @@ impl<'a> Checked<'a> {
     ///
     /// # Errors
     /// [`ImageError`] with the section and field at fault.
-    pub fn new(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+    pub fn new(
+        image: &'a [u8],
+        yield_now: &mut (impl FnMut() + ?Sized),
+    ) -> Result<Self, ImageError> {
         let mut budget = YieldBudget::new(yield_now);
         Self::of(Whole::new(image, &mut budget)?, &mut budget)
     }
 
     /// Checks what the sections of an image say whose checksums hold.
-    pub(crate) fn of(whole: Whole<'a>, budget: &mut YieldBudget<'_>) -> Result<Self, ImageError> {
+    pub(crate) fn of(
+        whole: Whole<'a>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+    ) -> Result<Self, ImageError> {
         let meta = Meta::parse(whole.required(SectionKind::Meta)?.bytes)?;
         let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
         let _ = tiers(whole.required(SectionKind::Tiers)?)?;
@@ -141,7 +147,7 @@ fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageE
 fn ambient<'a>(
     section: Section<'a>,
     count: usize,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = halfwords(section, count)?;
     let too_much = |bits| {
@@ -157,7 +163,7 @@ fn ambient<'a>(
 fn response<'a>(
     section: Section<'a>,
     channels: u8,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = Halfwords::new(section.bytes).ok_or(section.length_error())?;
     let own = usize::from(channels) * RESPONSE_KNOTS;
@@ -180,7 +186,7 @@ fn response<'a>(
 fn codes<'a>(
     section: Option<Section<'a>>,
     response: Option<Halfwords<'_>>,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<&'a [[u8; CODES]], ImageError> {
     let Some(section) = section else {
         return match response {
@@ -320,7 +326,7 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
 fn check_operator(
     whole: &Whole<'_>,
     meta: &Meta,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<(), ImageError> {
     let operator = if Stage::Operator.is_built() {
         operator(whole, meta)?
@@ -349,7 +355,7 @@ fn check_operator(
 /// Checks the text piece by piece, for it may be long.
 fn provenance<'a>(
     section: Section<'a>,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<&'a [u8], ImageError> {
     const PIECE: usize = 256;
     if section.bytes.len() > MAX_PROVENANCE {

@@ -47,7 +47,7 @@ pub fn crc32(bytes: &[&[u8]]) -> u32 {
 }
 
 /// The same of bytes that may be many.
-fn checksum(bytes: &[&[u8]], budget: &mut YieldBudget<'_>) -> u32 {
+fn checksum(bytes: &[&[u8]], budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>) -> u32 {
     const PIECE: usize = 256;
     let mut digest = Crc32::new();
     for piece in bytes.iter().flat_map(|part| part.chunks(PIECE)) {

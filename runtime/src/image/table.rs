@@ -108,7 +108,10 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// As [`check`](Self::check).
-    pub fn check_with(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+    pub fn check_with(
+        image: &'a [u8],
+        yield_now: &mut (impl FnMut() + ?Sized),
+    ) -> Result<Self, ImageError> {
         Ok(Checked::new(image, yield_now)?.table())
     }
 

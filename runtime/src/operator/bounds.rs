@@ -35,7 +35,7 @@ impl Bounds {
         basis: &Basis,
         segments: &[Segment<'_>],
         tier: u8,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<Self, OperatorError> {
         let of_tier = segments.iter().enumerate();
         let of_tier = of_tier.filter(|(_, segment)| segment.tier == tier);
@@ -110,7 +110,7 @@ impl<'a> Cursor<'a> {
     fn bounds_of(
         &mut self,
         row: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<Option<(u64, u64)>, OperatorError> {
         let mut found = None;
         budget.spend(1, cost::FUNCTION);

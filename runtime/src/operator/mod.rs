@@ -93,7 +93,7 @@ impl<'a> Operator<'a> {
     pub(crate) fn prove(
         &self,
         grid: Grid,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<Bounds, OperatorError> {
         if self.channel_scales.iter().any(|scale| *scale > U1F15::ONE) {
             return Err(OperatorError::ChannelScale);
@@ -141,7 +141,7 @@ impl<'a> Operator<'a> {
         &self,
         tier: u8,
         channels: u8,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> (u32, u32) {
         let mut total = (0_u32, 0_u32);
         for segment in self.of_tier(tier) {

@@ -107,7 +107,7 @@ impl<'a> Segment<'a> {
         &self,
         segment: usize,
         cells: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let mut groups = self.groups();
         let mut least = 1;
@@ -150,7 +150,7 @@ impl<'a> Group<'a> {
         &self,
         segment: usize,
         cells: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let mut least_row = 0;
         let mut rows = self.rows();
@@ -215,7 +215,10 @@ impl Row<'_> {
         self.entries_yielding(&mut YieldBudget::new(&mut || {}))
     }
 
-    pub(super) fn entries_yielding(&self, budget: &mut YieldBudget<'_>) -> usize {
+    pub(super) fn entries_yielding(
+        &self,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+    ) -> usize {
         self.fold(0, |sum, pair| {
             budget.spend(1, cost::PAIR);
             sum + pair.values.iter().filter(|value| **value != 0).count()
@@ -223,7 +226,7 @@ impl Row<'_> {
     }
 
     /// Sum of the magnitudes of its values.
-    pub(super) fn magnitude(&self, budget: &mut YieldBudget<'_>) -> u64 {
+    pub(super) fn magnitude(&self, budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>) -> u64 {
         let magnitude = |value: i16| u64::from(value.unsigned_abs());
         self.fold(0, |sum, Pair { values: [a, b], .. }| {
             budget.spend(1, cost::PAIR);
@@ -236,7 +239,7 @@ impl Row<'_> {
         &self,
         segment: usize,
         cells: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let (least, fits) = self.fold((0, true), |(least, fits), pair| {
             budget.spend(1, cost::PAIR);

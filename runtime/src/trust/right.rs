@@ -211,7 +211,7 @@ pub fn allows(
     deed: &Deed,
     sequence: u32,
     terms: &Terms,
-    yield_now: &mut dyn FnMut(),
+    yield_now: &mut (impl FnMut() + ?Sized),
 ) -> Result<(), NoRight> {
     let Some(site) = &terms.trust.key else {
         return Ok(());

@@ -160,9 +160,9 @@ impl<F: NorFlash> Updater<F> {
         slots: &mut impl TableSlots<F>,
     ) -> Result<(), Refusal> {
         let terms = self.terms();
-        let allowed = allows(right, deed, self.sequence(), &terms, &mut || {
-            slots.yield_now();
-        });
+        // Of the same type as for the check of a table: signatures are verified by one function.
+        let yield_now: &mut dyn FnMut() = &mut || slots.yield_now();
+        let allowed = allows(right, deed, self.sequence(), &terms, yield_now);
         allowed.map_err(Refusal::NoRight)
     }
 
