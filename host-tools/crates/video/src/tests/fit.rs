@@ -239,7 +239,12 @@ fn bounces_onto_black_are_clipped_at_black() {
         let Samples::Eight(codes) = made.samples() else {
             panic!("a picture of bytes");
         };
-        let ends = |code: u8| codes.iter().filter(|sample| **sample == code).count() as u64;
+        let ends = |code: u8| {
+            codes
+                .iter()
+                .map(|sample| u64::from(*sample == code))
+                .sum::<u64>()
+        };
         let black = totals.clipped - totals.clipped_white;
         assert!(black > 0 && black <= ends(0), "{black} of {}", ends(0));
         assert!(totals.clipped_white <= ends(255));
