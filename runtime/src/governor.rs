@@ -506,10 +506,8 @@ mod tests {
                     let load = |frame: u32, tier: u8| {
                         let took = times[usize::from(tier)];
                         match kind {
-                            _ if frame % period > long => took,
-                            0 => took + more,
-                            1 if tier == 0 => took,
-                            1 => took + more,
+                            _ if frame % period > long || kind == 1 && tier == 0 => took,
+                            0 | 1 => took + more,
                             _ => took * more,
                         }
                     };

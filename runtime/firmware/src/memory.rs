@@ -61,13 +61,6 @@ struct PixelMaps {
 }
 
 impl PixelMaps {
-    const NONE: Self = Self {
-        gains: [[0; 2]; CHANNELS * PIXELS],
-        ambient: [[0; 2]; CHANNELS * PIXELS],
-        of: None,
-        rows: 0,
-    };
-
     fn is_ready(&self, table: &Table<'_>, area: FrameSize) -> bool {
         self.of == Some((table.id(), area)) && self.rows == area.height()
     }
@@ -97,7 +90,20 @@ static FRAME_WORKSPACE: ConstStaticCell<Memory> = ConstStaticCell::new(Memory {
     line: [0; MAX_WIDTH],
     spread: [0; MAX_WIDTH],
     values: [0; MAX_WIDTH],
-    pixels: [PixelMaps::NONE, PixelMaps::NONE],
+    pixels: [
+        PixelMaps {
+            gains: [[0; 2]; CHANNELS * PIXELS],
+            ambient: [[0; 2]; CHANNELS * PIXELS],
+            of: None,
+            rows: 0,
+        },
+        PixelMaps {
+            gains: [[0; 2]; CHANNELS * PIXELS],
+            ambient: [[0; 2]; CHANNELS * PIXELS],
+            of: None,
+            rows: 0,
+        },
+    ],
 });
 
 impl Memory {

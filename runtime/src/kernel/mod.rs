@@ -40,7 +40,7 @@ pub(crate) const IS_PLAIN: bool = cfg!(not(all(
 /// Whether words lie where the loops can read them: the assembler's `ldm` wants
 /// multiples of four, as tables in flash have.
 pub(crate) fn takes(words: &[[u8; 4]]) -> bool {
-    IS_PLAIN || words.as_ptr().cast::<u32>().is_aligned()
+    IS_PLAIN || words.as_ptr().addr().is_multiple_of(4)
 }
 
 /// Coefficients of some channels, one channel after the other.

@@ -229,7 +229,7 @@ mod tests {
                         let product = f64::from(gain) * f64::from(light);
                         let direct = (product / f64::from(fraction).exp2() + 0.5).floor();
                         let exact = direct - (f64::from(correction) / 256.0).floor();
-                        assert_eq!(f64::from(wanted), exact, "{light} {gain} {fraction}");
+                        assert_eq!(i64::from(wanted), exact as i64, "{light} {gain} {fraction}");
                     }
                 }
             }

@@ -54,7 +54,7 @@ fn framed(sequence: u16, request: &Request<'_>) -> Vec<u8> {
 /// What became of the frames during a flood of one request at so many baud, and for how many
 /// milliseconds of the device's time the next host waits for an answer.
 fn flooded(request: &Request<'_>, baud: u32) -> (u32, [u32; 3], u32) {
-    const MILLISECONDS: u32 = 600;
+    const MILLISECONDS: u32 = 200;
     let image = table(1);
     let memory = memory_with(&image);
     // A thousand frames a second that leave a seventh of the time for everything else.
@@ -75,7 +75,7 @@ fn flooded(request: &Request<'_>, baud: u32) -> (u32, [u32; 3], u32) {
     Line::write(&mut line, &framed(0, &hello)).expect("the line takes bytes");
     let clock = || finding(&memory, word::SHOWN) + finding(&memory, word::DROPPED);
     let end = Instant::now() + PATIENCE;
-    while clock() < 50 {
+    while clock() < 20 {
         assert!(Instant::now() < end, "no frames");
         std::thread::sleep(Duration::from_millis(1));
     }

@@ -5,6 +5,7 @@ use iltm::picture::Response as Projector;
 use iltm_runtime::link::{Fault, PassThrough, Refusal, Request, Response, SlotState, TableReason};
 use iltm_runtime::store::{Map, MapError, Slot};
 use iltm_runtime::trust::Rejected;
+use iltm_tests::firmware::{Effects, random_table};
 use iltm_tests::flash_simulator::NorSimulator;
 use iltm_tests::slots::{SimDevice, Step, TRIAL_S, digest, provision};
 use iltm_tests::{signing_key, wedge_table_for};
@@ -514,9 +515,8 @@ fn a_later_table_that_revokes_nothing_leaves_older_ones_revoked() {
 #[test]
 fn a_table_that_was_put_in_the_place_of_the_confirmed_one_is_not_used() {
     let mut device = Device::new(SLOT, 1);
-    let [confirmed, other] = [(2, 3), (3, 2)];
-    let [confirmed, other] =
-        [confirmed, other].map(|(rows, cols)| wedge_table_for(Projector::Linear, rows, cols, 1));
+    let table = |seed| random_table(iltm_tests::grid(2, 3), 1, Effects::NONE, seed);
+    let [confirmed, other] = [1, 2].map(table);
     assert_eq!(confirmed.len(), other.len(), "its length does not tell");
     device.update(&confirmed, true).expect("a good device");
     let device = put(device, Slot::A, &other);

@@ -12,7 +12,8 @@ type Device = SimDevice<4, 256>;
 /// Sectors of a slot. The records follow the slots, and the identity them.
 const SLOT: usize = 48;
 
-const WEARS: [Wear; 3] = [Wear::StuckBits, Wear::LostBits, Wear::Refuses];
+/// Ways of wear that spoil every record. A stuck bit may lie where none is written.
+const WEARS: [Wear; 2] = [Wear::LostBits, Wear::Refuses];
 
 fn files() -> [Vec<u8>; 3] {
     [2, 3, 4].map(|cols| wedge_table_for(ProjectorResponse::Linear, 2, cols, 1))
@@ -101,7 +102,7 @@ fn a_key_that_cannot_be_stored_is_not_trusted() {
 #[test]
 fn the_record_that_counts_outlives_a_part_that_wears_out() {
     let [old, new, third] = files();
-    for how in WEARS {
+    for how in [Wear::StuckBits, Wear::LostBits, Wear::Refuses] {
         for (worn, before) in (0..2).flat_map(|worn| (0..6).map(move |before| (worn, before))) {
             let others = [&new, &third];
             let mut all = vec![&old];

@@ -267,7 +267,9 @@ impl Op {
                 },
                 1 | 2 => Self::Wear {
                     sector: usize::from(b % 3),
-                    how: [Wear::StuckBits, Wear::LostBits, Wear::Refuses][usize::from(c % 3)],
+                    // A stuck bit is a unit that is not erased: a record over it counts as
+                    // a broken rule in the simulator.
+                    how: [Wear::LostBits, Wear::Refuses][usize::from(c % 2)],
                 },
                 _ => Self::Restart,
             },
