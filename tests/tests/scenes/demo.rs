@@ -96,7 +96,7 @@ fn a_file_in_the_place_of_the_folder_is_left_alone() {
     let out = folder.path().join("taken");
     fs::write(&out, "mine").expect("a file");
     let error = demo::run(&out, &Silent).expect_err("no folder can be there");
-    assert!(matches!(&error, DemoError::Folder { path, .. } if *path == out));
+    assert!(matches!(error, DemoError::Folder(_)));
     assert!(error.to_string().contains("taken"));
     assert_eq!(fs::read(&out).expect("a file"), b"mine");
     assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);

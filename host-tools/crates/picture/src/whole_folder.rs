@@ -61,9 +61,12 @@ impl WholeFolder {
     /// Begins a folder that is to be called `out`, whatever is there.
     ///
     /// # Errors
-    /// [`FolderError::Io`] if nothing can be made beside it.
+    /// [`FolderError::Io`] if a file is there or nothing can be made beside it.
     pub fn beside(out: &Path) -> Result<Self, FolderError> {
         let out = followed(out);
+        if out.exists() && !out.is_dir() {
+            return Err(FolderError::io(&out)(io::ErrorKind::NotADirectory.into()));
+        }
         let parent = match out.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
@@ -144,23 +147,32 @@ impl WholeFolder {
     /// are left alone.
     ///
     /// # Errors
-    /// [`FolderError::Io`].
+    /// [`FolderError::Io`]; nothing has changed if a folder is in the place of a file or a file
+    /// in that of a folder.
     pub fn finish_over(self) -> Result<(), FolderError> {
         if check_free(&self.out).is_ok() {
             return self.finish();
         }
-        step(|| move_over(self.beside.path(), &self.out))
+        let from = self.beside.path();
+        step(|| over(from, &self.out, false).and_then(|()| over(from, &self.out, true)))
     }
 }
 
-fn move_over(from: &Path, to: &Path) -> Result<(), FolderError> {
-    fs::create_dir_all(to).map_err(FolderError::io(to))?;
+/// Moves files over those of another folder, or only sees whether each has its place.
+fn over(from: &Path, to: &Path, moves: bool) -> Result<(), FolderError> {
+    if moves {
+        fs::create_dir_all(to).map_err(FolderError::io(to))?;
+    }
     for entry in fs::read_dir(from).map_err(FolderError::io(from))? {
         let entry = entry.map_err(FolderError::io(from))?;
         let place = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            move_over(&entry.path(), &place)?;
-        } else {
+        let is_folder = entry.path().is_dir();
+        if place.exists() && place.is_dir() != is_folder {
+            return Err(FolderError::io(&place)(io::ErrorKind::AlreadyExists.into()));
+        }
+        if is_folder {
+            over(&entry.path(), &place, moves)?;
+        } else if moves {
             fs::rename(entry.path(), &place).map_err(FolderError::io(&place))?;
         }
     }
