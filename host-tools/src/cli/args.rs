@@ -1,17 +1,19 @@
 //! Arguments of the command line.
 
 use super::failure::Kind;
+use super::named::Named;
 use crate::capture::CameraSettings;
 use crate::capture::GateName;
 #[cfg(unix)]
 use crate::device::emulator::Board;
-use crate::scene::{Effect, InjectedFault};
+use crate::scene::{CaptureFault, Effect, InjectedFault};
 use crate::solve::Method;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
 use std::path::PathBuf;
 use std::time::Duration;
+use strum::{VariantArray, VariantNames};
 
 /// Cancels the light that bounces between the surfaces of a projection.
 #[derive(Debug, Parser)]
@@ -22,6 +24,27 @@ pub(super) struct Arguments {
     pub(super) json: bool,
     #[command(subcommand)]
     pub(super) command: Command,
+}
+
+fn effect() -> Named<Effect> {
+    Named::new(Effect::VARIANTS.iter().copied())
+}
+
+fn fault() -> Named<InjectedFault> {
+    Named::new(CaptureFault::VARIANTS.iter().copied())
+}
+
+fn gate() -> Named<GateName> {
+    Named::new(GateName::ALL.iter().map(|gate| gate.name()))
+}
+
+fn method() -> Named<Method> {
+    Named::new(Method::VARIANTS.iter().map(Into::into))
+}
+
+#[cfg(unix)]
+fn board() -> Named<Board> {
+    Named::new(Board::VARIANTS.iter().map(|board| board.name()))
 }
 
 #[derive(Debug, Subcommand)]
@@ -114,7 +137,7 @@ pub(super) struct Simulate {
     /// Let something go wrong, to practise: gamma, auto-exposure, tripod, swapped,
     /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
     /// larger than usual; may be repeated
-    #[arg(long, value_name = "FAULT")]
+    #[arg(long, value_name = "FAULT", value_parser = fault(), hide_possible_values = true)]
     pub(super) fault: Vec<InjectedFault>,
     /// Say which effects are simulated and why
     #[arg(long)]
@@ -129,10 +152,10 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(super) seed: u64,
     /// Simulate an effect whatever the scene says; may be repeated
-    #[arg(long, value_name = "EFFECT")]
+    #[arg(long, value_name = "EFFECT", value_parser = effect(), hide_possible_values = true)]
     pub(super) with: Vec<Effect>,
     /// Leave an effect out whatever the scene says; may be repeated
-    #[arg(long, value_name = "EFFECT")]
+    #[arg(long, value_name = "EFFECT", value_parser = effect(), hide_possible_values = true)]
     pub(super) without: Vec<Effect>,
     /// Share of white below which an effect is left out; by default what the
     /// camera's noise hides
@@ -253,12 +276,12 @@ pub(super) struct Solve {
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
     /// Go on although this gate fails (see `iltm check`); may be repeated
-    #[arg(long, value_name = "GATE")]
+    #[arg(long, value_name = "GATE", value_parser = gate(), hide_possible_values = true)]
     pub(super) ignore: Vec<GateName>,
     /// How to find the inverse: `joint` (all channels and photographs, with what
     /// physics knows), `direct` (the paper's plain l1), `two-stage` (plain l1 for the
     /// transport, then its inverse) or `brute-force` (least squares for the transport)
-    #[arg(long, default_value_t = Method::default())]
+    #[arg(long, default_value_t = Method::default(), value_parser = method(), hide_possible_values = true)]
     pub(super) method: Method,
     /// Weight of sparsity, relative to a flood photograph of mean 1; chosen by
     /// held-out photographs if left out
@@ -547,7 +570,7 @@ pub(super) struct Emulate {
     /// Table in the board's flash; without one it shows frames as they are
     pub(super) table: Option<PathBuf>,
     /// Board: mps2-an500 (Cortex-M7) or mps2-an386 (Cortex-M4F)
-    #[arg(long, value_name = "BOARD", default_value_t)]
+    #[arg(long, value_name = "BOARD", default_value_t, value_parser = board(), hide_possible_values = true)]
     pub(super) board: Board,
     /// ELF file of the firmware; by default that of the source folder, built anew
     #[arg(long, value_name = "ELF")]

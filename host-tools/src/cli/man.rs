@@ -11,7 +11,10 @@ use std::io::{self, Write};
 pub(super) fn run(arguments: &Man, output: &Output) -> Result<(), Failure> {
     let folder = &arguments.output;
     let mut pages = Vec::new();
-    collect(super::command(), "", &mut pages).map_err(|error| cannot_write(folder, &error))?;
+    let mut command = super::command();
+    // Options that all commands have stand on the page of each.
+    command.build();
+    collect(command, "", &mut pages).map_err(|error| cannot_write(folder, &error))?;
     write_files(folder, &pages)?;
     let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
     let data = json!({ "folder": folder.display().to_string(), "pages": names });
@@ -36,7 +39,10 @@ fn collect(
         }
     }
     // The name with a hyphen is what `man` looks for.
-    let command = command.name(name.clone()).disable_help_subcommand(true);
+    let mut command = command.name(name.clone()).disable_help_subcommand(true);
+    if !parent.is_empty() {
+        command = command.after_help("Exit codes: see iltm(1).");
+    }
     let mut page = Vec::new();
     clap_mangen::Man::new(command).render(&mut page)?;
     pages.push((format!("{name}.1"), page));

@@ -22,6 +22,7 @@ mod interrupt;
 mod key;
 mod man;
 mod monitor;
+mod named;
 mod output;
 mod patterns;
 mod ports;
@@ -110,7 +111,10 @@ fn refused(error: &clap::Error) -> ExitCode {
     let is_json = before_files.into_iter().any(|word| word == "--json");
     if error.use_stderr() && is_json {
         let said = error.to_string();
-        let message = said.lines().next().unwrap_or_default();
+        // What is wrong ends where the usage begins.
+        let wrong = said.lines().take_while(|line| !line.trim().is_empty());
+        let wrong: Vec<&str> = wrong.map(str::trim).collect();
+        let message = wrong.join(" ");
         let message = message.trim_start_matches("error: ");
         let next_step = "Run the command with --help.";
         return Output::new(true).failure(&Failure::new(Kind::Usage, message, next_step));

@@ -46,6 +46,20 @@ fn a_gate_that_fails_stops_check_and_solve_unless_it_is_ignored() {
 }
 
 #[test]
+fn names_in_a_stranger_s_folder_do_not_command_the_terminal() {
+    let user = User::with_capture();
+    let list = user.text("capture/capture.csv");
+    // Sets the title of a terminal's window.
+    let title = "\x1b]0;mine\x07";
+    user.write("capture/capture.csv", list.replacen("white", title, 1));
+    let ended = user.run("check capture");
+    assert_ne!(ended.code, 0);
+    contains(&ended.said, &["mine"]);
+    let obeyed = |c: char| c.is_control() && c != '\n';
+    assert!(!ended.said.contains(obeyed), "{:?}", ended.said);
+}
+
+#[test]
 fn a_gate_that_does_not_exist_is_a_mistake_in_the_command() {
     let said = User::new().fails(2, "solve SAMPLE -o t.iltm --ignore exposure");
     contains(&said, &["saturation"]);

@@ -363,6 +363,41 @@ fn inspect_says_of_the_theorem_what_solve_said() {
 }
 
 #[test]
+fn a_mistake_in_the_command_line_is_an_object_for_programs() {
+    for (line, what) in [
+        ("solve SAMPLE --json", "--output <TABLE.iltm>"),
+        ("--json nosuch", "'nosuch'"),
+        ("--json simulate x.toml -o c --fault fog", "fog"),
+        ("--json solve SAMPLE -o t --ignore fog", "fog"),
+    ] {
+        let refused = User::new().run(line);
+        assert_eq!(refused.code, 2, "{line}");
+        let data = refused.json();
+        assert_eq!(data["error"]["kind"], "usage", "{line}");
+        contains(data["error"]["message"].as_str().expect("words"), &[what]);
+    }
+}
+
+#[test]
+fn completions_know_the_names_of_gates_effects_faults_methods_and_boards() {
+    let script = User::new().says("completions bash");
+    let names = ["superposition", "interreflection", "tripod", "brute-force"];
+    contains(&script, &names);
+    #[cfg(unix)]
+    contains(&script, &["mps2-an386"]);
+}
+
+#[test]
+fn the_manual_page_of_a_command_has_the_options_of_all_commands() {
+    let user = User::new();
+    user.says("man -o m");
+    for page in ["iltm-solve.1", "iltm-key-new.1"] {
+        contains(&user.text(&format!("m/{page}")), &["json", "iltm(1)"]);
+    }
+    contains(&user.text("m/iltm.1"), &["Exit codes:"]);
+}
+
+#[test]
 fn help_lists_commands_and_exit_codes() {
     insta::assert_snapshot!(User::new().run("--help").out);
 }

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
-use strum::{Display, EnumString, IntoStaticStr};
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
@@ -17,7 +17,9 @@ const PROGRAM: &str = "qemu-system-arm";
 const START: Duration = Duration::from_secs(20);
 
 /// A board that can be emulated.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Display, EnumString, IntoStaticStr)]
+#[derive(
+    Clone, Copy, PartialEq, Eq, Debug, Default, Display, EnumString, IntoStaticStr, VariantArray,
+)]
 #[strum(parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Board {
     /// Arm MPS2 with the AN500 image: Cortex-M7 with FPU.

@@ -1,10 +1,22 @@
 //! Options of a solve: the method, and the settings that it has.
 
 use super::error::SolveError;
-use strum::{Display, EnumString, VariantArray};
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 /// How the inverse is found; the name on the command line and in reports is in kebab case.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash, Display, EnumString, VariantArray)]
+#[derive(
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Debug,
+    Default,
+    Hash,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[strum(serialize_all = "kebab-case", parse_err_ty = UnknownMethod, parse_err_fn = unknown)]
 pub enum Method {
     /// Gains and one operator for all channels together, from every photograph:
