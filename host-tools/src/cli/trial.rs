@@ -112,7 +112,7 @@ pub(super) fn rollback(arguments: &Decide, output: &Output) -> Result<(), Failur
     };
     if let (Fit::PassThrough(status), Some(_)) = (&fit, now) {
         let mode = super::words::mode(status, connection.client.slots().ok().as_ref());
-        done = format!("{}It is {mode}.\n", done);
+        done = format!("{done}It is {mode}.\n");
     }
     finish(connection, output, now, fit.data(), &done);
     Ok(())

@@ -122,7 +122,7 @@ fn a_flood_of_good_requests_drops_no_frame_and_holds_no_other_host_up_for_long()
     for (request, baud) in [
         (Request::Status, 115_200),
         (Request::Status, 921_600),
-        (sectors.clone(), 115_200),
+        (sectors, 115_200),
         (sectors, 921_600),
     ] {
         let (sent, frames, waited) = flooded(&request, baud);

@@ -213,7 +213,7 @@ pub fn judge(
     let found = (&readings.revisited, &drift, curve);
     let (mut outcome, mut cause) = decide(error[1], &bound, found);
     let search = readings.wanted && outcome != Outcome::Passed;
-    let chain = if search && !cause.is_some_and(|cause| cause.spoils_pictures()) {
+    let chain = if search && !cause.is_some_and(super::outcome::Cause::spoils_pictures) {
         let images = super::test_images(table)?;
         super::chain::find(table, &images, readings, &mut expected, &lit)?
     } else {
