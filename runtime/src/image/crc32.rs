@@ -2,21 +2,35 @@
 //! bytes instead of 1 KiB, which a device's flash has better uses for.
 
 /// The remainders of all half bytes.
-static REMAINDERS: [u32; 16] = {
-    let mut table = [0; 16];
-    let mut index = 0;
-    while index < 16 {
-        let mut remainder = index as u32;
-        let mut bit = 0;
-        while bit < 4 {
-            remainder = (remainder >> 1) ^ (0xEDB8_8320 * (remainder & 1));
-            bit += 1;
-        }
-        table[index] = remainder;
-        index += 1;
+static REMAINDERS: [u32; 16] = [
+    remainder(0),
+    remainder(1),
+    remainder(2),
+    remainder(3),
+    remainder(4),
+    remainder(5),
+    remainder(6),
+    remainder(7),
+    remainder(8),
+    remainder(9),
+    remainder(10),
+    remainder(11),
+    remainder(12),
+    remainder(13),
+    remainder(14),
+    remainder(15),
+];
+
+/// What half a byte leaves behind.
+const fn remainder(half: u32) -> u32 {
+    let mut remainder = half;
+    let mut bit = 0;
+    while bit < 4 {
+        remainder = (remainder >> 1) ^ (0xEDB8_8320 * (remainder & 1));
+        bit += 1;
     }
-    table
-};
+    remainder
+}
 
 /// A CRC-32 of bytes that come piece by piece.
 #[derive(Clone, Copy, Debug)]

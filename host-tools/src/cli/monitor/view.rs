@@ -470,6 +470,9 @@ mod tests {
         status.mode = Mode::PassThrough(PassThrough::NoTable);
         status.table = None;
         view.take(&MonitorEvent::Device(Event::Status(status)));
-        assert!(view.lines(80, 24)[1].contains("NOT COMPENSATING, frames pass unchanged: there is no table"));
+        assert!(
+            view.lines(80, 24)[1]
+                .contains("NOT COMPENSATING, frames pass unchanged: there is no table")
+        );
     }
 }
