@@ -73,7 +73,7 @@ impl Output {
                 "exit": failure.kind.code(),
                 "message": failure.message,
                 "next_step": failure.next_step,
-                "active": failure.active.as_ref().map(Active::data),
+                "active": failure.active.as_deref().map(Active::data),
             });
             let _ = writeln!(io::stdout(), "{data}");
         }
