@@ -200,7 +200,7 @@ pub(super) struct Failure {
     pub(super) message: String,
     pub(super) next_step: String,
     /// Where a device's tables were about to change: which one is in use now.
-    pub(super) active: Option<Active>,
+    pub(super) active: Option<Box<Active>>,
     /// What was found out before, for programs: an object that stands beside the error.
     pub(super) data: Option<Box<Value>>,
 }
@@ -228,7 +228,7 @@ impl Failure {
 
     /// The same, with the table that is in use now.
     pub(super) fn with(mut self, active: Active) -> Self {
-        self.active = Some(active);
+        self.active = Some(Box::new(active));
         self
     }
 

@@ -105,7 +105,7 @@ impl Output {
                 "exit": failure.kind.code(),
                 "message": failure.message,
                 "next_step": failure.next_step,
-                "active": failure.active.as_ref().map(Active::data),
+                "active": failure.active.as_deref().map(Active::data),
             });
             self.write(&last(data));
         }

@@ -55,16 +55,15 @@ fn ended(connection: &mut Connection, slots: &Slots, lost: CalledTable) -> Failu
         Some(now) => format!("the device went back to {now}"),
         None => "the device has no other table: frames pass unchanged".to_owned(),
     };
-    let message = match how_ended(slots, lost.name) {
-        Some(how) => format!("{port}: the trial of {lost} {how}; {now}"),
+    let message = if let Some(how) = how_ended(slots, lost.name) {
+        format!("{port}: the trial of {lost} {how}; {now}")
+    } else {
         // What the device knew of it is lost with a restart.
-        None => {
-            let status = connection.client.status().ok();
-            format!(
-                "{port}: {lost} is not in use: the device has restarted{}, and a trial ends with a restart; {now}",
-                status.map_or_else(String::new, |status| since(&status))
-            )
-        }
+        let status = connection.client.status().ok();
+        let since = status.map_or_else(String::new, |status| since(&status));
+        format!(
+            "{port}: {lost} is not in use: the device has restarted{since}, and a trial ends with a restart; {now}"
+        )
     };
     Failure::new(
         Kind::NoTable,

@@ -3,23 +3,34 @@
 
 /// The remainders of all half bytes.
 static REMAINDERS: [u32; 16] = [
-    0x0000_0000,
-    0x1db7_1064,
-    0x3b6e_20c8,
-    0x26d9_30ac,
-    0x76dc_4190,
-    0x6b6b_51f4,
-    0x4db2_6158,
-    0x5005_713c,
-    0xedb8_8320,
-    0xf00f_9344,
-    0xd6d6_a3e8,
-    0xcb61_b38c,
-    0x9b64_c2b0,
-    0x86d3_d2d4,
-    0xa00a_e278,
-    0xbdbd_f21c,
+    remainder(0),
+    remainder(1),
+    remainder(2),
+    remainder(3),
+    remainder(4),
+    remainder(5),
+    remainder(6),
+    remainder(7),
+    remainder(8),
+    remainder(9),
+    remainder(10),
+    remainder(11),
+    remainder(12),
+    remainder(13),
+    remainder(14),
+    remainder(15),
 ];
+
+/// What half a byte leaves behind.
+const fn remainder(half: u32) -> u32 {
+    let mut remainder = half;
+    let mut bit = 0;
+    while bit < 4 {
+        remainder = (remainder >> 1) ^ (0xEDB8_8320 * (remainder & 1));
+        bit += 1;
+    }
+    remainder
+}
 
 /// A CRC-32 of bytes that come piece by piece.
 #[derive(Clone, Copy, Debug)]

@@ -292,7 +292,13 @@ fn random(dice: &mut Rng, projector: &str, camera: &str) -> String {
         2 => {
             let folds = dice.usize(3..=5);
             let x = |k: usize| half * (2.0 * k as f64 / folds as f64 - 1.0);
-            let z = |k: usize| if k.is_multiple_of(2) { 0.0 } else { -0.5 * deep };
+            let z = |k: usize| {
+                if k.is_multiple_of(2) {
+                    0.0
+                } else {
+                    -0.5 * deep
+                }
+            };
             let panels = (0..folds)
                 .map(|k| wall([x(k), z(k)], [x(k + 1), z(k + 1)], tall))
                 .collect();

@@ -101,19 +101,8 @@ fn conversation(examples: &mut Examples) {
     examples.add("log", Channel::Log, 0, &[0x07, 0x00, 0x8F, 0x4E]);
 }
 
-/// A table of 5,000 bytes on its way, of which the first sector is there already.
-fn update(examples: &mut Examples) {
-    let old = TableName {
-        id: 0x89AB_CDEF,
-        version: 7,
-    };
-    let new = TableName {
-        id: 0x0123_4567,
-        version: 8,
-    };
-    let digest = Digest(*b"\x11\x22\x33\x44 the digest.");
-    let transfer = digest.transfer();
-    examples.request("slots-request", 5, &Request::Slots);
+/// The older table in use, after a trial of the newer one.
+fn slots(old: TableName, new: TableName) -> Slots {
     let slot = |state, table, length| SlotInfo {
         state,
         table,
@@ -128,7 +117,7 @@ fn update(examples: &mut Examples) {
             },
         }),
     };
-    let slots = Slots {
+    Slots {
         slots: [
             slot(SlotState::Active, Some(old), 4_800),
             slot(SlotState::Broken, None, 0),
@@ -146,7 +135,23 @@ fn update(examples: &mut Examples) {
             reason: TableReason::TrialOver,
             ago_ms: 2_000,
         }),
+    }
+}
+
+/// A table of 5,000 bytes on its way, of which the first sector is there already.
+fn update(examples: &mut Examples) {
+    let old = TableName {
+        id: 0x89AB_CDEF,
+        version: 7,
     };
+    let new = TableName {
+        id: 0x0123_4567,
+        version: 8,
+    };
+    let digest = Digest(*b"\x11\x22\x33\x44 the digest.");
+    let transfer = digest.transfer();
+    examples.request("slots-request", 5, &Request::Slots);
+    let slots = slots(old, new);
     examples.response("slots-response", 5, &Response::Slots(slots));
     let (length, first) = (5_000, 0);
     examples.request("sectors-request", 6, &Request::Sectors { length, first });
@@ -219,6 +224,11 @@ fn update(examples: &mut Examples) {
     };
     examples.request("rollback-request", 11, &back);
     examples.response("rollback-response", 11, &used(old));
+    owner(examples);
+}
+
+/// What a device asks of tables, and how it comes by a key.
+fn owner(examples: &mut Examples) {
     let older = Rejected::Older {
         version: 6,
         floor: 7,

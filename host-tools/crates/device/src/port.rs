@@ -112,27 +112,6 @@ fn holder(path: &Path) -> Option<String> {
     ))
 }
 
-#[cfg(all(test, target_os = "linux"))]
-mod tests {
-    use super::*;
-    use std::process::{Command, Stdio};
-
-    #[test]
-    fn the_program_that_has_a_file_open_is_named() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("port");
-        let file = fs::File::create(&path).expect("writable");
-        assert_eq!(holder(&path), None, "this process alone");
-        let mut sleep = Command::new("sleep");
-        let sleep = sleep.arg("60").stdin(Stdio::from(file)).spawn();
-        let mut sleep = sleep.expect("sleep is everywhere");
-        let held = holder(&path);
-        sleep.kill().expect("it runs");
-        sleep.wait().expect("killed");
-        assert_eq!(held, Some(format!("sleep (process {})", sleep.id())));
-    }
-}
-
 /// Longest that one write may wait for a line that does not take bytes.
 const WRITE_WAIT: Duration = Duration::from_secs(1);
 
@@ -164,4 +143,25 @@ fn is_nothing(error: &io::Error) -> bool {
         error.kind(),
         ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock
     )
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use std::process::{Command, Stdio};
+
+    #[test]
+    fn the_program_that_has_a_file_open_is_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("port");
+        let file = fs::File::create(&path).expect("writable");
+        assert_eq!(holder(&path), None, "this process alone");
+        let mut sleep = Command::new("sleep");
+        let sleep = sleep.arg("60").stdin(Stdio::from(file)).spawn();
+        let mut sleep = sleep.expect("sleep is everywhere");
+        let held = holder(&path);
+        sleep.kill().expect("it runs");
+        sleep.wait().expect("killed");
+        assert_eq!(held, Some(format!("sleep (process {})", sleep.id())));
+    }
 }

@@ -117,7 +117,7 @@ fn flash(
     let in_use = bring(connection, &parcel, &plan, &mut ending, &mut lost)?;
     lost.asked = Asked::Confirmation;
     let ended = ending.end(connection, in_use, "is in use");
-    ended.map_err(|failure| match failure.active {
+    ended.map_err(|failure| match failure.active.as_deref() {
         Some(Active::Unknown) => failure.with(Active::Lost(lost)),
         _ => failure,
     })
@@ -291,7 +291,7 @@ fn after_activation(connection: &mut Connection, error: &DeviceError) -> Failure
             "{}: the device has restarted{watchdog}, and a trial ends with a restart",
             connection.port
         );
-        failure.next_step = "Flash again.".to_owned();
+        "Flash again.".clone_into(&mut failure.next_step);
     }
     failure
 }
