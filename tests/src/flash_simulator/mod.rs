@@ -123,14 +123,23 @@ pub struct NorSimulator<const W: usize, const E: usize, const R: usize = 1> {
     cut_at: Option<u64>,
     misread: Option<(Range<usize>, u32, Misread)>,
     is_on: bool,
-    is_rewritable: bool,
-    preprograms: bool,
-    programs_units: bool,
+    part: Part,
     /// Units that cannot be read, on a part with ECC.
     torn: Option<Spent>,
     violations: Violations,
     last_cut: Option<Operation>,
     log: Option<Vec<Operation>>,
+}
+
+/// How a part programs and erases.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    /// A unit may be programmed again.
+    is_rewritable: bool,
+    /// An erase clears all bits first.
+    preprograms: bool,
+    /// All bytes of a unit are programmed at the same time.
+    programs_units: bool,
 }
 
 impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
@@ -150,9 +159,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
             cut_at: None,
             misread: None,
             is_on: true,
-            is_rewritable: false,
-            preprograms: false,
-            programs_units: false,
+            part: Part::default(),
             torn: None,
             violations: Violations::default(),
             last_cut: None,
@@ -163,14 +170,14 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// As a part on which a unit may be programmed again, to clear more bits. Ones
     /// leave bits as they are.
     pub const fn rewritable(mut self) -> Self {
-        self.is_rewritable = true;
+        self.part.is_rewritable = true;
         self
     }
 
     /// As a part that clears all bits of a sector before it sets them all: an erase
     /// that is cut then leaves zeros as well where there were ones.
     pub const fn with_preprogramming(mut self) -> Self {
-        self.preprograms = true;
+        self.part.preprograms = true;
         self
     }
 
@@ -185,7 +192,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// As a part that programs all bytes of a write unit at the same time: a cut in one
     /// of them tears all.
     pub const fn with_whole_units(mut self) -> Self {
-        self.programs_units = true;
+        self.part.programs_units = true;
         self
     }
 

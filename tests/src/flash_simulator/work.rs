@@ -130,7 +130,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         check_write(self, offset, bytes.len())?;
         let (from, to) = (offset as usize, offset as usize + bytes.len());
         self.refuses(from, to)?;
-        if !self.is_rewritable
+        if !self.part.is_rewritable
             && let Some(unit) = self.first_spent(from, to)
         {
             return Err(NorError::NotErased { unit });
@@ -143,7 +143,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         self.spent
             .set(from / W..(from + whole.len() + torn).div_ceil(W));
         let at = from + whole.len();
-        let unit = if self.programs_units { W } else { 1 };
+        let unit = if self.part.programs_units { W } else { 1 };
         for place in at / unit * unit..at / unit * unit + unit {
             // Those before it are done in this model, and go back into motion.
             if let Some(byte) = bytes.get(place - from).filter(|_| !rest.is_empty()) {
@@ -212,7 +212,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
 
     /// Programs a byte in which the power fails.
     fn tear(&mut self, at: usize, byte: u8) {
-        if self.programs_units
+        if self.part.programs_units
             && let Some(cell) = self.cells.get_mut(at)
         {
             *cell = 0xFF;
@@ -255,7 +255,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         sector.erases = sector.erases.saturating_add(1);
         let weak = self.weak.as_mut().and_then(|weak| weak.get_mut(from..to));
         if stage < ERASE_STAGES {
-            damage::half_erased(cells, weak, stage, self.preprograms, &mut self.random);
+            damage::half_erased(cells, weak, stage, self.part.preprograms, &mut self.random);
             self.spent.set(from / W..to / W);
             if let Some(torn) = &mut self.torn {
                 torn.set(from / W..to / W);

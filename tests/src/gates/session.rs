@@ -99,6 +99,9 @@ impl StudiedSession {
     }
 
     /// Takes the photographs, with a fault or none, and asks the gates.
+    ///
+    /// # Errors
+    /// What stops the gates: photographs that cannot be told from each other.
     pub fn examined(
         &self,
         simulation: &Simulation<'_>,

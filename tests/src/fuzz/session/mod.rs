@@ -72,6 +72,14 @@ fn live<const W: usize, const E: usize>(slot: usize, weak: bool, ops: impl Itera
     trial.restart();
 }
 
+/// What is wrong with a flash.
+struct Harm {
+    /// Bits that a cut caught in motion read as either.
+    weak: bool,
+    /// Records or the key's sector are worn: a request that writes there may be refused.
+    worn: bool,
+}
+
 /// A device, its models, and the host's end of the line.
 struct Trial<const W: usize, const E: usize> {
     wire: Option<Wire<W, E>>,
@@ -88,9 +96,7 @@ struct Trial<const W: usize, const E: usize> {
     last: Option<Held>,
     /// The last request was answered, and nothing has happened since.
     fresh: bool,
-    weak: bool,
-    /// Records or the key's sector are worn: a request that writes there may be refused.
-    worn: bool,
+    harm: Harm,
     /// Steps of the flash in a request until the power fails.
     cut_after: Option<u64>,
 }
@@ -127,8 +133,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             together: 0,
             last: None,
             fresh: false,
-            weak,
-            worn: false,
+            harm: Harm { weak, worn: false },
             cut_after: None,
         }
     }
@@ -179,7 +184,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             Op::Together { count } => {
                 self.flush();
                 // Which of several requests was cut or refused is hard to tell.
-                if self.cut_after.is_none() && !self.worn {
+                if self.cut_after.is_none() && !self.harm.worn {
                     self.together = count;
                 }
             }
@@ -519,7 +524,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         };
         let request = Request::parse(&held.payload);
         // What a cut leaves and what wear leaves are two questions.
-        !self.worn && (!self.weak || !matches!(request, Ok(Request::Write { .. })))
+        !self.harm.worn && (!self.harm.weak || !matches!(request, Ok(Request::Write { .. })))
     }
 
     /// Whether a request was refused because its record or the key could not be written.
@@ -538,15 +543,15 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             response,
             Response::Refused(Refusal::ReadOnly | Refusal::Flash { .. })
         );
-        self.worn && writes && refusal
+        self.harm.worn && writes && refusal
     }
 
     fn wear(&mut self, sector: usize, how: Wear) {
         self.flush();
-        if self.worn {
+        if self.harm.worn {
             return;
         }
-        self.worn = true;
+        self.harm.worn = true;
         self.cut_after = None;
         let first = self.layout.slot(Slot::B).end / self.layout.sector;
         let flash = self.wire().device.updater.flash_mut();
@@ -717,7 +722,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
 
     fn rot_records(&mut self, bits: usize) {
         self.flush();
-        if self.worn {
+        if self.harm.worn {
             return;
         }
         let start = self.layout.slot(Slot::B).end;
