@@ -131,6 +131,10 @@ impl Session {
     }
 
     /// Tells a subscribed host of something; nothing happens without one.
+    ///
+    /// Inlined, so that a firmware has what makes bytes of a message once, compiled by its own
+    /// settings.
+    #[inline]
     pub fn event(&mut self, event: &Event) {
         self.talk.event(event);
     }
@@ -218,6 +222,7 @@ impl Talk {
         }
     }
 
+    #[inline]
     fn event(&mut self, event: &Event) {
         if self.subscription.is_some() {
             let sequence = self.events;

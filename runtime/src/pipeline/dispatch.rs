@@ -1,5 +1,8 @@
 //! Dispatch by channels: frames as a device has them, bytes with the channels of a pixel side
 //! by side.
+//!
+//! Its functions are `#[inline]`, so that a firmware compiles them by its own settings: small.
+//! What takes the time of a frame is in the kernels.
 
 use super::full::FullPipeline;
 use super::grid::GridPipeline;
@@ -16,6 +19,7 @@ use crate::placement::PixelArea;
 ///
 /// # Errors
 /// As [`GridPipeline::compensate`].
+#[inline]
 pub fn compensate_cells(
     table: &Table<'_>,
     tier: u8,
@@ -63,6 +67,7 @@ pub struct FrameJob<'t, 'a> {
 /// # Errors
 /// [`FrameError`] if the area is smaller than the grid, or this build takes none larger.
 /// Slices that are too short are filled as far as they go.
+#[inline]
 pub fn prepare_pixels(
     table: &Table<'_>,
     area: FrameSize,
@@ -82,6 +87,7 @@ pub fn prepare_pixels(
 ///
 /// # Errors
 /// As [`FullPipeline::within`] and [`FullPipeline::compensate`].
+#[inline]
 pub fn compensate_pixels(
     job: &FrameJob<'_, '_>,
     wanted: &[u8],
