@@ -10,9 +10,9 @@ use crate::device::port_scan::{ListedPort, PortScan};
 use crate::device::transcript::Transcribed;
 use crate::device::{Client, DeviceError, Patience, Port};
 use crate::user::{Config, Folders};
-use std::fmt::Write as _;
+use std::fmt::Write;
 use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal};
 use std::time::Duration;
 
 /// A device may be busy with frames; an empty port should not take long.
@@ -184,11 +184,10 @@ fn choose(mut found: Vec<FoundDevice>, output: &Output) -> Result<FoundDevice, F
     if output.is_json() || !output.terminal || !io::stdin().is_terminal() {
         return Err(several(&found));
     }
-    let mut err = io::stderr();
-    let _ = writeln!(err, "Several devices answer:");
+    let mut question = String::from("Several devices answer:\n");
     for (number, device) in (1..).zip(&found) {
         let _ = writeln!(
-            err,
+            question,
             "  {number}  {}  {} {}, firmware {}",
             device.port.path,
             device.device.board,
@@ -196,8 +195,7 @@ fn choose(mut found: Vec<FoundDevice>, output: &Output) -> Result<FoundDevice, F
             device.device.firmware
         );
     }
-    let _ = write!(err, "Which one? ");
-    let _ = err.flush();
+    output.people(&(question + "Which one? "));
     let mut answer = String::new();
     let _ = io::stdin().read_line(&mut answer);
     match answer.trim().parse::<usize>() {
