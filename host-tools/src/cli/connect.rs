@@ -14,7 +14,7 @@ use crate::user::{Config, Folders};
 use ed25519_dalek::VerifyingKey;
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal};
 use std::path::Path;
 use std::time::Duration;
 
@@ -210,11 +210,10 @@ fn choose(mut found: Vec<FoundDevice>, output: &Output) -> Result<FoundDevice, F
     if output.is_json() || !output.terminal || !io::stdin().is_terminal() {
         return Err(several(&found));
     }
-    let mut err = io::stderr();
-    let _ = writeln!(err, "Several devices answer:");
+    let mut question = String::from("Several devices answer:\n");
     for (number, device) in (1..).zip(&found) {
         let _ = writeln!(
-            err,
+            question,
             "  {number}  {}  {} {}, firmware {}",
             device.port.path,
             device.device.board,
@@ -222,8 +221,7 @@ fn choose(mut found: Vec<FoundDevice>, output: &Output) -> Result<FoundDevice, F
             device.device.firmware
         );
     }
-    let _ = write!(err, "Which one? ");
-    let _ = err.flush();
+    output.people(&(question + "Which one? "));
     let mut answer = String::new();
     let _ = io::stdin().read_line(&mut answer);
     match answer.trim().parse::<usize>() {

@@ -110,8 +110,8 @@ pub fn run(meter: Option<Meter>) -> ExitCode {
 
 /// Says that the command line cannot be understood, or prints the help that it asks for.
 fn refused(error: &clap::Error) -> ExitCode {
-    let before_files = env::args_os().take_while(|word| word != "--");
-    let is_json = before_files.into_iter().any(|word| word == "--json");
+    let mut before_files = env::args_os().take_while(|word| word != "--");
+    let is_json = before_files.any(|word| word == "--json");
     if error.use_stderr() && is_json {
         let said = error.to_string();
         // What is wrong ends where the usage begins.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Version of the objects that `--json` prints: it rises when a field goes or changes its
-/// meaning. `docs/json/` has their schemas.
+/// meaning.
 const JSON_VERSION: u8 = 1;
 
 /// Standard output and standard error as a command sees them.

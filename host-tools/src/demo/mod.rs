@@ -101,6 +101,9 @@ pub struct DemoOutcome {
 /// # Errors
 /// [`DemoError`]; nothing is left behind then.
 pub fn run(out: &Path, progress: &dyn Progress) -> Result<DemoOutcome, DemoError> {
+    if let Some(parent) = out.parent() {
+        make_folder(parent)?;
+    }
     let work = WholeFolder::beside(out)?;
     let paths = Paths::new(work.path());
     let mut clock = Clock::new();

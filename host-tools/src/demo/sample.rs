@@ -1,9 +1,8 @@
 //! Sample capture that the program carries with it.
 
 use super::DemoError;
-use iltm_picture::{FolderError, whole_file};
+use iltm_picture::{FolderError, unfinished, whole_file};
 use include_dir::{Dir, File, include_dir};
-use std::fs;
 use std::path::Path;
 
 /// 60 photographs of coloured M-shaped panels, 16 x 24 cells: 1 white, 1 black,
@@ -46,13 +45,14 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), DemoError> {
 
 /// Makes a folder and those that it lies in.
 pub(super) fn make_folder(folder: &Path) -> Result<(), DemoError> {
-    Ok(fs::create_dir_all(folder).map_err(FolderError::io(folder))?)
+    Ok(unfinished::make_folder(folder).map_err(FolderError::io(folder))?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::capture::Manifest;
+    use std::fs;
 
     #[test]
     fn the_sample_carries_every_file_that_its_manifest_names() {

@@ -89,6 +89,23 @@ fn a_device_of_another_version_says_which_side_to_change() {
     insta::assert_snapshot!(said("status", port.path()));
 }
 
+#[test]
+fn a_device_s_name_does_not_command_the_terminal() {
+    // Sets the title of a terminal's window.
+    let named = || {
+        let mut device = FakeDevice::default();
+        device.status.board = "\x1b]0;mine\x07".try_into().expect("a short name");
+        device
+    };
+    let mut watching = Watching::of(named(), "monitor");
+    let mut seen = watching.until("mine");
+    watching.interrupted();
+    let port = FakePort::new(named());
+    seen += &said("status", port.path());
+    let obeyed = |c: char| c.is_control() && c != '\n';
+    assert!(!seen.contains(obeyed), "{seen:?}");
+}
+
 /// A monitor of a device, whose lines are read while it runs.
 struct Watching {
     child: Child,
@@ -99,7 +116,11 @@ struct Watching {
 
 impl Watching {
     fn start(command: &str) -> Self {
-        let port = FakePort::new(FakeDevice::default());
+        Self::of(FakeDevice::default(), command)
+    }
+
+    fn of(device: FakeDevice, command: &str) -> Self {
+        let port = FakePort::new(device);
         let line = format!("{command} --period 100 --port {}", port.path());
         let user = User::new();
         let mut child = user.spawn(&line);

@@ -105,12 +105,11 @@ pub fn make_folder(folder: &Path) -> io::Result<()> {
 }
 
 /// Removes all that is not finished, waiting for steps that go on. No other step begins after
-/// it: the process is about to end.
+/// it: the process is about to end. Not to be called inside a step.
 pub fn remove_all() {
-    if !INSIDE.get() {
-        mem::forget(STEP.lock().unwrap_or_else(PoisonError::into_inner));
-    }
-    remove_listed();
+    mem::forget(STEP.lock().unwrap_or_else(PoisonError::into_inner));
+    let listed = mem::take(&mut *list());
+    listed.iter().rev().for_each(remove);
 }
 
 /// Removes the folders made by [`make_folder`] that have remained empty: what was to go there
@@ -119,11 +118,6 @@ pub fn remove_empty_folders() {
     let made = |entry: &mut Entry| matches!(entry, Entry::Made(_));
     let made: Vec<Entry> = list().extract_if(.., made).collect();
     made.iter().rev().for_each(remove);
-}
-
-fn remove_listed() {
-    let listed = mem::take(&mut *list());
-    listed.iter().rev().for_each(remove);
 }
 
 /// Whoever ends has no use for an error here.

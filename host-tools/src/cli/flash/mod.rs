@@ -233,9 +233,6 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
         "seconds": seconds,
         "active": active(&plan.slots).data(),
     }));
-    if output.is_json() {
-        return;
-    }
     let what = if differing == 0 {
         "holds it already: nothing to send".to_owned()
     } else {
@@ -246,8 +243,8 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
             connection.baud
         )
     };
-    eprintln!(
-        "table    {}, {} bytes, {}\ndevice   {} at {}\nin use   {}\nslot {slot}   {what}",
+    output.people(&format!(
+        "table    {}, {} bytes, {}\ndevice   {} at {}\nin use   {}\nslot {slot}   {what}\n",
         table.called,
         table.bytes,
         table.signer(),
@@ -257,7 +254,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
             Some(used) => format!("table {used}"),
             None => "no table: frames pass unchanged".to_owned(),
         },
-    );
+    ));
 }
 
 /// Seconds that so many bytes take: 10 bits each, and the frames around chunks.

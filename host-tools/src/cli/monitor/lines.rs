@@ -1,5 +1,6 @@
 //! Lines on standard output, one for each event, as text or JSON.
 
+use super::super::output::printable;
 use super::super::words;
 use super::Show;
 use super::event::MonitorEvent;
@@ -81,6 +82,6 @@ impl Plain {
 /// A line, seen at once also through a pipe.
 fn line(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(out, "{text}")?;
+    writeln!(out, "{}", printable(text))?;
     out.flush()
 }

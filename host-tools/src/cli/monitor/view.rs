@@ -1,5 +1,6 @@
 //! View of a monitored device, as lines of a given width.
 
+use super::super::output::printable;
 use super::super::words;
 use super::event::MonitorEvent;
 use chrono::Local;
@@ -95,7 +96,7 @@ impl View {
                 self.event(event);
             }
             MonitorEvent::Lost(why) => {
-                self.lost = Some(why.clone());
+                self.lost = Some(printable(why).into_owned());
                 self.event(event);
             }
             MonitorEvent::Log(message) => {
@@ -107,7 +108,8 @@ impl View {
                     "trace" => style("trace").dim(),
                     _ => style("     "),
                 };
-                let line = format!("{} {level} {}", message.time, message.text);
+                let (time, text) = (printable(&message.time), printable(&message.text));
+                let line = format!("{time} {level} {text}");
                 keep(&mut self.log, line);
             }
             MonitorEvent::UnreadLog { .. } => {
@@ -122,7 +124,8 @@ impl View {
 
     fn event(&mut self, event: &MonitorEvent) {
         let time = Local::now().format("%H:%M:%S").to_string();
-        let words = style(event.words().unwrap_or_default());
+        let words = event.words().unwrap_or_default();
+        let words = style(printable(&words));
         let words = match event {
             MonitorEvent::Device(Event::Fault(_)) | MonitorEvent::Lost(_) => words.red(),
             MonitorEvent::Missed { .. } | MonitorEvent::Restarted => words.yellow(),
@@ -164,7 +167,7 @@ impl View {
             Some(device) => format!(
                 "{name}  {}  {}  firmware {}   {}",
                 self.port,
-                device.board,
+                printable(&device.board),
                 device.firmware,
                 style("ctrl-C ends").dim()
             ),
