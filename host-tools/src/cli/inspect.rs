@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::output::{Output, read_file};
 use super::table_words;
 use super::tables::check_sealed;
-use super::words::{key_id, lines};
+use super::words::{day, key_id, lines, named};
 use crate::compile::Provenance;
 use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
@@ -144,7 +144,8 @@ fn data(table: &Table<'_>) -> Value {
     let bounds = table.operator().map(Operator::bounds);
     json!({
         "id": format!("{:08x}", table.id()),
-        "name": table.label().name(),
+        "name": named(table.label()),
+        "date": day(table.label()),
         "rows": table.grid().rows(),
         "cols": table.grid().cols(),
         "channels": table.channels(),

@@ -5,8 +5,8 @@ use super::connect::connect;
 use super::failure::Failure;
 use super::output::Output;
 use super::words::{
-    clipped_share, duration, identity, milliseconds, mode, number, serial, slot_lines, slot_states,
-    slots_data, status_data, table_in_use, trust, watchdog,
+    called, clipped_share, duration, identity, milliseconds, mode, number, serial, slot_lines,
+    slot_states, slots_data, status_data, table_in_use, table_name, trust, watchdog,
 };
 use crate::device::DeviceError;
 use iltm_runtime::link::{Hello, Slots, Status};
@@ -26,6 +26,9 @@ pub(super) fn run(arguments: &args::Status, output: &Output) -> Result<(), Failu
     connection.remember(output);
     let device = connection.client.device();
     let mut data = status_data(&status);
+    data["table"] = json!(table_name(
+        status.table.map(|table| called(table, slots.as_ref()))
+    ));
     data["port"] = json!(connection.port);
     data["baud"] = json!(connection.baud);
     data["device"] = identity(device);

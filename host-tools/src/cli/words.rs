@@ -1,5 +1,6 @@
 //! Words and data that several commands have in common: a device, its state, its tables.
 
+use iltm_runtime::image::Label;
 use iltm_runtime::link::{
     FrameKind, Hello, Mode, PassThrough, SlotInfo, SlotState, Slots, Status, TableAbout, TableName,
     TableReason,
@@ -70,18 +71,24 @@ impl fmt::Display for CalledTable {
 pub(super) fn table_name(table: Option<impl Into<CalledTable>>) -> Option<Value> {
     table.map(|table| {
         let CalledTable { name, about } = table.into();
-        let label = about.map(|about| about.label);
+        let label = about.map(|about| about.label).unwrap_or_default();
         json!({
             "id": format!("{:08x}", name.id),
             "version": (name.version != 0).then_some(name.version),
-            "name": label.map(|label| label.name().to_owned()),
-            "date": label.and_then(|label| day(label.date())),
+            "name": named(&label),
+            "date": day(&label),
         })
     })
 }
 
-/// A day of a table's label, if it has one.
-fn day(date: u32) -> Option<String> {
+/// The name on a table's label, if it has one.
+pub(super) fn named(label: &Label) -> Option<&str> {
+    Some(label.name()).filter(|name| !name.is_empty())
+}
+
+/// The day on a table's label, if it has one.
+pub(super) fn day(label: &Label) -> Option<String> {
+    let date = label.date();
     let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
     (date != 0).then(|| format!("{year:04}-{month:02}-{day:02}"))
 }

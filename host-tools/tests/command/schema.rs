@@ -1,8 +1,9 @@
 //! Schemas of what `--json` prints: every object that a test sees is held against the schema of
 //! its command in `docs/json/`.
 
-use jsonschema::Validator;
+use jsonschema::{Retrieve, Uri, Validator};
 use serde_json::Value;
+use std::error::Error;
 use std::fs;
 use std::path::PathBuf;
 
@@ -27,8 +28,21 @@ fn of(line: &str) -> (String, Validator) {
     };
     let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{command}: {error}"));
     let schema: Value = serde_json::from_str(&text).expect("JSON");
-    let validator = jsonschema::draft202012::new(&schema).expect("a schema");
-    (command, validator)
+    let options = jsonschema::options().with_base_uri("iltm:/usage.json");
+    let validator = options.with_retriever(Beside).build(&schema);
+    (command, validator.expect("a schema"))
+}
+
+/// Schemas that others refer to lie in the same folder.
+struct Beside;
+
+impl Retrieve for Beside {
+    fn retrieve(&self, uri: &Uri<String>) -> Result<Value, Box<dyn Error + Send + Sync>> {
+        let name = uri.path().as_str().trim_start_matches('/').to_owned();
+        Ok(serde_json::from_str(&fs::read_to_string(
+            folder().join(name),
+        )?)?)
+    }
 }
 
 /// Holds what a command has printed against its schema: an object a line, the last of which
@@ -58,7 +72,7 @@ pub(crate) fn check(line: &str, printed: &str) {
 #[test]
 fn every_command_has_a_schema_that_says_what_each_field_is() {
     let commands = iltm::cli::command();
-    let mut names = vec!["usage".to_owned()];
+    let mut names = vec!["usage".to_owned(), "error".to_owned()];
     for command in commands.get_subcommands() {
         let name = command.get_name();
         let inner: Vec<_> = command.get_subcommands().collect();
@@ -93,7 +107,9 @@ fn described(place: &str, schema: &Value) {
         }
     }
     for part in ["items", "additionalProperties"] {
-        described(place, &schema[part]);
+        if let Some(inner) = schema.get(part) {
+            described(place, inner);
+        }
     }
     for part in ["anyOf", "oneOf"] {
         for one in schema[part].as_array().into_iter().flatten() {
