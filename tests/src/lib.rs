@@ -28,6 +28,8 @@ pub mod stages;
 pub mod verdicts;
 
 use ed25519_dalek::SigningKey;
+use ed25519_dalek::pkcs8::EncodePrivateKey;
+use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use iltm::compile::sign::{SealTerms, sign};
 use iltm::compile::{CompileOptions, compile};
 use iltm::picture::Response;
@@ -44,6 +46,12 @@ pub fn grid(rows: u16, cols: u16) -> Grid {
 /// A key that signs tables, another one for each seed.
 pub fn signing_key(seed: u8) -> SigningKey {
     SigningKey::from_bytes(&[seed; 32])
+}
+
+/// The file of a private key.
+pub fn key_file(key: &SigningKey) -> String {
+    let pem = key.to_pkcs8_pem(LineEnding::LF);
+    pem.expect("a key has a form").to_string()
 }
 
 /// The file of a table that is signed with a key, for the device of this number or, with 0,

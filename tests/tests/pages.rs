@@ -3,7 +3,7 @@
 //! the architecture what the manifests say.
 
 use iltm::capture::{CalibrationRole, Role, SETTINGS_FILE, Settings};
-use iltm_runtime::image::layout::{SectionKind, header, meta, projector, tier};
+use iltm_runtime::image::layout::{SectionKind, header, label, meta, projector, tier};
 use iltm_runtime::image::seal::field;
 use iltm_tests::reference_pages::{files_below, metadata, pages, root};
 use std::collections::{BTreeMap, BTreeSet};
@@ -112,6 +112,7 @@ fn the_table_format_is_the_one_of_the_reader() {
         ]
     );
     let one = |at: usize| at..at + 1;
+    let in_label = |range: Range<usize>| meta::LABEL.start + range.start..meta::LABEL.start + range.end;
     assert_eq!(
         of("Meta"),
         [
@@ -125,7 +126,9 @@ fn the_table_format_is_the_one_of_the_reader() {
             meta::CORRECTION_BOUND,
             meta::CHANNEL_SCALES,
             meta::RESERVED_END,
-            meta::INVERSE_ERROR
+            meta::INVERSE_ERROR,
+            in_label(label::NAME),
+            in_label(label::DATE)
         ]
     );
     assert_eq!(

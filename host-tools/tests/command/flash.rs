@@ -3,13 +3,11 @@
 
 use super::user::{Ended, User, contains, interrupt};
 use ed25519_dalek::SigningKey;
-use ed25519_dalek::pkcs8::EncodePrivateKey;
-use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use iltm::user::Folders;
 use iltm::user::emulated::{self, BoardRegistration};
 use iltm_runtime::link::{FrameKind, SlotState};
 use iltm_tests::fake_device::{FakeDevice, FakePort, FakeTables, Order, SECTOR, slot};
-use iltm_tests::{named_table, signing_key, wedge_table};
+use iltm_tests::{key_file, named_table, signing_key, wedge_table};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Read;
@@ -43,10 +41,7 @@ fn user() -> User {
     exclude(&user, &[]);
     user.write("a.iltm", &tables()[0]);
     user.write("b.iltm", &tables()[1]);
-    let key = key()
-        .to_pkcs8_pem(LineEnding::LF)
-        .expect("a key has a form");
-    user.write("site.key", key.as_bytes());
+    user.write("site.key", key_file(&key()));
     user
 }
 
