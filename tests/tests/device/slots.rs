@@ -68,6 +68,28 @@ fn a_confirmed_table_counts_after_a_restart_and_one_on_trial_does_not() {
     );
 }
 
+/// A device that took it for broken would say of the table before that it needs no
+/// confirmation, and nothing of the one that was lost.
+#[test]
+fn a_table_that_was_on_trial_at_a_restart_is_unconfirmed_whatever_length_its_slot_held_before() {
+    for sizes in [[3, 4, 5], [5, 4, 3]] {
+        let [first, second, third] = sizes.map(table);
+        let mut device = Device::new(SLOT, 1);
+        device.update(&first, true).expect("a good table");
+        device.update(&second, true).expect("a good table");
+        device.update(&third, false).expect("a good table");
+        assert!(device.runs(&third));
+        let device = device.restarted();
+        assert!(device.runs(&second));
+        let states = device.updater.states();
+        assert_eq!(
+            states,
+            [SlotState::Unconfirmed, SlotState::Active],
+            "{sizes:?}"
+        );
+    }
+}
+
 #[test]
 fn a_trial_ends_by_itself_by_rollback_or_by_confirmation() {
     let (mut device, first, second) = with_first();

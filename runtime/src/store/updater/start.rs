@@ -8,7 +8,7 @@ use crate::store::journal::Journal;
 use crate::store::record::{Commit, Identity};
 use crate::store::wear::WearLimit;
 use crate::store::{Map, Slot, TableSlots, flash, identity};
-use crate::trust::{Rejected, Terms, Trust};
+use crate::trust::{Accepted, Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<F: NorFlash> Updater<F> {
@@ -108,14 +108,12 @@ impl<F: NorFlash> Updater<F> {
             return;
         }
         let noted = last.map(|last| *slot.of(&last.lengths));
-        let length = noted.filter(|length| *length > 0);
-        let readable = self.is_readable(slot, length, slots);
-        let loaded = if readable {
-            slots.load(&self.flash, slot, length, &self.terms())
-        } else {
-            slots.unload(slot);
-            Err(Rejected::Damaged)
-        };
+        let noted = noted.filter(|length| *length > 0);
+        let mut loaded = self.load(slot, noted, slots);
+        // The length is that of the table before, if this one was on trial at a restart.
+        if loaded.is_err() && noted.is_some() && meant.is_none_or(|(meant, _)| meant != slot) {
+            loaded = self.load(slot, None, slots);
+        }
         let loaded = loaded.and_then(|accepted| match meant {
             // Something else was put there past this code.
             Some((meant, id)) if meant == slot && id != accepted.id => {
@@ -137,22 +135,26 @@ impl<F: NorFlash> Updater<F> {
         }
     }
 
-    /// Whether what will be read like memory can be read: flash with ECC faults at a unit
-    /// that was cut, where [`read`](embedded_storage::nor_flash::ReadNorFlash::read) gives
-    /// an error.
-    fn is_readable(
+    /// Checks the file of this length, or of the one that it states itself.
+    fn load(
         &mut self,
         slot: Slot,
         length: Option<u32>,
         slots: &mut impl TableSlots<F>,
-    ) -> bool {
+    ) -> Result<Accepted, Rejected> {
         let part = self.map.slot(slot);
-        let length = length.unwrap_or(part.length);
-        let read = flash::read(&mut self.flash, part, 0, length, |_| {
+        // It will be read like memory: flash with ECC faults there at a unit that was cut, where
+        // [`read`](embedded_storage::nor_flash::ReadNorFlash::read) gives an error.
+        let bytes = length.unwrap_or(part.length);
+        let readable = flash::read(&mut self.flash, part, 0, bytes, |_| {
             slots.yield_now();
             true
         });
-        read.is_ok()
+        if readable.is_err() {
+            slots.unload(slot);
+            return Err(Rejected::Damaged);
+        }
+        slots.load(&self.flash, slot, length, &self.terms())
     }
 
     /// The table that counts; where it cannot be used, the other one. Without any

@@ -143,6 +143,12 @@ impl Model {
         let noted = Some(record.lengths[slot]).filter(|length| *length > 0);
         let bytes = &self.slots[slot];
         let found = judge(bytes, noted, self.owner, record.floor);
+        // A table that nobody confirmed has its own length.
+        let confirmed = record.table.is_some_and(|(confirmed, _)| confirmed == slot);
+        let found = found.or_else(|| {
+            let own = noted.is_some() && !confirmed;
+            own.then(|| judge(bytes, None, self.owner, record.floor))?
+        });
         // Only the very table that was confirmed counts in its slot.
         let found = found.filter(|found| match record.table {
             Some((confirmed, id)) => confirmed != slot || id == found.id,
