@@ -112,7 +112,8 @@ fn the_table_format_is_the_one_of_the_reader() {
         ]
     );
     let one = |at: usize| at..at + 1;
-    let in_label = |range: Range<usize>| meta::LABEL.start + range.start..meta::LABEL.start + range.end;
+    let in_label =
+        |range: Range<usize>| meta::LABEL.start + range.start..meta::LABEL.start + range.end;
     assert_eq!(
         of("Meta"),
         [

@@ -108,7 +108,9 @@ impl Board {
 
     /// Begins `iltm flash FILE --confirm --key KEY`; returns when it talks to the board.
     pub(crate) fn flash(&self, name: &str) -> Flashing {
-        let flash = self.iltm(&["flash", name, "--confirm", "--key", KEY_FILE]).spawn();
+        let flash = self
+            .iltm(&["flash", name, "--confirm", "--key", KEY_FILE])
+            .spawn();
         let mut child = flash.expect("the binary is there");
         let out = BufReader::new(child.stdout.take().expect("piped"));
         let (sender, events) = channel();

@@ -91,14 +91,24 @@ impl<'a> Checked<'a> {
     /// The table, ready for frames.
     #[must_use]
     pub fn table(&self) -> Table<'a> {
-        let tiers = self.whole.required(SectionKind::Tiers).and_then(tiers);
+        let mut listed = Vec::new();
+        for tier in self
+            .whole
+            .required(SectionKind::Tiers)
+            .and_then(tiers)
+            .into_iter()
+            .flatten()
+        {
+            // There are no more than fit; collecting would have code for a panic.
+            let _ = listed.push(tier);
+        }
         Table {
             basis: Basis::new(self.meta.grid),
             channels: self.meta.channels,
             gain_fraction: self.meta.gain_fraction,
             reference_white: self.meta.reference_white,
             inverse_error: self.meta.inverse_error,
-            tiers: tiers.map_or(Vec::new(), Iterator::collect),
+            tiers: listed,
             gain: self.gain,
             ambient: self.ambient,
             response: self.response,

@@ -95,14 +95,15 @@ struct Cursor<'a> {
 
 impl<'a> Cursor<'a> {
     fn new(index: usize, segment: &Segment<'a>) -> Self {
+        let mut groups = Vec::new();
+        for group in segment.groups() {
+            // Others there are none; collecting would have code for a panic.
+            let _ = groups.push(group.rows());
+        }
         Self {
             segment: index,
             channels: segment.channels,
-            groups: segment
-                .groups()
-                .take(MAX_SHORT + 1)
-                .map(|group| group.rows())
-                .collect(),
+            groups,
         }
     }
 

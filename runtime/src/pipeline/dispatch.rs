@@ -1,8 +1,5 @@
 //! Dispatch by channels: frames as a device has them, bytes with the channels of a pixel side
 //! by side.
-//!
-//! Its functions are `#[inline]`, so that a firmware compiles them by its own settings: small.
-//! What takes the time of a frame is in the kernels.
 
 use super::full::FullPipeline;
 use super::grid::GridPipeline;
@@ -19,7 +16,6 @@ use crate::placement::PixelArea;
 ///
 /// # Errors
 /// As [`GridPipeline::compensate`].
-#[inline]
 pub fn compensate_cells(
     table: &Table<'_>,
     tier: u8,
@@ -67,7 +63,6 @@ pub struct FrameJob<'t, 'a> {
 /// # Errors
 /// [`FrameError`] if the area is smaller than the grid, or this build takes none larger.
 /// Slices that are too short are filled as far as they go.
-#[inline]
 pub fn prepare_pixels(
     table: &Table<'_>,
     area: FrameSize,
@@ -87,7 +82,6 @@ pub fn prepare_pixels(
 ///
 /// # Errors
 /// As [`FullPipeline::within`] and [`FullPipeline::compensate`].
-#[inline]
 pub fn compensate_pixels(
     job: &FrameJob<'_, '_>,
     wanted: &[u8],

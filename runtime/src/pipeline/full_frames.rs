@@ -88,7 +88,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
                 self.gain_row(y, channel, &mut memory.row, memory.values);
                 store(line, channel, channels, memory.values);
             }
-            if self.ambient_row(y, channel, &mut memory.row)
+            if self.table().ambient().is_some()
+                && self.ambient_row(y, channel, &mut memory.row)
                 && let Some(line) = memory.ambient.chunks_exact_mut(width).nth(y)
             {
                 let values = memory.values.iter_mut().zip(memory.row.spread.iter());
