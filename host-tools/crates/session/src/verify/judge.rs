@@ -18,13 +18,17 @@ use std::path::Path;
 /// How much larger than expected an error may be.
 pub(super) const MARGIN: f64 = 1.5;
 
-/// Most that the photographs' own faults may add to what the table promises, as a multiple of
-/// it. See `verified` in the documentation of accuracy: good sessions stay below, and the
-/// smallest bump of a tripod that spoils an error is above.
-pub(super) const MOST_ADDED: f64 = 1.5;
+/// Most that the noise of the photographs may add to what the table promises, as a multiple of
+/// it. Good sessions stay below, and the smallest bump of a tripod that spoils an error is above:
+/// `docs/verify.md` has the study.
+pub(super) const MOST_NOISE: f64 = 1.5;
 
-/// Largest change of white from cell to cell that a camera standing elsewhere explains.
-pub(super) const MOST_VIEWPOINT: f64 = 0.01;
+/// Most that finding the cells again may add, as a multiple of what the table promises: white
+/// differs by more than twice that where cells have few pixels.
+pub(super) const MOST_VIEWPOINT: f64 = 2.5;
+
+/// The most in any case: beyond, it is a change of the scene.
+const MOST_VIEWPOINT_OF_ALL: f64 = 0.01;
 
 /// Where the table predicts nothing: share of the error before that may remain.
 const UNPREDICTED: f64 = 0.5;
@@ -51,9 +55,9 @@ pub struct Bound {
     /// Error that the noise of these photographs makes, mean over the images; `None` with
     /// a single photograph of white.
     pub noise: Option<f64>,
-    /// Error of finding the cells again: what white differs by from cell to cell, which a
-    /// camera elsewhere sees other parts of; at most 1 %, beyond which it is
-    /// a change of the scene.
+    /// Error of finding the cells again: what white differs by from cell to cell and neighbours
+    /// do not share, since a camera elsewhere sees other parts of them; at most 1 %, beyond
+    /// which it is a change of the scene.
     pub viewpoint: f64,
     /// Error that the table promises on this projector: what it predicts and what range and
     /// codes leave. Where it predicts none, that of the limit without its margin.
@@ -66,6 +70,28 @@ pub struct Bound {
     /// The largest error that the promise and all faults of the photographs explain: what is
     /// beyond it is on the wall. At least the limit.
     pub doubt: f64,
+}
+
+impl Bound {
+    /// What the photographs add too much of for a table to pass on them.
+    pub(super) fn unsure(&self) -> Option<Cause> {
+        if self.noise.unwrap_or(0.0) > MOST_NOISE * self.promise {
+            Some(Cause::Noise)
+        } else if self.viewpoint > MOST_VIEWPOINT * self.promise {
+            Some(Cause::Viewpoint)
+        } else {
+            None
+        }
+    }
+
+    /// The larger of what the photographs add.
+    pub(super) fn worst(&self) -> Cause {
+        if self.noise.unwrap_or(0.0) >= self.viewpoint {
+            Cause::Noise
+        } else {
+            Cause::Viewpoint
+        }
+    }
 }
 
 /// A test image on the wall.
@@ -107,8 +133,20 @@ pub struct WhiteChange {
     pub level: Vec<f64>,
     /// The same from cell to cell once that is divided out: root mean square.
     pub shape: f64,
+    /// The part of it that neighbouring cells do not share: what a camera elsewhere explains,
+    /// which sees other parts of each cell. Paint changes neighbours alike.
+    pub alone: f64,
     /// Of each cell, mean over the channels; `None` where it was not compared.
     pub cells: Vec<Option<f64>>,
+}
+
+impl WhiteChange {
+    /// The part of [`shape`](Self::shape) that neighbouring cells share: paint, lamps, things
+    /// that were moved.
+    #[must_use]
+    pub fn shared(&self) -> f64 {
+        (self.shape.powi(2) - self.alone.powi(2)).max(0.0).sqrt()
+    }
 }
 
 /// A cell with a large error.
@@ -205,9 +243,10 @@ pub fn judge(
         images.iter().map(of).sum::<f64>() / images.len().max(1) as f64
     };
     let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
-    let drift = drift(readings, &mut expected, white, &lit);
-    let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
-    let viewpoint = shape.min(MOST_VIEWPOINT);
+    let cols = table.grid().cols();
+    let drift = drift(readings, &mut expected, (white, cols), &lit);
+    let alone = drift.white.as_ref().map_or(0.0, |white| white.alone);
+    let viewpoint = alone.min(MOST_VIEWPOINT_OF_ALL);
     let bound = self::bound(table, readings, &images, (error[0], bound), viewpoint, &lit);
     let curve = curve(readings, &lit);
     let found = (&readings.revisited, &drift, curve);
@@ -361,7 +400,9 @@ fn bound(
     let added_of = |image: usize| noise_of(image).hypot(viewpoint);
     let expected = mean(&|image| {
         let promise = promise_of(image);
-        promise.hypot(added_of(image).min(MOST_ADDED * promise))
+        let noise = noise_of(image).min(MOST_NOISE * promise);
+        let viewpoint = viewpoint.min(MOST_VIEWPOINT * promise);
+        promise.hypot(noise).hypot(viewpoint)
     });
     let expected = predicted.filter(|_| given.is_none()).map(|_| expected);
     let limit = expected.map_or(MARGIN * unpredicted, |expected| MARGIN * expected);
@@ -457,7 +498,7 @@ fn check_order(
 fn drift(
     readings: &Readings,
     expected: &mut Expected<'_, '_>,
-    white: f64,
+    (white, cols): (f64, usize),
     lit: &LiveCells,
 ) -> Drift {
     let seen = &readings.revisited.white;
@@ -471,7 +512,7 @@ fn drift(
     let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
     let flood = expected.photograph(&readings.flood);
     Drift {
-        white: flood.map(|flood| white_change(readings, &flood, white, lit)),
+        white: flood.map(|flood| white_change(readings, &flood, (white, cols), lit)),
         session: changes.fold(0.0, f64::max),
     }
 }
@@ -479,13 +520,13 @@ fn drift(
 fn white_change(
     readings: &Readings,
     flood: &CellPlanes,
-    white: f64,
+    (white, cols): (f64, usize),
     lit: &LiveCells,
 ) -> WhiteChange {
     let seen = &readings.revisited.white;
     let mut level = Vec::new();
     let mut change = vec![0.0; lit.0.len()];
-    let mut square = 0.0;
+    let (mut square, mut shared) = (0.0, 0.0);
     for (channel, plane) in flood.iter().enumerate() {
         let mean = |cell: &usize| {
             seen.iter().map(|light| light[channel][*cell]).sum::<f64>() / seen.len().max(1) as f64
@@ -498,14 +539,32 @@ fn white_change(
             *change += off / flood.len() as f64;
             square += off * off;
         }
+        let off = |ratio: &f64| (ratio / median.max(1e-12) - 1.0) as f32;
+        let off: Vec<f32> = ratios.iter().map(off).collect();
+        shared += shared_by_neighbours(&lit.among(readings.live.len(), &off), cols);
         level.push(median);
     }
+    let channels = flood.len().max(1) as f64;
+    let square = square / (lit.0.len().max(1) as f64 * channels);
     let change: Vec<f32> = change.into_iter().map(|change| change as f32).collect();
     WhiteChange {
         level,
-        shape: (square / (lit.0.len() * flood.len()).max(1) as f64).sqrt(),
+        shape: square.sqrt(),
+        alone: (square - shared / channels).max(0.0).sqrt(),
         cells: lit.among(readings.live.len(), &change),
     }
+}
+
+/// Mean product of the values of neighbouring cells, at least 0.
+fn shared_by_neighbours(cells: &[Option<f64>], cols: usize) -> f64 {
+    let pairs = (0..cells.len()).flat_map(|cell| {
+        let right = ((cell + 1) % cols != 0).then_some(cell + 1);
+        [right, Some(cell + cols)].map(|other| Some(cells[cell]? * (*cells.get(other?)?)?))
+    });
+    let (sum, count) = pairs
+        .flatten()
+        .fold((0.0, 0_usize), |(sum, n), product| (sum + product, n + 1));
+    (sum / count.max(1) as f64).max(0.0)
 }
 
 /// How bright wanted white is, of the projector's own.

@@ -5,7 +5,6 @@
 //! larger than everything that the photographs' own faults explain. Between the two, nobody
 //! knows.
 
-use super::judge::MOST_ADDED;
 use super::{Bound, Curve, Drift};
 use iltm_capture::{CellReadings, Gate, GateName, Nonlinearity};
 use strum::IntoStaticStr;
@@ -216,9 +215,6 @@ pub(super) fn decide(
 ) -> (Outcome, Option<Cause>) {
     let refused = refused(readings).map(|(cause, _)| cause);
     let fits = error <= bound.limit;
-    // Photographs that differ by many times what is promised tell nothing, however small the
-    // error is.
-    let sure = bound.added <= MOST_ADDED * bound.promise;
     let bent = error > bound.promise && curve.left < EXPLAINED * error && curve.left <= bound.limit;
     match refused {
         Some(Cause::DynamicProjector) => (Outcome::Failed, refused),
@@ -231,11 +227,13 @@ pub(super) fn decide(
             (Outcome::Inconclusive, Some(Cause::Response))
         }
         None if error > bound.doubt => (Outcome::Failed, Some(changed(bound, drift))),
-        None if fits && sure => (Outcome::Passed, None),
-        None if bound.noise.unwrap_or(0.0) >= bound.viewpoint => {
-            (Outcome::Inconclusive, Some(Cause::Noise))
-        }
-        None => (Outcome::Inconclusive, Some(Cause::Viewpoint)),
+        // Photographs that differ by many times what is promised tell nothing, however small
+        // the error is.
+        None if fits => match bound.unsure() {
+            None => (Outcome::Passed, None),
+            why => (Outcome::Inconclusive, why),
+        },
+        None => (Outcome::Inconclusive, Some(bound.worst())),
     }
 }
 
@@ -253,7 +251,7 @@ pub(super) fn colour(level: &[f64]) -> f64 {
 fn changed(bound: &Bound, drift: &Drift) -> Cause {
     match &drift.white {
         None => Cause::Unknown,
-        Some(white) if white.shape > 2.0 * bound.limit.max(0.01) => Cause::Scene,
+        Some(white) if white.shared() > bound.limit => Cause::Scene,
         Some(white) if colour(&white.level) > SAME_COLOUR => Cause::Colour,
         Some(_) => Cause::ProjectorResponse,
     }

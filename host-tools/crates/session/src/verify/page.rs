@@ -1,6 +1,6 @@
 //! Page of a verdict: one HTML file with everything inside.
 
-use super::judge::MOST_ADDED;
+use super::judge::{MOST_NOISE, MOST_VIEWPOINT};
 use super::maps::{MARKED, drift_scale, error_scale};
 use super::outcome::colour;
 use super::{Cause, ImageVerdict, Outcome, TableVerdict, TestImage};
@@ -170,10 +170,9 @@ fn expectation(verdict: &TableVerdict) -> Vec<(&'static str, String)> {
         match (bound.given, bound.expected) {
             (true, _) => format!("{}, as asked for", percent(bound.limit)),
             (false, Some(_)) => format!(
-                "{}: 1.5 times what is expected, where the photographs' own faults count up to {} times \
-                 the promise",
+                "{}: 1.5 times what is expected, where noise counts up to {MOST_NOISE} times the \
+                 promise, and finding the cells again up to {MOST_VIEWPOINT} times",
                 percent(bound.limit),
-                MOST_ADDED
             ),
             (false, None) => format!("{}: half of the error before", percent(bound.limit)),
         },
