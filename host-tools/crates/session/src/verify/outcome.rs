@@ -205,7 +205,7 @@ const EXPLAINED: f64 = 0.7;
 
 /// Powers of light up to this one, or its inverse, cannot be seen where patterns and their
 /// inverses add up.
-const UNSEEN: f64 = 1.1;
+const UNSEEN: f64 = 1.15;
 
 /// What follows from an error with compensation.
 pub(super) fn decide(
@@ -218,6 +218,8 @@ pub(super) fn decide(
     let bent = error > bound.promise && curve.left < EXPLAINED * error && curve.left <= bound.limit;
     match refused {
         Some(Cause::DynamicProjector) => (Outcome::Failed, refused),
+        // Light adds up once it is bent back, and the error is gone with that.
+        Some(Cause::Superposition) if bent => (Outcome::Inconclusive, Some(Cause::CameraResponse)),
         // Brightness that follows the picture is one factor a photograph, which errors leave out.
         Some(Cause::Superposition) if error > bound.doubt => {
             (Outcome::Failed, Some(changed(bound, drift)))
