@@ -33,7 +33,7 @@ const PIXELS: usize = if Stage::FullResolution.is_built() {
 /// The workspace. Its size counts apart from the rest of the firmware's memory:
 /// it follows the largest table and frame that a board is to take.
 ///
-/// The order of the fields matters: see [`STRAY`].
+/// The order of the fields matters: see `STRAY`.
 #[repr(C)]
 pub struct Memory {
     inputs: [InputCoefficient; CHANNELS * MAX_CELLS],
