@@ -13,7 +13,7 @@
 use iltm::progress::Silent;
 use iltm::video::live::Live;
 use iltm::video::watch::FileWatch;
-use iltm::video::{CompensateOptions, Compensator};
+use iltm::video::{CompensateOptions, Compensator, Input};
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
 use iltm_tests::made_up::MadeUp;
@@ -188,7 +188,8 @@ fn run(case: &Case) -> (f64, f64) {
             };
             let table = Table::check(&bytes).expect("the same table");
             let compensator = Compensator::new(&table, settings).expect("threads");
-            let summary = compensator.live(live, input, output, &Silent);
+            let summary =
+                compensator.live(live, Input::of(input).expect("a stream"), output, &Silent);
             summary.expect("a whole stream").frames.frames
         } else {
             let summary = compensator.y4m(input, output, &Silent);

@@ -19,6 +19,7 @@
 //! | [`haar`] | the exact integer Haar transform on any grid |
 //! | [`operator`] | the sparse operator and the proof that it cannot overflow |
 //! | [`image`] | the `.iltm` image: layout, check, accessors |
+//! | [`placement`] | which pixels of a frame the cells cover |
 //! | [`resample`] | between pixels and cells |
 //! | [`pipeline`] | frames in, projector input out |
 //! | [`frame_buffers`] | frame buffers shared with the hardware that fills and shows them |
@@ -59,6 +60,7 @@ mod kernel;
 pub mod link;
 pub mod operator;
 pub mod pipeline;
+pub mod placement;
 pub mod resample;
 pub mod response;
 pub mod ring;

@@ -9,7 +9,7 @@
 /// emulator; they need not be exact, only not far too low.
 pub(crate) mod cost {
     /// A byte through CRC-32.
-    pub(crate) const CRC_BYTE: usize = 10;
+    pub(crate) const CRC_BYTE: usize = 16;
     /// A byte through SHA-512.
     pub(crate) const HASH_BYTE: usize = 95;
     /// A sum of two points of the curve.
@@ -29,18 +29,18 @@ pub(crate) mod cost {
 }
 
 /// Counts work and yields when there was enough.
-pub(crate) struct YieldBudget<'p> {
-    yield_now: &'p mut dyn FnMut(),
+pub(crate) struct YieldBudget<'p, Y: ?Sized> {
+    yield_now: &'p mut Y,
     worked: usize,
 }
 
-impl<'p> YieldBudget<'p> {
-    /// Work between two calls, in instructions. Frames are tens of milliseconds
-    /// apart, so this could be longer; it is short enough that nobody has to ask.
-    pub(crate) const STRIDE: usize = 10_000;
+/// Work between two calls, in instructions. Frames are tens of milliseconds
+/// apart, so this could be longer; it is short enough that nobody has to ask.
+pub(crate) const STRIDE: usize = 10_000;
 
+impl<'p, Y: FnMut() + ?Sized> YieldBudget<'p, Y> {
     /// Starts counting.
-    pub(crate) fn new(yield_now: &'p mut dyn FnMut()) -> Self {
+    pub(crate) fn new(yield_now: &'p mut Y) -> Self {
         Self {
             yield_now,
             worked: 0,
@@ -52,7 +52,7 @@ impl<'p> YieldBudget<'p> {
     pub(crate) fn spend(&mut self, count: usize, cost: usize) {
         let work = count.saturating_mul(cost);
         self.worked = self.worked.saturating_add(work);
-        if self.worked >= Self::STRIDE {
+        if self.worked >= STRIDE {
             self.yield_anew();
         }
     }
@@ -73,7 +73,7 @@ mod tests {
         let mut calls = 0;
         let mut yield_now = || calls += 1;
         let mut budget = YieldBudget::new(&mut yield_now);
-        for _ in 0..3 * YieldBudget::STRIDE {
+        for _ in 0..3 * STRIDE {
             budget.spend(1, 1);
         }
         budget.spend(usize::MAX, usize::MAX);

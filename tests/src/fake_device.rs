@@ -5,10 +5,11 @@ use crate::flash_simulator::NorSimulator;
 use crate::line_faults::{FarEnd, PacedLine};
 use crate::slots::{SimDevice, SlotLayout};
 use iltm_runtime::image::layout::FORMAT_VERSION;
+use iltm_runtime::image::{Table, content, unseal};
 use iltm_runtime::link::{
-    Clipping, Device, Event, FrameCounts, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode, Name,
-    PROTOCOL_VERSION, PassThrough, Refusal, Request, Response, SerialCounts, Session, SlotState,
-    Stack, Status, TableName, Version,
+    Clipping, Device, Event, FrameCounts, FrameKind, FrameTime, Hello, Limits, MAX_PAYLOAD, Mode,
+    Name, PROTOCOL_VERSION, PassThrough, Refusal, Request, Response, SerialCounts, Session,
+    SlotState, Stack, Status, TableName, Version,
 };
 use iltm_runtime::store::{Slot, Updater};
 use std::fmt;
@@ -71,7 +72,11 @@ impl FakeTables {
     /// Of a device with this key and number.
     pub fn provisioned(key: [u8; 32], device: u64) -> Self {
         let mut tables = Self::default();
-        let response = tables.device.ask(Request::Provision { key, device });
+        let response = tables.device.ask(Request::Provision {
+            key,
+            device,
+            even_so: true,
+        });
         assert_eq!(response, Response::Provisioned);
         tables
     }
@@ -84,6 +89,20 @@ impl FakeTables {
     /// What the flash holds.
     pub fn contents(&self) -> Vec<u8> {
         self.device.flash().contents().to_vec()
+    }
+
+    /// The least frames that the table in use takes.
+    fn frames(&self) -> Option<FrameKind> {
+        let range = slot(self.updater().in_use()?.index());
+        let contents = self.device.flash().contents();
+        let file = content(&contents[range]);
+        let (image, _) = unseal(file).ok()?;
+        let table = Table::check(image).ok()?;
+        Some(FrameKind {
+            width: table.grid().cols() as u16,
+            height: table.grid().rows() as u16,
+            channels: table.channels(),
+        })
     }
 
     /// Whether it answers nothing any more.
@@ -162,6 +181,11 @@ impl Default for FakeDevice {
             },
             watchdog_resets: 0,
             serial: SerialCounts::default(),
+            input: Some(FrameKind {
+                width: 320,
+                height: 240,
+                channels: 1,
+            }),
         };
         Self {
             status,
@@ -250,13 +274,24 @@ impl Device for FakeDevice {
         let mut status = self.status.clone();
         status.uptime_ms = self.uptime_ms;
         status.frames.received = (self.uptime_ms * 60 / 1_000) as u32;
+        if status.input.is_none() {
+            status.frames.received = 0;
+        }
         status.frames.shown = status.frames.received;
         if let Some(tables) = &self.tables {
             status.table = tables.updater().table();
             status.slots = tables.updater().states();
-            status.mode = match status.table {
-                Some(_) => Mode::Compensating,
+            status.mode = match tables.frames().zip(status.input) {
+                None if status.table.is_some() => Mode::Compensating,
                 None => Mode::PassThrough(PassThrough::NoTable),
+                Some((least, input))
+                    if least.channels == input.channels
+                        && least.width <= input.width
+                        && least.height <= input.height =>
+                {
+                    Mode::Compensating
+                }
+                Some(_) => Mode::PassThrough(PassThrough::OtherFrames),
             };
         }
         status

@@ -111,6 +111,7 @@ pub mod word {
     pub const TEAR: usize = 11;
     pub const PANIC: usize = 12;
     pub const NEW_OUTPUT: usize = 13;
+    pub const HANGS: usize = 14;
     pub const SHOWN: usize = 32;
     pub const WRONG: usize = 33;
     pub const OVER: usize = 34;
@@ -316,13 +317,12 @@ pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Ve
         tier: Some(tier),
         encoding: format.encoding(),
         threads: 1,
+        ..CompensateOptions::default()
     };
     let compensator = Compensator::new(table, settings).expect("the tier exists");
     let samples = Samples::Eight(frame.to_vec());
-    let mut picture = Picture::new(format.size(), samples).expect("a whole frame");
-    let summary = compensator
-        .picture(&mut picture)
-        .expect("it fits the table");
+    let picture = Picture::new(format.size(), samples).expect("a whole frame");
+    let (picture, summary) = compensator.frame(picture).expect("it fits the table");
     match picture.samples() {
         Samples::Eight(samples) => (samples.clone(), summary.clipped),
         Samples::Sixteen(_) => unreachable!("the samples were bytes"),

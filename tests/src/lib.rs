@@ -25,13 +25,17 @@ pub mod reference_pages;
 pub mod simulated;
 pub mod slots;
 pub mod stages;
+pub mod verdicts;
 
 use ed25519_dalek::SigningKey;
+use ed25519_dalek::pkcs8::EncodePrivateKey;
+use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use iltm::compile::sign::{SealTerms, sign};
 use iltm::compile::{CompileOptions, compile};
 use iltm::picture::Response;
 use iltm::solve::{ChannelInverse, InverseTransport};
 use iltm_runtime::Grid;
+use iltm_runtime::image::Label;
 use nalgebra::DMatrix;
 
 /// A grid of these sides.
@@ -42,6 +46,12 @@ pub fn grid(rows: u16, cols: u16) -> Grid {
 /// A key that signs tables, another one for each seed.
 pub fn signing_key(seed: u8) -> SigningKey {
     SigningKey::from_bytes(&[seed; 32])
+}
+
+/// The file of a private key.
+pub fn key_file(key: &SigningKey) -> String {
+    let pem = key.to_pkcs8_pem(LineEnding::LF);
+    pem.expect("a key has a form").to_string()
 }
 
 /// The file of a table that is signed with a key, for the device of this number or, with 0,
@@ -123,6 +133,16 @@ pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
 /// The table image of [`wedge`] for an sRGB projector.
 pub fn wedge_table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
     wedge_table_for(Response::Srgb, rows, cols, channels)
+}
+
+/// A small grey table image with this name and day.
+pub fn named_table(name: &str, date: u32) -> Vec<u8> {
+    let options = CompileOptions {
+        label: Label::new(name, date),
+        ..CompileOptions::default()
+    };
+    let compiled = compile(&wedge(grid(4, 6), 1), None, &options);
+    compiled.expect("the wedge is a plain scene").image
 }
 
 /// The table image of [`wedge`].

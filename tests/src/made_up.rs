@@ -3,14 +3,15 @@
 
 use fastrand::Rng;
 use fixed::types::{U0F32, U1F15, U8F24};
-use iltm::compile::image::{ImageWriter, StoredRow, segment_bytes};
+use iltm::compile::image::{ImageWriter, StoredRow, projector_section, segment_bytes};
 use iltm::compile::response;
 use iltm::picture::Response;
 use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::SectionKind;
-use iltm_runtime::image::{Meta, TierInfo};
+use iltm_runtime::image::{Label, Meta, TierInfo};
 use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use iltm_runtime::placement::ProjectorPixels;
 use std::collections::BTreeSet;
 
 /// What a table is to hold.
@@ -30,6 +31,8 @@ pub struct MadeUp {
     pub response: bool,
     /// Gains finer than the cells: rows, columns, and gains as above.
     pub fine_gains: Option<(u16, u16, Vec<u16>)>,
+    /// The projector that it was made with, where that is known.
+    pub projector: Option<ProjectorPixels>,
     /// Rows of the operator in each tier above 0, those of lower tiers included; no tier
     /// without an operator.
     pub tiers: Vec<Vec<StoredRow>>,
@@ -50,6 +53,7 @@ impl MadeUp {
             ambient: None,
             response: false,
             fine_gains: None,
+            projector: None,
             tiers: Vec::new(),
             scales,
         }
@@ -165,6 +169,9 @@ impl MadeUp {
         for (tier, segment) in (1..).zip(&segments) {
             image.section(SectionKind::Operator, tier, segment.clone());
         }
+        if let Some(projector) = self.projector {
+            image.section(SectionKind::Projector, 0, projector_section(projector));
+        }
         image.finish()
     }
 
@@ -177,6 +184,7 @@ impl MadeUp {
             inverse_error: U0F32::ZERO,
             bounds: operator.map_or(Bounds::default(), Operator::bounds),
             channel_scales: self.scales,
+            label: Label::default(),
         }
     }
 }

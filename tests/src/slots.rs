@@ -2,13 +2,15 @@
 //! simulated flash, with nothing but memory around them.
 
 use crate::flash_simulator::NorSimulator;
-use ed25519_dalek::SigningKey;
-use iltm_runtime::image::content;
-use iltm_runtime::link::{Digest, PassThrough, Refusal, Request, Response};
+use crate::signing_key;
+use ed25519_dalek::{Signer, SigningKey};
+use iltm_runtime::image::{Seal, content};
+use iltm_runtime::link::{Digest, PassThrough, Refusal, Request, Response, Slots};
 use iltm_runtime::store::{Map, Slot, TableSlots, Updater};
-use iltm_runtime::trust::{Accepted, Rejected, Terms, admit};
+use iltm_runtime::trust::{Accepted, Deed, Rejected, Terms, admit};
 use sha2::{Digest as _, Sha512};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Where the slots of a device are: both at the start of the flash, then a sector for
 /// each half of the records and one for the identity.
@@ -68,6 +70,27 @@ pub struct SimTables {
 }
 
 impl<const W: usize, const E: usize> TableSlots<NorSimulator<W, E>> for SimTables {
+    fn examine(
+        &mut self,
+        flash: &NorSimulator<W, E>,
+        slot: Slot,
+        length: Option<u32>,
+        terms: &Terms,
+    ) -> Result<Accepted, Rejected> {
+        let bytes = flash.contents().get(self.layout.slot(slot));
+        let bytes = bytes.unwrap_or_default();
+        let file = match length {
+            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
+            None => content(bytes),
+        };
+        let start = self.layout.slot(slot).start;
+        let read = start..start + length.map_or(bytes.len(), |length| length as usize);
+        assert!(flash.is_readable(read), "the processor faults");
+        let pauses = &mut self.pauses;
+        let (_, accepted) = admit(file, terms, &mut || *pauses += 1)?;
+        Ok(accepted)
+    }
+
     fn load(
         &mut self,
         flash: &NorSimulator<W, E>,
@@ -76,14 +99,7 @@ impl<const W: usize, const E: usize> TableSlots<NorSimulator<W, E>> for SimTable
         terms: &Terms,
     ) -> Result<Accepted, Rejected> {
         *slot.of_mut(&mut self.kept) = false;
-        let bytes = flash.contents().get(self.layout.slot(slot));
-        let bytes = bytes.unwrap_or_default();
-        let file = match length {
-            Some(length) => bytes.get(..length as usize).unwrap_or(bytes),
-            None => content(bytes),
-        };
-        let pauses = &mut self.pauses;
-        let (_, accepted) = admit(file, terms, &mut || *pauses += 1)?;
+        let accepted = self.examine(flash, slot, length, terms)?;
         *slot.of_mut(&mut self.kept) = true;
         Ok(accepted)
     }
@@ -126,6 +142,10 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
 
     /// One that finds this in its flash when it starts.
     pub fn start(flash: NorSimulator<W, E>, layout: SlotLayout) -> Self {
+        Self::start_after(false, flash, layout)
+    }
+
+    fn start_after(crashes: bool, flash: NorSimulator<W, E>, layout: SlotLayout) -> Self {
         let mut tables = SimTables {
             layout,
             selected: Err(PassThrough::NoTable),
@@ -133,7 +153,7 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
             pauses: 0,
         };
         let map = layout.map(&flash);
-        let updater = Updater::start(flash, map, &mut tables);
+        let updater = Updater::start_after(crashes, flash, map, &mut tables);
         Self {
             updater,
             tables,
@@ -149,9 +169,32 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
         Self::start(flash, self.layout)
     }
 
+    /// The same after it has crashed again and again.
+    pub fn restarted_after_crashes(self) -> Self {
+        Self::start_after(true, self.updater.into_flash(), self.layout)
+    }
+
+    /// What it does where the table in use has rotted.
+    pub fn abandon(&mut self) {
+        self.updater.abandon(&mut self.tables);
+    }
+
     /// Asks it something.
     pub fn ask(&mut self, request: Request<'_>) -> Response {
         self.updater.answer(request, self.now_ms, &mut self.tables)
+    }
+
+    /// What is in its slots.
+    pub fn slots(&mut self) -> Slots {
+        match self.ask(Request::Slots) {
+            Response::Slots(slots) => slots,
+            other => panic!("not to a question for the slots: {other:?}"),
+        }
+    }
+
+    /// The right to do this now.
+    pub fn right(&mut self, deed: &Deed) -> Vec<u8> {
+        right(&self.slots(), deed)
     }
 
     /// Time passes.
@@ -223,11 +266,17 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
         let digest = digest(file);
         let transfer = digest.transfer();
         let table = self.updater.table().map_or(0, |table| table.id);
+        let right;
         let request = match *step {
-            Step::Begin => Request::Begin {
-                length: file.len() as u32,
-                digest,
-            },
+            Step::Begin => {
+                let length = file.len() as u32;
+                right = self.right(&Deed::Begin { length, digest });
+                Request::Begin {
+                    length,
+                    digest,
+                    right: &right,
+                }
+            }
             Step::Write(offset) => {
                 let start = offset as usize;
                 let end = file
@@ -243,8 +292,16 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
                 transfer,
                 trial_s: TRIAL_S,
             },
-            Step::Confirm => Request::Confirm { table },
-            Step::Rollback => Request::Rollback { table },
+            Step::Confirm => {
+                right = self.right(&Deed::Confirm { table });
+                let right = &right;
+                Request::Confirm { table, right }
+            }
+            Step::Rollback => {
+                right = self.right(&Deed::Rollback { table });
+                let right = &right;
+                Request::Rollback { table, right }
+            }
             Step::TrialOver => {
                 self.wait(u64::from(TRIAL_S) * 1_000);
                 return Ok(());
@@ -257,10 +314,25 @@ impl<const W: usize, const E: usize> SimDevice<W, E> {
     }
 }
 
+/// What a device with one of the tests' [keys](signing_key) wants to be shown; nothing for
+/// a device without a key.
+pub fn right(slots: &Slots, deed: &Deed) -> Vec<u8> {
+    static KEYS: OnceLock<Vec<SigningKey>> = OnceLock::new();
+    let keys = KEYS.get_or_init(|| (0..64).map(signing_key).collect());
+    let known = |key: &&SigningKey| slots.key == Some(Seal::key_id(key.verifying_key().as_bytes()));
+    let message = deed.message(slots.device, slots.sequence);
+    let key = keys.iter().find(known);
+    key.map_or(Vec::new(), |key| key.sign(&message).to_bytes().to_vec())
+}
+
 /// A request to give a device its number, and the key whose tables it takes from then on.
 pub fn provision(key: &SigningKey, device: u64) -> Request<'static> {
     let key = key.verifying_key().to_bytes();
-    Request::Provision { key, device }
+    Request::Provision {
+        key,
+        device,
+        even_so: true,
+    }
 }
 
 /// Seconds of a trial.

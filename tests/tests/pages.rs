@@ -3,7 +3,7 @@
 //! the architecture what the manifests say.
 
 use iltm::capture::{CalibrationRole, Role, SETTINGS_FILE, Settings};
-use iltm_runtime::image::layout::{SectionKind, header, meta, tier};
+use iltm_runtime::image::layout::{SectionKind, header, label, meta, projector, tier};
 use iltm_runtime::image::seal::field;
 use iltm_tests::reference_pages::{files_below, metadata, pages, root};
 use std::collections::{BTreeMap, BTreeSet};
@@ -99,7 +99,7 @@ fn the_table_format_is_the_one_of_the_reader() {
         let kind = SectionKind::from_number(row[0].parse().unwrap());
         assert_eq!(kind.map(SectionKind::name), Some(row[1]));
     }
-    assert_eq!(rows(&page, "Sections").len(), 9);
+    assert_eq!(rows(&page, "Sections").len(), 10);
     let of = |heading| ranges(&rows(&page, heading));
     assert_eq!(
         of("Header"),
@@ -112,6 +112,8 @@ fn the_table_format_is_the_one_of_the_reader() {
         ]
     );
     let one = |at: usize| at..at + 1;
+    let in_label =
+        |range: Range<usize>| meta::LABEL.start + range.start..meta::LABEL.start + range.end;
     assert_eq!(
         of("Meta"),
         [
@@ -125,12 +127,23 @@ fn the_table_format_is_the_one_of_the_reader() {
             meta::CORRECTION_BOUND,
             meta::CHANNEL_SCALES,
             meta::RESERVED_END,
-            meta::INVERSE_ERROR
+            meta::INVERSE_ERROR,
+            in_label(label::NAME),
+            in_label(label::DATE)
         ]
     );
     assert_eq!(
         of("Tiers"),
         [tier::PREDICTED_ERROR, tier::ENTRIES, tier::MULTIPLICATIONS]
+    );
+    assert_eq!(
+        of("Projector"),
+        [
+            projector::WIDTH,
+            projector::HEIGHT,
+            projector::BORDER,
+            projector::RESERVED
+        ]
     );
     assert_eq!(
         of("Seal"),

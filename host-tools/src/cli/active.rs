@@ -1,8 +1,8 @@
 //! Active table of a device, for whoever wants to know after something went wrong.
 
-use super::words::{in_use, table_name};
+use super::words::{CalledTable, in_use, table_name};
 use crate::device::{Client, DeviceError, Line};
-use iltm_runtime::link::{Refusal, TableName};
+use iltm_runtime::link::Refusal;
 use serde_json::{Value, json};
 use std::fmt;
 
@@ -11,7 +11,7 @@ use std::fmt;
 pub(super) enum Active {
     /// The device says so.
     Known {
-        table: Option<TableName>,
+        table: Option<CalledTable>,
         trial_ms: u32,
     },
     /// It does not answer.
@@ -26,7 +26,7 @@ pub(super) enum Active {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Lost {
     /// The table in use when it was last asked.
-    pub(super) before: Option<TableName>,
+    pub(super) before: Option<CalledTable>,
     /// What it was asked for since.
     pub(super) asked: Asked,
 }

@@ -2,12 +2,13 @@
 
 use super::failure::Kind;
 use super::named::Named;
-use crate::capture::CameraSettings;
-use crate::capture::GateName;
+use super::simulate_chain::Chain;
+use crate::capture::{CameraSettings, GateName, MIN_BERNOULLI};
 #[cfg(unix)]
 use crate::device::emulator::Board;
 use crate::scene::{CaptureFault, Effect, InjectedFault};
 use crate::solve::Method;
+use crate::video::Fit;
 use clap::{Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
@@ -81,9 +82,9 @@ pub(super) enum Command {
     /// Bring a table to a device, which uses it on trial
     Flash(Flash),
     /// Keep the table that is on trial
-    Confirm(SerialLine),
+    Confirm(Decide),
     /// Go back to the table before
-    Rollback(SerialLine),
+    Rollback(Decide),
     /// Say how a device is
     Status(Status),
     /// Watch a device: frame rate, tier, time budget, events, log
@@ -102,8 +103,18 @@ pub(super) enum Command {
     Emulate(Emulate),
 }
 
+/// Whether a command says all that it knows of a table.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct Detail {
+    /// Say everything: photographs, devices, theory, tiers, where the table comes from
+    #[arg(long, short)]
+    pub(super) verbose: bool,
+}
+
 #[derive(Debug, Args)]
 pub(super) struct Demo {
+    #[command(flatten)]
+    pub(super) detail: Detail,
     /// Folder to write into; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "iltm-demo")]
     pub(super) out: PathBuf,
@@ -134,6 +145,20 @@ pub(super) struct Simulate {
         requires = "output"
     )]
     pub(super) shot: Option<u32>,
+    /// Show the folder's slides through a chain that compensates with --table, to practise
+    /// `iltm verify --wanted`: once as it should be, or off, twice, mirrored, shifted=PIXELS,
+    /// scaled=FACTOR
+    #[arg(
+        long,
+        value_name = "CHAIN",
+        requires = "photograph",
+        requires = "table",
+        conflicts_with = "shot"
+    )]
+    pub(super) chain: Option<Chain>,
+    /// Table of the chain
+    #[arg(long, value_name = "TABLE.iltm", requires = "chain")]
+    pub(super) table: Option<PathBuf>,
     /// Let something go wrong, to practise: gamma, auto-exposure, tripod, swapped,
     /// dropped, skipped, clipped, vivid or flicker, with `=SIZE` if it is to be smaller or
     /// larger than usual; may be repeated
@@ -146,7 +171,13 @@ pub(super) struct Simulate {
     #[arg(long)]
     pub(super) ablate: bool,
     /// Bernoulli photographs, beside white, black and the Gray code
-    #[arg(long, value_name = "M", default_value_t = 150)]
+    #[arg(
+        long,
+        value_name = "M",
+        default_value_t = 150,
+        conflicts_with = "photograph",
+        requires = "output"
+    )]
     pub(super) photos: usize,
     /// Seed of the patterns and of the noise
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -186,8 +217,8 @@ pub(super) struct Patterns {
     /// Columns of cells
     #[arg(long, value_name = "C")]
     pub(super) cols: u16,
-    /// Bernoulli patterns, beside white, black and the Gray code
-    #[arg(long, value_name = "M", default_value_t = 150, value_parser = clap::value_parser!(u16).range(..=10_000))]
+    /// Bernoulli patterns, beside white, black and the Gray code; at least 10
+    #[arg(long, value_name = "M", default_value_t = 150, value_parser = bernoulli)]
     pub(super) photos: u16,
     /// Seed of the Bernoulli patterns
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -215,20 +246,25 @@ pub(super) struct Patterns {
 
 /// What `iltm capture --help` ends with.
 const CAMERAS: &str = "\
-Commands are run by the shell. These words are replaced, quoted where the shell needs it:
-  {photo}     file to write      {stem}  the same without its ending, for another one
-  {slide}     file that is shown {index} its number    {role}  what it is shown for
+Commands are run by the shell. These words are replaced, quoted where the shell
+needs it:
+  {photo}     file to write      {stem}   the same without its ending
+  {slide}     file that is shown {index}  its number
+  {role}      what it is shown for
   {exposure}  the fifth column of capture.csv, if there is one
 
 Cameras, each with exposure, white balance and focus set by hand before:
-  --camera 'gphoto2 --force-overwrite --capture-image-and-download --filename {stem}.jpg'
-  --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 --awbgains 2,2 -o {photo}'
-  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 --stream-to={stem}.jpg'
-  --watch ~/Pictures/tethered      whatever fills that folder, or a person at the release
+  --camera 'gphoto2 --force-overwrite --capture-image-and-download \\
+            --filename {stem}.jpg'
+  --camera 'libcamera-still -n --immediate -e png --shutter 33333 --gain 1 \\
+            --awbgains 2,2 -o {photo}'
+  --camera 'v4l2-ctl -v pixelformat=MJPG --stream-mmap --stream-count=1 \\
+            --stream-to={stem}.jpg'
+  --watch ~/Pictures/tethered      whatever fills that folder
 
-Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command returns
-when the slide is shown. Escape on the slide, or ctrl-C, ends a session; the same command
-goes on with what is missing.";
+Slides without a desktop: --show 'cp {slide} /media/player/now.png'; the command
+returns when the slide is shown. Escape on the slide, or ctrl-C, ends a session;
+the same command goes on with what is missing.";
 
 #[derive(Debug, Args)]
 #[allow(clippy::struct_field_names, reason = "it is what stands there")]
@@ -261,12 +297,14 @@ pub(super) struct Capture {
     #[arg(long, value_name = "INDEX", num_args = 1.., value_delimiter = ',', value_parser = indices)]
     pub(super) again: Vec<RangeInclusive<u32>>,
     /// Say what is missing, and take nothing
-    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency"])]
+    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency", "timeout", "retries"])]
     pub(super) list: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct Solve {
+    #[command(flatten)]
+    pub(super) detail: Detail,
     /// Folder with `capture.csv`, patterns and photographs
     pub(super) capture: PathBuf,
     /// Table to write
@@ -295,12 +333,20 @@ pub(super) struct Solve {
     /// brightest that cuts no more of it than --clip-share; may be repeated
     #[arg(long, value_name = "FILE")]
     pub(super) content: Vec<PathBuf>,
+    /// What becomes of content whose aspect is not the projector's, which is refused
+    /// otherwise: letterbox, crop or stretch, as for `iltm compensate`
+    #[arg(long, value_name = "HOW", requires = "content")]
+    pub(super) fit: Option<Fit>,
     /// Share of the content's samples that may be cut at the projector's white
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.001, requires = "content")]
     pub(super) clip_share: f64,
     /// Folder for a report of the scene: a page with pictures; made if it is not there
     #[arg(long, value_name = "DIR")]
     pub(super) report: Option<PathBuf>,
+    /// Name of the table, which devices show; by default that of the scene, or of the
+    /// capture's folder
+    #[arg(long, value_name = "NAME")]
+    pub(super) name: Option<String>,
     /// Sign the table with this key
     #[arg(long, value_name = "FILE")]
     pub(super) key: Option<PathBuf>,
@@ -325,15 +371,16 @@ pub(super) struct Bounces {
 
 #[derive(Debug, Args)]
 pub(super) struct SealTerms {
-    /// Version of the table; a device does not go back to a lower one by itself
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) table_version: u32,
-    /// Number of the only device that the table is for; any if left out
-    #[arg(long, value_name = "NUMBER", value_parser = device_number)]
+    /// Version of the signed table; devices with the key take none below the highest that
+    /// was confirmed there; minutes since 1970 if left out
+    #[arg(long, value_name = "N", requires = "key", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) table_version: Option<u32>,
+    /// Number of the only device that the signed table is for; any if left out
+    #[arg(long, value_name = "NUMBER", requires = "key", value_parser = device_number)]
     pub(super) for_device: Option<u64>,
     /// Once the table is confirmed, versions below this never run again on the device
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) revoke_below: u32,
+    #[arg(long, value_name = "N", requires = "key")]
+    pub(super) revoke_below: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -395,6 +442,18 @@ pub(super) struct Flash {
     /// Say what would be sent and change nothing
     #[arg(long)]
     pub(super) dry_run: bool,
+    /// Site's or technician's key that shows a device with a key the right to do so
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Decide {
+    #[command(flatten)]
+    pub(super) line: SerialLine,
+    /// Site's or technician's key that shows a device with a key the right to do so
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -418,6 +477,24 @@ pub(super) enum KeyCommand {
     },
     /// Give a device that has none its public key, for good
     Install(Install),
+    /// Make a technician's key: it flashes tables that the site signed, and signs none
+    Technician(Technician),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Technician {
+    /// The site's private key
+    pub(super) site: PathBuf,
+    /// File to write; never one that is there already
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Number of the only device that it is for; any if left out
+    #[arg(long, value_name = "NUMBER", value_parser = device_number, default_value = "0", hide_default_value = true)]
+    pub(super) device: u64,
+    /// Void on devices that confirmed a table with a higher --revoke-below; minutes since
+    /// 1970 if left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) version: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -432,6 +509,9 @@ pub(super) struct Install {
     /// Do not ask whether this is meant
     #[arg(long)]
     pub(super) yes: bool,
+    /// Also where the table in use would be refused from the device's next start on
+    #[arg(long)]
+    pub(super) lose_table: bool,
 }
 
 #[derive(Debug, Args)]
@@ -464,6 +544,8 @@ pub(super) struct Completions {
 
 #[derive(Debug, Args)]
 pub(super) struct Inspect {
+    #[command(flatten)]
+    pub(super) detail: Detail,
     /// Table to read
     pub(super) table: PathBuf,
     /// Key to verify its signature with
@@ -485,7 +567,8 @@ pub(super) struct Tradeoff {
 pub(super) struct Compensate {
     /// Table to compensate with
     pub(super) table: PathBuf,
-    /// PNG or Y4M, of the grid's size or larger; `-` reads a Y4M from standard input
+    /// PNG or Y4M in the projector's aspect, of the size inside its border, or of one pixel
+    /// a cell; `-` reads from standard input
     pub(super) input: PathBuf,
     /// Where to write, in the input's format; `-` is standard output
     #[arg(short, long, value_name = "OUTPUT")]
@@ -494,6 +577,10 @@ pub(super) struct Compensate {
     /// projector's response out
     #[arg(long)]
     pub(super) linear: bool,
+    /// What becomes of frames whose aspect is not the projector's, which are refused
+    /// otherwise: letterbox (black bars), crop (edges cut off) or stretch (shown stretched)
+    #[arg(long, value_name = "HOW")]
+    pub(super) fit: Option<Fit>,
     /// Tier of the table's accuracy ladder; the most accurate if left out
     #[arg(long, value_name = "TIER", conflicts_with = "budget")]
     pub(super) tier: Option<u8>,
@@ -521,6 +608,10 @@ pub(super) struct Verify {
     /// Folder to make, with the pictures to project
     #[arg(short, long, value_name = "FOLDER")]
     pub(super) output: Option<PathBuf>,
+    /// Write the test images as they should look, for the player or the device that will
+    /// compensate them: the verdict is then on the chain that really runs
+    #[arg(long, requires = "output")]
+    pub(super) wanted: bool,
     /// Resolution of the projector; by default as the patterns of the scene had it, which
     /// the table remembers, or 1920x1080
     #[arg(long, value_name = "WxH", value_parser = frame_size, requires = "output")]
@@ -534,6 +625,10 @@ pub(super) struct Verify {
     /// Folder for the page and the maps; by default `verdict` in FOLDER
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub(super) report: Option<PathBuf>,
+    /// Serial port of the device that is handed over: the page names its board, its firmware
+    /// and the table that it uses
+    #[arg(long, value_name = "PORT", conflicts_with = "output")]
+    pub(super) port: Option<String>,
 }
 
 #[derive(Clone, Debug, Args)]
@@ -578,7 +673,8 @@ pub(super) struct Emulate {
     /// PNG or Y4M to play over and over, instead of a moving test scene
     #[arg(long, value_name = "INPUT")]
     pub(super) frames: Option<PathBuf>,
-    /// Size of the test scene; by default 128x96, or the grid's where that is larger
+    /// Size of the test scene; by default 128x96 or the grid's where that is larger, in the
+    /// aspect of the table's projector
     #[arg(long, value_name = "WxH", value_parser = frame_size, conflicts_with = "frames")]
     pub(super) size: Option<FrameSize>,
     /// Frames a second; by default the video's own rate, or 25
@@ -597,14 +693,11 @@ pub(super) struct Emulate {
 
 /// A number, or the 16 hexadecimal digits that `iltm status` shows.
 fn device_number(text: &str) -> Result<u64, String> {
-    let digits = text
-        .strip_prefix("0x")
-        .or((text.len() == 16).then_some(text));
-    let number = match digits {
+    let number = match text.strip_prefix("0x") {
         Some(digits) => u64::from_str_radix(digits, 16),
         None => text.parse(),
     };
-    number.map_err(|_| "a device's number is decimal, or 16 hexadecimal digits".to_owned())
+    number.map_err(|_| "a device's number is decimal, or hexadecimal with 0x before it".to_owned())
 }
 
 /// A response as `capture.toml` has it.
@@ -647,6 +740,17 @@ fn milliseconds(text: &str) -> Result<Duration, String> {
 fn error_bound(text: &str) -> Result<f64, String> {
     let range = (Bound::Excluded(0.0), Bound::Included(1.0));
     number(text, range, "an error is a number above 0, at most 1")
+}
+
+/// Bernoulli patterns of a capture that a table is to be solved from.
+fn bernoulli(text: &str) -> Result<u16, String> {
+    const MOST: u16 = 10_000;
+    let found = text.parse().ok().filter(|count| *count <= MOST);
+    match found {
+        Some(count) if usize::from(count) >= MIN_BERNOULLI => Ok(count),
+        Some(_) => Err(format!("a solve needs at least {MIN_BERNOULLI}")),
+        None => Err(format!("a whole number from {MIN_BERNOULLI} to {MOST}")),
+    }
 }
 
 fn frame_size(text: &str) -> Result<FrameSize, String> {

@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let examined = examined?;
     let failed = failed(&examined.gates);
     let page = arguments.output.as_deref().map(|folder| {
-        let html = report::gates::page(&name(&arguments.capture), &examined.gates);
+        let html = report::gates::page(&name(&arguments.capture), &examined);
         write_files(folder, &[(PAGE_FILE, html)])?;
         Ok::<_, Failure>(folder.join(PAGE_FILE))
     });
@@ -36,6 +36,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     let data = json!({
         "capture": arguments.capture.display().to_string(),
         "pass": failed.is_empty(),
+        "not_judged": not_judged(&examined.gates),
         "gates": gates(&examined.gates),
         "cells": cells(&examined),
         "page": page.as_ref().map(|page| page.display().to_string()),
@@ -45,6 +46,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         let _ = writeln!(text, "{}: what each gate saw", page.display());
     }
     if failed.is_empty() {
+        text += &passed(&examined.gates);
         output.result(&data, &text);
         return Ok(());
     }
@@ -65,6 +67,25 @@ fn name(capture: &Path) -> String {
 /// The gates that fail.
 fn failed(gates: &[Gate]) -> Vec<&Gate> {
     gates.iter().filter(|gate| gate.fails()).collect()
+}
+
+/// Names of the gates that were not judged.
+fn not_judged(gates: &[Gate]) -> Vec<&'static str> {
+    let open = gates
+        .iter()
+        .filter(|gate| gate.verdict == Verdict::NotJudged);
+    open.map(|gate| gate.name.name()).collect()
+}
+
+/// The last line of a check that no gate fails.
+fn passed(gates: &[Gate]) -> String {
+    match not_judged(gates).as_slice() {
+        [] => "passed: these photographs can be used\n".to_owned(),
+        open => format!(
+            "passed, as far as it was judged: nothing is known of {}\n",
+            open.join(", ")
+        ),
+    }
 }
 
 /// What scripts get for a capture that does not pass.

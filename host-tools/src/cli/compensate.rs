@@ -5,10 +5,11 @@ use super::failure::{Failure, Kind, cannot_read};
 use super::output::{Output, read_file};
 use super::progress::progress;
 use super::tables::check;
+use crate::compile::Provenance;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
 use crate::video::watch::FileWatch;
 use crate::video::y4m::Y4mError;
-use crate::video::{CompensateOptions, Compensator, FrameTotals, VideoError};
+use crate::video::{CompensateOptions, Compensator, FrameTotals, Input, VideoError};
 use iltm_picture::WholeFile;
 use iltm_runtime::pipeline::Encoding;
 use serde_json::{Value, json};
@@ -37,11 +38,12 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     let settings = settings(arguments);
     let compensator = Compensator::new(&table, settings)?;
     let input = opened(&arguments.input)?;
+    fits_name(&input, &arguments.output)?;
     let bars = progress(output);
     let start = Instant::now();
     let (summary, live) = written(&arguments.output, output, |out| {
         if watch.is_none() && arguments.budget.is_none() {
-            let summary = compensator.stream(input, out, bars.as_ref())?;
+            let summary = compensator.input(input, out, bars.as_ref())?;
             return Ok((summary, None));
         }
         let live = Live {
@@ -52,11 +54,19 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
         let summary = compensator.live(live, input, out, bars.as_ref())?;
         Ok((summary.frames, Some(summary)))
     })?;
-    let (mut data, mut text) = totals(&summary, start.elapsed().as_secs_f64());
+    let brightness = Provenance::read(table.provenance()).brightness;
+    let (mut data, totals) = totals(&summary, start.elapsed().as_secs_f64());
+    data["brightness"] = json!(brightness);
+    let mut text = brightness.map_or_else(String::new, |brightness| brightness.words() + "\n");
+    text += &totals;
     if let Some(live) = live {
         add_live(&live, arguments, &mut data, &mut text);
     }
-    output.result(&data, &text);
+    if is_pipe(&arguments.output) {
+        output.people(&text);
+    } else {
+        output.result(&data, &text);
+    }
     Ok(())
 }
 
@@ -68,17 +78,42 @@ fn settings(arguments: &Compensate) -> CompensateOptions {
         } else {
             Encoding::Display
         },
+        fit: arguments.fit,
         ..CompensateOptions::default()
     }
 }
 
 /// The input, from its beginning.
-fn opened(input: &Path) -> Result<Box<dyn Read + Send>, Failure> {
-    if is_pipe(input) {
-        return Ok(Box::new(io::stdin()));
+fn opened(path: &Path) -> Result<Input<Box<dyn Read + Send>>, Failure> {
+    let input: Box<dyn Read + Send> = if is_pipe(path) {
+        Box::new(io::stdin())
+    } else {
+        Box::new(File::open(path).map_err(|error| cannot_read(path, &error))?)
+    };
+    Ok(Input::of(input)?)
+}
+
+/// The output is of the input's kind: a name that says otherwise would mislead whoever opens
+/// it.
+fn fits_name<R>(input: &Input<R>, output: &Path) -> Result<(), Failure> {
+    let ending = output.extension().unwrap_or_default();
+    let says = |kind: &str| ending.eq_ignore_ascii_case(kind);
+    let (given, other) = if input.is_png() {
+        ("a PNG picture", "y4m")
+    } else {
+        ("a Y4M stream", "png")
+    };
+    if !says(other) {
+        return Ok(());
     }
-    let file = File::open(input).map_err(|error| cannot_read(input, &error))?;
-    Ok(Box::new(file))
+    Err(Failure::new(
+        Kind::Usage,
+        format!(
+            "{}: the input is {given}, and the output becomes one",
+            output.display()
+        ),
+        "Give --output the ending of the input, or convert with ffmpeg before or after.",
+    ))
 }
 
 /// What `write` writes, on standard output, or in a file that is there whole or not at all.
@@ -114,25 +149,41 @@ fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
+/// Percent of the samples cut off at white from which people are told what to do.
+const WORTH_ADVICE: f64 = 0.1;
+
 /// What was done, for programs and for people.
 fn totals(summary: &FrameTotals, seconds: f64) -> (Value, String) {
-    let share = 100.0 * summary.clipped as f64 / summary.samples.max(1) as f64;
+    let share = |count: u64| 100.0 * count as f64 / summary.samples.max(1) as f64;
+    let white = share(summary.clipped_white);
+    let black = share(summary.clipped - summary.clipped_white);
     let data = json!({
         "width": summary.size.width(),
         "height": summary.size.height(),
         "frames": summary.frames,
         "samples": summary.samples,
         "clipped": summary.clipped,
+        "clipped_white": summary.clipped_white,
+        "cut_short": summary.cut_short,
         "seconds": seconds,
     });
     let frames = match summary.frames {
         1 => "1 frame".to_owned(),
         frames => format!("{frames} frames"),
     };
-    let text = format!(
-        "{frames} of {} in {seconds:.2} s, {share:.2} % of the samples clipped\n",
+    let mut text = format!(
+        "{frames} of {} in {seconds:.2} s\n\
+         cut off  {white:.2} % of the samples are too bright for the projector's white, \
+         {black:.2} % darker than its black\n",
         summary.size
     );
+    if white > WORTH_ADVICE {
+        text += "         too bright: `iltm solve --content FILE` makes a table that is dark \
+                 enough for it\n";
+    }
+    if summary.cut_short {
+        text += "         the program that takes the frames ended before the last one: the rest is lost\n";
+    }
     (data, text)
 }
 

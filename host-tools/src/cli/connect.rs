@@ -5,14 +5,17 @@ use super::args::SerialLine;
 use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::words;
+use crate::compile::sign::RightSigner;
 use crate::device::discovery::{self, FoundDevice};
 use crate::device::port_scan::{ListedPort, PortScan};
 use crate::device::transcript::Transcribed;
-use crate::device::{Client, DeviceError, Patience, Port};
+use crate::device::{Authority, Client, DeviceError, Patience, Port};
 use crate::user::{Config, Folders};
-use std::fmt::Write;
+use ed25519_dalek::VerifyingKey;
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal};
+use std::path::Path;
 use std::time::Duration;
 
 /// A device may be busy with frames; an empty port should not take long.
@@ -52,7 +55,10 @@ pub(super) fn connect(line: &SerialLine, output: &Output) -> Result<Connection, 
         let greeted = discovery::greet(&port, line.baud, REMEMBERED, Transcribed::new);
         match greeted {
             Ok((client, baud)) => return Ok(Connection::new(client, &port, baud, None)),
-            Err(error @ DeviceError::Protocol { .. }) => {
+            // It is meant; that it is busy does not make another one meant.
+            Err(error @ (DeviceError::Protocol { .. } | DeviceError::Open { .. }))
+                if Path::new(&port).exists() =>
+            {
                 return Err(Failure::of_device(&port, &error));
             }
             Err(_) => output.remark(&format!("no device at {port}; asking the other ports")),
@@ -95,6 +101,24 @@ impl Connection {
         {
             output.remark(&format!("the port is not remembered: {error}"));
         }
+    }
+
+    /// What is asked of a device with a key is signed with the key in this file from now
+    /// on; returns the public key that signs such a device's tables.
+    pub(super) fn authorise(
+        &mut self,
+        path: Option<&Path>,
+    ) -> Result<Option<VerifyingKey>, Failure> {
+        let Some(path) = path else {
+            return Ok(None);
+        };
+        let signer = RightSigner::read(path)?;
+        let site = *signer.site();
+        self.client
+            .authorise(Authority::new(move |deed, device, sequence| {
+                signer.right(deed, device, sequence)
+            }));
+        Ok(Some(site))
     }
 
     /// Writes down what is said from now on.
@@ -164,12 +188,14 @@ fn nobody(silent: &[(ListedPort, DeviceError)], unasked: &[ListedPort]) -> Failu
     // What keeps a port from being asked matters more than silence.
     let unopened = silent.iter().map(|(_, error)| error);
     let mut unopened = unopened.filter(|error| matches!(error, DeviceError::Open { .. }));
-    let next_step = match unopened.next() {
-        Some(error) => error.next_step().to_owned(),
-        None => "Check power and cable, or name the port with --port and its speed with --baud."
-            .to_owned(),
+    let (kind, next_step) = match unopened.next() {
+        Some(error) => (Kind::Port, error.next_step()),
+        None => (
+            Kind::NoDevice,
+            "Check power and cable, or name the port with --port and its speed with --baud.",
+        ),
     };
-    Failure::new(Kind::NoDevice, message, next_step)
+    Failure::new(kind, message, next_step)
 }
 
 /// One of several devices: a question on a terminal, an error elsewhere.

@@ -5,6 +5,8 @@ use super::failure::Failure;
 use super::output::Output;
 use super::progress::progress;
 use super::summary;
+use super::table_words;
+use super::tables::check;
 use crate::demo::{self, DemoOutcome};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -18,7 +20,18 @@ pub(super) fn run(arguments: &Demo, output: &Output) -> Result<(), Failure> {
     bars.end();
     let outcome = outcome?;
     let seconds = start.elapsed().as_secs_f64();
-    output.result(&data(&outcome, seconds), &text(&outcome, seconds));
+    let table = check(&outcome.paths.table, &outcome.built.compiled.image)?;
+    let mut data = data(&outcome, seconds);
+    for (name, value) in table_words::data(&table).as_object().into_iter().flatten() {
+        data[name] = value.clone();
+    }
+    let mut text = table_words::lines(&outcome.paths.table, &table);
+    text += &summary::remarks(&outcome.built);
+    if arguments.detail.verbose {
+        let _ = write!(text, "\n{}", summary::text(&outcome.built));
+    }
+    text += &done(&outcome, seconds);
+    output.result(&data, &text);
     Ok(())
 }
 
@@ -59,9 +72,9 @@ fn data(outcome: &DemoOutcome, seconds: f64) -> Value {
     data
 }
 
-fn text(outcome: &DemoOutcome, seconds: f64) -> String {
+fn done(outcome: &DemoOutcome, seconds: f64) -> String {
     let paths = &outcome.paths;
-    let mut text = summary::text(&outcome.built);
+    let mut text = String::new();
     let listed = [
         ("photographs", &paths.capture),
         ("table", &paths.table),

@@ -99,6 +99,14 @@ pub(super) enum Kind {
     Camera = 32,
     #[strum(message = "slides cannot be shown")]
     Display = 33,
+    #[strum(message = "photographs cannot tell whether a table keeps its promise")]
+    Inconclusive = 34,
+    #[strum(message = "a device shows frames as they are instead of compensating them")]
+    PassThrough = 35,
+    #[strum(message = "a device with a key was not shown the right to do that")]
+    NoRight = 36,
+    #[strum(message = "photographs or a folder belong to another table")]
+    OtherTable = 37,
 }
 
 impl From<&Rejected> for Kind {
@@ -128,7 +136,8 @@ impl From<&DeviceError> for Kind {
                 Refusal::Table(rejected) => rejected.into(),
                 Refusal::TooLong { .. } => Self::TooLarge,
                 Refusal::OnTrial => Self::OnTrial,
-                Refusal::Flash { .. } => Self::Flash,
+                Refusal::Flash { .. } | Refusal::Wear { .. } => Self::Flash,
+                Refusal::NoRight(_) => Self::NoRight,
                 Refusal::NoTransfer | Refusal::Incomplete | Refusal::Chunk => Self::Transfer,
                 Refusal::NotInUse { .. } | Refusal::NoOther => Self::NoTable,
                 Refusal::HasKey => Self::HasKey,
@@ -191,7 +200,7 @@ pub(super) struct Failure {
     pub(super) message: String,
     pub(super) next_step: String,
     /// Where a device's tables were about to change: which one is in use now.
-    pub(super) active: Option<Active>,
+    pub(super) active: Option<Box<Active>>,
     /// What was found out before, for programs: an object that stands beside the error.
     pub(super) data: Option<Box<Value>>,
 }
@@ -219,7 +228,7 @@ impl Failure {
 
     /// The same, with the table that is in use now.
     pub(super) fn with(mut self, active: Active) -> Self {
-        self.active = Some(active);
+        self.active = Some(Box::new(active));
         self
     }
 
@@ -306,7 +315,7 @@ impl From<SolveError> for Failure {
 impl From<CompileError> for Failure {
     fn from(error: CompileError) -> Self {
         let kind = match error {
-            CompileError::ReferenceWhite { .. } => Kind::Usage,
+            CompileError::ReferenceWhite { .. } | CompileError::BeyondReach { .. } => Kind::Usage,
             _ => Kind::Solve,
         };
         Self::new(kind, &error, error.next_step())
@@ -365,7 +374,11 @@ impl From<VerifyError> for Failure {
             VerifyError::Slides(_) => Kind::Usage,
             VerifyError::NoManifest { .. } => Kind::Read,
             VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,
-            VerifyError::OtherTable { .. } | VerifyError::Grid { .. } => Kind::Verdict,
+            VerifyError::OtherTable { .. }
+            | VerifyError::NotOfTable { .. }
+            | VerifyError::Grid { .. } => Kind::OtherTable,
+            VerifyError::Untold { .. } => Kind::Table,
+            VerifyError::Overexposed { .. } => Kind::Inconclusive,
             VerifyError::Missing { .. }
             | VerifyError::Unpaired { .. }
             | VerifyError::NoImages { .. }
@@ -379,14 +392,16 @@ impl From<VerifyError> for Failure {
 impl From<VideoError> for Failure {
     fn from(error: VideoError) -> Self {
         let kind = match &error {
-            VideoError::NoSuchTier { .. } | VideoError::Threads { .. } | VideoError::Still => {
-                Kind::Usage
-            }
+            VideoError::NoSuchTier { .. }
+            | VideoError::Threads { .. }
+            | VideoError::Still
+            | VideoError::NothingToFit => Kind::Usage,
             VideoError::Table(_) => Kind::Table,
             VideoError::File { .. }
             | VideoError::Y4m(Y4mError::Write { .. })
             | VideoError::Png(PngError::Write { .. }) => Kind::Write,
-            VideoError::Read { .. }
+            VideoError::Open { .. }
+            | VideoError::Read { .. }
             | VideoError::Y4m(Y4mError::Read { .. })
             | VideoError::Png(PngError::Read { .. }) => Kind::Read,
             _ => Kind::Frames,

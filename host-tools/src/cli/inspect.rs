@@ -3,8 +3,9 @@
 use super::args::Inspect;
 use super::failure::Failure;
 use super::output::{Output, read_file};
+use super::table_words;
 use super::tables::check_sealed;
-use super::words::{key_id, lines};
+use super::words::{day, key_id, lines, named};
 use crate::compile::Provenance;
 use crate::compile::cost::{CLOCK, RATE};
 use crate::compile::sign::{is_signed_by, read_public_key};
@@ -32,15 +33,18 @@ pub(super) fn run(arguments: &Inspect, output: &Output) -> Result<(), Failure> {
         )?;
     }
     let mut data = data(&table);
-    let mut text = text(&arguments.table, &table);
+    for (name, value) in table_words::data(&table).as_object().into_iter().flatten() {
+        data[name] = value.clone();
+    }
+    let mut text = table_words::lines(&arguments.table, &table);
+    text += &seal_text(seal.as_ref(), arguments.key.is_some());
+    if arguments.detail.verbose {
+        let _ = write!(text, "\n{}", self::text(&table));
+    }
     data["file_bytes"] = json!(file.len());
     data["seal"] = json!(
         seal.as_ref()
             .map(|seal| seal_data(seal, arguments.key.is_some()))
-    );
-    text.insert_str(
-        text.find('\n').map_or(0, |end| end + 1),
-        &seal_text(seal.as_ref(), arguments.key.is_some()),
     );
     output.result(&data, &text);
     Ok(())
@@ -76,7 +80,7 @@ fn seal_data(seal: &Seal, verified: bool) -> Value {
     json!({
         "version": seal.version,
         "revokes_below": seal.oldest,
-        "device": (seal.device != 0).then(|| format!("{:016x}", seal.device)),
+        "device": (seal.device != 0).then(|| seal.device.to_string()),
         "key": key_id(&seal.key),
         "verified": verified,
     })
@@ -84,7 +88,7 @@ fn seal_data(seal: &Seal, verified: bool) -> Value {
 
 fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
     let Some(seal) = seal else {
-        return "signed           no: only devices without a key take it\n".to_owned();
+        return "signed      no: only devices without a key take it\n".to_owned();
     };
     let verified = if verified {
         "verified"
@@ -93,14 +97,14 @@ fn seal_text(seal: Option<&Seal>, verified: bool) -> String {
     };
     let device = match seal.device {
         0 => "any device".to_owned(),
-        device => format!("device {device:016x} only"),
+        device => format!("device {device} only"),
     };
     let revokes = match seal.oldest {
         0 => String::new(),
         oldest => format!(", revokes versions below {oldest}"),
     };
     format!(
-        "version          {}, for {device}{revokes}\nsigned           with key {} ({verified})\n",
+        "version     {}, for {device}{revokes}\nsigned      with key {} ({verified})\n",
         seal.version,
         key_id(&seal.key)
     )
@@ -139,6 +143,9 @@ fn data(table: &Table<'_>) -> Value {
     });
     let bounds = table.operator().map(Operator::bounds);
     json!({
+        "id": format!("{:08x}", table.id()),
+        "name": named(table.label()),
+        "date": day(table.label()),
         "rows": table.grid().rows(),
         "cols": table.grid().cols(),
         "channels": table.channels(),
@@ -159,20 +166,8 @@ fn data(table: &Table<'_>) -> Value {
     })
 }
 
-fn text(path: &Path, table: &Table<'_>) -> String {
+fn text(table: &Table<'_>) -> String {
     let mut text = String::new();
-    let colour = if table.channels() == 1 {
-        "grey"
-    } else {
-        "colour"
-    };
-    let _ = writeln!(
-        text,
-        "{}: {} cells, {colour}, {} bytes",
-        path.display(),
-        table.grid(),
-        table.bytes()
-    );
     let _ = writeln!(text, "effects          {}", effects(table).join(", "));
     if let Some(fine) = table.fine_gain() {
         let _ = writeln!(text, "fine gain        {}", fine.size());

@@ -105,7 +105,7 @@ impl Output {
                 "exit": failure.kind.code(),
                 "message": failure.message,
                 "next_step": failure.next_step,
-                "active": failure.active.as_ref().map(Active::data),
+                "active": failure.active.as_deref().map(Active::data),
             });
             self.write(&last(data));
         }
@@ -188,4 +188,17 @@ pub(super) fn write_files(
     files: &[(impl AsRef<Path>, impl AsRef<[u8]>)],
 ) -> Result<(), Failure> {
     whole_folder::put(folder, files).map_err(|error| cannot_write(&error.path, &error.source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_is_sent_no_commands_of_strangers() {
+        assert_eq!(
+            printable("a\u{1b}]0;X\u{7}\nb\u{9b}"),
+            "a\\u{1b}]0;X\\u{7}\nb\\u{9b}"
+        );
+    }
 }

@@ -3,7 +3,7 @@
 use super::args::Ports;
 use super::failure::Failure;
 use super::output::Output;
-use super::words::{identity, table_in_use, table_name};
+use super::words::{called, identity, table_in_use, table_name};
 use crate::device::DeviceError;
 use crate::device::discovery::{FoundDevice, ask};
 use crate::device::port_scan::{ListedPort, PortScan};
@@ -23,7 +23,13 @@ pub(super) fn run(arguments: &Ports, output: &Output) -> Result<(), Failure> {
         data["port"] = json!(found.port.path);
         data["about"] = json!(found.port.about);
         data["baud"] = json!(found.baud);
-        data["table"] = json!(found.status.as_ref().map(|status| table_name(status.table)));
+        data["table"] = json!(found.status.as_ref().map(|status| {
+            table_name(
+                status
+                    .table
+                    .map(|table| called(table, found.slots.as_ref())),
+            )
+        }));
         data
     });
     let others = silent.iter().map(|(port, error)| {
@@ -57,14 +63,16 @@ fn text(
 ) -> String {
     let mut rows = vec![["port", "board", "firmware", "number", "table"].map(str::to_owned)];
     for device in found {
-        let table = device.status.as_ref().map(table_in_use);
+        let slots = device.slots.as_ref();
+        let table = device.status.as_ref();
+        let table = table.map(|status| table_in_use(status, slots));
         rows.push([
             device.port.path.clone(),
             device.device.board.to_string(),
             device.device.firmware.to_string(),
             match device.device.device {
                 0 => "none".to_owned(),
-                number => format!("{number:016x}"),
+                number => number.to_string(),
             },
             table.unwrap_or_else(|| "?".to_owned()),
         ]);

@@ -2,8 +2,9 @@
 
 use super::args::Simulate;
 use super::failure::{Failure, Kind};
-use super::output::Output;
+use super::output::{Output, read_file};
 use super::progress::progress;
+use super::simulate_chain::ChainedSlides;
 use crate::capture::pattern_set;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::Scene;
@@ -23,6 +24,27 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     if let (Some(out), None) = (&arguments.output, &arguments.photograph) {
         iltm_picture::check_free(out)?;
     }
+    check_used(arguments)?;
+    let session = match &arguments.photograph {
+        Some(folder) => {
+            let read = UnfilledCapture::read(folder, scene.projector.grid);
+            Some((folder.as_path(), read.map_err(not_taken)?))
+        }
+        None => None,
+    };
+    let only_these = arguments.shot.is_none() && !arguments.explain && !arguments.ablate;
+    if let Some((folder, session)) = session.as_ref().filter(|_| only_these)
+        && session.missing().map_err(not_taken)?.is_empty()
+    {
+        // Nothing has to be simulated for that.
+        let data = json!({ "folder": folder.display().to_string(), "photographs": 0 });
+        let text = format!(
+            "session     {}: every photograph is there\n",
+            folder.display()
+        );
+        output.result(&data, &text);
+        return Ok(());
+    }
     let options = SimulationOptions {
         forced: forced(arguments),
         threshold: arguments.threshold,
@@ -30,7 +52,7 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     let bars = progress(output);
     let simulation = Simulation::new(&scene, &options, bars.as_ref())?;
     let ready = start.elapsed().as_secs_f64();
-    let done = shoot(arguments, &scene, &simulation, bars.as_ref())?;
+    let done = shoot(arguments, &scene, session, &simulation, bars.as_ref())?;
     let ablated = if arguments.ablate {
         ablate(&scene, &options, bars.as_ref())?
     } else {
@@ -86,6 +108,25 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     Ok(())
 }
 
+/// Refuses what would be dropped.
+fn check_used(arguments: &Simulate) -> Result<(), Failure> {
+    let takes_none = arguments.output.is_none() && arguments.photograph.is_none();
+    let dropped =
+        if arguments.photograph.is_some() && arguments.shot.is_none() && arguments.output.is_some()
+        {
+            "--output has no use beside --photograph, which writes into its own folder"
+        } else if takes_none && !arguments.fault.is_empty() {
+            "--fault has no use where no photograph is taken"
+        } else {
+            return Ok(());
+        };
+    Err(Failure::new(
+        Kind::Usage,
+        dropped,
+        "Leave it away, or see `iltm simulate --help`.",
+    ))
+}
+
 /// The effects that the command line turns on and off.
 fn forced(arguments: &Simulate) -> Forced {
     let on = arguments.with.iter().map(|effect| (*effect, true));
@@ -108,13 +149,14 @@ enum Shot<'a> {
 fn shoot<'a>(
     arguments: &'a Simulate,
     scene: &Scene,
+    session: Option<(&'a Path, UnfilledCapture)>,
     simulation: &Simulation<'_>,
     progress: &dyn Progress,
 ) -> Result<Shot<'a>, Failure> {
     let camera = || VirtualCamera::new(scene, simulation, arguments.seed);
     let camera = || camera().map(|camera| camera.with_faults(&arguments.fault));
-    if let Some(folder) = &arguments.photograph {
-        let taken = photograph(arguments, folder, &camera()?, progress).map_err(not_taken)?;
+    if let Some((folder, session)) = session {
+        let taken = photograph(arguments, folder, session, (scene, &camera()?), progress)?;
         return Ok(Shot::Missing(folder, taken));
     }
     let Some(out) = &arguments.output else {
@@ -129,14 +171,27 @@ fn shoot<'a>(
 fn photograph(
     arguments: &Simulate,
     folder: &Path,
-    camera: &VirtualCamera<'_>,
+    mut session: UnfilledCapture,
+    (scene, camera): (&Scene, &VirtualCamera<'_>),
     progress: &dyn Progress,
-) -> Result<usize, FillCaptureError> {
-    let session = UnfilledCapture::read(folder, camera.grid())?;
-    match (arguments.shot, &arguments.output) {
+) -> Result<usize, Failure> {
+    if let (Some(chain), Some(path)) = (arguments.chain, &arguments.table) {
+        let slides = ChainedSlides {
+            folder,
+            chain,
+            table: &read_file(path)?,
+            path,
+            grid: camera.grid(),
+            response: scene.projector.response,
+        };
+        let codes = slides.codes(&session.indices())?;
+        session = session.showing(codes);
+    }
+    let taken = match (arguments.shot, &arguments.output) {
         (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),
         _ => session.take_missing(camera, progress),
-    }
+    };
+    taken.map_err(not_taken)
 }
 
 fn not_taken(error: FillCaptureError) -> Failure {

@@ -4,16 +4,18 @@ use super::args::Solve;
 use super::failure::{Failure, Kind};
 use super::output::{Output, pictures, write_file, write_files};
 use super::progress::progress;
-use super::summary::{summary, text};
-use super::tables::seal;
-use crate::build_table::{BuiltTable, build_table};
-use crate::capture::CaptureOptions;
+use super::summary::{self, remarks, summary};
+use super::table_words;
+use super::tables::{check, seal};
+use crate::build_table::{BuiltTable, build_table_from};
+use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
-use crate::solve::SolveOptions;
+use crate::solve::{Method, SolveOptions};
 use crate::solve_page::{self, Content};
-use crate::video::sampled_frames;
-use iltm_picture::{LightPicture, progress::Progress};
+use crate::video::{Fit, PlacedFrames, VideoError, sampled_frames};
+use iltm_picture::{LightPicture, Picture, progress::Progress};
+use iltm_runtime::FrameSize;
 use serde_json::json;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -24,8 +26,17 @@ const FRAMES: usize = 48;
 
 pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
+    if arguments.lambda.is_some() && arguments.method != Method::Joint {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!("the method `{}` has no weight", arguments.method),
+            "Leave --lambda or --method away.",
+        ));
+    }
     // A key that cannot be read is known before the work, not after it.
     let key = arguments.key.as_deref().map(read_key).transpose()?;
+    // So is a place that cannot be written to.
+    check_place(&arguments.output)?;
     let photographs = CaptureOptions {
         bernoulli: arguments.photos,
         ignore: arguments.ignore.clone(),
@@ -38,6 +49,11 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     };
     let bars = progress(output);
     let content = content(&arguments.content, bars.as_ref())?;
+    let mut measurements = capture::read(&arguments.capture, &photographs, bars.as_ref())?;
+    if let Some(name) = &arguments.name {
+        measurements.settings.scene.name = Some(name.clone());
+    }
+    let content = placed(content, &measurements, arguments.fit)?;
     let frames: Vec<LightPicture> = content.iter().flat_map(Content::light).collect();
     let white = match arguments.white {
         Some(light) => Some(WhiteRequest::Light(light)),
@@ -47,9 +63,9 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
             share: arguments.clip_share,
         }),
     };
-    let built = build_table(
+    let built = build_table_from(
+        measurements,
         &arguments.capture,
-        &photographs,
         &options,
         white,
         bars.as_ref(),
@@ -73,14 +89,21 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     data["seconds"] = json!(seconds);
     data["signed"] = json!(key.is_some());
     data["report"] = json!(page.as_ref().map(|page| page.display().to_string()));
-    let mut text = text(&built);
+    let table = check(&arguments.output, image)?;
+    for (name, value) in table_words::data(&table).as_object().into_iter().flatten() {
+        data[name] = value.clone();
+    }
+    let mut text = table_words::lines(&arguments.output, &table);
+    text += &remarks(&built);
     let _ = writeln!(
         text,
-        "table       {}: {} bytes, {}in {seconds:.2} s",
+        "written     {}{} in {seconds:.2} s",
         arguments.output.display(),
-        file.len(),
-        if key.is_some() { "signed, " } else { "" },
+        if key.is_some() { ", signed," } else { "" },
     );
+    if arguments.detail.verbose {
+        let _ = write!(text, "\n{}", summary::text(&built));
+    }
     if let Some(page) = &page {
         let _ = writeln!(text, "report      {}", page.display());
     }
@@ -88,15 +111,29 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Whether a file can be put in a place, before the work for it is done.
+fn check_place(file: &Path) -> Result<(), Failure> {
+    let next_step = "Make the folder first, or choose another file with -o.";
+    let refuse = |why: String| {
+        let message = format!("{}: cannot be written: {why}", file.display());
+        Err(Failure::new(Kind::Write, message, next_step))
+    };
+    if file.is_dir() {
+        return refuse("it is a folder".to_owned());
+    }
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            refuse(format!("there is no folder {}", folder.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Some frames of each of the user's files.
 fn content(files: &[PathBuf], bars: &dyn Progress) -> Result<Vec<Content>, Failure> {
     bars.begin("looking at the content", 0);
     let read = |path: &PathBuf| {
-        let frames = sampled_frames(path, FRAMES).map_err(|error| {
-            let mut failure = Failure::from(error);
-            failure.message = format!("{}: {}", path.display(), failure.message);
-            failure
-        })?;
+        let frames = sampled_frames(path, FRAMES).map_err(|error| named(path, error))?;
         let name = path.file_name().unwrap_or(path.as_os_str());
         Ok(Content {
             name: name.to_string_lossy().into_owned(),
@@ -110,6 +147,43 @@ fn content(files: &[PathBuf], bars: &dyn Progress) -> Result<Vec<Content>, Failu
 
 /// The page's name in the folder that `--report` gives.
 const PAGE: &str = "report.html";
+/// The failure of a file of content, which names it.
+fn named(path: &Path, error: VideoError) -> Failure {
+    let names_it = matches!(error, VideoError::Open { .. });
+    let mut failure = Failure::from(error);
+    if !names_it {
+        failure.message = format!("{}: {}", path.display(), failure.message);
+    }
+    failure
+}
+
+/// The part of the content that falls on the cells.
+fn placed(
+    content: Vec<Content>,
+    measurements: &Measurements,
+    fit: Option<Fit>,
+) -> Result<Vec<Content>, Failure> {
+    let projector = measurements.settings.projector.pixels();
+    let one_a_cell = FrameSize::of_grid(measurements.grid);
+    let on_cells = |frame: Picture| match projector {
+        None if fit.is_some() => Err(VideoError::NothingToFit),
+        Some(projector) if frame.size() != one_a_cell => {
+            let placed = PlacedFrames::on(projector, frame.size(), fit)?;
+            Ok(placed.on_cells(&frame).unwrap_or(frame))
+        }
+        _ => Ok(frame),
+    };
+    let of_file = |content: Content| {
+        let frames = content.frames.into_iter().map(on_cells);
+        Ok(Content {
+            frames: frames
+                .collect::<Result<_, _>>()
+                .map_err(|error| named(Path::new(&content.name), error))?,
+            name: content.name,
+        })
+    };
+    content.into_iter().map(of_file).collect()
+}
 
 /// Writes the report; its page.
 fn report(

@@ -5,8 +5,8 @@ use super::connect::connect;
 use super::failure::Failure;
 use super::output::Output;
 use super::words::{
-    clipped_share, duration, identity, milliseconds, number, serial, slot_lines, slot_states,
-    slots_data, status_data, table_in_use, trust, watchdog,
+    called, clipped_share, duration, identity, milliseconds, mode, number, serial, slot_lines,
+    slot_states, slots_data, status_data, table_in_use, table_name, trust, watchdog,
 };
 use crate::device::DeviceError;
 use iltm_runtime::link::{Hello, Slots, Status};
@@ -26,6 +26,9 @@ pub(super) fn run(arguments: &args::Status, output: &Output) -> Result<(), Failu
     connection.remember(output);
     let device = connection.client.device();
     let mut data = status_data(&status);
+    data["table"] = json!(table_name(
+        status.table.map(|table| called(table, slots.as_ref()))
+    ));
     data["port"] = json!(connection.port);
     data["baud"] = json!(connection.baud);
     data["device"] = identity(device);
@@ -42,6 +45,7 @@ fn text(port: &str, status: &Status, device: &Hello, slots: Option<&Slots>) -> S
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<12} {value}");
     };
+    line("mode", mode(status, slots));
     line(
         "device",
         format!(
@@ -52,8 +56,7 @@ fn text(port: &str, status: &Status, device: &Hello, slots: Option<&Slots>) -> S
             duration(status.uptime_ms)
         ),
     );
-    line("mode", status.mode.to_string());
-    line("table", table_in_use(status));
+    line("table", table_in_use(status, slots));
     match slots {
         Some(slots) => {
             for (index, slot) in slot_lines(slots).into_iter().enumerate() {

@@ -147,27 +147,13 @@ fn range(what: &str, first: usize, last: usize) -> String {
     }
 }
 
-/// A table that was built, for people.
-pub(super) fn text(built: &BuiltTable) -> String {
-    let report = &built.report;
+/// What people have to know of a table that was built beside how good it is: cells that it
+/// leaves dark, gates that were ignored, a weight at the edge of what was searched, and why
+/// it cancels no bounces.
+pub(super) fn remarks(built: &BuiltTable) -> String {
     let mut text = String::new();
-    let photographs = report.photographs;
-    let _ = writeln!(
-        text,
-        "photographs {} white, {} Gray code, {} Bernoulli",
-        photographs.white, photographs.gray_code, photographs.bernoulli
-    );
-    // The default one needs no mention.
-    if report.method != Method::Joint {
-        let _ = writeln!(text, "method      {}", report.method);
-    }
-    let _ = writeln!(
-        text,
-        "cells       {} of {} ({})",
-        report.live_cells, report.cells, built.inverse.grid
-    );
     for line in left_out(built) {
-        let _ = writeln!(text, "            {line}");
+        let _ = writeln!(text, "left out    {line}");
     }
     for gate in &built.measurements.diagnostics.gates {
         match gate.verdict {
@@ -180,6 +166,33 @@ pub(super) fn text(built: &BuiltTable) -> String {
             Verdict::Pass | Verdict::NotJudged => {}
         }
     }
+    if let Some(why) = no_operator(built) {
+        let _ = writeln!(text, "note        {why}");
+    }
+    text
+}
+
+/// Details of a table that was built, for people who ask.
+pub(super) fn text(built: &BuiltTable) -> String {
+    let report = &built.report;
+    let mut text = String::new();
+    let photographs = report.photographs;
+    let repeats = &built.measurements.repeats;
+    let white = repeats.get(Measurements::WHITE).copied().unwrap_or(1);
+    let _ = writeln!(
+        text,
+        "photographs {} white, {} Gray code, {} Bernoulli",
+        white, photographs.gray_code, photographs.bernoulli
+    );
+    // The default one needs no mention.
+    if report.method != Method::Joint {
+        let _ = writeln!(text, "method      {}", report.method);
+    }
+    let _ = writeln!(
+        text,
+        "cells       {} of {} ({})",
+        report.live_cells, report.cells, built.inverse.grid
+    );
     let _ = writeln!(
         text,
         "scene       condition {:.2}\n\
@@ -198,35 +211,38 @@ pub(super) fn text(built: &BuiltTable) -> String {
     let prediction = report.prediction;
     let _ = writeln!(
         text,
-        "error       {:.4} with an operator; {:.4} with gain alone, {:.4} with nothing\n\
-         \x20           (predicted from {} photographs that the solve had not seen)",
+        "held out    {:.4} off with the operator, {:.4} with the best gains alone, {:.4} with nothing,\n\
+         \x20           in {} photographs that the solve had not seen",
         prediction.compensated,
         prediction.gain_only,
         prediction.uncompensated,
         prediction.photographs,
     );
-    if report.compensation == Compensation::GainOnly {
-        let clipped = report.clipped;
-        let cancelled = 100.0 * prediction.cancelled();
-        let why = if cancelled < 0.2 {
-            format!("it would cancel {cancelled:.2} % of the light")
-        } else if clipped.compensated < clipped.gain_only {
-            format!(
-                "it is not proven better: {:.1} standard errors, and 2 are asked for",
-                prediction.confidence
-            )
-        } else {
-            format!(
-                "clipped images err by {:.4} with it and {:.4} without",
-                clipped.compensated, clipped.gain_only
-            )
-        };
-        let _ = writeln!(
-            text,
-            "            the table has gains and no operator: {why}"
-        );
-    }
     text
+}
+
+/// Why a table has gains and no operator; `None` of one with an operator.
+fn no_operator(built: &BuiltTable) -> Option<String> {
+    let report = &built.report;
+    if report.compensation != Compensation::GainOnly {
+        return None;
+    }
+    let (clipped, prediction) = (report.clipped, report.prediction);
+    let cancelled = 100.0 * prediction.cancelled();
+    let why = if cancelled < 0.2 {
+        format!("it would cancel {cancelled:.2} % of the light")
+    } else if clipped.compensated < clipped.gain_only {
+        format!(
+            "it is not proven better: {:.1} standard errors, and 2 are asked for",
+            prediction.confidence
+        )
+    } else {
+        format!(
+            "clipped images err by {:.4} with it and {:.4} without",
+            clipped.compensated, clipped.gain_only
+        )
+    };
+    Some(format!("the table has gains and no operator: {why}"))
 }
 
 /// The gates for programs.

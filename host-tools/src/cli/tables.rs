@@ -6,6 +6,7 @@ use crate::compile::sign::{self, SealTerms};
 use ed25519_dalek::SigningKey;
 use iltm_runtime::image::{Seal, Table, unseal};
 use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Checks the bytes of a table file. The signature is not looked at.
 pub(super) fn check<'a>(path: &Path, file: &'a [u8]) -> Result<Table<'a>, Failure> {
@@ -30,23 +31,32 @@ pub(super) fn check_sealed<'a>(
 
 /// Signs a file on the terms of the command line.
 pub(super) fn seal(file: &[u8], key: &SigningKey, given: &Given) -> Result<Vec<u8>, Failure> {
-    if given.revoke_below > given.table_version {
+    let version = given.table_version.unwrap_or_else(version_of_now);
+    let oldest = given.revoke_below.unwrap_or(0);
+    if oldest > version {
         return Err(Failure::new(
             Kind::Usage,
             format!(
-                "version {} would revoke itself: versions below {} are to be revoked",
-                given.table_version, given.revoke_below
+                "version {version} would revoke itself: versions below {oldest} are to be revoked"
             ),
             "Give --revoke-below at most the --table-version.",
         ));
     }
     let terms = SealTerms {
-        version: given.table_version,
-        oldest: given.revoke_below,
+        version,
+        oldest,
         device: given.for_device.unwrap_or(0),
     };
     sign::sign(file, key, terms).map_err(|error| {
         let next_step = "Make the table anew with `iltm solve`.";
         Failure::new(Kind::Table, error, next_step)
     })
+}
+
+/// Version of what is signed now where nobody says one: minutes since 1970, so that what is
+/// signed later is newer.
+pub(super) fn version_of_now() -> u32 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let minutes = now.map_or(0, |now| now.as_secs() / 60);
+    u32::try_from(minutes).unwrap_or(u32::MAX).max(1)
 }

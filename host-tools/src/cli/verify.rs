@@ -1,17 +1,20 @@
 //! `iltm verify`
 
-use super::args::Verify;
+use super::args::{SerialLine, Verify};
+use super::connect::connect;
 use super::failure::{Failure, Kind};
 use super::output::{self, Output, read_file, write_files};
 use super::progress::progress;
+use super::summary::gates;
 use super::tables::check;
+use super::words::{number, table_in_use};
 use crate::compile::Provenance;
 use crate::session::Layout;
 use crate::verify::{
-    ImageVerdict, Readings, TableVerdict, TestImage, html, judge, pictures, reason, test_images,
-    write,
+    Cause, Handover, ImageVerdict, Outcome, Readings, Slides, TableVerdict, TestImage,
+    brightness_words, html, judge, pictures, reason, test_images, write,
 };
-use iltm_picture::progress::Progress;
+use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -52,10 +55,16 @@ fn prepare(
     };
     let border = arguments.border.unwrap_or(settings.projector.border);
     let layout = Layout::new(table.grid(), projector, border)?;
-    let written = write(table, &layout, &settings, out, bars)?;
+    let kind = if arguments.wanted {
+        Slides::Wanted
+    } else {
+        Slides::Both
+    };
+    let written = write(table, &layout, (&settings, kind), out, bars)?;
     bars.end();
     let data = json!({
         "folder": out.display().to_string(),
+        "wanted": arguments.wanted,
         "pictures": written.pictures,
         "images": written.images.iter().map(|image| json!({
             "title": image.title,
@@ -64,8 +73,13 @@ fn prepare(
         "projector": size(layout.projector()),
         "border": layout.border(),
     });
+    let how = if arguments.wanted {
+        "as it should look, for whatever compensates"
+    } else {
+        "each as it is and compensated"
+    };
     let text = format!(
-        "{}: {} pictures to project and photograph ({} test images, each as it is and compensated;\n\
+        "{}: {} pictures to project and photograph ({} test images, {how};\n\
          white, black and patterns that find the cells). README.md in it says how. Then:\n\
          iltm verify {} {}\n",
         out.display(),
@@ -97,27 +111,69 @@ fn verdict(
         .report
         .clone()
         .unwrap_or_else(|| folder.join("verdict"));
-    let page = report(table, &readings, &verdict, &images, &out)?;
+    let device = arguments.port.as_ref().map(|_| device(arguments, output));
+    let handover = Handover {
+        table: arguments.table.display().to_string(),
+        date: chrono::Local::now().format("%Y-%m-%d %H:%M").to_string(),
+        device: device.transpose()?,
+    };
+    let page = report(table, &readings, &verdict, (&images, &handover), &out)?;
     bars.end();
     let data = data(arguments, folder, &verdict, &images, &page);
     let text = text(&verdict, &images, &page);
-    if verdict.passed {
+    if verdict.outcome == Outcome::Passed {
         output.result(&data, &text);
         return Ok(());
     }
     output.findings(&text);
+    let (kind, says) = match verdict.outcome {
+        Outcome::Inconclusive => (
+            Kind::Inconclusive,
+            "these photographs cannot tell whether it keeps its promise",
+        ),
+        _ => (Kind::Verdict, "it does not keep its promise"),
+    };
     let message = format!(
-        "{} does not keep its promise: error {:.4}, at most {:.4} passes",
+        "{}: {says}: error {}, at most {} passes",
         arguments.table.display(),
-        verdict.error[1],
-        verdict.bound.limit
+        percent(verdict.error[1]),
+        percent(verdict.bound.limit)
     );
+    let todo = verdict.cause.map_or("", Cause::next_step);
     let next_step = format!(
-        "{} Look at {}, then photograph and solve again, or choose a larger --bound.",
+        "{} {todo} The page is {}.",
         reason(&verdict),
         page.display()
     );
-    Err(Failure::new(Kind::Verdict, message, next_step).with_result(data))
+    Err(Failure::new(kind, message, next_step).with_result(data))
+}
+
+/// What the device at the port says of itself.
+fn device(arguments: &Verify, output: &Output) -> Result<Vec<(String, String)>, Failure> {
+    let line = SerialLine {
+        port: arguments.port.clone(),
+        baud: None,
+    };
+    let mut connection = connect(&line, output)?;
+    let status = connection.client.status();
+    let status = status.map_err(|error| connection.failed(&error))?;
+    let slots = connection.client.slots().ok();
+    let device = connection.client.device();
+    let who = format!(
+        "{}, {}, firmware {}, at {}",
+        status.board,
+        number(device.device),
+        status.firmware,
+        connection.port
+    );
+    Ok(vec![
+        ("device".to_owned(), who),
+        (
+            "its table".to_owned(),
+            table_in_use(&status, slots.as_ref()),
+        ),
+        ("its mode".to_owned(), status.mode.to_string()),
+    ])
 }
 
 /// The page's name in its folder.
@@ -128,11 +184,11 @@ fn report(
     table: &Table<'_>,
     readings: &Readings,
     verdict: &TableVerdict,
-    images: &[TestImage],
+    (images, handover): (&[TestImage], &Handover),
     out: &Path,
 ) -> Result<PathBuf, Failure> {
     let drawn = pictures(table, readings, verdict);
-    let page = html(table, verdict, images, &drawn);
+    let page = html(table, verdict, images, &drawn, handover);
     let mut files = output::pictures(&drawn);
     files.push((PAGE.into(), page.as_bytes()));
     write_files(out, &files)?;
@@ -169,22 +225,30 @@ fn data(
     let worst = verdict
         .worst
         .iter()
-        .map(|cell| json!({ "row": cell.row, "col": cell.col, "error": cell.error }));
+        .map(|cell| json!({ "row": cell.row + 1, "col": cell.col + 1, "error": cell.error }));
     json!({
         "table": arguments.table.display().to_string(),
         "capture": folder.display().to_string(),
-        "passed": verdict.passed,
+        "outcome": verdict.outcome.name(),
+        "cause": verdict.cause.map(Cause::name),
+        "gates": gates(&verdict.gates),
         "mean_error": { "before": verdict.error[0], "after": verdict.error[1] },
         "bound": {
             "limit": bound.limit,
             "given": bound.given,
             "expected": bound.expected,
+            "promise": bound.promise,
+            "added": bound.added,
+            "doubt": bound.doubt,
             "predicted": bound.predicted,
             "range": bound.range,
             "noise": bound.noise,
             "viewpoint": bound.viewpoint,
         },
         "images": verdict.images.iter().map(of_image).collect::<Vec<_>>(),
+        "wanted": verdict.wanted,
+        "curve": { "power": verdict.curve.power, "left": verdict.curve.left },
+        "brightness": verdict.brightness,
         "drift": {
             "level": white.map(|white| &white.level),
             "shape": white.map(|white| white.shape),
@@ -214,7 +278,8 @@ fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
         (true, _) => "as asked for".to_owned(),
         (false, None) => "half of the error before: the table predicts none".to_owned(),
         (false, Some(expected)) => format!(
-            "1.5 times the {expected:.4} expected: table {}, range and codes {}, noise {}, viewpoint {:.4}",
+            "1.5 times the {expected:.4} expected: table {}, range and codes {}, noise {}, viewpoint \
+             {:.4}",
             known(bound.predicted),
             known(bound.range),
             known(bound.noise),
@@ -245,14 +310,19 @@ fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
     if let Some(worst) = verdict.worst.first() {
         let _ = writeln!(
             text,
-            "worst cell  row {}, column {}: {:.2} % of white",
-            worst.row,
-            worst.col,
+            "worst cell  row {}, column {}, from 1 at the top left: {:.2} % of white",
+            worst.row + 1,
+            worst.col + 1,
             100.0 * worst.error
         );
     }
+    let _ = writeln!(text, "brightness  {}", brightness_words(verdict));
     let _ = writeln!(text, "page        {}", page.display());
-    let answer = if verdict.passed { "PASSED" } else { "FAILED" };
+    let answer = match verdict.outcome {
+        Outcome::Passed => "PASSED",
+        Outcome::Failed => "FAILED",
+        Outcome::Inconclusive => "CANNOT TELL",
+    };
     let _ = writeln!(text, "verdict     {answer}: {}", reason(verdict));
     text
 }

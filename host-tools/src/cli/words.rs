@@ -1,8 +1,12 @@
 //! Words and data that several commands have in common: a device, its state, its tables.
 
-use iltm_runtime::link::{Hello, Mode, PassThrough, SlotInfo, SlotState, Slots, Status, TableName};
+use iltm_runtime::image::Label;
+use iltm_runtime::link::{
+    FrameKind, Hello, Mode, PassThrough, SlotInfo, SlotState, Slots, Status, TableAbout, TableName,
+    TableReason,
+};
 use serde_json::{Value, json};
-use std::fmt::Write;
+use std::fmt::{self, Write};
 
 /// Lines under a heading, the following ones indented as far.
 pub(super) fn lines(heading: &str, lines: &[String]) -> String {
@@ -20,7 +24,7 @@ pub(super) fn number(number: u64) -> String {
     if number == 0 {
         "no number".to_owned()
     } else {
-        format!("number {number:016x}")
+        format!("number {number}")
     }
 }
 
@@ -29,7 +33,7 @@ pub(super) fn identity(device: &Hello) -> Value {
     json!({
         "board": device.board.as_str(),
         "firmware": device.firmware.to_string(),
-        "number": format!("{:016x}", device.device),
+        "number": device.device.to_string(),
         "protocol": device.protocol,
         "table_format": device.table_format,
         "max_payload": device.max_payload,
@@ -41,13 +45,60 @@ pub(super) fn identity(device: &Hello) -> Value {
     })
 }
 
+/// A table as people know it: by name and day, where a device has said them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct CalledTable {
+    pub(super) name: TableName,
+    pub(super) about: Option<TableAbout>,
+}
+
+impl From<TableName> for CalledTable {
+    fn from(name: TableName) -> Self {
+        Self { name, about: None }
+    }
+}
+
+impl fmt::Display for CalledTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.about.map(|about| about.label) {
+            Some(label) if !label.name().is_empty() => write!(f, "{label}, {}", self.name),
+            _ => write!(f, "{}", self.name),
+        }
+    }
+}
+
 /// What a table is called, for programs.
-pub(super) fn table_name(table: Option<TableName>) -> Option<Value> {
+pub(super) fn table_name(table: Option<impl Into<CalledTable>>) -> Option<Value> {
     table.map(|table| {
+        let CalledTable { name, about } = table.into();
+        let label = about.map(|about| about.label).unwrap_or_default();
         json!({
-            "id": format!("{:08x}", table.id),
-            "version": table.version,
+            "id": format!("{:08x}", name.id),
+            "version": (name.version != 0).then_some(name.version),
+            "name": named(&label),
+            "date": day(&label),
         })
+    })
+}
+
+/// The name on a table's label, if it has one.
+pub(super) fn named(label: &Label) -> Option<&str> {
+    Some(label.name()).filter(|name| !name.is_empty())
+}
+
+/// The day on a table's label, if it has one.
+pub(super) fn day(label: &Label) -> Option<String> {
+    let date = label.date();
+    let (year, month, day) = (date / 10_000, date / 100 % 100, date % 100);
+    (date != 0).then(|| format!("{year:04}-{month:02}-{day:02}"))
+}
+
+/// Frames, for programs.
+pub(super) fn frame_kind(frames: FrameKind) -> Value {
+    json!({
+        "width": frames.width,
+        "height": frames.height,
+        "channels": frames.channels,
     })
 }
 
@@ -62,6 +113,7 @@ pub(super) fn status_data(status: &Status) -> Value {
         PassThrough::BrokenTable => "broken-table",
         PassThrough::OtherFrames => "other-frames",
         PassThrough::Memory => "memory",
+        PassThrough::CrashLoop => "crash-loop",
     };
     json!({
         "firmware": status.firmware.to_string(),
@@ -94,14 +146,52 @@ pub(super) fn status_data(status: &Status) -> Value {
         "last_fault": status.last_fault.map(|fault| fault.to_string()),
         "stack": { "used": status.stack.used, "size": status.stack.size },
         "watchdog_resets": status.watchdog_resets,
+        "input": status.input.map(frame_kind),
         "serial": { "bad": status.serial.bad, "unsent": status.serial.unsent },
     })
 }
 
-/// The table in use.
-pub(super) fn table_in_use(status: &Status) -> String {
-    let table = status.table.map(|table| table.to_string());
+/// The table in use; with what the slots say of it, where they were asked.
+pub(super) fn table_in_use(status: &Status, slots: Option<&Slots>) -> String {
+    let table = status.table.map(|table| called(table, slots).to_string());
     table.unwrap_or_else(|| "none".to_owned())
+}
+
+/// A table, with what the slots say of it.
+pub(super) fn called(name: TableName, slots: Option<&Slots>) -> CalledTable {
+    let all = slots.into_iter().flat_map(|slots| &slots.slots);
+    let mut same = all.filter(|slot| slot.table == Some(name));
+    CalledTable {
+        name,
+        about: same.next().and_then(|slot| slot.about),
+    }
+}
+
+/// What a device does with frames: plain where it does not compensate them.
+pub(super) fn mode(status: &Status, slots: Option<&Slots>) -> String {
+    let Mode::PassThrough(why) = status.mode else {
+        return match status.input {
+            Some(input) => format!("compensating {input}"),
+            None => "ready to compensate: no frames have come in yet".to_owned(),
+        };
+    };
+    let why = match why {
+        PassThrough::OtherFrames => match slots.and_then(|slots| misfit(status, slots)) {
+            Some(misfit) => misfit,
+            None => why.to_string(),
+        },
+        why => why.to_string(),
+    };
+    format!("NOT COMPENSATING, frames pass unchanged: {why}")
+}
+
+/// Which frames come in and which the table in use takes.
+pub(super) fn misfit(status: &Status, slots: &Slots) -> Option<String> {
+    let (input, about) = (status.input?, used(slots)?.about?);
+    Some(format!(
+        "the device gets {input}, this table is for {} or more",
+        about.frames
+    ))
 }
 
 /// Both slots, in a few words.
@@ -160,15 +250,38 @@ fn used(slots: &Slots) -> Option<&SlotInfo> {
     all.find(|slot| matches!(slot.state, SlotState::Active | SlotState::Trial))
 }
 
+fn held(slot: &SlotInfo) -> Option<CalledTable> {
+    Some(CalledTable {
+        name: slot.table?,
+        about: slot.about,
+    })
+}
+
 /// The table in use.
-pub(super) fn in_use(slots: &Slots) -> Option<TableName> {
-    used(slots)?.table
+pub(super) fn in_use(slots: &Slots) -> Option<CalledTable> {
+    held(used(slots)?)
 }
 
 /// The table to go back to.
-pub(super) fn other(slots: &Slots) -> Option<TableName> {
+pub(super) fn other(slots: &Slots) -> Option<CalledTable> {
     let mut all = slots.slots.iter();
-    all.find(|slot| slot.state == SlotState::Valid)?.table
+    held(all.find(|slot| slot.state == SlotState::Valid)?)
+}
+
+/// The table that is there and was never confirmed.
+pub(super) fn unconfirmed(slots: &Slots) -> Option<CalledTable> {
+    let mut all = slots.slots.iter();
+    held(all.find(|slot| slot.state == SlotState::Unconfirmed)?)
+}
+
+/// How the trial of a table that nobody confirmed ended; `None` if it was none.
+pub(super) fn how_ended(slots: &Slots, table: TableName) -> Option<String> {
+    let ended = slots.ended.filter(|ended| ended.table == table.id)?;
+    let ago = ended.ago_ms.div_ceil(1_000);
+    Some(match ended.reason {
+        TableReason::RolledBack => format!("was rolled back {ago} s ago"),
+        _ => format!("ended {ago} s ago"),
+    })
 }
 
 /// Whether a file of this length with this table is in use.
@@ -181,7 +294,8 @@ pub(super) fn slots_data(slots: &Slots) -> Value {
     let slot = |slot: &SlotInfo| {
         json!({
             "state": slot.state.to_string(),
-            "table": table_name(slot.table),
+            "table": table_name(held(slot)),
+            "frames": slot.about.map(|about| frame_kind(about.frames)),
             "bytes": slot.length,
             "erases": slot.erases,
         })
@@ -192,16 +306,33 @@ pub(super) fn slots_data(slots: &Slots) -> Value {
         "trial_ms": slots.trial_ms,
         "oldest": slots.oldest,
         "key": slots.key.map(|id| key_id(&id)),
-        "number": format!("{:016x}", slots.device),
+        "number": slots.device.to_string(),
         "sector_bytes": slots.sector,
         "record_erases": slots.record_erases,
+        "sequence": slots.sequence,
+        "ended": slots.ended.map(|ended| json!({
+            "id": format!("{:08x}", ended.table),
+            "reason": table_reason(ended.reason),
+            "ago_ms": ended.ago_ms,
+        })),
     })
+}
+
+/// Why another table is in use, for programs.
+pub(super) const fn table_reason(reason: TableReason) -> &'static str {
+    match reason {
+        TableReason::Trial => "trial",
+        TableReason::Confirmed => "confirmed",
+        TableReason::TrialOver => "trial-over",
+        TableReason::RolledBack => "rolled-back",
+        TableReason::Damaged => "damaged",
+    }
 }
 
 /// A line a slot.
 pub(super) fn slot_lines(slots: &Slots) -> Vec<String> {
     let line = |(index, slot): (u8, &SlotInfo)| {
-        let table = match slot.table {
+        let table = match held(slot) {
             Some(table) => format!("table {table}, {} bytes, ", slot.length),
             None => String::new(),
         };
@@ -221,6 +352,7 @@ pub(super) fn slot_lines(slots: &Slots) -> Vec<String> {
         let state = match slot.state {
             // A transfer that was cut is no defect.
             SlotState::Broken => "no whole table".to_owned(),
+            SlotState::Unconfirmed => "never confirmed".to_owned(),
             state => state.to_string(),
         };
         format!("{} {state}{trial}: {table}{erases}", letter(index))

@@ -12,9 +12,18 @@ fn the_sample_passes_every_gate_and_has_a_page() {
     assert!(!checked.said.contains("FAIL"), "{}", checked.said);
     contains(&checked.said, &["order"]);
     let page = user.text("page/check.html");
-    assert_eq!(page.matches("<section class=\"gate").count(), 11);
+    assert_eq!(page.matches("<details class=\"gate").count(), 11);
+    contains(
+        &page,
+        &[
+            "Passed",
+            "White as the camera sees it",
+            "No pixel is clipped",
+        ],
+    );
     let data = user.json("check SAMPLE");
     assert_eq!(data["pass"], true);
+    assert_eq!(data["not_judged"].as_array().map(Vec::len), Some(0));
     assert_eq!(data["cells"]["live"], 273);
 }
 
@@ -28,7 +37,12 @@ fn a_gate_that_fails_stops_check_and_solve_unless_it_is_ignored() {
     assert_eq!(checked.code, 5);
     let found = checked.json();
     let gates = found["gates"].as_array().expect("gates");
-    for (name, verdict) in [("order", "fail"), ("complete", "pass")] {
+    // What follows from exchanged photographs is neither good nor bad yet.
+    for (name, verdict) in [
+        ("order", "fail"),
+        ("complete", "pass"),
+        ("noise", "not-judged"),
+    ] {
         let gate = gates.iter().find(|gate| gate["name"] == name);
         assert_eq!(gate.expect("judged")["verdict"], verdict, "{name}");
     }
@@ -57,6 +71,12 @@ fn names_in_a_stranger_s_folder_do_not_command_the_terminal() {
     contains(&ended.said, &["mine"]);
     let obeyed = |c: char| c.is_control() && c != '\n';
     assert!(!ended.said.contains(obeyed), "{:?}", ended.said);
+}
+
+#[test]
+fn too_few_patterns_for_a_solve_are_refused_before_the_work() {
+    let said = User::new().fails(2, "patterns -o p --rows 4 --cols 4 --photos 9");
+    contains(&said, &["at least 10"]);
 }
 
 #[test]

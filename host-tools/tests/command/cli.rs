@@ -347,8 +347,8 @@ fn bounces_add_up_to_the_photograph_in_files_too() {
 #[test]
 fn inspect_says_of_the_theorem_what_solve_said() {
     let user = User::new();
-    let solved = user.says("solve SAMPLE -o t.iltm");
-    let inspected = user.says("inspect t.iltm");
+    let solved = user.says("solve SAMPLE -o t.iltm --verbose");
+    let inspected = user.says("inspect t.iltm --verbose");
     let sentence = |said: &str| -> Vec<String> {
         let lines = said
             .lines()

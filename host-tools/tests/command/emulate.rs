@@ -1,6 +1,6 @@
 //! `iltm emulate` with a key: what a technician can try of refusals without hardware.
 
-use super::user::{User, interrupt};
+use super::user::{User, contains, interrupt};
 use iltm::compile::sign::new_key;
 use iltm::device::emulator::Board;
 use iltm_runtime::image::Seal;
@@ -9,6 +9,7 @@ use iltm_tests::{signed, wedge_table};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
 
 /// A running `iltm emulate`, and the port that it said.
 struct Emulated {
@@ -60,12 +61,15 @@ fn a_board_with_a_key_from_its_factory_takes_only_tables_that_are_signed_with_it
     let id = Seal::key_id(key.verifying_key().as_bytes());
     let id = format!("{:016x}", u64::from_be_bytes(id));
     assert_eq!(before["update"]["key"], id);
-    assert_eq!(before["device"]["number"], "0000000000000009");
+    assert_eq!(before["device"]["number"], "9");
     assert_eq!(before["table"]["version"], 2, "the signed table is in use");
     let flash = |name: &str, code| {
         user.fails(
             code,
-            &format!("flash {name} --confirm --port {}", board.port),
+            &format!(
+                "flash {name} --confirm --key iltm.key --port {}",
+                board.port
+            ),
         );
     };
     for (name, code) in [
@@ -84,4 +88,37 @@ fn a_board_with_a_key_from_its_factory_takes_only_tables_that_are_signed_with_it
     // A board keeps its key, and a number comes with a key.
     user.fails(28, "emulate --key other.key --memory board --device 9");
     user.fails(2, "emulate --device 9");
+}
+
+#[test]
+fn a_board_without_a_table_gets_frames_for_any_table_that_is_flashed_to_it() {
+    let user = User::new();
+    // Grey; colour; more rows and columns than the film that the board begins with has.
+    let tables = [
+        wedge_table(4, 6, 1),
+        wedge_table(5, 4, 3),
+        wedge_table(100, 2, 1),
+    ];
+    let board = Emulated::start(&user, "");
+    let status = || user.json(&format!("status --port {}", board.port));
+    for (index, table) in tables.iter().enumerate() {
+        user.write("t.iltm", table);
+        user.says(&format!("flash t.iltm --port {}", board.port));
+        assert_eq!(status()["mode"], "compensating", "table {index}");
+        user.says(&format!("confirm --port {}", board.port));
+    }
+    // The way back is one to frames of another kind, too.
+    user.says(&format!("rollback --port {}", board.port));
+    let end = Instant::now() + Duration::from_secs(20);
+    while status()["mode"] != "compensating" {
+        assert!(Instant::now() < end, "{}", status());
+    }
+}
+
+#[test]
+fn a_firmware_that_is_none_is_an_error() {
+    let user = User::new();
+    user.write("notes.txt", "no firmware at all");
+    let said = user.fails(13, "emulate --firmware notes.txt");
+    contains(&said, &["notes.txt", "not an ELF file for Arm"]);
 }

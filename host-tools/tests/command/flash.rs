@@ -5,9 +5,9 @@ use super::user::{Ended, User, contains, interrupt};
 use ed25519_dalek::SigningKey;
 use iltm::user::Folders;
 use iltm::user::emulated::{self, BoardRegistration};
-use iltm_runtime::link::SlotState;
-use iltm_tests::fake_device::{FakeDevice, FakePort, FakeTables, SECTOR, slot};
-use iltm_tests::{signing_key, wedge_table};
+use iltm_runtime::link::{FrameKind, SlotState};
+use iltm_tests::fake_device::{FakeDevice, FakePort, FakeTables, Order, SECTOR, slot};
+use iltm_tests::{key_file, named_table, signing_key, wedge_table};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Read;
@@ -41,6 +41,7 @@ fn user() -> User {
     exclude(&user, &[]);
     user.write("a.iltm", &tables()[0]);
     user.write("b.iltm", &tables()[1]);
+    user.write("site.key", key_file(&key()));
     user
 }
 
@@ -86,7 +87,7 @@ impl Device {
         let device = Self::with(FakeTables::provisioned(public, 9));
         let user = user();
         user.write("5.iltm", signed(&tables()[0], 5));
-        user.says(&device.at("flash 5.iltm --confirm"));
+        user.says(&device.at("flash 5.iltm --confirm --key site.key"));
         device
     }
 
@@ -222,12 +223,12 @@ fn a_table_that_was_signed_again_to_revoke_others_is_another_file() {
     assert_eq!(device.writes(), sent);
     let revoking = iltm_tests::signed(&tables()[0], &key(), 5, 5, 0);
     user.write("revoking.iltm", &revoking);
-    let said = user.says(&device.at("flash revoking.iltm"));
+    let said = user.says(&device.at("flash revoking.iltm --key site.key"));
     contains(&said, &["is in use, on trial"]);
     assert_eq!(device.writes(), sent + revoking.len().div_ceil(CHUNK));
     // By now both are there under one name, and the device tells them apart.
     user.fails(26, &device.at("flash 5.iltm"));
-    let said = user.says(&device.at("flash revoking.iltm --confirm"));
+    let said = user.says(&device.at("flash revoking.iltm --confirm --key site.key"));
     contains(&said, &["is in use already, confirmed"]);
     assert_eq!(device.writes(), sent + revoking.len().div_ceil(CHUNK));
 }
@@ -284,12 +285,12 @@ fn every_cause_of_refusal_has_its_code_and_says_which_table_is_in_use() {
         // Refused before anything is sent.
         assert_eq!(device.writes(), sent, "{name}");
     }
-    // Only the device can tell.
     let mut false_signature = signed(table, 6);
     *false_signature.last_mut().expect("long") ^= 1;
     user.write("t.iltm", &false_signature);
-    let said = user.fails(23, &device.at("flash t.iltm"));
+    let said = user.fails(23, &device.at("flash t.iltm --key site.key"));
     contains(&said, &["signature", &in_use]);
+    assert_eq!(device.writes(), sent, "the public key is known here");
     assert_eq!(device.in_use(), used);
 }
 
@@ -333,7 +334,7 @@ fn rolling_back_says_which_table_is_in_use_now() {
     user.says(&device.at("flash b.iltm"));
     let b = device.in_use();
     rolled_back(&a, &b);
-    contains(&user.says(&device.at("status")), &["B valid"]);
+    contains(&user.says(&device.at("status")), &["B never confirmed"]);
     // Not on to the one that nobody confirmed; but back and forth between two that
     // somebody did.
     refused(&format!("Table {a} is in use."));
@@ -453,14 +454,14 @@ fn a_key_is_made_installed_and_tables_signed_with_it_are_taken() {
     let id = format!("{:016x}", u64::from_be_bytes(id.expect("a key")));
     assert_eq!(shown["id"], id);
     let said = user.says(&device.at("status"));
-    contains(&said, &[&id, "number 0000000000000009"]);
+    contains(&said, &[&id, "number 9,"]);
 
     user.fails(21, &device.at("flash a.iltm"));
     user.says("sign a.iltm --key iltm.key --table-version 3 --for-device 9");
     let said = user.says("inspect a.iltm --key iltm.key");
-    let version = "version          3, for device 0000000000000009 only";
+    let version = "3, for device 9 only";
     contains(&said, &[version, "(verified)"]);
-    user.says(&device.at("flash a.iltm --confirm"));
+    user.says(&device.at("flash a.iltm --confirm --key iltm.key"));
 
     user.rename("iltm.key", "old.key");
     user.says("key new");
@@ -474,7 +475,7 @@ fn a_report_has_what_support_needs_and_no_keys() {
     user.says("key new");
     user.says(&device.at("key install iltm.key --yes"));
     user.says("sign a.iltm --key iltm.key");
-    user.says(&device.at("flash a.iltm"));
+    user.says(&device.at("flash a.iltm --key iltm.key"));
     user.says(&device.at("report -o r.zip --seconds 0"));
     let file = File::open(user.path("r.zip")).expect("written");
     let mut zip = zip::ZipArchive::new(file).expect("a zip file");
@@ -512,4 +513,222 @@ fn a_report_has_what_support_needs_and_no_keys() {
 fn a_report_without_a_device_says_why() {
     let said = user().says("report -o r.zip --port /dev/no-such-port");
     contains(&said, &["device-error.txt", "/dev/no-such-port"]);
+}
+
+/// Frames that come into a device.
+fn gets(device: &Device, input: Option<(u16, u16, u8)>) {
+    let input = input.map(|(width, height, channels)| FrameKind {
+        width,
+        height,
+        channels,
+    });
+    device.look(move |device| device.status.input = input);
+}
+
+#[test]
+fn a_table_for_other_frames_is_an_error_and_the_one_before_comes_back() {
+    let (user, device) = (user(), Device::new());
+    user.says(&device.at("flash a.iltm --confirm"));
+    let a = device.in_use();
+    user.write("colour.iltm", wedge_table(10, 14, 3));
+    for confirm in ["", " --confirm"] {
+        let said = user.fails(35, &device.at(&format!("flash colour.iltm{confirm}")));
+        contains(
+            &said,
+            &[
+                "the device gets grey frames of 320 x 240",
+                "this table is for colour frames of 14 x 10 or more",
+                &format!("Table {a} is in use."),
+            ],
+        );
+        assert_eq!(device.in_use(), a);
+        assert_eq!(device.states()[0], SlotState::Active);
+    }
+    // Frames that are too small.
+    gets(&device, Some((15, 12, 1)));
+    let said = user.fails(35, &device.at("flash a.iltm"));
+    contains(
+        &said,
+        &["grey frames of 15 x 12", "grey frames of 16 x 12 or more"],
+    );
+    assert_eq!(device.in_use(), a, "it was confirmed before");
+    let said = user.says(&device.at("status"));
+    assert!(said.starts_with("mode         NOT COMPENSATING"), "{said}");
+}
+
+#[test]
+fn a_table_that_compensates_nothing_is_not_confirmed() {
+    let (user, device) = (user(), Device::new());
+    user.says(&device.at("flash a.iltm"));
+    gets(&device, Some((320, 240, 3)));
+    let said = user.fails(35, &device.at("confirm"));
+    contains(
+        &said,
+        &["colour frames of 320 x 240", "Nothing was confirmed."],
+    );
+    assert_eq!(device.states()[0], SlotState::Trial);
+    gets(&device, Some((320, 240, 1)));
+    contains(
+        &user.says(&device.at("confirm")),
+        &["is in use, confirmed."],
+    );
+}
+
+#[test]
+fn where_no_frames_arrive_nobody_says_that_the_table_fits() {
+    let (user, device) = (user(), Device::new());
+    gets(&device, None);
+    let words = "No frames arrive: whether the table fits them cannot be told.\n";
+    for command in ["flash a.iltm", "confirm", "flash b.iltm --confirm"] {
+        let said = user.says(&device.at(command));
+        assert!(said.ends_with(words), "{command}: {said}");
+    }
+    let done = user.events(&device.at("flash b.iltm"));
+    let done = done.last().expect("a last line");
+    assert!(done["compensating"].is_null(), "{done}");
+}
+
+#[test]
+fn a_confirmation_that_comes_too_late_is_an_error() {
+    let (user, device) = (user(), Device::new());
+    user.says(&device.at("flash a.iltm --confirm"));
+    let a = device.in_use();
+    user.says(&device.at("flash b.iltm --trial 1"));
+    let b = device.in_use();
+    thread::sleep(Duration::from_millis(1_500));
+    let back = format!("the device went back to {a}");
+    let again = "Nothing was confirmed. Flash the table again";
+    let said = user.fails(27, &device.at("confirm"));
+    let ended = format!("the trial of {b} ended ");
+    contains(&said, &[&ended, " s ago", &back, again]);
+    // After a restart it is known that nobody confirmed it.
+    device.order(Order::Restart);
+    let said = user.fails(27, &device.at("confirm"));
+    let gone = format!("{b} is not in use: the device has restarted");
+    contains(&said, &[&gone, "a trial ends with a restart", &back, again]);
+    user.says(&device.at("flash b.iltm --confirm"));
+    contains(
+        &user.says(&device.at("confirm")),
+        &["needs no confirmation"],
+    );
+}
+
+#[test]
+fn tables_have_names_on_the_device() {
+    let (user, device) = (user(), Device::new());
+    user.write("foyer.iltm", named_table("foyer", 20_261_123));
+    user.write("evil.iltm", named_table("a\u{1b}]0;b\u{7}", 0));
+    let said = user.says(&device.at("flash foyer.iltm"));
+    let id = device.in_use();
+    let name = format!("foyer, 2026-11-23, {id}");
+    contains(&said, &[&format!("Table {name} is in use, on trial")]);
+    contains(&user.says(&device.at("confirm")), &[&name]);
+    contains(
+        &user.says(&device.at("status")),
+        &[&format!("table        {name}")],
+    );
+    let status = user.json(&device.at("status"));
+    let table = &status["update"]["slots"][0]["table"];
+    assert_eq!(
+        (&table["name"], &table["date"]),
+        (&"foyer".into(), &"2026-11-23".into())
+    );
+    let board = register(&user, &device, "one");
+    contains(&user.says("ports"), &[&name]);
+    drop(board);
+    let inspected = user.json("inspect foyer.iltm");
+    let short = inspected["id"].as_str().expect("text");
+    assert!(id.starts_with(short), "{id}");
+    contains(
+        &user.says("inspect foyer.iltm"),
+        &["foyer, 2026-11-23, ", short],
+    );
+    // A terminal gets nothing that it would obey.
+    for said in [
+        user.says("inspect evil.iltm"),
+        user.says(&device.at("flash evil.iltm")),
+        user.says(&device.at("status")),
+    ] {
+        contains(&said, &["a\\u{1b}]0;b\\u{7}"]);
+        assert!(!said.contains('\u{1b}'), "{said}");
+    }
+    let said = user.says(&device.at("rollback"));
+    contains(&said, &[&format!("Table {name} is in use again")]);
+}
+
+#[test]
+fn a_device_with_a_key_wants_to_be_shown_the_right() {
+    let (user, device) = (user(), Device::strict());
+    let sent = device.writes();
+    user.write("6.iltm", signed(&tables()[1], 6));
+    let said = user.fails(36, &device.at("flash 6.iltm"));
+    contains(&said, &["--key", "is in use."]);
+    assert_eq!(device.writes(), sent, "nothing was sent");
+    user.says("key new -o other.key");
+    user.fails(36, &device.at("flash 6.iltm --key other.key"));
+    // A technician of this device flashes, confirms and rolls back, and signs nothing.
+    user.says("key technician site.key -o anna.key --device 9");
+    user.says("key technician site.key -o ben.key --device 10");
+    user.fails(17, "sign a.iltm --key anna.key");
+    let said = user.fails(36, &device.at("flash 6.iltm --key ben.key"));
+    contains(&said, &["for the device 10"]);
+    user.says(&device.at("flash 6.iltm --key anna.key"));
+    for command in ["confirm", "rollback"] {
+        let said = user.fails(36, &device.at(command));
+        contains(&said, &["on trial for", "--key"]);
+    }
+    user.says(&device.at("confirm --key anna.key"));
+    let said = user.says(&device.at("rollback --key anna.key"));
+    contains(&said, &["is in use again"]);
+    // What was confirmed once is not undercut from the line.
+    user.write("5.iltm", signed(&wedge_table(9, 9, 1), 5));
+    user.fails(24, &device.at("flash 5.iltm --key site.key"));
+}
+
+#[test]
+fn a_key_is_not_installed_over_a_table_that_it_would_lose() {
+    let (user, device) = (user(), Device::new());
+    user.says(&device.at("flash a.iltm --confirm"));
+    let a = device.in_use();
+    let install = device.at("key install site.key --device 42 --yes");
+    let said = user.fails(21, &install);
+    contains(&said, &["nothing was installed", &a, "--lose-table"]);
+    user.write("1.iltm", signed(&tables()[0], 1));
+    user.says(&device.at("flash 1.iltm --confirm"));
+    let said = user.says(&install);
+    contains(&said, &["number 42"]);
+}
+
+#[test]
+fn terms_of_a_seal_without_a_key_are_an_error() {
+    let user = user();
+    for terms in ["--for-device 3", "--table-version 7", "--revoke-below 2"] {
+        let said = user.fails(2, &format!("solve nowhere -o t.iltm {terms}"));
+        contains(&said, &["--key"]);
+    }
+}
+
+#[test]
+fn a_version_that_nobody_chose_rises_with_the_time() {
+    let user = user();
+    user.says("sign a.iltm --key site.key");
+    let seal = &user.json("inspect a.iltm")["seal"];
+    // Minutes; 2026-01-01 was minute 29,453,760.
+    assert!(seal["version"].as_u64() > Some(29_453_760), "{seal}");
+}
+
+#[test]
+fn a_port_that_cannot_be_opened_has_one_code_named_or_found() {
+    let user = user();
+    user.write("no-port", "not a terminal");
+    let path = user.path("no-port").display().to_string();
+    let folders = Folders {
+        config: user.path("config"),
+        state: user.path("state"),
+    };
+    let _board = emulated::register(&folders, &path, "one").expect("writable");
+    let named = user.fails(10, &format!("status --port {path}"));
+    for said in [named, user.fails(10, "status")] {
+        contains(&said, &["the port cannot be opened"]);
+    }
 }

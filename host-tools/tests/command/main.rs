@@ -11,8 +11,10 @@ mod flash;
 #[cfg(target_os = "linux")]
 mod interruption;
 mod live;
+mod schema;
 mod session;
 mod simulate;
+mod table_words;
 mod tradeoff;
 mod user;
 mod verify;

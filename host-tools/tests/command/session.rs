@@ -13,7 +13,7 @@ use tempfile::TempDir;
 /// With a capture `c` of 3 x 4 cells that nobody has photographed.
 fn patterns(more: &str) -> User {
     let user = User::new();
-    let line = "patterns -o c --rows 3 --cols 4 --photos 2 --projector 64x48";
+    let line = "patterns -o c --rows 3 --cols 4 --photos 10 --projector 64x48";
     user.says(&format!("{line} {more}"));
     user
 }

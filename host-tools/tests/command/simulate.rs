@@ -4,7 +4,7 @@ use super::user::{User, contains};
 use std::fs;
 
 /// A small scene, two walls that face each other.
-const CORNER: &str = "name = \"Corner\"
+pub(crate) const CORNER: &str = "name = \"Corner\"
 [projector]
 position = [0, 0, 4]
 look_at = [0, 0, 0]

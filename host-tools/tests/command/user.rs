@@ -1,6 +1,7 @@
 //! User of the command line: a folder in which `iltm` is run, and what a command says and
 //! leaves behind.
 
+use crate::schema;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -115,8 +116,13 @@ impl User {
         self.iltm(line).spawn().expect("the binary is there")
     }
 
+    #[track_caller]
     pub(crate) fn run(&self, line: &str) -> Ended {
-        Ended::of(self.spawn(line))
+        let ended = Ended::of(self.spawn(line));
+        if line.split(' ').any(|word| word == "--json") {
+            schema::check(line, &ended.out);
+        }
+        ended
     }
 
     /// What a command that succeeds says.

@@ -10,7 +10,7 @@ use iltm_runtime::image::{Table, unseal};
 use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::firmware::{clipped_on_host, elf, random_frame, start, through};
-use iltm_tests::{grid, signing_key};
+use iltm_tests::{grid, key_file, signing_key};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -31,6 +31,9 @@ pub(crate) const DEVICE: u64 = 9;
 
 /// Longest that anything may take.
 const LONGEST: Duration = Duration::from_mins(1);
+
+/// Its file, which shows the right to change what the board uses.
+const KEY_FILE: &str = "site.key";
 
 /// The board takes tables signed with this key.
 pub(crate) fn key() -> SigningKey {
@@ -53,6 +56,7 @@ impl Board {
         let memory = BoardMemory::kept(&folder.path().join("memory")).expect("a new file");
         let public = key().verifying_key().to_bytes();
         memory.provision(public, DEVICE).expect("it has none");
+        fs::write(folder.path().join(KEY_FILE), key_file(&key())).expect("writable");
         let size = FrameSize::of_grid(cells());
         let format = Format::new(size, 1, Encoding::Display, 40_000).expect("small frames");
         Self {
@@ -102,9 +106,11 @@ impl Board {
         serde_json::from_slice(&output).expect("an object")
     }
 
-    /// Begins `iltm flash FILE --confirm`; returns when it talks to the board.
+    /// Begins `iltm flash FILE --confirm --key KEY`; returns when it talks to the board.
     pub(crate) fn flash(&self, name: &str) -> Flashing {
-        let flash = self.iltm(&["flash", name, "--confirm"]).spawn();
+        let flash = self
+            .iltm(&["flash", name, "--confirm", "--key", KEY_FILE])
+            .spawn();
         let mut child = flash.expect("the binary is there");
         let out = BufReader::new(child.stdout.take().expect("piped"));
         let (sender, events) = channel();

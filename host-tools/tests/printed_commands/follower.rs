@@ -27,7 +27,7 @@ const STAND_INS: [(&str, &str); 7] = [
     ("gphoto2", CAMERA),
     ("v4l2-ctl", CAMERA),
     ("libcamera-still", CAMERA),
-    ("ffmpeg", "exec cat \"${0%/*}/film.y4m\""),
+    ("ffmpeg", FFMPEG),
     ("mpv", "exec cat > played.y4m"),
     // Fuzzing has no end: only whether the target is there.
     (
@@ -35,6 +35,21 @@ const STAND_INS: [(&str, &str); 7] = [
         "for target; do :; done; exec test -f \"fuzz_targets/$target.rs\"",
     ),
 ];
+
+/// Writes what it is given, if that is a Y4M file, or else a film, in the aspect that it is
+/// asked for; of a picture the first frame. To its last argument, which may be a pipe.
+const FFMPEG: &str = "films=${0%/*}
+for made; do [ \"$last\" = -i ] && input=$made; last=$made; done
+case \"$input\" in
+*.y4m) film=$input;;
+*=1280x800:*) film=$films/wide.y4m;;
+*) film=$films/film.y4m;;
+esac
+case \"$made\" in
+-) exec cat \"$film\";;
+*.png) exec cp \"$films/still.png\" \"$made\";;
+*) exec cp \"$film\" \"$made\";;
+esac";
 
 const CAMERA: &str = "for photo; do :; done; exec cp \"$(cat shown)\" \"${photo#*=}\"";
 
@@ -102,7 +117,9 @@ impl Follower {
             fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("written");
             fs::set_permissions(&path, Permissions::from_mode(0o755)).expect("allowed");
         }
-        fs::write(programs.join("film.y4m"), video(3)).expect("written");
+        fs::write(programs.join("film.y4m"), video(3, (320, 180))).expect("written");
+        fs::write(programs.join("wide.y4m"), video(3, (320, 200))).expect("written");
+        still(&programs.join("still.png"), (320, 200));
         Self {
             place,
             clone,
@@ -268,13 +285,9 @@ impl Follower {
                 fs::copy(root().join(SCENES).join(name), path).expect("a scene");
             }
             Some("png") => {
-                let poster = image::RgbImage::from_fn(320, 240, |x, y| {
-                    image::Rgb([80 + (x / 2) as u8, 120, 60 + (y / 2) as u8])
-                });
-                let poster = image::DynamicImage::from(poster).into_luma8();
-                poster.save(path).expect("written");
+                still(&path, (320, 180));
             }
-            Some("y4m") => fs::write(path, video(3)).expect("written"),
+            Some("y4m") => fs::write(path, video(3, (320, 180))).expect("written"),
             Some("iltm") => {
                 self.succeed(&format!("iltm solve {SAMPLE}-colour -o {name}"));
             }
@@ -368,12 +381,22 @@ fn share(folder: &Path, name: &Path) {
 }
 
 /// A few frames of 320 x 240, brighter and brighter.
-pub(crate) fn video(frames: u8) -> Vec<u8> {
-    let mut video = b"YUV4MPEG2 W320 H240 F25:1 Ip A1:1 C420jpeg\n".to_vec();
+pub(crate) fn video(frames: u8, (width, height): (usize, usize)) -> Vec<u8> {
+    let header = format!("YUV4MPEG2 W{width} H{height} F25:1 Ip A1:1 C420jpeg\n");
+    let mut video = header.into_bytes();
     for frame in 0..frames {
         video.extend(b"FRAME\n");
-        video.extend(std::iter::repeat_n(60 + 30 * frame, 320 * 240));
-        video.extend(std::iter::repeat_n(128, 320 * 120));
+        video.extend(std::iter::repeat_n(60 + 30 * frame, width * height));
+        video.extend(std::iter::repeat_n(128, width * height / 2));
     }
     video
+}
+
+/// A grey picture of this size.
+fn still(path: &Path, (width, height): (u32, u32)) {
+    let poster = image::RgbImage::from_fn(width, height, |x, y| {
+        image::Rgb([80 + (x / 2) as u8, 120, 60 + (y / 2) as u8])
+    });
+    let poster = image::DynamicImage::from(poster).into_luma8();
+    poster.save(path).expect("written");
 }

@@ -90,7 +90,7 @@ pages! {
             "foyer-verify/verdict/verdict.html",
         ]);
         let played = fs::read(clone.join("played.y4m")).expect("the player got a video");
-        assert_eq!(played.len(), video(3).len());
+        assert_eq!(played.len(), video(3, (320, 200)).len());
     };
     the_page_of_the_firmware, "docs/firmware.md", |_| ();
     the_page_of_flashing, "docs/flashing.md", |_| ();

@@ -17,6 +17,11 @@ pub trait Board: Sized {
 
     /// Time.
     type Clock: Clock;
+    /// Milliseconds within which the loop must come round, or the watchdog restarts the
+    /// device: a few frames, and more than [`TableFlash::LONGEST_MS`], which is checked
+    /// when the firmware is compiled.
+    const WATCHDOG_MS: u32;
+
     /// Where wanted frames come from.
     type Source: FrameSource;
     /// Where projector input goes.
@@ -114,7 +119,16 @@ pub trait FrameSink {
 /// Frames go on while it is written, up to one write or the erase of one sector at a
 /// time: a board whose flash cannot be read meanwhile, or whose sectors take longer to
 /// erase than a frame has to spare, shows the last frame that much longer.
+///
+/// [`read`](embedded_storage::nor_flash::ReadNorFlash::read) must give an error where cells
+/// cannot be read, as of a unit of flash with ECC whose write was cut; it must not fault.
+/// The slot is not read like memory before every byte has been read so.
 pub trait TableFlash: NorFlash {
+    /// Longest time in milliseconds that one call of `erase` or `write` blocks. The largest
+    /// area that one call erases is a records area, the key's area, or
+    /// [`Map::sector`] bytes of a slot.
+    const LONGEST_MS: u32;
+
     /// What lies where.
     ///
     /// # Errors

@@ -7,8 +7,8 @@
 //!
 //! A frame comes before everything else, and what else there is takes a bounded
 //! part of the time between two frames: at most four pieces of what came in on
-//! the line a round, and no more log bytes than one message carries. What takes
-//! longer lets frames through meanwhile.
+//! the line a round, with a frame after every answer, and no more log bytes than one
+//! message carries. What takes longer lets frames through meanwhile.
 
 use crate::board::{Board, Clock, Idle, Peripherals, TableFlash, Watchdog};
 use crate::fault;
@@ -32,9 +32,12 @@ use iltm_runtime::store::{Map, Updater};
 /// million instructions.
 const START_MS: u32 = 10_000;
 
-/// Milliseconds in which the loop must come round; at least four frames at 24 a
-/// second.
-const WATCHDOG_MS: u32 = 250;
+/// Crashes in a row after which the device starts without its table.
+const CRASHES: u32 = 3;
+
+/// What a device must have done since its start for the crashes before to count no more:
+/// milliseconds and frames.
+const GOOD: (u64, u32) = (60_000, 600);
 
 /// Pieces of what came in on the line that a round looks at.
 const READS: usize = 4;
@@ -58,6 +61,12 @@ struct RequestHandler<'a, B: Board, H> {
 
 /// Sets the board up and runs the device for ever.
 pub fn start<B: Board, H: FrameHooks>(hooks: impl FnOnce() -> H) -> ! {
+    const {
+        assert!(
+            B::Flash::LONGEST_MS < B::WATCHDOG_MS,
+            "the watchdog restarts the board while its flash is at work"
+        );
+    }
     stack::paint();
     let Some((mut board, memory)) = B::take().zip(Memory::take()) else {
         fault::restart();
@@ -85,7 +94,8 @@ fn run<B: Board>(
     let (side, serial, flash, idle) = part(board);
     let telemetry = Telemetry::new::<B>(restart);
     let mut frames = Frames::<B, _>::new(side, memory, tables, hooks, telemetry);
-    let updater = Updater::start(flash, map, &mut frames);
+    let crashes = restart.crashes >= CRASHES;
+    let updater = Updater::start_after(crashes, flash, map, &mut frames);
     if let Some(fault) = updater.fault() {
         match fault {
             Fault::Table { slot, .. } => {
@@ -96,7 +106,7 @@ fn run<B: Board>(
         }
         frames.telemetry.set_fault(fault);
     }
-    frames.begin(WATCHDOG_MS);
+    frames.begin();
     let mut main_loop = MainLoop {
         serial,
         idle,
@@ -139,12 +149,26 @@ impl<B: Board, H: FrameHooks> Device for RequestHandler<'_, B, H> {
     fn carry_out(&mut self, request: Request<'_>, now_ms: u64) -> Response {
         self.updater.answer(request, now_ms, self.frames)
     }
+
+    fn answered(&mut self) {
+        self.frames.round();
+    }
 }
 
 impl<B: Board, H: FrameHooks> RequestHandler<'_, B, H> {
     /// What happens to tables by itself.
     fn poll(&mut self, now_ms: u64) {
         self.updater.poll(now_ms, self.frames);
+        if self.frames.recheck(now_ms) {
+            self.updater.abandon(self.frames);
+            if let Some(fault) = self.updater.fault() {
+                self.frames.fault(fault);
+            }
+        }
+        let (time, frames) = GOOD;
+        if now_ms >= time && self.frames.telemetry.frame_counts().shown >= frames {
+            Retained::get().forget_crashes();
+        }
         if let Some(change) = self.updater.take_change() {
             self.frames.table_changed(change.table, change.reason);
         }

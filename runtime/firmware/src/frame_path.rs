@@ -4,7 +4,8 @@ use crate::memory::{MAX_CELLS, MAX_PIXELS, MAX_WIDTH, Memory};
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
-use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells, compensate_pixels};
+use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells};
+use iltm_runtime::placement::PixelArea;
 use iltm_runtime::{FrameSize, features};
 
 /// What is done to the frames of a format.
@@ -14,8 +15,8 @@ pub enum FramePath {
     PassThrough(PassThrough),
     /// They have one pixel a cell.
     Grid(Encoding),
-    /// They are larger than the grid.
-    Full(Encoding, FrameSize),
+    /// They are larger than the grid, and cells cover this area of them.
+    Full(Encoding, FrameSize, PixelArea),
 }
 
 impl FramePath {
@@ -39,10 +40,22 @@ impl FramePath {
         if !features::Stage::FullResolution.is_built() {
             return Self::PassThrough(PassThrough::OtherFrames);
         }
+        let Some(area) = table.area(size) else {
+            return Self::PassThrough(PassThrough::OtherFrames);
+        };
         if size.width() > MAX_WIDTH || size.pixels() > MAX_PIXELS {
             return Self::PassThrough(PassThrough::Memory);
         }
-        Self::Full(format.encoding(), size)
+        Self::Full(format.encoding(), size, area)
+    }
+
+    /// Size of the area that cells cover, in frames larger than the grid.
+    #[must_use]
+    pub const fn area(&self) -> Option<FrameSize> {
+        match self {
+            Self::Full(_, _, area) => Some(area.size),
+            Self::PassThrough(_) | Self::Grid(_) => None,
+        }
     }
 
     /// Makes the projector's input of a wanted frame with the table that the stage
@@ -69,17 +82,15 @@ impl FramePath {
                 let mut workspace = memory.workspace();
                 compensate_cells(table, tier, encoding, wanted, input, &mut workspace)
             }
-            (Self::Full(encoding, size), Some(table)) => {
+            (Self::Full(encoding, size, area), Some(table)) => {
                 let job = FrameJob {
                     table,
                     size,
-                    prepared: memory.is_prepared(table, size),
+                    area,
                     tier,
                     encoding,
                 };
-                let (channels, cells) = (table.channels().into(), table.grid().cells());
-                let (mut pixels, mut workspace) = memory.full(channels, cells, size.width());
-                compensate_pixels(&job, wanted, input, &mut pixels, &mut workspace)
+                memory.compensate(&job, wanted, input)
             }
         }
     }

@@ -19,13 +19,16 @@ use embedded_hal::digital::OutputPin;
 use heapless::Deque;
 use iltm_runtime::frame_buffers::{Format, Lateness};
 use iltm_runtime::governor::{Governor, Reason, TierChange};
-use iltm_runtime::image::Table;
+use iltm_runtime::image::{Recheck, Table};
 use iltm_runtime::link::{Event, Fault, Mode, PassThrough, TableName, TableReason, TierReason};
 use iltm_runtime::store::Slot;
 
 /// Things to tell the host that may wait for a round: more happen only while a
 /// table is checked.
 const NOTICES: usize = 8;
+
+/// Milliseconds from the end of a recheck of the table in use to the next.
+const RECHECK_MS: u64 = 60_000;
 
 /// The board's frame side, and what is done with frames.
 pub struct Frames<B: Board, H> {
@@ -38,6 +41,10 @@ pub struct Frames<B: Board, H> {
     hooks: H,
     pub(crate) tables: &'static mut Tables,
     pub(crate) in_use: Result<Slot, PassThrough>,
+    /// The files of the tables, gone over again and again.
+    pub(crate) rechecks: [Option<Recheck<'static>>; 2],
+    /// When that begins anew.
+    recheck_ms: u64,
     pub(crate) telemetry: Telemetry,
     stream: Option<Stream>,
     /// Late frames of earlier streams.
@@ -84,6 +91,8 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
             hooks,
             tables,
             in_use: Err(PassThrough::NoTable),
+            rechecks: [None, None],
+            recheck_ms: 0,
             telemetry,
             stream: None,
             late: 0,
@@ -93,10 +102,10 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         }
     }
 
-    /// Frames are worked on from now on, and the loop comes round within so many
-    /// milliseconds.
-    pub(crate) fn begin(&mut self, watchdog_ms: u32) {
-        self.watchdog.start(watchdog_ms);
+    /// Frames are worked on from now on, and the loop comes round within the watchdog's
+    /// time.
+    pub(crate) fn begin(&mut self) {
+        self.watchdog.start(B::WATCHDOG_MS);
         self.live = true;
     }
 
@@ -148,6 +157,41 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         self.notice(Notice::Table(table, reason, self.next));
     }
 
+    /// Computes what the table of a slot needs for frames like those that come now, row by
+    /// row while they go on, so that none of them waits for it when the table is used.
+    pub(crate) fn prepare(&mut self, slot: Slot) {
+        while let Some((table, format)) = slot
+            .of(self.tables)
+            .as_ref()
+            .zip(self.stream.as_ref().map(|stream| stream.format))
+            && let FramePath::Full(_, _, area) = FramePath::new(Ok(table), format)
+            && !self.memory.is_ready(table, area.size)
+        {
+            let used = self.stream.as_ref().and_then(|stream| stream.path.area());
+            let in_use = self.table().ok().map(Table::id).zip(used);
+            // No frame of the path's format can fail; it was sized by it.
+            let _ = self.memory.prepare(table, area.size, in_use);
+            self.round();
+        }
+    }
+
+    /// Goes over the next piece of the table in use, once a minute over all of it. Says
+    /// whether it is no longer what was checked.
+    pub(crate) fn recheck(&mut self, now_ms: u64) -> bool {
+        let Ok(slot) = self.in_use else {
+            return false;
+        };
+        if now_ms < self.recheck_ms {
+            return false;
+        }
+        let file = slot.of_mut(&mut self.rechecks).as_mut();
+        let Some(same) = file.and_then(Recheck::step) else {
+            return false;
+        };
+        self.recheck_ms = now_ms.saturating_add(RECHECK_MS);
+        !same
+    }
+
     /// The table in use, or why there is none.
     fn table(&self) -> Result<&Table<'static>, PassThrough> {
         let slot = self.in_use?;
@@ -169,6 +213,7 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
 
     fn start(&mut self, format: Format) {
         self.sink.start(format);
+        self.telemetry.set_input(format);
         let lateness = Lateness::new(ticks::<B::Clock>(format.period_us()));
         self.stage(format, lateness);
         defmt::info!(
@@ -236,6 +281,18 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         let Some(stream) = &mut self.stream else {
             return false;
         };
+        let table = self
+            .in_use
+            .ok()
+            .and_then(|slot| slot.of(self.tables).as_ref());
+        // After a start, or where frames of another size begin: the display keeps what it
+        // shows until all is ready.
+        if let (FramePath::Full(_, _, area), Some(table)) = (stream.path, table)
+            && !self.memory.is_ready(table, area.size)
+        {
+            let _ = self.memory.prepare(table, area.size, None);
+            return true;
+        }
         if !self.sink.has_room() {
             return false;
         }
@@ -251,10 +308,6 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         let tier = self.hooks.tier(chosen);
         let wanted = self.source.wanted();
         let input = self.sink.begin(sequence);
-        let table = self
-            .in_use
-            .ok()
-            .and_then(|slot| slot.of(self.tables).as_ref());
         let result = stream.path.frame(table, tier, wanted, input, self.memory);
         self.hooks.during_frame(sequence, tier, &self.clock);
         let whole = self.source.release();
@@ -304,7 +357,8 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         self.notice(Notice::Tier(change, sequence.wrapping_add(1)));
     }
 
-    fn fault(&mut self, fault: Fault) {
+    /// Tells of something that went wrong.
+    pub(crate) fn fault(&mut self, fault: Fault) {
         match fault {
             Fault::Frame { sequence, cause } => {
                 defmt::warn!("frame {=u32} is broken, cause {=u8}", sequence, cause as u8);

@@ -16,7 +16,8 @@ mod word {
     pub(super) const CAUSE: usize = 1;
     pub(super) const PLACE: usize = 2;
     pub(super) const WATCHDOG_RESETS: usize = 3;
-    pub(super) const COUNT: usize = 4;
+    pub(super) const CRASHES: usize = 4;
+    pub(super) const COUNT: usize = 5;
 }
 
 /// Why the device starts.
@@ -48,6 +49,8 @@ pub struct Restart {
     pub place: u32,
     /// Watchdog restarts since the device was switched on.
     pub watchdog_resets: u32,
+    /// Restarts in a row that nobody asked for, with less than a minute between them.
+    pub crashes: u32,
 }
 
 impl Retained {
@@ -84,14 +87,28 @@ impl Retained {
         let place = self.word(word::PLACE);
         self.set_cause(Cause::Outside, 0);
         if cause == Cause::Watchdog {
-            let resets = self.word(word::WATCHDOG_RESETS);
-            self.set(word::WATCHDOG_RESETS, resets.saturating_add(1));
+            self.count(word::WATCHDOG_RESETS);
+        }
+        if cause == Cause::Outside {
+            self.forget_crashes();
+        } else {
+            self.count(word::CRASHES);
         }
         Restart {
             cause,
             place,
             watchdog_resets: self.word(word::WATCHDOG_RESETS),
+            crashes: self.word(word::CRASHES),
         }
+    }
+
+    /// The device runs well: crashes in a row are counted anew.
+    pub fn forget_crashes(self) {
+        self.set(word::CRASHES, 0);
+    }
+
+    fn count(self, at: usize) {
+        self.set(at, self.word(at).saturating_add(1));
     }
 
     fn word(self, at: usize) -> u32 {

@@ -3,10 +3,10 @@
 use crate::board::{Board, Clock};
 use crate::retained::{Cause, Restart};
 use crate::stack;
-use iltm_runtime::frame_buffers::InputCounts;
+use iltm_runtime::frame_buffers::{Format, InputCounts};
 use iltm_runtime::link::{
-    Clipping, Fault, FrameCounts, FrameTime, Mode, Name, PassThrough, SerialCounts, SlotState,
-    Stack, Status, Version,
+    Clipping, Fault, FrameCounts, FrameKind, FrameTime, Mode, Name, PassThrough, SerialCounts,
+    SlotState, Stack, Status, Version,
 };
 
 /// Everything that a status says, kept up to date by the frame loop.
@@ -46,14 +46,20 @@ impl Telemetry {
                 stack: Stack::default(),
                 watchdog_resets: restart.watchdog_resets,
                 serial: SerialCounts::default(),
+                input: None,
             },
             ticks_per_microsecond: (B::Clock::HERTZ / 1_000_000).max(1),
             mean: 0,
         }
     }
 
-    /// The time.
+    /// The time. Once a second the stack is measured, which takes as long as a small frame.
     pub fn set_uptime(&mut self, milliseconds: u64) {
+        let seconds = |time: u64| time as u32 / 1_000;
+        let stack = &mut self.status.stack;
+        if stack.size == 0 || seconds(milliseconds) != seconds(self.status.uptime_ms) {
+            *stack = stack::depth();
+        }
         self.status.uptime_ms = milliseconds;
     }
 
@@ -64,6 +70,15 @@ impl Telemetry {
         self.status.top_tier = top_tier;
         self.status.clipping.samples = samples;
         self.status.frame_time.budget_us = budget / self.ticks_per_microsecond;
+    }
+
+    /// Frames of this format come in.
+    pub fn set_input(&mut self, format: Format) {
+        self.status.input = Some(FrameKind {
+            width: format.size().width() as u16,
+            height: format.size().height() as u16,
+            channels: format.channels(),
+        });
     }
 
     /// A frame was worked on in this many ticks.
@@ -108,9 +123,6 @@ impl Telemetry {
     /// All of it, but for what the store knows.
     #[must_use]
     pub fn status(&self) -> Status {
-        Status {
-            stack: stack::depth(),
-            ..self.status.clone()
-        }
+        self.status.clone()
     }
 }

@@ -13,7 +13,7 @@ pub(super) fn u32_at(bytes: &[u8], field: Range<usize>) -> Option<u32> {
 }
 
 /// Writes a field, as much of it as there is room for.
-pub(super) fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
+pub(crate) fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
     let places = bytes.get_mut(field).unwrap_or_default();
     for (place, byte) in places.iter_mut().zip(value) {
         *place = *byte;

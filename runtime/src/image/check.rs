@@ -1,7 +1,7 @@
 //! Check of an image: what its sections say, and that no frame can overflow.
 
 use super::bytes::{Halfwords, u16_at, u32_at};
-use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, tier};
+use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, projector, tier};
 use super::sections::{Section, Whole};
 use super::table::curve;
 use super::{FineGain, ImageError, Meta, SectionProblem, Table, TierInfo};
@@ -9,6 +9,7 @@ use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::layout::MAX_SEGMENTS;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use crate::placement::ProjectorPixels;
 use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
 use crate::units::Light;
 use crate::yield_budget::{YieldBudget, cost};
@@ -29,6 +30,7 @@ pub struct Checked<'a> {
     codes: &'a [[u8; CODES]],
     fine_gain: Option<FineGain<'a>>,
     provenance: &'a [u8],
+    projector: Option<ProjectorPixels>,
 }
 
 impl<'a> Checked<'a> {
@@ -36,13 +38,19 @@ impl<'a> Checked<'a> {
     ///
     /// # Errors
     /// [`ImageError`] with the section and field at fault.
-    pub fn new(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+    pub fn new(
+        image: &'a [u8],
+        yield_now: &mut (impl FnMut() + ?Sized),
+    ) -> Result<Self, ImageError> {
         let mut budget = YieldBudget::new(yield_now);
         Self::of(Whole::new(image, &mut budget)?, &mut budget)
     }
 
     /// Checks what the sections of an image say whose checksums hold.
-    pub(crate) fn of(whole: Whole<'a>, budget: &mut YieldBudget<'_>) -> Result<Self, ImageError> {
+    pub(crate) fn of(
+        whole: Whole<'a>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+    ) -> Result<Self, ImageError> {
         let meta = Meta::parse(whole.required(SectionKind::Meta)?.bytes)?;
         let (grid, values) = (meta.grid, meta.grid.cells() * usize::from(meta.channels));
         let _ = tiers(whole.required(SectionKind::Tiers)?)?;
@@ -68,6 +76,10 @@ impl<'a> Checked<'a> {
             provenance: whole
                 .optional(SectionKind::Provenance)
                 .map_or(Ok(&[][..]), |section| provenance(section, budget))?,
+            projector: whole
+                .optional(SectionKind::Projector)
+                .map(projector_pixels)
+                .transpose()?,
             codes: codes(
                 of_stage(Stage::Response, &whole, SectionKind::Codes),
                 response,
@@ -79,14 +91,24 @@ impl<'a> Checked<'a> {
     /// The table, ready for frames.
     #[must_use]
     pub fn table(&self) -> Table<'a> {
-        let tiers = self.whole.required(SectionKind::Tiers).and_then(tiers);
+        let mut listed = Vec::new();
+        for tier in self
+            .whole
+            .required(SectionKind::Tiers)
+            .and_then(tiers)
+            .into_iter()
+            .flatten()
+        {
+            // There are no more than fit; collecting would have code for a panic.
+            let _ = listed.push(tier);
+        }
         Table {
             basis: Basis::new(self.meta.grid),
             channels: self.meta.channels,
             gain_fraction: self.meta.gain_fraction,
             reference_white: self.meta.reference_white,
             inverse_error: self.meta.inverse_error,
-            tiers: tiers.map_or(Vec::new(), Iterator::collect),
+            tiers: listed,
             gain: self.gain,
             ambient: self.ambient,
             response: self.response,
@@ -98,8 +120,10 @@ impl<'a> Checked<'a> {
                 None
             },
             provenance: self.provenance,
+            projector: self.projector,
             bytes: self.whole.image.len(),
             id: self.id(),
+            label: self.meta.label,
         }
     }
 
@@ -107,6 +131,12 @@ impl<'a> Checked<'a> {
     #[must_use]
     pub fn id(&self) -> u32 {
         u32_at(self.whole.image, header::CRC).unwrap_or(0)
+    }
+
+    /// What its meta section says.
+    #[must_use]
+    pub const fn meta(&self) -> &Meta {
+        &self.meta
     }
 }
 
@@ -127,7 +157,7 @@ fn halfwords(section: Section<'_>, count: usize) -> Result<Halfwords<'_>, ImageE
 fn ambient<'a>(
     section: Section<'a>,
     count: usize,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = halfwords(section, count)?;
     let too_much = |bits| {
@@ -143,7 +173,7 @@ fn ambient<'a>(
 fn response<'a>(
     section: Section<'a>,
     channels: u8,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<Halfwords<'a>, ImageError> {
     let words = Halfwords::new(section.bytes).ok_or(section.length_error())?;
     let own = usize::from(channels) * RESPONSE_KNOTS;
@@ -166,7 +196,7 @@ fn response<'a>(
 fn codes<'a>(
     section: Option<Section<'a>>,
     response: Option<Halfwords<'_>>,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<&'a [[u8; CODES]], ImageError> {
     let Some(section) = section else {
         return match response {
@@ -214,6 +244,21 @@ fn fine_gains(section: Section<'_>, cells: Grid, channels: u8) -> Result<FineGai
         channels,
         gain,
     })
+}
+
+/// The projector, with a border that leaves pixels.
+fn projector_pixels(section: Section<'_>) -> Result<ProjectorPixels, ImageError> {
+    if section.bytes.len() != projector::SIZE {
+        return Err(section.length_error());
+    }
+    let field = |field| u16_at(section.bytes, field).unwrap_or(0);
+    if field(projector::RESERVED) != 0 {
+        return Err(section.field_error("reserved", projector::RESERVED.start));
+    }
+    let size = FrameSize::new(field(projector::WIDTH), field(projector::HEIGHT))
+        .ok_or(section.field_error("size", projector::WIDTH.start))?;
+    ProjectorPixels::new(size, field(projector::BORDER))
+        .ok_or(section.field_error("border", projector::BORDER.start))
 }
 
 /// A table with a stage that is not built is refused as a whole: half of its stages
@@ -291,7 +336,7 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
 fn check_operator(
     whole: &Whole<'_>,
     meta: &Meta,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<(), ImageError> {
     let operator = if Stage::Operator.is_built() {
         operator(whole, meta)?
@@ -320,7 +365,7 @@ fn check_operator(
 /// Checks the text piece by piece, for it may be long.
 fn provenance<'a>(
     section: Section<'a>,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<&'a [u8], ImageError> {
     const PIECE: usize = 256;
     if section.bytes.len() > MAX_PROVENANCE {
@@ -344,4 +389,44 @@ fn provenance<'a>(
         budget.spend(piece.len(), cost::VALUE);
     }
     Ok(section.bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::made_up::{flat, image};
+    use super::*;
+    use std::vec::Vec;
+
+    fn with_projector(fields: &[u16]) -> Result<Option<ProjectorPixels>, ImageError> {
+        let bytes: Vec<u8> = fields
+            .iter()
+            .flat_map(|field| field.to_le_bytes())
+            .collect();
+        let mut sections = flat(2, 3);
+        sections.push((SectionKind::Projector, bytes));
+        Table::check(&image(&sections)).map(|table| table.projector())
+    }
+
+    #[test]
+    fn a_projector_has_a_size_and_a_border_that_leaves_pixels() {
+        let projector = with_projector(&[1280, 800, 100, 0]).unwrap().unwrap();
+        assert_eq!(
+            (projector.size().width(), projector.size().height()),
+            (1280, 800)
+        );
+        assert_eq!(projector.border(), 100);
+        let refused = [
+            (&[0, 800, 0, 0][..], "size"),
+            (&[1280, 0, 0, 0], "size"),
+            (&[1280, 800, 400, 0], "border"),
+            (&[1280, 800, u16::MAX, 0], "border"),
+            (&[1280, 800, 0, 1], "reserved"),
+            (&[1280, 800, 0], "length"),
+            (&[1280, 800, 0, 0, 0], "length"),
+        ];
+        for (fields, why) in refused {
+            let error = with_projector(fields).unwrap_err();
+            assert!(std::format!("{error}").contains(why), "{error}");
+        }
+    }
 }

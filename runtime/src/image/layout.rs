@@ -102,6 +102,8 @@ pub enum SectionKind {
     Operator = 8,
     /// Where the table comes from: UTF-8 text for people and host tools.
     Provenance = 9,
+    /// The projector that the photographs were taken with; see [`projector`].
+    Projector = 10,
 }
 
 impl SectionKind {
@@ -118,6 +120,7 @@ impl SectionKind {
             7 => Self::FineGain,
             8 => Self::Operator,
             9 => Self::Provenance,
+            10 => Self::Projector,
             _ => return None,
         })
     }
@@ -135,11 +138,12 @@ impl SectionKind {
             Self::FineGain => "fine gain",
             Self::Operator => "operator",
             Self::Provenance => "provenance",
+            Self::Projector => "projector",
         }
     }
 }
 
-/// The meta section, 32 bytes.
+/// The meta section, 68 bytes.
 pub mod meta {
     use super::Range;
     /// Rows of the grid, `u16`.
@@ -148,7 +152,7 @@ pub mod meta {
     pub const COLS: Range<usize> = 2..4;
     /// Colour channels, 1 or 3, `u8`.
     pub const CHANNELS: usize = 4;
-    /// Fraction bits of the gains, 0 to 15, `u8`.
+    /// Fraction bits of the gains, 1 to 15, `u8`.
     pub const GAIN_FRACTION: usize = 5;
     /// Zero.
     pub const RESERVED: Range<usize> = 6..8;
@@ -167,8 +171,24 @@ pub mod meta {
     /// Predicted closed-loop error of the inverse itself, before any tier leaves
     /// entries out, `u32` with 32 fraction bits.
     pub const INVERSE_ERROR: Range<usize> = 28..32;
+    /// Name and date; see [`label`](super::label).
+    pub const LABEL: Range<usize> = 32..68;
     /// Length of the section.
-    pub const SIZE: usize = 32;
+    pub const SIZE: usize = 68;
+}
+
+/// What people call a table, 36 bytes at the end of the meta section.
+pub mod label {
+    use super::Range;
+    /// Longest name, bytes.
+    pub const NAME_BYTES: usize = 32;
+    /// The name, UTF-8, filled up with zeros.
+    pub const NAME: Range<usize> = 0..NAME_BYTES;
+    /// The day when the table was made as a decimal number, `u32`: 20261123 for
+    /// 2026-11-23; 0 if unknown.
+    pub const DATE: Range<usize> = 32..36;
+    /// Length of the label.
+    pub const SIZE: usize = 36;
 }
 
 /// One entry of the tiers section, 12 bytes.
@@ -182,6 +202,21 @@ pub mod tier {
     pub const MULTIPLICATIONS: Range<usize> = 8..12;
     /// Length of an entry.
     pub const SIZE: usize = 12;
+}
+
+/// The projector section, 8 bytes.
+pub mod projector {
+    use super::Range;
+    /// Pixels of its rows, `u16`.
+    pub const WIDTH: Range<usize> = 0..2;
+    /// Its rows, `u16`.
+    pub const HEIGHT: Range<usize> = 2..4;
+    /// Pixels on every side that no cell covers, `u16`.
+    pub const BORDER: Range<usize> = 4..6;
+    /// Zero.
+    pub const RESERVED: Range<usize> = 6..8;
+    /// Length of the section.
+    pub const SIZE: usize = 8;
 }
 
 /// The head of the fine gain section, 4 bytes; the gains follow as in

@@ -1,7 +1,7 @@
 //! Sample images for tests of this crate; the host tools write the real ones.
 
 use super::layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, tier};
-use super::{Meta, crc32};
+use super::{Label, Meta, crc32};
 use crate::Grid;
 use crate::operator::Bounds;
 use fixed::types::{U0F32, U1F15, U8F24};
@@ -42,6 +42,7 @@ pub(crate) fn flat(rows: u16, cols: u16) -> Vec<(SectionKind, Vec<u8>)> {
         inverse_error: U0F32::ZERO,
         bounds: Bounds::default(),
         channel_scales: [U1F15::ZERO; 3],
+        label: Label::default(),
     };
     let cells = usize::from(rows) * usize::from(cols);
     vec![

@@ -2,7 +2,7 @@
 
 use super::bytes::{put, u16_at, u32_at};
 use super::layout::{SectionKind, meta, tier};
-use super::{ImageError, SectionProblem};
+use super::{ImageError, Label, SectionProblem};
 use crate::Grid;
 use crate::operator::Bounds;
 use fixed::types::{U0F32, U1F15, U8F24};
@@ -14,7 +14,7 @@ pub struct Meta {
     pub grid: Grid,
     /// Colour channels, 1 or 3.
     pub channels: u8,
-    /// Fraction bits of the gains, 0 to 15.
+    /// Fraction bits of the gains, 1 to 15.
     pub gain_fraction: u8,
     /// Light of reference white in camera units, not 0.
     pub reference_white: U8F24,
@@ -24,6 +24,8 @@ pub struct Meta {
     pub bounds: Bounds,
     /// Scale of the operator in each channel; 0 for channels that there are not.
     pub channel_scales: [U1F15; 3],
+    /// What people call the table.
+    pub label: Label,
 }
 
 impl Meta {
@@ -52,7 +54,8 @@ impl Meta {
             return Err(wrong("channels", meta::CHANNELS));
         }
         let gain_fraction = byte(meta::GAIN_FRACTION);
-        if gain_fraction > 15 {
+        // With none, light times gain less the correction could leave 32 bits.
+        if !(1..=15).contains(&gain_fraction) {
             return Err(wrong("gain fraction", meta::GAIN_FRACTION));
         }
         for reserved in [meta::RESERVED, meta::RESERVED_END] {
@@ -79,6 +82,9 @@ impl Meta {
                 return Err(wrong("channel scale", offset));
             }
         }
+        let label = bytes.get(meta::LABEL).and_then(<[u8]>::first_chunk);
+        let label = label.and_then(Label::parse);
+        let label = label.ok_or(wrong("name", meta::LABEL.start))?;
         Ok(Self {
             grid,
             channels,
@@ -90,6 +96,7 @@ impl Meta {
                 correction: wide(meta::CORRECTION_BOUND),
             },
             channel_scales,
+            label,
         })
     }
 
@@ -103,6 +110,7 @@ impl Meta {
         // The two bytes stand side by side.
         let pair = meta::CHANNELS..meta::RESERVED.start;
         put(&mut bytes, pair, &[self.channels, self.gain_fraction]);
+        put(&mut bytes, meta::LABEL, &self.label.emit());
         let scales = self.channel_scales.map(U1F15::to_le_bytes);
         put(&mut bytes, meta::CHANNEL_SCALES, scales.as_flattened());
         for (field, value) in [

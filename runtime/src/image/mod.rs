@@ -10,44 +10,49 @@
 
 mod bytes;
 mod check;
+mod crc32;
 mod error;
+mod label;
 pub mod layout;
 #[cfg(test)]
 pub(crate) mod made_up;
 mod meta;
+mod recheck;
 pub mod seal;
 mod sections;
 mod table;
 
 pub use check::Checked;
+pub(crate) use crc32::Crc32;
 pub use error::{ImageError, SealError, SectionProblem};
+pub use label::Label;
 pub use meta::{Meta, TierInfo};
+pub use recheck::Recheck;
 pub use seal::{Seal, content, unseal};
 pub(crate) use sections::Whole;
 pub use table::{FineGain, Table};
 
-use crate::yield_budget::{YieldBudget, cost};
+pub(crate) use bytes::put;
 
-/// CRC-32 (ISO-HDLC), piece by piece.
-pub(crate) static CRC_32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+use crate::yield_budget::{YieldBudget, cost};
 
 /// CRC-32 as the layout uses it.
 #[must_use]
 pub fn crc32(bytes: &[&[u8]]) -> u32 {
-    let mut digest = CRC_32.digest();
+    let mut digest = Crc32::new();
     for part in bytes {
         digest.update(part);
     }
-    digest.finalize()
+    digest.finish()
 }
 
 /// The same of bytes that may be many.
-fn checksum(bytes: &[&[u8]], budget: &mut YieldBudget<'_>) -> u32 {
+fn checksum(bytes: &[&[u8]], budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>) -> u32 {
     const PIECE: usize = 256;
-    let mut digest = CRC_32.digest();
+    let mut digest = Crc32::new();
     for piece in bytes.iter().flat_map(|part| part.chunks(PIECE)) {
         digest.update(piece);
         budget.spend(piece.len(), cost::CRC_BYTE);
     }
-    digest.finalize()
+    digest.finish()
 }

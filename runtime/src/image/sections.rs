@@ -23,7 +23,10 @@ pub(super) struct Section<'a> {
 
 impl<'a> Whole<'a> {
     /// Checks the header, the section table, and the checksum of every section.
-    pub(crate) fn new(image: &'a [u8], budget: &mut YieldBudget<'_>) -> Result<Self, ImageError> {
+    pub(crate) fn new(
+        image: &'a [u8],
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+    ) -> Result<Self, ImageError> {
         let given = image.len();
         let truncated = |needed: usize| ImageError::Truncated { needed, given };
         let (head, rest) = image
@@ -60,7 +63,7 @@ impl<'a> Whole<'a> {
     }
 
     /// Sections stand in order, one behind the other, each with its checksum.
-    fn check(&self, budget: &mut YieldBudget<'_>) -> Result<(), ImageError> {
+    fn check(&self, budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>) -> Result<(), ImageError> {
         let given = self.image.len();
         let mut place = header::SIZE + self.entries.len() * entry::SIZE;
         let mut last = None;

@@ -2,10 +2,11 @@
 
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
-use super::{Checked, ImageError, TierInfo};
+use super::{Checked, ImageError, Label, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
+use crate::placement::{PixelArea, ProjectorPixels};
 use crate::response::{CODES, RESPONSE_KNOTS, ResponseCurve};
 use crate::units::Light;
 use crate::{FrameSize, Grid};
@@ -31,8 +32,10 @@ pub struct Table<'a> {
     pub(super) fine_gain: Option<FineGain<'a>>,
     pub(super) operator: Option<Operator<'a>>,
     pub(super) provenance: &'a [u8],
+    pub(super) projector: Option<ProjectorPixels>,
     pub(super) bytes: usize,
     pub(super) id: u32,
+    pub(super) label: Label,
 }
 
 /// Gains on a grid finer than the cells, for frames larger than the grid.
@@ -105,7 +108,10 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// As [`check`](Self::check).
-    pub fn check_with(image: &'a [u8], yield_now: &mut dyn FnMut()) -> Result<Self, ImageError> {
+    pub fn check_with(
+        image: &'a [u8],
+        yield_now: &mut (impl FnMut() + ?Sized),
+    ) -> Result<Self, ImageError> {
         Ok(Checked::new(image, yield_now)?.table())
     }
 
@@ -137,6 +143,12 @@ impl<'a> Table<'a> {
     #[must_use]
     pub const fn id(&self) -> u32 {
         self.id
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub const fn label(&self) -> &Label {
+        &self.label
     }
 
     /// Bytes of the image.
@@ -253,6 +265,25 @@ impl<'a> Table<'a> {
         } else {
             None
         }
+    }
+
+    /// The projector that the table was made with, where that is known.
+    #[must_use]
+    pub const fn projector(&self) -> Option<ProjectorPixels> {
+        self.projector
+    }
+
+    /// The pixels that cells cover of a frame of more than one pixel a cell: all, where
+    /// nothing is known of the projector. `None` if the frame has another aspect than the
+    /// projector, or a cell would have no pixel.
+    #[must_use]
+    pub fn area(&self, frame: FrameSize) -> Option<PixelArea> {
+        let area = match self.projector {
+            None => Some(PixelArea::all(frame)),
+            Some(projector) if projector.has_aspect_of(frame) => projector.area(frame),
+            Some(_) => None,
+        };
+        area.filter(|area| area.size.holds(self.grid()))
     }
 
     /// Where the table comes from, for people and host tools.

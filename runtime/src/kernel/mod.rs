@@ -31,6 +31,18 @@ pub(crate) use portable::{gather, levels, lines, pixels};
 
 use crate::units::{Halfword, InputCoefficient};
 
+/// Whether there are no assembler loops.
+pub(crate) const IS_PLAIN: bool = cfg!(not(all(
+    target_arch = "arm",
+    not(feature = "reference-kernel")
+)));
+
+/// Whether words lie where the loops can read them: the assembler's `ldm` wants
+/// multiples of four, as tables in flash have.
+pub(crate) fn takes(words: &[[u8; 4]]) -> bool {
+    IS_PLAIN || words.as_ptr().addr().is_multiple_of(4)
+}
+
 /// Coefficients of some channels, one channel after the other.
 pub(crate) struct Sums<'s> {
     /// Coefficients of a channel, `N`.

@@ -7,7 +7,7 @@
 
 use super::status::{Fault, Name, Status, TableName};
 use super::update::{Digest, InUse, Receiving, Sectors, Slots};
-use crate::trust::Rejected;
+use crate::trust::{NoRight, Rejected};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +49,9 @@ pub enum Request<'a> {
         length: u32,
         /// Of the file.
         digest: Digest,
+        /// The [right](crate::trust::allows) to do so, where the device has a key.
+        #[serde(borrow)]
+        right: &'a [u8],
     },
     /// A chunk of it. Answered by [`Response::Written`] when the flash holds it.
     Write {
@@ -72,12 +75,18 @@ pub enum Request<'a> {
     Confirm {
         /// [`TableName::id`] of the table.
         table: u32,
+        /// The right to do so, where the device has a key.
+        #[serde(borrow)]
+        right: &'a [u8],
     },
     /// Goes back to the table before: that of the other slot. Answered by
     /// [`Response::InUse`].
     Rollback {
         /// [`TableName::id`] of the table that is to go.
         table: u32,
+        /// The right to do so, where the device has a key.
+        #[serde(borrow)]
+        right: &'a [u8],
     },
     /// Gives a new device its key and its number, once and for all. Answered by
     /// [`Response::Provisioned`].
@@ -86,6 +95,8 @@ pub enum Request<'a> {
         key: [u8; 32],
         /// The device's number; 0 for none.
         device: u64,
+        /// Also where the table in use would be refused from the next start on.
+        even_so: bool,
     },
 }
 
@@ -182,6 +193,13 @@ pub enum Refusal {
     ReadOnly,
     /// The device was given a key that it cannot read any more: it takes no table.
     KeyLost,
+    /// The device has a key, and the request does not show the right to do that.
+    NoRight(NoRight),
+    /// The flash has been erased too often since the start.
+    Wear {
+        /// Seconds until the next erase is allowed.
+        wait_s: u32,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -212,6 +230,13 @@ impl fmt::Display for Refusal {
             Self::HasKey => "the device has another key or number",
             Self::ReadOnly => "the device cannot be updated",
             Self::KeyLost => "the device cannot read its key and takes no table",
+            Self::NoRight(cause) => return write!(f, "{cause}"),
+            Self::Wear { wait_s } => {
+                return write!(
+                    f,
+                    "the flash has been erased too often since the start; the next erase is allowed in {wait_s} s"
+                );
+            }
         })
     }
 }
@@ -289,6 +314,8 @@ pub enum TableReason {
     TrialOver,
     /// A host went back to it.
     RolledBack,
+    /// The other one was damaged while it was in use.
+    Damaged,
 }
 
 impl fmt::Display for TableReason {
@@ -298,6 +325,7 @@ impl fmt::Display for TableReason {
             Self::Confirmed => "confirmed",
             Self::TrialOver => "nobody confirmed the other one",
             Self::RolledBack => "rolled back",
+            Self::Damaged => "the other one is damaged",
         })
     }
 }

@@ -36,7 +36,9 @@ pub use message::{
 pub use outbox::Outbox;
 pub use session::{Device, LAPSE_MS, MIN_PERIOD_MS, OUTBOX, Session};
 pub use status::{
-    Clipping, Fault, FaultyFrame, FrameCounts, FrameTime, MAX_NAME, Mode, Name, PassThrough,
-    SerialCounts, SlotState, SourceFault, Stack, Status, TableName,
+    Clipping, Fault, FaultyFrame, FrameCounts, FrameKind, FrameTime, MAX_NAME, Mode, Name,
+    PassThrough, SerialCounts, SlotState, SourceFault, Stack, Status, TableName,
 };
-pub use update::{Digest, InUse, MAX_SECTORS, Receiving, Sectors, SlotInfo, Slots};
+pub use update::{
+    Digest, EndedTrial, InUse, MAX_SECTORS, Receiving, Sectors, SlotInfo, Slots, TableAbout,
+};

@@ -48,6 +48,31 @@ pub struct Status {
     pub watchdog_resets: u32,
     /// Trouble on this line.
     pub serial: SerialCounts,
+    /// The frames that come in; `None` before a source has announced any.
+    pub input: Option<FrameKind>,
+}
+
+/// Frames of a size and channels: those that come in, or the least that a table takes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct FrameKind {
+    /// Pixels in a row.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+    /// Samples of a pixel, 1 or 3.
+    pub channels: u8,
+}
+
+impl fmt::Display for FrameKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            width,
+            height,
+            channels,
+        } = self;
+        let colour = if *channels == 1 { "grey" } else { "colour" };
+        write!(f, "{colour} frames of {width} x {height}")
+    }
 }
 
 /// What tells one table from another.
@@ -61,7 +86,10 @@ pub struct TableName {
 
 impl fmt::Display for TableName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:08x} version {}", self.id, self.version)
+        match self.version {
+            0 => write!(f, "{:08x}, unsigned", self.id),
+            version => write!(f, "{:08x}, version {version}", self.id),
+        }
     }
 }
 
@@ -86,6 +114,8 @@ pub enum PassThrough {
     OtherFrames,
     /// The table needs more memory than the device has.
     Memory,
+    /// The device crashed or hung with the table at one start after the other.
+    CrashLoop,
 }
 
 impl fmt::Display for Mode {
@@ -104,6 +134,7 @@ impl fmt::Display for PassThrough {
             Self::BrokenTable => "the table cannot be used",
             Self::OtherFrames => "the table is for other frames",
             Self::Memory => "the table needs more memory than there is",
+            Self::CrashLoop => "the device crashed with the table three times in a row",
         })
     }
 }
@@ -152,7 +183,7 @@ pub struct FrameTime {
 pub enum SlotState {
     /// Nothing.
     Empty,
-    /// A whole table, not in use.
+    /// A whole table that was confirmed, not in use.
     Valid,
     /// Something that is no table.
     Broken,
@@ -160,6 +191,8 @@ pub enum SlotState {
     Active,
     /// The table in use, until it is confirmed or its time is over.
     Trial,
+    /// A whole table that nobody has confirmed, not in use.
+    Unconfirmed,
 }
 
 impl fmt::Display for SlotState {
@@ -170,6 +203,7 @@ impl fmt::Display for SlotState {
             Self::Broken => "broken",
             Self::Active => "active",
             Self::Trial => "trial",
+            Self::Unconfirmed => "unconfirmed",
         })
     }
 }

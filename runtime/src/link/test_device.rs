@@ -11,6 +11,12 @@ const VERSION: Version = Version {
     patch: u16::MAX,
 };
 
+const KIND: FrameKind = FrameKind {
+    width: u16::MAX,
+    height: u16::MAX,
+    channels: u8::MAX,
+};
+
 fn name() -> Name {
     let name = [b'x'; MAX_NAME];
     let name = core::str::from_utf8(&name).expect("ASCII");
@@ -43,6 +49,10 @@ pub(super) fn slots() -> Slots {
         }),
         length: MOST,
         erases: MOST,
+        about: Some(TableAbout {
+            label: crate::image::Label::new(&"x".repeat(32), MOST),
+            frames: KIND,
+        }),
     };
     Slots {
         slots: [slot; 2],
@@ -53,6 +63,12 @@ pub(super) fn slots() -> Slots {
         device: u64::MAX,
         sector: MOST,
         record_erases: MOST,
+        sequence: MOST,
+        ended: Some(EndedTrial {
+            table: MOST,
+            reason: TableReason::RolledBack,
+            ago_ms: MOST,
+        }),
     }
 }
 
@@ -110,6 +126,7 @@ impl Device for FullDevice {
                 bad: MOST,
                 unsent: MOST,
             },
+            input: Some(KIND),
         }
     }
 }

@@ -2,7 +2,9 @@
 //!
 //! The order of variants and fields is the wire format: do not reorder.
 
-use super::status::{SlotState, TableName};
+use super::message::TableReason;
+use super::status::{FrameKind, SlotState, TableName};
+use crate::image::Label;
 use crate::trust::KEY_ID;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -51,6 +53,22 @@ pub struct Slots {
     pub sector: u32,
     /// Times that a sector of the commit records has been erased.
     pub record_erases: u32,
+    /// What a [right](crate::trust::allows) must be signed for.
+    pub sequence: u32,
+    /// The last trial since the start that ended without confirmation, if no other one
+    /// has begun.
+    pub ended: Option<EndedTrial>,
+}
+
+/// A trial that ended without confirmation.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct EndedTrial {
+    /// [`TableName::id`] of the table.
+    pub table: u32,
+    /// Why it ended.
+    pub reason: TableReason,
+    /// Milliseconds since then.
+    pub ago_ms: u32,
 }
 
 /// What is in a slot.
@@ -64,6 +82,17 @@ pub struct SlotInfo {
     pub length: u32,
     /// Times that a sector of it has been erased, as far as known.
     pub erases: u32,
+    /// What the table in it is called and takes, if it is whole.
+    pub about: Option<TableAbout>,
+}
+
+/// What a device shows of a table beside its [`TableName`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct TableAbout {
+    /// For people.
+    pub label: Label,
+    /// The smallest frames that it takes.
+    pub frames: FrameKind,
 }
 
 /// CRC-32 of what sectors hold.

@@ -35,7 +35,7 @@ impl Bounds {
         basis: &Basis,
         segments: &[Segment<'_>],
         tier: u8,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<Self, OperatorError> {
         let of_tier = segments.iter().enumerate();
         let of_tier = of_tier.filter(|(_, segment)| segment.tier == tier);
@@ -95,14 +95,15 @@ struct Cursor<'a> {
 
 impl<'a> Cursor<'a> {
     fn new(index: usize, segment: &Segment<'a>) -> Self {
+        let mut groups = Vec::new();
+        for group in segment.groups() {
+            // Others there are none; collecting would have code for a panic.
+            let _ = groups.push(group.rows());
+        }
         Self {
             segment: index,
             channels: segment.channels,
-            groups: segment
-                .groups()
-                .take(MAX_SHORT + 1)
-                .map(|group| group.rows())
-                .collect(),
+            groups,
         }
     }
 
@@ -110,7 +111,7 @@ impl<'a> Cursor<'a> {
     fn bounds_of(
         &mut self,
         row: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<Option<(u64, u64)>, OperatorError> {
         let mut found = None;
         budget.spend(1, cost::FUNCTION);

@@ -93,7 +93,7 @@ impl<'a> Operator<'a> {
     pub(crate) fn prove(
         &self,
         grid: Grid,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<Bounds, OperatorError> {
         if self.channel_scales.iter().any(|scale| *scale > U1F15::ONE) {
             return Err(OperatorError::ChannelScale);
@@ -141,7 +141,7 @@ impl<'a> Operator<'a> {
         &self,
         tier: u8,
         channels: u8,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> (u32, u32) {
         let mut total = (0_u32, 0_u32);
         for segment in self.of_tier(tier) {
@@ -227,7 +227,9 @@ fn add<const C: usize>(
         count: group.count,
         words: group.words(),
     });
-    if kernel::gather::gather(rows, &scales, fresh, sums) {
+    // A tier's segment for all channels is its first, so the assembler has a loop for
+    // every segment of a checked table.
+    if kernel::gather::gather(rows, &scales, fresh, sums) || !kernel::IS_PLAIN {
         return;
     }
     for group in segment.groups() {

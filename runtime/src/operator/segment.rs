@@ -2,6 +2,7 @@
 
 use super::OperatorError;
 use super::layout::{MAX_SHORT, WORD, halves, pair_words};
+use crate::kernel;
 use crate::yield_budget::{YieldBudget, cost};
 
 /// Which channels a segment applies to.
@@ -64,8 +65,8 @@ impl<'a> Segment<'a> {
     /// checks them.
     ///
     /// # Errors
-    /// [`OperatorError::Words`] if the bytes are not whole words; `index` is the
-    /// place that the error names.
+    /// [`OperatorError::Words`] if the bytes are not whole words, or lie where the
+    /// assembler loops cannot read words; `index` is the place that the error names.
     pub fn new(
         index: usize,
         tier: u8,
@@ -73,7 +74,7 @@ impl<'a> Segment<'a> {
         bytes: &'a [u8],
     ) -> Result<Self, OperatorError> {
         let (words, rest) = bytes.as_chunks::<WORD>();
-        if !rest.is_empty() {
+        if !rest.is_empty() || !kernel::takes(words) {
             return Err(OperatorError::Words { segment: index });
         }
         Ok(Self {
@@ -106,14 +107,20 @@ impl<'a> Segment<'a> {
         &self,
         segment: usize,
         cells: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let mut groups = self.groups();
         let mut least = 1;
         while !groups.words.is_empty() {
             let group = groups.next().ok_or(OperatorError::Group { segment })?;
-            let pairs = group.pairs.map_or(MAX_SHORT + 1, usize::from);
-            if pairs < least || pairs > MAX_SHORT + 1 || group.count == 0 {
+            // Longer rows share the group that states no number, and come last.
+            let longest = if group.pairs.is_some() {
+                MAX_SHORT
+            } else {
+                MAX_SHORT + 1
+            };
+            let pairs = group.pairs.map_or(longest, usize::from);
+            if pairs < least || pairs > longest || group.count == 0 {
                 return Err(OperatorError::Group { segment });
             }
             least = pairs + 1;
@@ -143,7 +150,7 @@ impl<'a> Group<'a> {
         &self,
         segment: usize,
         cells: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let mut least_row = 0;
         let mut rows = self.rows();
@@ -208,7 +215,10 @@ impl Row<'_> {
         self.entries_yielding(&mut YieldBudget::new(&mut || {}))
     }
 
-    pub(super) fn entries_yielding(&self, budget: &mut YieldBudget<'_>) -> usize {
+    pub(super) fn entries_yielding(
+        &self,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+    ) -> usize {
         self.fold(0, |sum, pair| {
             budget.spend(1, cost::PAIR);
             sum + pair.values.iter().filter(|value| **value != 0).count()
@@ -216,7 +226,7 @@ impl Row<'_> {
     }
 
     /// Sum of the magnitudes of its values.
-    pub(super) fn magnitude(&self, budget: &mut YieldBudget<'_>) -> u64 {
+    pub(super) fn magnitude(&self, budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>) -> u64 {
         let magnitude = |value: i16| u64::from(value.unsigned_abs());
         self.fold(0, |sum, Pair { values: [a, b], .. }| {
             budget.spend(1, cost::PAIR);
@@ -229,7 +239,7 @@ impl Row<'_> {
         &self,
         segment: usize,
         cells: usize,
-        budget: &mut YieldBudget<'_>,
+        budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let (least, fits) = self.fold((0, true), |(least, fits), pair| {
             budget.spend(1, cost::PAIR);

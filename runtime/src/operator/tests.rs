@@ -264,6 +264,25 @@ fn malformed_rows_are_refused_with_their_place() {
         row(1),
         "a short row among the long ones"
     );
+    let five = Basis::new(Grid::new(4, 8).expect("a small grid"));
+    let nine: Vec<_> = (0..9_u16)
+        .collect::<Vec<_>>()
+        .chunks(2)
+        .flat_map(|two| match *two {
+            [first, second] => vec![values, values, word(2 * first, 2 * second)],
+            _ => vec![values, word(16, 0)],
+        })
+        .collect();
+    let of_nine = |head: &[[u8; 4]]| {
+        let bytes: Vec<u8> = [head, &nine].concat().concat();
+        super::tests::operator(&five, &bytes).map(|_| ())
+    };
+    assert_eq!(of_nine(&long(16, 9)), Ok(()));
+    assert_eq!(
+        of_nine(&[word(9, 1), word(1, 20)]),
+        group,
+        "rows of nine pairs in a group of their own"
+    );
     assert_eq!(
         check(&[&long(15, 8)[..], &eight, &[values]].concat()),
         row(1),

@@ -7,7 +7,9 @@ use super::sample::Encoding;
 use super::stages::Workspace;
 use super::{FrameError, FullMemory};
 use crate::FrameSize;
+use crate::features::Stage;
 use crate::image::Table;
+use crate::placement::PixelArea;
 
 /// Compensates a frame of one pixel a cell at a tier; returns how many samples were
 /// clipped.
@@ -47,19 +49,39 @@ pub struct FrameJob<'t, 'a> {
     pub table: &'t Table<'a>,
     /// Its size.
     pub size: FrameSize,
-    /// Whether the memory is prepared for table and size.
-    pub prepared: bool,
+    /// Where in it the cells lie.
+    pub area: PixelArea,
     /// The tier that it goes through.
     pub tier: u8,
     /// What its codes mean.
     pub encoding: Encoding,
 }
 
-/// Compensates a frame larger than the grid, preparing the memory first unless it is;
-/// returns how many samples were clipped.
+/// Prepares one row of the memory for frames larger than the grid whose cells lie in an area
+/// of this size; all its rows are to be, before a frame is compensated.
 ///
 /// # Errors
-/// As [`FullPipeline::new`] and [`FullPipeline::compensate`].
+/// [`FrameError`] if the area is smaller than the grid, or this build takes none larger.
+/// Slices that are too short are filled as far as they go.
+pub fn prepare_pixels(
+    table: &Table<'_>,
+    area: FrameSize,
+    row: usize,
+    memory: &mut FullMemory<'_>,
+) -> Result<(), FrameError> {
+    if !Stage::FullResolution.is_built() {
+        return Err(FrameError::NotBuilt(Stage::FullResolution));
+    }
+    let pipeline = FullPipeline::<1>::of_any(table, area)?;
+    pipeline.prepare_row_of(table.channels().into(), row, memory);
+    Ok(())
+}
+
+/// Compensates a frame larger than the grid with memory that was
+/// [prepared](prepare_pixels) for table and area; returns how many samples were clipped.
+///
+/// # Errors
+/// As [`FullPipeline::within`] and [`FullPipeline::compensate`].
 pub fn compensate_pixels(
     job: &FrameJob<'_, '_>,
     wanted: &[u8],
@@ -80,10 +102,7 @@ fn pixels<const C: usize>(
     memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
 ) -> Result<u32, FrameError> {
-    let pipeline = FullPipeline::<C>::new(job.table, job.size)?;
-    if !job.prepared {
-        pipeline.prepare(memory)?;
-    }
+    let pipeline = FullPipeline::<C>::within(job.table, job.size, job.area)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     pipeline.compensate(job.tier, job.encoding, wanted, input, memory, workspace)
 }

@@ -12,11 +12,12 @@
 )]
 
 use super::FrameError;
-use super::stages::{Workspace, correct, drive_row, subtract_ambient};
+use super::stages::{ClippedInRow, Workspace, correct, drive_row, subtract_ambient};
 use crate::FrameSize;
 use crate::features::Stage;
 use crate::haar::ShortSlice;
 use crate::image::{FineGain, Table};
+use crate::placement::PixelArea;
 use crate::resample::area::AreaAverage;
 use crate::resample::interpolation::{Axis, blend, blend_rows};
 use crate::units::{Drive, Light};
@@ -27,11 +28,14 @@ const GAIN_GUARD_BITS: u32 = 12;
 /// Half of the last place that is kept of an interpolated gain.
 const GAIN_HALF: i32 = 1 << (GAIN_GUARD_BITS - 1);
 
-/// Compensates frames of one size, `C` channels.
+/// Compensates frames of one size, `C` channels. The cells cover all of a frame, or the
+/// area of it that [`within`](Self::within) names; rows and their pixels are those of the
+/// area.
 #[derive(Clone, Copy, Debug)]
 pub struct FullPipeline<'t, 'a, const C: usize> {
     table: &'t Table<'a>,
-    frame: FrameSize,
+    whole: FrameSize,
+    area: PixelArea,
     average: AreaAverage,
     fine_gain: Option<FineGain<'a>>,
     cells: [Axis; 2],
@@ -56,20 +60,44 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// than the grid, or this build takes no frames larger than it.
     #[inline]
     pub fn new(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
+        Self::within(table, frame, PixelArea::all(frame))
+    }
+
+    /// A pipeline for frames of size `whole`, whose cells lie in `area`. What is outside
+    /// becomes black; what of the area is outside of the frame is not shown.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), of the area instead of the frame.
+    #[inline]
+    pub fn within(
+        table: &'t Table<'a>,
+        whole: FrameSize,
+        area: PixelArea,
+    ) -> Result<Self, FrameError> {
         if Stage::FullResolution.is_built() {
-            Self::sized(table, frame)
+            Self::sized(table, whole, area)
         } else {
             Err(FrameError::NotBuilt(Stage::FullResolution))
         }
     }
 
-    fn sized(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
+    fn sized(table: &'t Table<'a>, whole: FrameSize, area: PixelArea) -> Result<Self, FrameError> {
+        let frame = area.size;
         if usize::from(table.channels()) != C {
             return Err(FrameError::Channels {
                 table: table.channels(),
                 pipeline: C as u8,
             });
         }
+        Ok(Self {
+            whole,
+            area,
+            ..Self::of_any(table, frame)?
+        })
+    }
+
+    /// Of frames that cells cover all of, without a look at the number of channels.
+    pub(super) fn of_any(table: &'t Table<'a>, frame: FrameSize) -> Result<Self, FrameError> {
         let smaller = FrameError::SmallerThanGrid {
             width: frame.width() as u16,
             height: frame.height() as u16,
@@ -87,7 +115,8 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         };
         Ok(Self {
             table,
-            frame,
+            whole: frame,
+            area: PixelArea::all(frame),
             average: AreaAverage::new(grid, frame).ok_or(smaller)?,
             fine_gain,
             cells: axes(FrameSize::of_grid(grid)).ok_or(smaller)?,
@@ -101,10 +130,22 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.table
     }
 
-    /// The size of its frames.
+    /// The size of the area that cells cover: of the frame, unless that has a border.
     #[must_use]
     pub const fn frame(&self) -> FrameSize {
-        self.frame
+        self.area.size
+    }
+
+    /// The size of its frames.
+    #[must_use]
+    pub const fn whole(&self) -> FrameSize {
+        self.whole
+    }
+
+    /// Where in a frame the cells lie.
+    #[must_use]
+    pub const fn area(&self) -> PixelArea {
+        self.area
     }
 
     /// Whether frames of `tier` go through the operator. Those of others need neither
@@ -274,7 +315,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         corrections: &[i32],
         row: &mut RowBuffers<'_>,
         drives: &mut [Drive],
-    ) -> u32 {
+    ) -> ClippedInRow {
         self.correct_row(y, corrections, row);
         let fraction = u32::from(self.table.gain_fraction());
         drive_row(light, gain, fraction, row.spread, drives)

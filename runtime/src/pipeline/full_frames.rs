@@ -18,7 +18,8 @@ use core::array::from_fn;
 /// Memory for frames of `W x H` pixels of `C` channels over `N` cells.
 #[derive(Debug)]
 pub struct FullMemory<'m> {
-    /// Gains of the pixels, channels of a pixel side by side, `W * H * C` elements.
+    /// Gains of the pixels that cells cover, channels of a pixel side by side,
+    /// `W * H * C` elements.
     pub gains: &'m mut [Halfword],
     /// Ambient light of the pixels in the same way; unused in a dark room.
     pub ambient: &'m mut [Halfword],
@@ -65,32 +66,37 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     /// # Errors
     /// [`FrameError::Short`] if a slice is too short.
     pub fn prepare(&self, memory: &mut FullMemory<'_>) -> Result<(), FrameError> {
+        (0..self.frame().height()).try_for_each(|y| self.prepare_row(y, memory))
+    }
+
+    /// [`prepare`](Self::prepare) for one row of pixels.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn prepare_row(&self, y: usize, memory: &mut FullMemory<'_>) -> Result<(), FrameError> {
         self.check(memory)?;
-        let (width, height) = (self.frame().width(), self.frame().height());
-        let (gains, _) = memory.gains.as_chunks_mut::<C>();
-        for (y, line) in gains.chunks_exact_mut(width).take(height).enumerate() {
-            for channel in 0..C {
-                self.gain_row(y, channel, &mut memory.row, memory.values);
-                store(line, channel, memory.values);
-            }
-        }
-        let lit = if self.table().ambient().is_some() {
-            height
-        } else {
-            0
-        };
-        let (ambient, _) = memory.ambient.as_chunks_mut::<C>();
-        let lines = ambient.chunks_exact_mut(width).take(lit);
-        for (y, line) in lines.enumerate() {
-            for channel in 0..C {
-                if self.ambient_row(y, channel, &mut memory.row) {
-                    let values = memory.values.iter_mut().zip(memory.row.spread.iter());
-                    values.for_each(|(value, ambient)| *value = *ambient as u16);
-                    store(line, channel, memory.values);
-                }
-            }
-        }
+        self.prepare_row_of(C, y, memory);
         Ok(())
+    }
+
+    /// [`prepare_row`](Self::prepare_row) for `channels` channels, whatever `C` is: code
+    /// for one serves all.
+    pub(super) fn prepare_row_of(&self, channels: usize, y: usize, memory: &mut FullMemory<'_>) {
+        let width = self.frame().width() * channels;
+        for channel in 0..channels {
+            if let Some(line) = memory.gains.chunks_exact_mut(width).nth(y) {
+                self.gain_row(y, channel, &mut memory.row, memory.values);
+                store(line, channel, channels, memory.values);
+            }
+            if self.table().ambient().is_some()
+                && self.ambient_row(y, channel, &mut memory.row)
+                && let Some(line) = memory.ambient.chunks_exact_mut(width).nth(y)
+            {
+                let values = memory.values.iter_mut().zip(memory.row.spread.iter());
+                values.for_each(|(value, ambient)| *value = *ambient as u16);
+                store(line, channel, channels, memory.values);
+            }
+        }
     }
 
     /// Compensates one frame at `tier` with memory that was
@@ -168,7 +174,13 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
         let mut clipped = 0;
-        let lines = input.chunks_exact_mut(width).take(self.frame().height());
+        if self.frame() != self.whole() {
+            // What no cell covers stays black.
+            input.as_flattened_mut().fill(S::default());
+        }
+        let input = input.get_mut(self.start()..).unwrap_or_default();
+        let lines = input.chunks_mut(self.whole().width());
+        let lines = lines.take(self.frame().height());
         let (gains, _) = memory.gains.as_chunks();
         let (ambient, _) = memory.ambient.as_chunks();
         for (y, (line, gains)) in lines.zip(gains.chunks_exact(width)).enumerate() {
@@ -186,8 +198,14 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     }
 
     fn check_pixels(&self, what: &'static str, given: usize) -> Result<(), ShortSlice> {
-        let needed = self.frame().pixels();
+        let needed = self.whole().pixels();
         ShortSlice::check(what, needed, given)
+    }
+
+    /// The first pixel that a cell covers.
+    const fn start(&self) -> usize {
+        let area = self.area();
+        area.top * self.whole().width() + area.left
     }
 
     /// One channel of the pixels from row `y` on.
@@ -199,15 +217,17 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         channel: usize,
         curves: S::Curves<'f>,
     ) -> Pixels<'f, S, C> {
-        let (table, start) = (self.table(), y * self.frame().width());
-        let ambient = table
+        let width = self.frame().width();
+        let start = self.start() + y * self.whole().width();
+        let ambient = self
+            .table()
             .ambient()
-            .map(|_| ambient.get(start..).unwrap_or_default());
+            .map(|_| ambient.get(y * width..).unwrap_or_default());
         Pixels {
             plane: Plane {
                 codes: wanted.get(start..).unwrap_or_default(),
                 ambient,
-                cols: self.frame().width(),
+                cols: width,
                 channel,
             },
             curves,
@@ -216,10 +236,9 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
 }
 
 /// Stores a row of one channel.
-fn store<const C: usize>(line: &mut [[Halfword; C]], channel: usize, values: &[u16]) {
-    for (pixel, value) in line.iter_mut().zip(values) {
-        if let Some(slot) = pixel.get_mut(channel) {
-            *slot = value.to_le_bytes();
-        }
+fn store(line: &mut [Halfword], channel: usize, channels: usize, values: &[u16]) {
+    let line = line.iter_mut().skip(channel).step_by(channels.max(1));
+    for (slot, value) in line.zip(values) {
+        *slot = value.to_le_bytes();
     }
 }

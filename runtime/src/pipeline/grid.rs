@@ -3,7 +3,7 @@
 use super::FrameError;
 use super::pixels::Pixels;
 use super::sample::{Encoding, Sample};
-use super::stages::Workspace;
+use super::stages::{Workspace, drive, is_too_bright};
 use crate::haar::ShortSlice;
 use crate::image::Table;
 use crate::kernel::Plane;
@@ -119,6 +119,38 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
             clipped += S::finish(&pixels, fraction, gains, corrections, input);
         }
         Ok(clipped)
+    }
+
+    /// How many samples of the frame that [`compensate`](Self::compensate) has just made at
+    /// this tier were clipped at white; all others of those clipped were at black.
+    ///
+    /// # Errors
+    /// [`FrameError::Short`] if a slice is too short.
+    pub fn too_bright<S: Sample>(
+        &self,
+        tier: u8,
+        encoding: Encoding,
+        wanted: &[[S; C]],
+        workspace: &mut Workspace<'_>,
+    ) -> Result<u32, FrameError> {
+        self.check("wanted", wanted.len())?;
+        workspace.check(self.table)?;
+        let fraction = u32::from(self.table.gain_fraction());
+        let mut count = 0;
+        for channel in 0..C {
+            if self.operates(tier) {
+                workspace.synthesise(self.table, channel)?;
+            }
+            let pixels = self.pixels(encoding, wanted, channel);
+            let gains = self.table.gains().iter().skip(channel).step_by(C);
+            let cells = gains.zip(workspace.cells.iter());
+            for (index, (gain, correction)) in cells.enumerate() {
+                let gain = u16::from_le_bytes(*gain);
+                let wanted = drive(pixels.light(index), gain, fraction, *correction);
+                count += u32::from(is_too_bright(wanted));
+            }
+        }
+        Ok(count)
     }
 
     /// Whether frames of `tier` go through the operator.

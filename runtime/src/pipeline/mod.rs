@@ -27,7 +27,7 @@ mod sample;
 pub mod srgb;
 pub mod stages;
 
-pub use dispatch::{FrameJob, compensate_cells, compensate_pixels};
+pub use dispatch::{FrameJob, compensate_cells, compensate_pixels, prepare_pixels};
 pub use full::{FullPipeline, RowBuffers};
 pub use full_frames::FullMemory;
 pub use grid::GridPipeline;

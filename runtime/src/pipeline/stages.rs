@@ -37,6 +37,7 @@ pub fn drive(light: Light, gain: u16, gain_fraction: u32, correction: i32) -> i3
     let product = u32::from(gain).wrapping_mul(u32::from(light.to_bits()));
     let half = 1_u32.wrapping_shl(gain_fraction) >> 1;
     let direct = product.wrapping_add(half).wrapping_shr(gain_fraction) as i32;
+    // Below 2^30 + 2^22: a table's gains have at least one fraction bit.
     direct.wrapping_sub(correction >> CORRECTION_GUARD_BITS)
 }
 
@@ -48,6 +49,15 @@ pub(super) fn clip(wanted: i32) -> (Drive, bool) {
     (Drive::from_bits(reached as u16), wanted != reached)
 }
 
+/// Samples that were clipped, by the end at which they were.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct ClippedInRow {
+    /// Drives below 0: more light arrives from elsewhere than is wanted.
+    pub black: u32,
+    /// Drives above 1.
+    pub white: u32,
+}
+
 /// A row of [`drive`]s between 0 and 1; returns how many were clipped.
 #[inline(always)]
 pub fn drive_row(
@@ -56,15 +66,22 @@ pub fn drive_row(
     gain_fraction: u32,
     corrections: &[i32],
     drives: &mut [Drive],
-) -> u32 {
+) -> ClippedInRow {
     let inputs = light.iter().zip(gain).zip(corrections);
-    let mut clipped = 0;
+    let mut clipped = ClippedInRow::default();
     for (slot, ((light, gain), correction)) in drives.iter_mut().zip(inputs) {
-        let (reached, was_clipped) = clip(drive(*light, *gain, gain_fraction, *correction));
-        *slot = reached;
-        clipped += u32::from(was_clipped);
+        let wanted = drive(*light, *gain, gain_fraction, *correction);
+        *slot = clip(wanted).0;
+        clipped.black += u32::from(wanted < 0);
+        clipped.white += u32::from(is_too_bright(wanted));
     }
     clipped
+}
+
+/// Whether a drive is above 1.
+#[inline(always)]
+pub(super) fn is_too_bright(wanted: i32) -> bool {
+    wanted > i32::from(Drive::ONE.to_bits())
 }
 
 /// Memory for the operator on a grid of `N` cells. Channels lie one after the
@@ -181,4 +198,42 @@ pub fn correct(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Meta;
+    use crate::image::layout::{SectionKind, meta};
+    use crate::image::made_up::flat;
+    use crate::operator::Bounds;
+
+    #[test]
+    fn no_table_that_is_taken_has_a_drive_that_leaves_its_type() {
+        let most = Bounds::MAX_CORRECTION as i32;
+        let mut taken = 0;
+        for fraction in 0..=u8::MAX {
+            let mut sections = flat(2, 3);
+            let (kind, bytes) = sections.first_mut().expect("there are some");
+            assert_eq!(*kind, SectionKind::Meta);
+            bytes[meta::GAIN_FRACTION] = fraction;
+            let Ok(meta) = Meta::parse(bytes) else {
+                continue;
+            };
+            taken += 1;
+            let fraction = u32::from(meta.gain_fraction);
+            for light in [0, 1, 1 << 15] {
+                for gain in [0, 1, 4_096, u16::MAX] {
+                    for correction in [-most, -1, 0, CORRECTION_HALF, most + CORRECTION_HALF] {
+                        let wanted = drive(Light::from_bits(light), gain, fraction, correction);
+                        let product = f64::from(gain) * f64::from(light);
+                        let direct = (product / f64::from(fraction).exp2() + 0.5).floor();
+                        let exact = direct - (f64::from(correction) / 256.0).floor();
+                        assert_eq!(i64::from(wanted), exact as i64, "{light} {gain} {fraction}");
+                    }
+                }
+            }
+        }
+        assert_eq!(taken, 15);
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::StoreError;
 use super::map::{MAX_WRITE, Part};
-use crate::image::CRC_32;
+use crate::image::Crc32;
 use embedded_storage::nor_flash::NorFlash;
 
 /// Bytes that are read at once: a multiple of every unit.
@@ -46,12 +46,12 @@ pub(super) fn crc<F: NorFlash>(
     start: u32,
     length: u32,
 ) -> Result<u32, StoreError> {
-    let mut digest = CRC_32.digest();
+    let mut digest = Crc32::new();
     read(flash, part, start, length, |piece| {
         digest.update(piece);
         true
     })?;
-    Ok(digest.finalize())
+    Ok(digest.finish())
 }
 
 /// Whether a part holds these bytes from `start` on.

@@ -32,6 +32,7 @@ mod map;
 mod record;
 mod transfer;
 mod updater;
+mod wear;
 
 pub use error::StoreError;
 pub use identity::identity_record;
@@ -92,9 +93,21 @@ impl Slot {
 /// Where checked tables are kept, one a slot, and where frames are worked on.
 pub trait TableSlots<F> {
     /// Checks the file of `length` bytes in a slot with
-    /// [`admit`](crate::trust::admit) and keeps its table; where nobody has noted the
-    /// length, [`content`](crate::image::content) tells it. Frames go on with the table
-    /// in use.
+    /// [`examine`](crate::trust::examine); where nobody has noted the length,
+    /// [`content`](crate::image::content) tells it. Frames go on with the table in use,
+    /// and nothing else is kept or forgotten.
+    ///
+    /// # Errors
+    /// [`Rejected`].
+    fn examine(
+        &mut self,
+        flash: &F,
+        slot: Slot,
+        length: Option<u32>,
+        terms: &Terms,
+    ) -> Result<Accepted, Rejected>;
+
+    /// The same, and its table is kept.
     ///
     /// # Errors
     /// [`Rejected`]; nothing is kept for the slot then.

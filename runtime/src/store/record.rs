@@ -3,7 +3,7 @@
 use super::flash::{self, ERASED, PIECE};
 use super::map::Part;
 use super::{Slot, StoreError};
-use crate::image::crc32;
+use crate::image::{crc32, put};
 use core::ops::Range;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -37,6 +37,7 @@ mod commit {
     pub(super) const HAS_OTHER: Range<usize> = 44..48;
     /// 1 if the device has a key; anything else is none.
     pub(super) const HAS_KEY: Range<usize> = 48..52;
+    pub(super) const NEWEST: Range<usize> = 52..56;
 }
 
 /// The fields of an identity record.
@@ -64,6 +65,8 @@ pub(super) struct Commit {
     pub(super) erases: [u32; 3],
     /// Whether the device has a key.
     pub(super) has_key: bool,
+    /// The highest version that was ever confirmed under the key.
+    pub(super) newest: u32,
 }
 
 impl Commit {
@@ -96,13 +99,6 @@ fn u32_at(bytes: &[u8; RECORD], field: Range<usize>) -> u32 {
     bytes.map_or(0, u32::from_le_bytes)
 }
 
-fn put(bytes: &mut [u8; RECORD], field: Range<usize>, value: &[u8]) {
-    let places = bytes.get_mut(field).unwrap_or_default();
-    for (place, byte) in places.iter_mut().zip(value) {
-        *place = *byte;
-    }
-}
-
 impl Record for Commit {
     const MAGIC: [u8; 4] = *b"ILTC";
 
@@ -122,6 +118,7 @@ impl Record for Commit {
             lengths: lengths.map(|field| u32_at(bytes, field)),
             erases: erases.map(|field| u32_at(bytes, field)),
             has_key: u32_at(bytes, commit::HAS_KEY) == 1,
+            newest: u32_at(bytes, commit::NEWEST),
         }
     }
 
@@ -143,6 +140,7 @@ impl Record for Commit {
             (commit::OTHER, self.other.unwrap_or(0)),
             (commit::HAS_OTHER, self.other.is_some().into()),
             (commit::HAS_KEY, self.has_key.into()),
+            (commit::NEWEST, self.newest),
         ] {
             put(bytes, field, &value.to_le_bytes());
         }

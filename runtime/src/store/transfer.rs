@@ -40,6 +40,12 @@ impl Transfer {
         Ok(())
     }
 
+    /// Whether the chunk at this offset has its sector erased first.
+    pub(super) fn erases(&mut self, map: &Map, offset: u32) -> bool {
+        let flag = self.flag(offset / map.sector());
+        flag.is_some_and(|(word, bit)| *word & bit == 0)
+    }
+
     /// Has the flash hold a chunk that was [`check`](Self::check)ed. Returns how many sectors were erased for it.
     ///
     /// A sector is erased before the first chunk that goes there, whatever it holds:
@@ -62,27 +68,31 @@ impl Transfer {
             *word |= bit;
             erases = map.sector() / (F::ERASE_SIZE as u32).max(1);
         }
-        let failed = |_: StoreError| Refusal::Flash { offset };
-        // The same chunk may come twice.
-        if flash::holds(flash, slot, offset, bytes).map_err(failed)? {
-            return Ok(erases);
-        }
-        // Another one for the same place must not be written over it.
-        let length = bytes.len() as u32;
-        let blank = flash::is_blank(flash, slot, offset, length);
-        let written = blank.and_then(|blank| {
-            if blank {
-                flash::write(flash, slot, offset, bytes)
-            } else {
-                Err(StoreError::Flash { offset })
-            }
-        });
-        written.map_err(|error| {
+        let written = Self::put(flash, slot, offset, bytes);
+        written.map_err(|_| {
             // The whole sector is to come again.
             *word &= !bit;
-            failed(error)
+            Refusal::Flash { offset }
         })?;
         Ok(erases)
+    }
+
+    fn put<F: NorFlash>(
+        flash: &mut F,
+        slot: Part,
+        offset: u32,
+        bytes: &[u8],
+    ) -> Result<(), StoreError> {
+        // The same chunk may come twice.
+        if flash::holds(flash, slot, offset, bytes)? {
+            return Ok(());
+        }
+        // Another one for the same place must not be written over it.
+        if flash::is_blank(flash, slot, offset, bytes.len() as u32)? {
+            flash::write(flash, slot, offset, bytes)
+        } else {
+            Err(StoreError::Flash { offset })
+        }
     }
 
     /// Whether a slot holds the file.

@@ -11,7 +11,7 @@ use crate::yield_budget::YieldBudget;
 pub fn admit<'a>(
     file: &'a [u8],
     terms: &Terms,
-    yield_now: &mut dyn FnMut(),
+    yield_now: &mut (impl FnMut() + ?Sized),
 ) -> Result<(Table<'a>, Accepted), Rejected> {
     let (checked, accepted) = examine(file, terms, yield_now)?;
     Ok((checked.table(), accepted))
@@ -33,7 +33,7 @@ pub fn admit<'a>(
 pub fn examine<'a>(
     file: &'a [u8],
     terms: &Terms,
-    yield_now: &mut dyn FnMut(),
+    yield_now: &mut (impl FnMut() + ?Sized),
 ) -> Result<(Checked<'a>, Accepted), Rejected> {
     let (image, seal) = unseal(file)?;
     let mut budget = YieldBudget::new(yield_now);
@@ -48,6 +48,9 @@ pub fn examine<'a>(
         version: seal.map_or(0, |seal| seal.version),
         oldest,
         length: file.len() as u32,
+        grid: checked.meta().grid,
+        channels: checked.meta().channels,
+        label: checked.meta().label,
     };
     Ok((checked, accepted))
 }
@@ -60,7 +63,7 @@ fn vouched(
     seal: Option<&Seal>,
     key: &[u8; 32],
     terms: &Terms,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<u32, Rejected> {
     let seal = seal.ok_or(Rejected::Unsigned)?;
     if seal.key != Seal::key_id(key) {

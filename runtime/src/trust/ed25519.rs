@@ -22,7 +22,7 @@ pub(super) fn verify(
     key: &[u8; 32],
     signature: &[u8; 64],
     message: &[u8],
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> bool {
     let (Some((r, _)), Some((_, s))) = (
         signature.split_first_chunk::<32>(),
@@ -52,7 +52,12 @@ pub(super) fn verify(
 }
 
 /// `k`: the hash of `R`, the key and the message, modulo the order of the group.
-fn challenge(r: &[u8; 32], key: &[u8; 32], message: &[u8], budget: &mut YieldBudget<'_>) -> Scalar {
+fn challenge(
+    r: &[u8; 32],
+    key: &[u8; 32],
+    message: &[u8],
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+) -> Scalar {
     let mut hash = Sha512::new();
     hash.update(r);
     hash.update(key);
@@ -72,7 +77,7 @@ fn combination(
     k: &Scalar,
     point: EdwardsPoint,
     s: &Scalar,
-    budget: &mut YieldBudget<'_>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> EdwardsPoint {
     let base = ED25519_BASEPOINT_POINT;
     let both = point + base;

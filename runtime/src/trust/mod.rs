@@ -7,6 +7,7 @@
 mod admission;
 mod ed25519;
 mod rejected;
+mod right;
 
 #[cfg(test)]
 mod ed25519_tests;
@@ -15,8 +16,10 @@ mod tests;
 
 pub use admission::{admit, examine};
 pub use rejected::Rejected;
+pub use right::{Certificate, Deed, NoRight, SIGNATURE, allows};
 
-use crate::image::Seal;
+use crate::Grid;
+use crate::image::{Label, Seal};
 
 /// Bytes of a key that name it.
 pub const KEY_ID: usize = 8;
@@ -61,4 +64,10 @@ pub struct Accepted {
     pub oldest: u32,
     /// Bytes of the file, its seal included.
     pub length: u32,
+    /// The table's grid.
+    pub grid: Grid,
+    /// The table's colour channels.
+    pub channels: u8,
+    /// What people call the table.
+    pub label: Label,
 }

@@ -87,7 +87,7 @@ impl fmt::Display for Rejected {
                 "the table has version {version}; none below {floor} is taken"
             ),
             Self::OtherDevice { device } => {
-                write!(f, "the table is for the device {device:016x}")
+                write!(f, "the table is for the device {device}")
             }
             Self::NotBuilt { stage } => write!(
                 f,

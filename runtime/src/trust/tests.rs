@@ -5,7 +5,7 @@ use crate::features::Stage;
 use crate::image::layout::{SectionKind, header, meta};
 use crate::image::made_up::{flat, image};
 use crate::image::{ImageError, Seal, Table, seal::field};
-use crate::yield_budget::{YieldBudget, cost};
+use crate::yield_budget::cost;
 use ed25519_dalek::{Signer, SigningKey};
 use std::collections::BTreeSet;
 use std::string::ToString;
@@ -72,6 +72,9 @@ fn a_table_signed_for_the_device_is_admitted_with_what_its_seal_states() {
         version: 5,
         oldest: 4,
         length: file.len() as u32,
+        grid: table.grid(),
+        channels: 1,
+        label: *table.label(),
     };
     assert_eq!((table.bytes(), accepted), (image.len(), expected));
 }
@@ -222,7 +225,10 @@ fn pauses_come_as_often_as_the_work_asks_for() {
     ] {
         let more = pauses(Some(section)) - without;
         // No stride is half as long again, for no single piece of work is so long.
-        assert!(more >= work / (YieldBudget::STRIDE * 3 / 2), "{more}");
+        assert!(
+            more >= work / (crate::yield_budget::STRIDE * 3 / 2),
+            "{more}"
+        );
     }
 }
 

@@ -1,38 +1,41 @@
-//! Gates before a solve: takes simulated photographs with every fault at several sizes and
-//! prints which gates notice: `cargo run --release -p iltm-tests --bin gates`.
+//! Study of the gates before a solve: random good sessions, and each fault in some of them.
+//! `cargo run --release -p iltm-tests --bin gates` prints the tables of docs/gates.md.
 //!
-//! Words choose the faults whose names contain one of them.
+//! Arguments, all optional: good sessions, sessions with each fault, the first seed, then
+//! faults as `NAME` or `NAME=SIZE`.
 
-use iltm::capture::Verdict;
-use iltm_tests::gates::{GateRig, GateSession, table, tried};
-use iltm_tests::simulated::scene;
+use iltm::scene::InjectedFault;
+use iltm_tests::gates::{StudiedFault, Study};
 
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let scene = scene("m-panels", &[]);
-    let rig = GateRig::new(&scene);
-    let say = |session: &GateSession| {
-        let name = session
-            .fault
-            .map_or_else(|| "no fault".to_owned(), |f| f.to_string());
-        let (fail, warn) = (session.that(Verdict::Fail), session.that(Verdict::Warn));
-        eprintln!(
-            "{name:18} fail {fail:?} remark {warn:?} {}",
-            session.first_words()
-        );
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |at: usize, usual: u64| {
+        let argument = arguments.get(at).and_then(|argument| argument.parse().ok());
+        argument.unwrap_or(usual)
     };
-    say(&rig.session(None));
-    let mut all = Vec::new();
-    for (kind, what, sizes) in tried() {
-        if !words.is_empty() && !words.iter().any(|word| kind.to_string().contains(word)) {
-            continue;
+    let asked: Vec<InjectedFault> = (arguments.iter().skip(3))
+        .map(|argument| argument.parse().expect("a fault"))
+        .collect();
+    let faults = StudiedFault::ALL.iter().filter_map(|fault| {
+        if asked.is_empty() {
+            return Some(*fault);
         }
-        let sessions = sizes.into_iter().map(|size| {
-            let session = rig.session(Some(iltm::scene::InjectedFault { kind, size }));
-            say(&session);
-            session
-        });
-        all.push((what, sessions.collect()));
-    }
-    print!("{}", table(&all));
+        let (argument, asked) =
+            (arguments[3..].iter().zip(&asked)).find(|(_, asked)| asked.kind == fault.kind)?;
+        let size = if argument.contains('=') {
+            asked.size
+        } else {
+            fault.size
+        };
+        Some(StudiedFault { size, ..*fault })
+    });
+    let study = Study {
+        good: number(0, 500) as usize,
+        faulty: number(1, 200) as usize,
+        first: number(2, 1),
+        faults: faults.collect(),
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let result = study.run(&|said| eprint!("{said}"));
+    print!("{}", result.table(&study));
 }

@@ -122,7 +122,9 @@ impl Sector {
     };
 
     pub(super) fn is_worn(&self, how: Wear) -> bool {
+        // One that takes no erase any more refuses the first that is too many.
+        let more = u32::from(how == Wear::Refuses);
         self.limit
-            .is_some_and(|(stands, wear)| wear == how && self.erases > stands)
+            .is_some_and(|(stands, wear)| wear == how && self.erases + more > stands)
     }
 }

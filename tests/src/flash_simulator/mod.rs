@@ -21,14 +21,16 @@ use std::ops::Range;
 /// Steps that the erase of one sector takes, at each of which the power can fail.
 pub const ERASE_STAGES: u64 = 8;
 
-/// How a sector fails that has been erased too often. It says nothing: only reading
-/// back shows.
+/// How a sector fails that has been erased too often. But for [`Wear::Refuses`] it says
+/// nothing: only reading back shows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Wear {
     /// An erase leaves one bit in 1,024, and at least one, stuck at 0.
     StuckBits,
     /// A program leaves one bit in 64 of those that it should clear as it was.
     LostBits,
+    /// Programs and erases report an error and change nothing.
+    Refuses,
 }
 
 /// How a read goes wrong though the cells are good: a bus that is disturbed, a supply that
@@ -62,7 +64,7 @@ pub enum Misread {
 ///
 /// | cut in | what is left |
 /// |---|---|
-/// | a byte | a random subset of the bits to be cleared is; bytes before it are programmed, bytes behind it untouched; its write unit may not be programmed again |
+/// | a byte | a random subset of the bits to be cleared is; bytes before it are programmed, bytes behind it untouched; its write unit may not be programmed again. [`with_whole_units`](Self::with_whole_units) has all bytes of that unit torn at once |
 /// | an erase, first step | nothing has changed |
 /// | an erase, any other | a random share of the zeros has become ones, from 1/64 at the second step to 1,023/1,024 at the last; no unit of the sector may be programmed |
 ///
@@ -121,11 +123,23 @@ pub struct NorSimulator<const W: usize, const E: usize, const R: usize = 1> {
     cut_at: Option<u64>,
     misread: Option<(Range<usize>, u32, Misread)>,
     is_on: bool,
-    is_rewritable: bool,
-    preprograms: bool,
+    part: Part,
+    /// Units that cannot be read, on a part with ECC.
+    torn: Option<Spent>,
     violations: Violations,
     last_cut: Option<Operation>,
     log: Option<Vec<Operation>>,
+}
+
+/// How a part programs and erases.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    /// A unit may be programmed again.
+    is_rewritable: bool,
+    /// An erase clears all bits first.
+    preprograms: bool,
+    /// All bytes of a unit are programmed at the same time.
+    programs_units: bool,
 }
 
 impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
@@ -145,8 +159,8 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
             cut_at: None,
             misread: None,
             is_on: true,
-            is_rewritable: false,
-            preprograms: false,
+            part: Part::default(),
+            torn: None,
             violations: Violations::default(),
             last_cut: None,
             log: None,
@@ -156,14 +170,14 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     /// As a part on which a unit may be programmed again, to clear more bits. Ones
     /// leave bits as they are.
     pub const fn rewritable(mut self) -> Self {
-        self.is_rewritable = true;
+        self.part.is_rewritable = true;
         self
     }
 
     /// As a part that clears all bits of a sector before it sets them all: an erase
     /// that is cut then leaves zeros as well where there were ones.
     pub const fn with_preprogramming(mut self) -> Self {
-        self.preprograms = true;
+        self.part.preprograms = true;
         self
     }
 
@@ -173,6 +187,26 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     pub fn with_weak_bits(mut self) -> Self {
         self.weak = Some(vec![0; self.cells.len()]);
         self
+    }
+
+    /// As a part that programs all bytes of a write unit at the same time: a cut in one
+    /// of them tears all.
+    pub const fn with_whole_units(mut self) -> Self {
+        self.part.programs_units = true;
+        self
+    }
+
+    /// As a part with ECC over each write unit: one that a cut caught in motion cannot be
+    /// read until it is erased.
+    pub fn with_ecc(mut self) -> Self {
+        self.torn = Some(Spent::new(self.cells.len() / W));
+        self
+    }
+
+    /// Whether bytes can be read like memory; where not, a processor faults.
+    pub fn is_readable(&self, bytes: Range<usize>) -> bool {
+        let units = bytes.start / W..bytes.end.div_ceil(W);
+        !self.torn.as_ref().is_some_and(|torn| torn.any(units))
     }
 
     /// Notes every operation in [`log`](Self::log).
@@ -285,6 +319,9 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         cells.copy_from_slice(bytes);
         self.spent.clear(from / W..to.div_ceil(W));
         self.firm(from..to);
+        if let Some(torn) = &mut self.torn {
+            torn.clear(from / W..to.div_ceil(W));
+        }
         Ok(())
     }
 

@@ -19,8 +19,11 @@ pub enum NorError {
     NotAligned,
     /// A range that is not within the part. Nothing was changed.
     OutOfBounds,
-    /// The cells could not be read, by order.
+    /// The cells could not be read, by order or because their write unit is torn on a part
+    /// with ECC.
     Unreadable,
+    /// A worn sector took no program or erase. Nothing was changed.
+    Worn,
 }
 
 impl fmt::Display for NorError {
@@ -31,6 +34,7 @@ impl fmt::Display for NorError {
             Self::NotAligned => f.write_str("offset or length is not aligned"),
             Self::OutOfBounds => f.write_str("the range is not within the flash"),
             Self::Unreadable => f.write_str("the cells cannot be read"),
+            Self::Worn => f.write_str("the sector is worn"),
         }
     }
 }
@@ -40,7 +44,9 @@ impl std::error::Error for NorError {}
 impl NorFlashError for NorError {
     fn kind(&self) -> NorFlashErrorKind {
         match self {
-            Self::PowerCut | Self::NotErased { .. } | Self::Unreadable => NorFlashErrorKind::Other,
+            Self::PowerCut | Self::NotErased { .. } | Self::Unreadable | Self::Worn => {
+                NorFlashErrorKind::Other
+            }
             Self::NotAligned => NorFlashErrorKind::NotAligned,
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
         }
@@ -72,7 +78,7 @@ pub struct Violations {
 impl Violations {
     pub(super) const fn count(&mut self, error: NorError) {
         let count = match error {
-            NorError::PowerCut | NorError::Unreadable => return,
+            NorError::PowerCut | NorError::Unreadable | NorError::Worn => return,
             NorError::NotErased { .. } => &mut self.not_erased,
             NorError::NotAligned => &mut self.not_aligned,
             NorError::OutOfBounds => &mut self.out_of_bounds,

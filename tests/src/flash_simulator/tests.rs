@@ -439,3 +439,55 @@ fn an_order_to_cut_does_not_outlive_the_next_start() {
     assert_eq!(flash.read(0, &mut [0]), Err(NorError::PowerCut));
     assert_eq!(flash.last_cut(), None, "it fell into no operation");
 }
+
+#[test]
+fn a_cut_tears_the_whole_write_unit_where_a_part_programs_it_at_once() {
+    let mut later = 0;
+    for seed in 0..50 {
+        let mut flash = NorSimulator::<8, 64>::new(1, seed).with_whole_units();
+        flash.cut_after(11);
+        let cut = flash.write(0, &[0; 32]);
+        assert_eq!(cut, Err(NorError::PowerCut));
+        let cells = flash.contents();
+        assert_eq!(cells[..8], [0; 8], "the unit before is done");
+        assert_eq!(cells[16..], [0xFF; 48], "the units behind are untouched");
+        later += u32::from(cells[12..16] != [0xFF; 4]);
+    }
+    assert!(
+        later > 40,
+        "bytes behind the cut are in motion too: {later}"
+    );
+}
+
+#[test]
+fn a_torn_unit_cannot_be_read_on_a_part_with_ecc_until_it_is_erased() {
+    let mut flash = NorSimulator::<8, 64>::new(2, 1).with_ecc();
+    flash.cut_after(11);
+    let _ = flash.write(0, &[0; 32]);
+    flash.power_on();
+    let mut bytes = [0; 8];
+    for (unit, expected) in [(0, Ok(())), (8, Err(NorError::Unreadable)), (16, Ok(()))] {
+        assert_eq!(flash.read(unit, &mut bytes), expected, "unit {unit}");
+    }
+    assert!(!flash.is_readable(0..9) && flash.is_readable(16..128));
+    // An erase that is cut leaves nothing that can be read.
+    flash.cut_after(4);
+    let _ = flash.erase(0, 64);
+    flash.power_on();
+    assert_eq!(flash.read(0, &mut bytes), Err(NorError::Unreadable));
+    flash.erase(0, 64).expect("a good sector");
+    flash.read(8, &mut bytes).expect("erased");
+    assert_eq!(flash.violations(), Violations::default());
+}
+
+#[test]
+fn a_sector_that_refuses_work_says_so_and_stays_as_it_is() {
+    let mut flash = NorSimulator::<4, 64>::new(2, 1);
+    flash.erase(0, 64).expect("the last that it stands");
+    flash.wear_out(0, 1, Wear::Refuses).expect("there");
+    assert_eq!(flash.write(0, &[0; 4]), Err(NorError::Worn));
+    assert_eq!(flash.erase(0, 64), Err(NorError::Worn));
+    flash.write(64, &[0; 4]).expect("the other one");
+    assert_eq!(flash.contents()[..64], [0xFF; 64]);
+    assert_eq!(flash.violations(), Violations::default());
+}

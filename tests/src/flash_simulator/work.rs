@@ -1,6 +1,6 @@
 //! NOR flash work: what a simulated flash does when it is asked: read, program, erase.
 
-use super::damage;
+use super::damage::{self, Sector};
 use super::{ERASE_STAGES, Misread, NorError, NorSimulator, Operation, Wear, Work};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, ReadNorFlash, check_erase, check_read, check_write,
@@ -20,6 +20,9 @@ impl<const W: usize, const E: usize, const R: usize> ReadNorFlash for NorSimulat
             return Err(kind.into());
         }
         let (from, to) = (offset as usize, offset as usize + bytes.len());
+        if !self.is_readable(from..to) {
+            return Err(NorError::Unreadable);
+        }
         bytes.copy_from_slice(self.cells.get(from..to).unwrap_or_default());
         let weak = self.weak.as_ref().and_then(|weak| weak.get(from..to));
         for (byte, weak) in bytes.iter_mut().zip(weak.unwrap_or_default()) {
@@ -126,7 +129,8 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
     fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorError> {
         check_write(self, offset, bytes.len())?;
         let (from, to) = (offset as usize, offset as usize + bytes.len());
-        if !self.is_rewritable
+        self.refuses(from, to)?;
+        if !self.part.is_rewritable
             && let Some(unit) = self.first_spent(from, to)
         {
             return Err(NorError::NotErased { unit });
@@ -138,10 +142,25 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         let torn = usize::from(!rest.is_empty());
         self.spent
             .set(from / W..(from + whole.len() + torn).div_ceil(W));
-        if let Some(byte) = rest.first() {
-            self.tear(from + whole.len(), *byte);
+        let at = from + whole.len();
+        let unit = if self.part.programs_units { W } else { 1 };
+        for place in at / unit * unit..at / unit * unit + unit {
+            // Those before it are done in this model, and go back into motion.
+            if let Some(byte) = bytes.get(place - from).filter(|_| !rest.is_empty()) {
+                self.tear(place, *byte);
+            }
         }
         self.need_power()
+    }
+
+    /// Whether one of the sectors is worn so that it takes nothing.
+    fn refuses(&self, from: usize, to: usize) -> Result<(), NorError> {
+        let sectors = self.sectors.get(from / E..to.div_ceil(E));
+        let worn = |sector: &Sector| sector.is_worn(Wear::Refuses);
+        if sectors.unwrap_or_default().iter().any(worn) {
+            return Err(NorError::Worn);
+        }
+        Ok(())
     }
 
     /// Where the first unit begins that may not be programmed.
@@ -193,9 +212,17 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
 
     /// Programs a byte in which the power fails.
     fn tear(&mut self, at: usize, byte: u8) {
+        if self.part.programs_units
+            && let Some(cell) = self.cells.get_mut(at)
+        {
+            *cell = 0xFF;
+        }
         let Some(cell) = self.cells.get_mut(at) else {
             return;
         };
+        if let Some(torn) = &mut self.torn {
+            torn.set(at / W..at / W + 1);
+        }
         if let Some(weak) = self.weak.as_mut().and_then(|weak| weak.get_mut(at)) {
             *weak |= *cell & !byte;
         }
@@ -204,6 +231,7 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
 
     fn erase_sectors(&mut self, from: u32, to: u32) -> Result<(), NorError> {
         check_erase(self, from, to)?;
+        self.refuses(from as usize, to as usize)?;
         for sector in from as usize / E..to as usize / E {
             let stage = self.advance(ERASE_STAGES);
             self.erase_sector(sector, stage);
@@ -227,8 +255,11 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
         sector.erases = sector.erases.saturating_add(1);
         let weak = self.weak.as_mut().and_then(|weak| weak.get_mut(from..to));
         if stage < ERASE_STAGES {
-            damage::half_erased(cells, weak, stage, self.preprograms, &mut self.random);
+            damage::half_erased(cells, weak, stage, self.part.preprograms, &mut self.random);
             self.spent.set(from / W..to / W);
+            if let Some(torn) = &mut self.torn {
+                torn.set(from / W..to / W);
+            }
             return;
         }
         cells.fill(0xFF);
@@ -236,6 +267,9 @@ impl<const W: usize, const E: usize, const R: usize> NorSimulator<W, E, R> {
             damage::worn_erase(cells, &mut self.random);
         }
         self.spent.clear(from / W..to / W);
+        if let Some(torn) = &mut self.torn {
+            torn.clear(from / W..to / W);
+        }
         self.firm(from..to);
     }
 }

@@ -17,7 +17,7 @@ const SEAL: usize = 96;
 pub(super) const DEVICES: [u64; 2] = [7, 8];
 
 /// The signing key of this number.
-fn signer(number: u8) -> SigningKey {
+pub(super) fn signer(number: u8) -> SigningKey {
     SigningKey::from_bytes(&[number + 1; 32])
 }
 

@@ -25,6 +25,7 @@ use iltm::capture::{
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};
 use iltm::video::{Compensator, OperatorMemory};
+use iltm_runtime::FrameSize;
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
 use iltm_runtime::link::{DELIMITER, Decoder, Event, MAX_PAYLOAD, Request, Response, Session};
@@ -42,6 +43,27 @@ pub fn image(bytes: &[u8]) {
         match table.channels() {
             1 => frame::<1>(&table),
             _ => frame::<3>(&table),
+        }
+        placed(&table);
+    }
+}
+
+/// Where the cells of frames larger than the grid lie: inside, whatever a table says.
+fn placed(table: &Table<'_>) {
+    for (width, height) in [
+        (1, 1),
+        (64, 40),
+        (17, 200),
+        (u16::MAX, 3),
+        (u16::MAX, u16::MAX),
+    ] {
+        let Some(frame) = FrameSize::new(width, height) else {
+            continue;
+        };
+        if let Some(area) = table.area(frame) {
+            assert!(area.left + area.size.width() <= frame.width());
+            assert!(area.top + area.size.height() <= frame.height());
+            assert!(area.size.holds(table.grid()));
         }
     }
 }

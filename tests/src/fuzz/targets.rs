@@ -1,9 +1,12 @@
 //! Table of the fuzz targets: all of them by name, with good inputs to start from.
 
 use super::{files, session};
+use crate::made_up::MadeUp;
 use crate::simulated::host_tools;
 use crate::{wedge_table, wedge_table_for};
 use iltm::picture::Response;
+use iltm_runtime::placement::ProjectorPixels;
+use iltm_runtime::{FrameSize, Grid};
 
 /// What is fuzzed.
 #[derive(Clone, Copy, Debug)]
@@ -191,7 +194,10 @@ fn gate() -> Vec<Vec<u8>> {
 }
 
 fn tables() -> Vec<Vec<u8>> {
-    let mut all = vec![wedge_table(3, 4, 3), wedge_table(4, 4, 1)];
+    let mut placed = MadeUp::of_all_kinds(Grid::new(2, 3).expect("small"), 1, 3, 1);
+    let size = FrameSize::new(64, 40).expect("not empty");
+    placed.projector = ProjectorPixels::new(size, 5);
+    let mut all = vec![wedge_table(3, 4, 3), wedge_table(4, 4, 1), placed.image()];
     all.extend(
         [(1, 1), (2, 3)].map(|(rows, cols)| wedge_table_for(Response::Linear, rows, cols, 1)),
     );

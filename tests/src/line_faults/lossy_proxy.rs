@@ -62,7 +62,10 @@ impl LossyProxy {
     /// # Errors
     /// [`DeviceError::Open`] if the system has no pseudo-terminal or thread left.
     pub fn before(line: impl Line + Send + 'static, faults: Faults) -> Result<Self, DeviceError> {
-        let open = |source| DeviceError::Open { source };
+        let open = |source| DeviceError::Open {
+            source,
+            holder: None,
+        };
         let (mut ours, theirs) = TTYPort::pair().map_err(open)?;
         ours.set_timeout(ROUND).map_err(open)?;
         let path = theirs.name().unwrap_or_default();

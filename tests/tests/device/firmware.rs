@@ -11,12 +11,14 @@ use iltm_runtime::frame_buffers::{ControlWords, Format, Layout, psram};
 use iltm_runtime::image::{Table, crc32};
 use iltm_runtime::link::{Event, Fault, FaultyFrame, Mode, PassThrough, SlotState, Status};
 use iltm_runtime::pipeline::Encoding;
+use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::trust::Rejected;
 use iltm_tests::firmware::{
     CountedBoard, Effects, PATIENCE, client, clipped_on_host, counted, elf, finding, flash_bytes,
     memory_with, on_host, order, play, random_frame, random_table, start, through, word,
 };
 use iltm_tests::grid;
+use iltm_tests::made_up::MadeUp;
 use std::time::{Duration, Instant};
 
 fn size(width: u16, height: u16) -> FrameSize {
@@ -199,6 +201,45 @@ fn a_device_without_a_usable_table_passes_frames_through_and_says_why() {
 
     let grey = random_table(grid(6, 8), 1, Effects::ALL, 3);
     passes_through(&grey, PassThrough::OtherFrames);
+}
+
+#[test]
+fn a_border_stays_black_on_the_device_and_another_aspect_passes_through() {
+    for (board, channels) in [(Board::An500, 3), (Board::An386, 1)] {
+        let mut made = MadeUp::of_all_kinds(grid(5, 9), channels, 4, 7);
+        made.projector = ProjectorPixels::new(size(320, 200), 21);
+        let image = made.image();
+        let table = Table::check(&image).expect("whole");
+        let (memory, emulator) = product(board, &image);
+        let mut client = client(&emulator);
+        for (width, height, mode) in [
+            (96, 60, Mode::Compensating),
+            (75, 47, Mode::Compensating),
+            (80, 60, Mode::PassThrough(PassThrough::OtherFrames)),
+        ] {
+            let format = format(size(width, height), channels, Encoding::Display);
+            let mut playback = Playback::new(&memory, format).expect("it fits");
+            let wanted = random_frame(format, 4);
+            let shown = through(&mut playback, &wanted);
+            let status = client.status().expect("the device answers");
+            assert_eq!(status.mode, mode, "{board} {width} x {height}");
+            if mode == Mode::Compensating {
+                let clipped = clipped_on_host(&table, format, &wanted, &shown);
+                assert!(
+                    clipped.is_some(),
+                    "{board} {width} x {height}: not the host's frame"
+                );
+                assert!(
+                    shown
+                        .iter()
+                        .take(width as usize * channels)
+                        .all(|code| *code == 0)
+                );
+            } else {
+                assert_eq!(shown, wanted);
+            }
+        }
+    }
 }
 
 #[test]

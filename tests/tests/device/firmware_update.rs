@@ -1,10 +1,10 @@
 //! Firmware update: tables on their way into the firmware, in the emulator: what the
 //! device does with frames meanwhile, and which tables it takes.
 
-use ed25519_dalek::SigningKey;
+use ed25519_dalek::{Signer, SigningKey};
 use iltm::device::memory::BoardMemory;
 use iltm::device::upload::{NoObserver, Parcel, Upload, UploadError};
-use iltm::device::{Client, DeviceError, Patience};
+use iltm::device::{Authority, Client, DeviceError, Patience};
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::{Table, crc32};
 use iltm_runtime::link::{Refusal, SlotState};
@@ -91,8 +91,12 @@ fn an_update_misses_no_frame_and_the_new_table_comes_between_two() {
     let (_board, mut client) = run(&memory, format, &frame);
     let client = &mut client;
     client
-        .provision(key().verifying_key().to_bytes(), DEVICE)
+        .provision(key().verifying_key().to_bytes(), DEVICE, false)
         .expect("it had no key");
+    client.authorise(Authority::new(|deed, device, sequence| {
+        let signature = key().sign(&deed.message(device, sequence));
+        signature.to_bytes().to_vec()
+    }));
     let before = client.status().expect("an answer");
     let parcel = Parcel::new(&new);
     let mut upload = Upload::new(client, &parcel);
@@ -156,7 +160,7 @@ fn a_trial_that_nobody_confirms_ends_with_the_old_table() {
     loop {
         let status = client.status().expect("an answer");
         if status.table == first {
-            assert_eq!(status.slots, [SlotState::Active, SlotState::Valid]);
+            assert_eq!(status.slots, [SlotState::Active, SlotState::Unconfirmed]);
             assert_eq!(status.frames.late, 0);
             break;
         }
@@ -172,8 +176,12 @@ fn the_firmware_refuses_each_bad_table_for_its_own_reason_and_keeps_the_old_one(
     let (_board, mut client) = run(&memory, format, &random_frame(format, 3));
     let client = &mut client;
     client
-        .provision(key().verifying_key().to_bytes(), DEVICE)
+        .provision(key().verifying_key().to_bytes(), DEVICE, false)
         .expect("it had no key");
+    client.authorise(Authority::new(|deed, device, sequence| {
+        let signature = key().sign(&deed.message(device, sequence));
+        signature.to_bytes().to_vec()
+    }));
     let in_use = client.status().expect("an answer").table;
     let image = random_table(iltm_tests::grid(3, 4), 1, Effects::NONE, 7);
     let seal =

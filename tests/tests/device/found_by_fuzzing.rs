@@ -4,7 +4,7 @@
 use ed25519_dalek::SigningKey;
 use iltm::picture::Response as Projector;
 use iltm_runtime::link::{Refusal, Request, Response, SlotState};
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::trust::{Deed, Rejected};
 use iltm_tests::flash_simulator::{ERASE_STAGES, NorSimulator, Violations};
 use iltm_tests::slots::{self, SimDevice, SlotLayout, Step, digest};
 use iltm_tests::{signing_key, wedge_table_for};
@@ -151,9 +151,11 @@ fn a_rollback_that_is_repeated_confirms_nothing() {
     let mut device = with_key(&[&old]);
     device.update(&new, false).expect("a good file");
     let table = device.updater.table().expect("it is on trial").id;
-    device.ask(Request::Rollback { table });
+    let right = device.right(&Deed::Rollback { table });
+    let right = &right;
+    device.ask(Request::Rollback { table, right });
     assert!(device.runs(&old));
-    let again = refused(device.ask(Request::Rollback { table }));
+    let again = refused(device.ask(Request::Rollback { table, right }));
     assert_eq!(again, Refusal::NoOther);
     assert!(device.runs(&old) && device.restarted().runs(&old));
 }

@@ -55,7 +55,14 @@ fn takes_nothing(device: &mut Device, how: &str) {
         assert_eq!(device.update(&file, true), Err(Refusal::KeyLost), "{how}");
     }
     let used = device.updater.table().map_or(0, |table| table.id);
-    assert_eq!(device.ask(Request::Rollback { table: used }), lost, "{how}");
+    assert_eq!(
+        device.ask(Request::Rollback {
+            table: used,
+            right: &[]
+        }),
+        lost,
+        "{how}"
+    );
     assert_eq!(device.ask(provision(6)), lost, "{how}");
     assert_eq!(device.ask(provision(5)), lost, "{how}");
     let Response::Slots(slots) = device.ask(Request::Slots) else {

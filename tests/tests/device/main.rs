@@ -3,11 +3,14 @@
 //! `cargo test -p iltm-tests --test device upload` runs the tests of one.
 
 mod firmware;
+mod firmware_trouble;
 mod firmware_update;
 mod found_by_fuzzing;
 mod identity;
 mod link;
 mod power_cuts;
 mod protocol;
+mod rights;
 mod slots;
 mod upload;
+mod worn;

@@ -9,9 +9,10 @@
 //! `cargo test --release -p iltm-tests --test device power_cuts -- --include-ignored --nocapture`.
 
 use ed25519_dalek::SigningKey;
-use iltm::picture::Response;
-use iltm_runtime::link::Refusal;
-use iltm_tests::flash_simulator::{Violations, Wear, Work};
+use iltm::picture::Response as ProjectorResponse;
+use iltm_runtime::image::crc32;
+use iltm_runtime::link::{Refusal, Request, Response};
+use iltm_tests::flash_simulator::{NorSimulator, Violations, Wear, Work};
 use iltm_tests::slots::{SimDevice, SlotLayout, Step, provision};
 use iltm_tests::{signed, signing_key, wedge_table_for};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -25,7 +26,7 @@ fn key() -> SigningKey {
 }
 
 fn table(rows: u16, cols: u16, channels: usize) -> Vec<u8> {
-    wedge_table_for(Response::Linear, rows, cols, channels)
+    wedge_table_for(ProjectorResponse::Linear, rows, cols, channels)
 }
 
 /// Two files that differ from the first sector on.
@@ -35,9 +36,9 @@ struct Files {
 }
 
 impl Files {
-    /// Tables that are signed, the second with a higher version.
+    /// Tables that are signed, the second with a higher version. Both revoke version 0.
     fn signed() -> Self {
-        let file = |cols, version| signed(&table(6, cols, 1), &key(), version, 0, DEVICE);
+        let file = |cols, version| signed(&table(6, cols, 1), &key(), version, 1, DEVICE);
         Self {
             old: file(8, 1),
             new: file(9, 2),
@@ -86,12 +87,125 @@ struct Counts {
     again: AtomicU64,
 }
 
+/// Starts after each cut.
+const STARTS: u32 = 3;
+
+/// What the flash is like.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    /// What was cut reads the same for ever.
+    Plain,
+    /// Bits that a cut caught in motion read as either.
+    Weak,
+    /// A write unit is programmed at once, and cannot be read if that was cut.
+    Ecc,
+}
+
+impl Part {
+    fn make<const W: usize, const E: usize>(self, layout: SlotLayout) -> NorSimulator<W, E> {
+        let flash = NorSimulator::new(layout.sectors(), 1);
+        match self {
+            Self::Plain => flash,
+            Self::Weak => flash.with_weak_bits(),
+            Self::Ecc => flash.with_whole_units().with_ecc(),
+        }
+    }
+}
+
+/// Cuts the power at every point at which a device with a table is given its key.
+fn cut_provision<const W: usize, const E: usize>(files: &Files, slot: usize, part: Part) -> u64 {
+    let layout = SlotLayout { slot, sector: E };
+    let mut device = SimDevice::<W, E>::start(part.make(layout), layout);
+    device.update(&files.old, true).expect("a good device");
+    let mut whole = device.clone();
+    let start = whole.flash().steps();
+    whole.ask(provision(&key(), DEVICE));
+    let work = whole.flash().steps() - start;
+    for cut in 0..work {
+        let mut device = device.clone();
+        let flash = device.updater.flash_mut();
+        flash.reseed(cut);
+        flash.cut_after(cut);
+        let answer = device.ask(provision(&key(), DEVICE));
+        let mut device = device.restarted();
+        let what = format!("unit {W}, cut {cut} of {work}");
+        let trust = *device.updater.trust();
+        // What was answered holds: the cut fell into the duplicate of the last record.
+        assert!(
+            answer != Response::Provisioned || trust.device == DEVICE,
+            "{what}"
+        );
+        for _ in 0..STARTS {
+            assert_eq!(*device.updater.trust(), trust, "{what}");
+            assert!(device.runs(&files.old), "{what}");
+            assert_eq!(device.updater.fault(), None, "{what}");
+            assert_eq!(device.flash().violations(), Violations::default(), "{what}");
+            device = device.restarted();
+        }
+        let given = device.ask(provision(&key(), DEVICE));
+        assert_eq!(given, Response::Provisioned, "{what}");
+        let device = device.restarted();
+        assert_eq!(device.updater.trust().device, DEVICE, "{what}");
+        assert!(device.runs(&files.old), "{what}");
+    }
+    work
+}
+
+#[test]
+fn a_cut_while_the_key_is_given_leaves_none_or_the_whole_one_and_the_table() {
+    let files = Files::signed();
+    let mut cuts = 0;
+    for part in [Part::Plain, Part::Weak, Part::Ecc] {
+        cuts += cut_provision::<1, 256>(&files, 48, part);
+        cuts += cut_provision::<8, 256>(&files, 48, part);
+        cuts += cut_provision::<32, 256>(&files, 48, part);
+    }
+    println!("{cuts} cuts");
+    assert!(cuts > 1_000);
+}
+
+#[test]
+fn an_update_goes_on_where_a_write_unit_cannot_be_read() {
+    let files = Files::signed();
+    let layout = SlotLayout {
+        slot: 4,
+        sector: 4_096,
+    };
+    let mut device = SimDevice::<32, 4_096>::start(Part::Ecc.make(layout), layout);
+    device.update(&files.old, true).expect("a good device");
+    let steps = device.plan(&files.new, true);
+    let [begin, first, second, ..] = steps.as_slice() else {
+        panic!("a table of several chunks");
+    };
+    for step in [begin, first] {
+        device.carry_out(&files.new, step).expect("a good device");
+    }
+    device.updater.flash_mut().cut_after(100);
+    device
+        .carry_out(&files.new, second)
+        .expect_err("it was cut");
+    let mut device = device.restarted();
+    assert!(device.runs(&files.old), "the torn slot is not read");
+    let length = files.new.len() as u32;
+    let Response::Sectors(sectors) = device.ask(Request::Sectors { length, first: 0 }) else {
+        panic!("the sectors cannot be compared");
+    };
+    let wanted = files.new.chunks(4_096).map(|sector| crc32(&[sector]));
+    assert!(
+        wanted
+            .zip(&sectors.crcs)
+            .all(|(wanted, held)| wanted != *held)
+    );
+    device.update(&files.new, true).expect("it goes on");
+    assert!(device.restarted().runs(&files.new));
+}
+
 /// Cuts the power at every point of one step of a device that runs `before`, and of
 /// what the device does when it starts again.
 fn cut_everywhere<const W: usize, const E: usize>(
     device: &SimDevice<W, E>,
     files: &Files,
-    (file, step): (&[u8], &Step),
+    (file, step, starts): (&[u8], &Step, u32),
     before: Option<&[u8]>,
     counts: &Counts,
 ) {
@@ -125,6 +239,15 @@ fn cut_everywhere<const W: usize, const E: usize>(
             "{what}: neither the old table nor the new one runs"
         );
         assert_eq!(device.flash().violations(), Violations::default(), "{what}");
+        // Where cells read as either, the first start has settled it.
+        let settled = [Some(files.old.as_slice()), Some(&files.new), None]
+            .into_iter()
+            .find(|file| runs(&device, *file));
+        for start in 2..=starts {
+            device = device.restarted();
+            let same = settled.is_some_and(|file| runs(&device, file));
+            assert!(same, "{what}: another table at start {start}");
+        }
         // Now and then, the update is made once more, to the end.
         if cut.is_multiple_of(61) {
             counts.again.fetch_add(1, Ordering::Relaxed);
@@ -140,13 +263,9 @@ fn cut_everywhere<const W: usize, const E: usize>(
 }
 
 /// One life with cuts everywhere.
-fn live<const W: usize, const E: usize>(files: &Files, slot: usize, weak: bool, counts: &Counts) {
-    let mut device = SimDevice::<W, E>::new(slot, 1);
-    if weak {
-        let flash = device.updater.into_flash().with_weak_bits();
-        let layout = SlotLayout { slot, sector: E };
-        device = SimDevice::start(flash, layout);
-    }
+fn live<const W: usize, const E: usize>(files: &Files, slot: usize, part: Part, counts: &Counts) {
+    let layout = SlotLayout { slot, sector: E };
+    let mut device = SimDevice::<W, E>::start(part.make(layout), layout);
     device.ask(provision(&key(), DEVICE));
     assert_eq!(device.updater.trust().device, DEVICE);
     // What a start would find: not what is on trial.
@@ -156,7 +275,14 @@ fn live<const W: usize, const E: usize>(files: &Files, slot: usize, weak: bool, 
         steps.pop();
         steps.extend(&story.steps);
         for step in &steps {
-            cut_everywhere(&device, files, (story.file, step), confirmed, counts);
+            let starts = if part == Part::Weak { STARTS } else { 1 };
+            cut_everywhere(
+                &device,
+                files,
+                (story.file, step, starts),
+                confirmed,
+                counts,
+            );
             device.carry_out(story.file, step).expect("a good device");
             if matches!(step, Step::Confirm | Step::Rollback) {
                 confirmed = files.both().into_iter().find(|file| device.runs(file));
@@ -175,14 +301,15 @@ fn a_cut_at_any_byte_or_erase_stage_leaves_the_old_table_or_the_new_whole() {
     thread::scope(|scope| {
         // Sectors of four records, so that the records change sectors as well.
         scope.spawn(|| {
-            live::<1, 256>(&files, 48, false, &counts);
-            live::<4, 256>(&files, 48, false, &counts);
-            live::<8, 256>(&files, 48, true, &counts);
+            live::<1, 256>(&files, 48, Part::Plain, &counts);
+            live::<4, 256>(&files, 48, Part::Plain, &counts);
+            live::<8, 256>(&files, 48, Part::Weak, &counts);
         });
         scope.spawn(|| {
-            live::<16, 256>(&files, 48, false, &counts);
-            live::<32, 256>(&files, 48, false, &counts);
-            live::<4, 4_096>(&files, 4, true, &counts);
+            live::<16, 256>(&files, 48, Part::Plain, &counts);
+            live::<8, 256>(&files, 48, Part::Ecc, &counts);
+            live::<32, 256>(&files, 48, Part::Ecc, &counts);
+            live::<4, 4_096>(&files, 4, Part::Weak, &counts);
         });
     });
     let count = |count: &AtomicU64| count.load(Ordering::Relaxed);

@@ -1,13 +1,15 @@
 //! Protocol: that `docs/protocol.md` says what host and device say: its byte examples and
 //! limits.
 
+use ed25519_dalek::{Signer, SigningKey};
+use iltm_runtime::image::Label;
 use iltm_runtime::link::{
-    Channel, Device as _, Digest, Event, Fault, FaultyFrame, InUse, LinkFrame, MAX_ENCODED,
-    MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState,
-    Slots, TableName, TableReason, TierReason,
+    Channel, Device as _, Digest, EndedTrial, Event, Fault, FaultyFrame, FrameKind, InUse,
+    LinkFrame, MAX_ENCODED, MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response,
+    Sectors, SlotInfo, SlotState, Slots, TableAbout, TableName, TableReason, TierReason,
 };
 use iltm_runtime::store::MAX_CHUNK;
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::trust::{Deed, Rejected};
 use iltm_tests::fake_device::FakeDevice;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -59,6 +61,12 @@ impl Examples {
     }
 }
 
+/// The secret key of RFC 8032, section 7.1, test 1.
+const SECRET: [u8; 32] = [
+    0x9D, 0x61, 0xB1, 0x9D, 0xEF, 0xFD, 0x5A, 0x60, 0xBA, 0x84, 0x4A, 0xF4, 0x92, 0xEC, 0x2C, 0xC4,
+    0x44, 0x49, 0xC5, 0x69, 0x7B, 0x32, 0x69, 0x19, 0x70, 0x3B, 0xAC, 0x03, 0x1C, 0xAE, 0x7F, 0x60,
+];
+
 /// What is said whatever the tables.
 fn conversation(examples: &mut Examples) {
     let mut device = FakeDevice::default();
@@ -93,6 +101,43 @@ fn conversation(examples: &mut Examples) {
     examples.add("log", Channel::Log, 0, &[0x07, 0x00, 0x8F, 0x4E]);
 }
 
+/// The older table in use, after a trial of the newer one.
+fn slots(old: TableName, new: TableName) -> Slots {
+    let slot = |state, table, length| SlotInfo {
+        state,
+        table,
+        length,
+        erases: 40,
+        about: table.map(|_| TableAbout {
+            label: Label::new("foyer", 20_261_123),
+            frames: FrameKind {
+                width: 16,
+                height: 12,
+                channels: 1,
+            },
+        }),
+    };
+    Slots {
+        slots: [
+            slot(SlotState::Active, Some(old), 4_800),
+            slot(SlotState::Broken, None, 0),
+        ],
+        target: 1,
+        trial_ms: 0,
+        oldest: 7,
+        key: Some([0xD7, 0x5A, 0x98, 0x01, 0x82, 0xB1, 0x0A, 0xB7]),
+        device: 0x0102_0304_0506_0708,
+        sector: 4_096,
+        record_erases: 3,
+        sequence: 12,
+        ended: Some(EndedTrial {
+            table: new.id,
+            reason: TableReason::TrialOver,
+            ago_ms: 2_000,
+        }),
+    }
+}
+
 /// A table of 5,000 bytes on its way, of which the first sector is there already.
 fn update(examples: &mut Examples) {
     let old = TableName {
@@ -106,32 +151,22 @@ fn update(examples: &mut Examples) {
     let digest = Digest(*b"\x11\x22\x33\x44 the digest.");
     let transfer = digest.transfer();
     examples.request("slots-request", 5, &Request::Slots);
-    let slot = |state, table, length| SlotInfo {
-        state,
-        table,
-        length,
-        erases: 40,
-    };
-    let slots = Slots {
-        slots: [
-            slot(SlotState::Active, Some(old), 4_800),
-            slot(SlotState::Broken, None, 0),
-        ],
-        target: 1,
-        trial_ms: 0,
-        oldest: 7,
-        key: Some([0xD7, 0x5A, 0x98, 0x01, 0x82, 0xB1, 0x0A, 0xB7]),
-        device: 0x0102_0304_0506_0708,
-        sector: 4_096,
-        record_erases: 3,
-    };
+    let slots = slots(old, new);
     examples.response("slots-response", 5, &Response::Slots(slots));
     let (length, first) = (5_000, 0);
     examples.request("sectors-request", 6, &Request::Sectors { length, first });
     let crcs = [0x1020_3040, 0xFFFF_FFFF].into_iter().collect();
     let sectors = Response::Sectors(Sectors { first, crcs });
     examples.response("sectors-response", 6, &sectors);
-    examples.request("begin-request", 7, &Request::Begin { length, digest });
+    examples.request(
+        "begin-request",
+        7,
+        &Request::Begin {
+            length,
+            digest,
+            right: &[],
+        },
+    );
     let receiving = Response::Receiving(Receiving {
         slot: 1,
         chunk: 512,
@@ -163,7 +198,14 @@ fn update(examples: &mut Examples) {
         frame: 2_000,
     };
     examples.event("table-event", 2, &event);
-    examples.request("confirm-request", 10, &Request::Confirm { table: new.id });
+    examples.request(
+        "confirm-request",
+        10,
+        &Request::Confirm {
+            table: new.id,
+            right: &[],
+        },
+    );
     let used = |table| {
         Response::InUse(InUse {
             table: Some(table),
@@ -171,9 +213,22 @@ fn update(examples: &mut Examples) {
         })
     };
     examples.response("confirm-response", 10, &used(new));
-    let back = Request::Rollback { table: new.id };
+    let signer = SigningKey::from_bytes(&SECRET);
+    let deed = Deed::Rollback { table: new.id };
+    let right = signer
+        .sign(&deed.message(0x0102_0304_0506_0708, 12))
+        .to_bytes();
+    let back = Request::Rollback {
+        table: new.id,
+        right: &right,
+    };
     examples.request("rollback-request", 11, &back);
     examples.response("rollback-response", 11, &used(old));
+    owner(examples);
+}
+
+/// What a device asks of tables, and how it comes by a key.
+fn owner(examples: &mut Examples) {
     let older = Rejected::Older {
         version: 6,
         floor: 7,
@@ -186,7 +241,15 @@ fn update(examples: &mut Examples) {
         0x51, 0x1A,
     ];
     let device = 42;
-    examples.request("provision-request", 13, &Request::Provision { key, device });
+    examples.request(
+        "provision-request",
+        13,
+        &Request::Provision {
+            key,
+            device,
+            even_so: false,
+        },
+    );
     examples.response("provision-response", 13, &Response::Provisioned);
 }
 

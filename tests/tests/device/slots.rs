@@ -2,9 +2,10 @@
 
 use ed25519_dalek::SigningKey;
 use iltm::picture::Response as Projector;
-use iltm_runtime::link::{PassThrough, Refusal, Request, Response, SlotState, Slots};
-use iltm_runtime::store::{Map, MapError};
+use iltm_runtime::link::{Fault, PassThrough, Refusal, Request, Response, SlotState, TableReason};
+use iltm_runtime::store::{Map, MapError, Slot};
 use iltm_runtime::trust::Rejected;
+use iltm_tests::firmware::{Effects, random_table};
 use iltm_tests::flash_simulator::NorSimulator;
 use iltm_tests::slots::{SimDevice, Step, TRIAL_S, digest, provision};
 use iltm_tests::{signing_key, wedge_table_for};
@@ -44,13 +45,6 @@ fn with_first() -> (Device, Vec<u8>, Vec<u8>) {
     (device, first, second)
 }
 
-fn slots(device: &mut Device) -> Slots {
-    match device.ask(Request::Slots) {
-        Response::Slots(slots) => slots,
-        other => panic!("{other:?}"),
-    }
-}
-
 fn roll_back(device: &mut Device) -> Result<(), Refusal> {
     device.carry_out(&[], &Step::Rollback)
 }
@@ -70,15 +64,37 @@ fn a_confirmed_table_counts_after_a_restart_and_one_on_trial_does_not() {
     assert!(device.runs(&first));
     assert_eq!(
         device.updater.states(),
-        [SlotState::Active, SlotState::Valid]
+        [SlotState::Active, SlotState::Unconfirmed]
     );
+}
+
+/// A device that took it for broken would say of the table before that it needs no
+/// confirmation, and nothing of the one that was lost.
+#[test]
+fn a_table_that_was_on_trial_at_a_restart_is_unconfirmed_whatever_length_its_slot_held_before() {
+    for sizes in [[3, 4, 5], [5, 4, 3]] {
+        let [first, second, third] = sizes.map(table);
+        let mut device = Device::new(SLOT, 1);
+        device.update(&first, true).expect("a good table");
+        device.update(&second, true).expect("a good table");
+        device.update(&third, false).expect("a good table");
+        assert!(device.runs(&third));
+        let device = device.restarted();
+        assert!(device.runs(&second));
+        let states = device.updater.states();
+        assert_eq!(
+            states,
+            [SlotState::Unconfirmed, SlotState::Active],
+            "{sizes:?}"
+        );
+    }
 }
 
 #[test]
 fn a_trial_ends_by_itself_by_rollback_or_by_confirmation() {
     let (mut device, first, second) = with_first();
     device.update(&second, false).expect("a good table");
-    assert_eq!(slots(&mut device).trial_ms, u32::from(TRIAL_S) * 1_000);
+    assert_eq!(device.slots().trial_ms, u32::from(TRIAL_S) * 1_000);
     device.wait(u64::from(TRIAL_S) * 1_000 - 1);
     assert!(device.runs(&second));
     device.wait(1);
@@ -140,7 +156,10 @@ fn requests_that_come_twice_do_no_more_than_once() {
     }
     assert!(device.runs(&second));
     let id = device.updater.table().expect("in use").id;
-    let back = Request::Rollback { table: id };
+    let back = Request::Rollback {
+        table: id,
+        right: &[],
+    };
     assert!(matches!(device.ask(back), Response::InUse(_)));
     assert!(device.runs(&first));
     let again = device.ask(back);
@@ -212,6 +231,7 @@ fn a_file_that_has_not_come_whole_or_is_too_long_is_refused() {
     let long = Request::Begin {
         length: device.updater.map().slot_bytes() + 1,
         digest: digest(&file),
+        right: &[],
     };
     let limit = device.updater.map().slot_bytes();
     assert_eq!(
@@ -361,12 +381,12 @@ fn erases_are_counted_and_the_counts_outlive_a_restart() {
     let sectors = file.len().div_ceil(256) as u32;
     let mut device = Device::new(SLOT, 1);
     device.update(&file, true).expect("good");
-    let before = slots(&mut device);
+    let before = device.slots();
     assert_eq!(before.slots[0].erases, sectors);
     assert_eq!(before.slots[1].erases, 0);
     assert!(before.record_erases > 0);
     let mut device = device.restarted();
-    let after = slots(&mut device);
+    let after = device.slots();
     assert_eq!(after.slots.map(|slot| slot.erases), [sectors, 0]);
     assert_eq!(after.record_erases, before.record_erases);
     let counted: u32 = (0..SLOT)
@@ -404,4 +424,124 @@ fn a_flash_is_parted_only_as_it_can_be() {
     let small = NorSimulator::<4, 32>::new(64, 1);
     let parts = Map::new(&small, [0..64, 64..128], [128..192, 192..256], 256..320);
     assert_eq!(parts, Err(MapError::Unit));
+}
+
+#[test]
+fn a_device_that_crashes_again_and_again_uses_no_table_until_another_one_comes() {
+    let [a, b, c] = [2, 3, 4].map(table);
+    for before in [&[&a][..], &[&a, &b]] {
+        let mut device = Device::new(SLOT, 1);
+        for file in before {
+            device.update(file, true).expect("a good device");
+        }
+        let in_use = device.updater.in_use();
+        let mut device = device.restarted_after_crashes();
+        let crash_loop = Err(PassThrough::CrashLoop);
+        assert_eq!(device.tables.selected, crash_loop);
+        assert_eq!(
+            (device.updater.in_use(), device.updater.table()),
+            (None, None)
+        );
+        // A trial that nobody confirms leads back to no table.
+        device.carry_out(&c, &Step::Begin).expect("the line works");
+        let steps = whole(&c, &device);
+        for step in &steps {
+            device.carry_out(&c, step).expect("the line works");
+        }
+        assert!(device.runs(&c));
+        assert_eq!(
+            device.updater.in_use(),
+            in_use,
+            "it took the suspect's place"
+        );
+        device.wait(u64::from(TRIAL_S) * 1_000);
+        assert_eq!(device.tables.selected, crash_loop);
+        for step in &steps {
+            device.carry_out(&c, step).expect("the line works");
+        }
+        device
+            .carry_out(&c, &Step::Confirm)
+            .expect("the line works");
+        assert!(device.restarted().runs(&c));
+    }
+}
+
+/// A transfer of all chunks of a file, and its trial.
+fn whole(file: &[u8], device: &Device) -> Vec<Step> {
+    let chunk = usize::from(device.updater.map().chunk());
+    let writes = (0..file.len()).step_by(chunk);
+    let writes = writes.map(|offset| Step::Write(offset as u32));
+    let begin = std::iter::once(Step::Begin);
+    begin.chain(writes).chain([Step::Activate]).collect()
+}
+
+#[test]
+fn a_table_that_rots_in_use_gives_way_to_the_one_before_or_to_none() {
+    let [a, b] = [2, 3].map(table);
+    let mut device = Device::new(SLOT, 1);
+    device.update(&a, true).expect("a good device");
+    let mut alone = device.clone();
+    alone.abandon();
+    assert_eq!(alone.tables.selected, Err(PassThrough::BrokenTable));
+    device.update(&b, true).expect("a good device");
+    device.abandon();
+    assert!(device.runs(&a));
+    assert!(matches!(
+        device.updater.fault(),
+        Some(Fault::Table { slot: 1, .. })
+    ));
+    let change = device.updater.take_change().map(|change| change.reason);
+    assert_eq!(change, Some(TableReason::Damaged));
+    // One that was on trial beside a confirmed one.
+    let mut device = Device::new(SLOT, 1);
+    device.update(&a, true).expect("a good device");
+    device.update(&b, false).expect("a good device");
+    device.abandon();
+    assert!(device.runs(&a));
+    device.wait(u64::from(TRIAL_S) * 1_000);
+    assert!(device.runs(&a), "its trial is over");
+    // Nobody ever confirmed the other one.
+    let mut device = Device::new(SLOT, 1);
+    device.update(&a, true).expect("a good device");
+    device.update(&b, false).expect("a good device");
+    device.wait(u64::from(TRIAL_S) * 1_000);
+    device.abandon();
+    assert_eq!(device.tables.selected, Err(PassThrough::BrokenTable));
+}
+
+/// Puts a file into a slot through the debug port while the device is off.
+fn put(device: Device, slot: Slot, file: &[u8]) -> Device {
+    let place = device.layout().slot(slot);
+    let mut bytes = file.to_vec();
+    bytes.resize(place.len(), 0xFF);
+    let mut device = device;
+    let flash = device.updater.flash_mut();
+    flash.put(place.start as u32, &bytes).expect("it fits");
+    device.restarted()
+}
+
+#[test]
+fn a_later_table_that_revokes_nothing_leaves_older_ones_revoked() {
+    let mut device = Device::new(SLOT, 1);
+    device.ask(provision(&key(), NUMBER));
+    device.update(&signed(2, 2, 2), true).expect("signed");
+    device.update(&signed(3, 3, 0), true).expect("signed");
+    let device = put(device, Slot::A, &signed(4, 1, 0));
+    assert_eq!(
+        device.updater.states(),
+        [SlotState::Broken, SlotState::Active],
+        "version 1 was revoked by the first"
+    );
+}
+
+#[test]
+fn a_table_that_was_put_in_the_place_of_the_confirmed_one_is_not_used() {
+    let mut device = Device::new(SLOT, 1);
+    let table = |seed| random_table(iltm_tests::grid(2, 3), 1, Effects::NONE, seed);
+    let [confirmed, other] = [1, 2].map(table);
+    assert_eq!(confirmed.len(), other.len(), "its length does not tell");
+    device.update(&confirmed, true).expect("a good device");
+    let device = put(device, Slot::A, &other);
+    assert_eq!(device.updater.states()[0], SlotState::Broken);
+    assert_eq!(device.updater.in_use(), None);
 }

@@ -56,10 +56,14 @@ fn every_tier_keeps_its_promise<const C: usize>(rows: u16, cols: u16) {
         let mut squares = 0.0;
         for (index, channel) in inverse.channels.iter().enumerate() {
             let light = inverse.channel(index).light(&drives[index]);
-            let light = light.expect("the wedge's bounces fade");
-            let ambient = channel.ambient[0];
-            let difference = light.add_scalar(ambient) - &wanted * white;
-            squares += relative_error(&difference, &(&wanted * white)).powi(2);
+            let mut light = light.expect("the wedge's bounces fade");
+            light.add_scalar_mut(channel.ambient[0]);
+            let wanted = &wanted * white;
+            if tier == 0 {
+                // Gains leave the picture brighter; their error is what no brightness mends.
+                light *= light.dot(&wanted) / light.norm_squared();
+            }
+            squares += relative_error(&(light - &wanted), &wanted).powi(2);
         }
         let error = (squares / C as f64).sqrt();
         let promised = info.predicted_error.to_num::<f64>();

@@ -5,6 +5,7 @@ use iltm::video::OperatorMemory;
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{Encoding, FullMemory, FullPipeline, RowBuffers};
+use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::firmware::{Effects, on_host, random_frame, random_table};
 use iltm_tests::made_up::MadeUp;
@@ -15,7 +16,8 @@ fn device<const C: usize>(
     wanted: &[u8],
 ) -> Vec<u8> {
     let (cells, size) = (C * table.grid().cells(), format.size());
-    let pipeline = FullPipeline::<C>::new(table, size).expect("it fits");
+    let area = table.area(size).expect("of the projector's aspect");
+    let pipeline = FullPipeline::<C>::within(table, size, area).expect("it fits");
     let mut memory = FullMemory {
         gains: &mut vec![[0; 2]; C * size.pixels()],
         ambient: &mut vec![[0; 2]; C * size.pixels()],
@@ -24,9 +26,9 @@ fn device<const C: usize>(
         columns: &mut vec![0; 2 * C * size.width()],
         row: RowBuffers {
             line: &mut vec![0; pipeline.line_len()],
-            spread: &mut vec![0; size.width()],
+            spread: &mut vec![0; area.size.width()],
         },
-        values: &mut vec![0; size.width()],
+        values: &mut vec![0; area.size.width()],
     };
     pipeline.prepare(&mut memory).expect("sized");
     let mut input = vec![[0; C]; size.pixels()];
@@ -74,6 +76,39 @@ fn a_device_makes_of_a_larger_frame_what_the_host_makes_of_it() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_device_and_the_host_leave_the_same_border_black() {
+    for (seed, channels) in [(1, 1), (2, 3)] {
+        let mut table = MadeUp::of_all_kinds(Grid::new(5, 9).expect("small"), channels, 4, seed);
+        table.projector = ProjectorPixels::new(FrameSize::new(160, 90).expect("not empty"), 11);
+        let image = table.image();
+        let table = Table::check(&image).expect("whole");
+        for (width, height) in [(160, 90), (64, 36), (121, 68)] {
+            let size = FrameSize::new(width, height).expect("not empty");
+            let encoding = Encoding::Display;
+            let format = Format::new(size, channels as u8, encoding, 1_000).expect("a format");
+            let area = table.area(size).expect("of its aspect");
+            for tier in 0..=table.top_tier() {
+                let wanted = random_frame(format, seed + u64::from(tier));
+                let (expected, clipped) = on_host(&table, tier, format, &wanted);
+                let made = match channels {
+                    1 => device::<1>(&table, (tier, format), &wanted),
+                    _ => device::<3>(&table, (tier, format), &wanted),
+                };
+                assert!(made == expected, "{size}, {channels} channels, tier {tier}");
+                assert!(clipped < (area.size.pixels() * channels) as u64);
+                let row = size.width() * channels;
+                assert!(made.iter().take(area.top * row).all(|code| *code == 0));
+                let left = made
+                    .chunks_exact(row)
+                    .map(|row| &row[..area.left * channels]);
+                assert!(left.flatten().all(|code| *code == 0));
+            }
+        }
+        assert_eq!(table.area(FrameSize::new(64, 48).expect("not empty")), None);
     }
 }
 

@@ -14,7 +14,6 @@ use iltm::session::{self, Layout, OrderOptions, order};
 use iltm::verify;
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
-use iltm_tests::gates::GateSession;
 use iltm_tests::simulated::{self, simulation};
 use std::path::Path;
 use strum::IntoEnumIterator;
@@ -83,11 +82,10 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
         let faults: Vec<InjectedFault> = fault.into_iter().collect();
         photographed(&simulation, &scene, &faults, &folder);
         let examined = capture::examine(&folder, &CaptureOptions::default(), &Silent);
-        let gates = examined.unwrap().gates;
-        GateSession { fault, gates }
+        examined.unwrap().gates
     };
     let good = examined(None, "good");
-    let failed: Vec<_> = good.gates.iter().filter(|gate| gate.fails()).collect();
+    let failed: Vec<_> = good.iter().filter(|gate| gate.fails()).collect();
     assert!(failed.is_empty(), "{failed:#?}");
     let mut silent = Vec::new();
     for kind in CaptureFault::iter() {
@@ -98,11 +96,11 @@ fn every_fault_is_named_by_its_gate_and_a_good_session_passes() {
         };
         let session = examined(Some(fault), &kind.to_string());
         let (gates, words) = named_by(kind);
-        let named = session.gates.iter().any(|gate| {
+        let named = session.iter().any(|gate| {
             let said = format!("{} {}", gate.what, gate.next_step).to_lowercase();
             gate.fails() && gates.contains(&gate.name) && words.iter().any(|w| said.contains(w))
         });
-        for gate in session.gates.iter().filter(|gate| gate.fails()) {
+        for gate in session.iter().filter(|gate| gate.fails()) {
             println!("{kind}: {} {}: {}", gate.name, gate.number, gate.what);
         }
         if !named {
@@ -127,7 +125,14 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
         ..Settings::default()
     };
     let folder = place.join("verify");
-    verify::write(&table, &layout, &settings, &folder, &Silent).unwrap();
+    verify::write(
+        &table,
+        &layout,
+        (&settings, verify::Slides::Both),
+        &folder,
+        &Silent,
+    )
+    .unwrap();
     let quiet = Forced::default().with(Effect::Noise, false);
     let simulation = simulation(laboratory, quiet);
     let camera = VirtualCamera::new(laboratory, &simulation, 11).unwrap();

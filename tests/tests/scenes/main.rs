@@ -3,10 +3,12 @@
 
 mod closed_loop_simulated;
 mod demo;
+mod gates;
 mod hard_cases;
 mod installation;
 mod paper;
 mod path_tracer;
+mod placed_simulated;
 mod reference;
 mod simulator;
 mod verify_simulated;

@@ -6,12 +6,15 @@ use iltm::build_table::BuiltTable;
 use iltm::capture::Settings;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, VirtualCamera, fill_capture};
+use iltm::scene::{CaptureFault, Effect, Forced, VirtualCamera, fill_capture};
 use iltm::session::Layout;
-use iltm::verify::{Readings, TableVerdict, VerifyError, WhiteChange, judge, write};
+use iltm::verify::{
+    Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, WhiteChange, judge, write,
+};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_tests::simulated::{self, cell_means, error, photograph, simulation};
+use iltm_tests::verdicts::VerdictRig;
 use nalgebra::DMatrix;
 use std::path::Path;
 
@@ -41,7 +44,7 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
         camera: learned.measurements.settings.camera.clone(),
         ..Settings::default()
     };
-    write(&table, &layout, &settings, folder, &Silent).unwrap();
+    write(&table, &layout, (&settings, Slides::Both), folder, &Silent).unwrap();
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
     let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();
@@ -77,23 +80,30 @@ fn a_good_table_passes_with_the_errors_that_are_really_there_wherever_the_camera
     let place = tempfile::tempdir().unwrap();
     let original = scene(&[]);
     let learned = learned(&original, place.path());
-    let moved = scene(&[
-        ("position = [0.6, 0.3, 9.0]", "position = [-0.2, 0.6, 8.6]"),
-        ("field_of_view = 27.0", "field_of_view = 29.0"),
-    ]);
-    for (name, scene) in [("same", &original), ("moved", &moved)] {
+    let at = |position: &str, view: &str| {
+        scene(&[
+            ("position = [0.6, 0.3, 9.0]", position),
+            ("field_of_view = 27.0", view),
+        ])
+    };
+    let near = at("position = [0.5, 0.35, 8.9]", "field_of_view = 28.0");
+    let far = at("position = [-0.2, 0.6, 8.6]", "field_of_view = 29.0");
+    for (name, scene) in [("same", &original), ("near", &near), ("far", &far)] {
         let folder = place.path().join(name);
         photographed(&learned, scene, &folder);
         let verdict = verdict(&learned, &folder).unwrap();
         let truth = truth(&learned, &original, &folder);
         println!(
-            "{name}: verdict {:?}, truth {truth:?}, bound {:?}, drift {:?} {:?}",
+            "{name}: {:?} {:?}, truth {truth:?}, bound {:?}, drift {:?} {:.4} alone {:.4}",
+            verdict.outcome,
             verdict.error,
             verdict.bound,
             white_of(&verdict).level,
-            white_of(&verdict).shape
+            white_of(&verdict).shape,
+            white_of(&verdict).alone
         );
-        assert!(verdict.passed, "{name}");
+        let said = (verdict.outcome, verdict.cause);
+        assert_eq!(said, (Outcome::Passed, None), "{name}");
         assert!(
             verdict.cells.0 * 100 >= verdict.cells.1 * 95,
             "{:?}",
@@ -137,7 +147,13 @@ fn a_table_of_another_scene_fails_and_white_says_that_the_scene_is_another() {
     let folder = place.path().join("other");
     photographed(&learned, &painted, &folder);
     let verdict = verdict(&learned, &folder).unwrap();
-    assert!(!verdict.passed, "{:?} {:?}", verdict.error, verdict.bound);
+    let said = (verdict.outcome, verdict.cause);
+    assert_eq!(
+        said,
+        (Outcome::Failed, Some(Cause::Scene)),
+        "{:?}",
+        verdict.bound
+    );
     assert!(white_of(&verdict).shape > 0.1, "{:?}", verdict.drift);
     // The worst cells are on the panel that was painted, or on the one that it lights:
     // columns 5 to 15 of 21 are the inner two.
@@ -155,21 +171,51 @@ fn exchanged_photographs_are_named_and_missing_ones_listed() {
     let learned = learned(&original, place.path());
     let folder = place.path().join("folder");
     photographed(&learned, &original, &folder);
-    let photo = |index: usize| folder.join("photos").join(format!("{index:03}.png"));
-    // White and black, the Gray code, random patterns, white and black again.
-    let first = 2 + 2 * (4 + 5) + 32 + 2;
-    std::fs::rename(photo(first), photo(900)).unwrap();
-    std::fs::rename(photo(first + 3), photo(first)).unwrap();
-    std::fs::rename(photo(900), photo(first + 3)).unwrap();
+    let listed = std::fs::read_to_string(folder.join("verify.csv")).unwrap();
+    let name_of = |role: &str| {
+        let line = listed.lines().find(|line| line.contains(role)).unwrap();
+        line.rsplit(',').next().unwrap().to_owned()
+    };
+    let [own, other] = ["plain-0", "plain-1"].map(|role| folder.join(name_of(role)));
+    let aside = folder.join("aside");
+    std::fs::rename(&own, &aside).unwrap();
+    std::fs::rename(&other, &own).unwrap();
+    std::fs::rename(&aside, &other).unwrap();
     let error = verdict(&learned, &folder).unwrap_err();
     assert!(matches!(error, VerifyError::Order { .. }), "{error}");
     assert!(error.to_string().contains("plain-0"), "{error}");
-    std::fs::remove_file(photo(3)).unwrap();
-    std::fs::remove_file(photo(first)).unwrap();
+    std::fs::remove_file(folder.join("photos/003.png")).unwrap();
+    std::fs::remove_file(&own).unwrap();
     let error = verdict(&learned, &folder).unwrap_err();
     let text = error.to_string();
     assert!(
-        text.contains("003.png") && text.contains(&format!("{first:03}.png")),
+        text.contains("003.png") && text.contains(&name_of("plain-0")),
         "{text}"
     );
+}
+
+/// A short form of the study on `docs/verify.md`.
+#[test]
+fn what_passes_is_on_the_wall_and_no_fault_of_photographs_or_wall_passes() {
+    use CaptureFault as F;
+    use Outcome::{Failed, Inconclusive};
+    let rig = VerdictRig::new(simulated::scene("installation", &[]));
+    let wall = "[2.4, 0, 0], [0, 0, 0]]\nalbedo = 0.7";
+    let painted = wall.replace("0.7", "0.6");
+    let painted = simulated::scene("installation", &[(wall, &painted)]);
+    let cases = [
+        rig.good("no fault", 1),
+        rig.faulty(F::Tripod, 0.5, &[Inconclusive]),
+        rig.faulty(F::Tripod, 3.0, &[Inconclusive]),
+        rig.faulty(F::Flicker, 0.01, &[Inconclusive]),
+        rig.faulty(F::Gamma, 2.2, &[Inconclusive]),
+        rig.faulty(F::AutoExposure, 1.0, &[Inconclusive]),
+        rig.faulty(F::Vivid, 0.15, &[Failed]),
+        rig.changed("painted", painted, &[Failed]),
+    ];
+    for case in cases {
+        let session = rig.judge(case);
+        println!("{}", session.line());
+        assert!(session.is_right(), "{session:?}");
+    }
 }

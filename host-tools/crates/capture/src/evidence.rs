@@ -4,17 +4,20 @@
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
-use crate::devices::{Devices, MeasuredDevices};
+use crate::devices::{ColourMixingMatrix, Devices, MeasuredDevices};
 use crate::format::error::CaptureError;
 use crate::format::picture_file::FileFormat;
 use crate::format::sequence::Sequence;
 use crate::format::settings::Settings;
+use crate::photographs::channel_sum;
 use crate::photographs::clipping::{self, Clipped};
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::order::{self, Order};
 use crate::photographs::sampled::Sampled;
+use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::registration::movement::{self, Moved};
 use crate::registration::{self, Registered};
+use iltm_picture::Declared;
 use iltm_picture::progress::Progress;
 use iltm_picture::statistics::quantile;
 use nalgebra::DMatrix;
@@ -24,6 +27,8 @@ use std::path::Path;
 pub(crate) struct CaptureEvidence {
     /// What the photographs' files are, and bits of a sample in them.
     pub(crate) files: (FileFormat, u8),
+    /// Whether `capture.toml` says how the files follow the light.
+    pub(crate) response_stated: bool,
     pub(crate) clipped: Clipped,
     pub(crate) devices: Devices,
     pub(crate) order: Option<Order>,
@@ -32,12 +37,46 @@ pub(crate) struct CaptureEvidence {
     pub(crate) moved: Option<Moved>,
     /// `None` if no cell was found.
     pub(crate) cells: Option<CellEvidence>,
+    /// The photograph of white, as it is drawn.
+    pub(crate) white: WhitePhotograph,
     /// The flood photograph with black subtracted, one plane a channel.
     flood: Vec<Vec<f32>>,
 }
 
+/// The photograph of white, for whoever draws it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct WhitePhotograph {
+    /// Width and height in pixels.
+    pub size: (usize, usize),
+    /// Its light, mean of the channels, row by row.
+    pub light: Vec<f32>,
+    /// Which pixels are clipped in it.
+    pub clipped: Vec<bool>,
+    /// Whether a pixel sees any cell of the projection.
+    pub lit: Vec<bool>,
+}
+
+impl WhitePhotograph {
+    fn new(linear: &LinearPhotographs<'_>, registration: &Registration) -> Self {
+        let share = 1.0 / linear.flood.len().max(1) as f32;
+        let light = channel_sum(&linear.flood)
+            .into_iter()
+            .map(|sum| share * sum);
+        Self {
+            size: registration.camera,
+            light: light.collect(),
+            clipped: linear.saturated.clone(),
+            lit: registration
+                .seen_cell
+                .iter()
+                .map(|cell| *cell != NO_CELL)
+                .collect(),
+        }
+    }
+}
+
 impl CaptureEvidence {
-    /// Goes through all phases.
+    /// Reads the photographs and goes through all phases.
     ///
     /// # Errors
     /// A photograph's own error, or a phase's.
@@ -49,11 +88,29 @@ impl CaptureEvidence {
     ) -> Result<Self, CaptureError> {
         let reading = settings.camera.reading();
         let mut linear = LinearPhotographs::read(folder, sequence, &reading, progress)?;
+        Self::find(folder, sequence, (settings, None), &mut linear, progress)
+    }
+
+    /// Goes through all phases. With `mixing`, of camera channels by projector channels, and
+    /// also where it is measured, `linear` is afterwards in the projector's channels.
+    ///
+    /// # Errors
+    /// A photograph's own error, or a phase's.
+    pub(crate) fn find(
+        folder: &Path,
+        sequence: &Sequence,
+        (settings, mixing): (&Settings, Option<&ColourMixingMatrix>),
+        linear: &mut LinearPhotographs<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Self, CaptureError> {
         // In the camera's own channels, where a ceiling is one value.
-        let clipped = clipping::find(sequence, &mut linear, progress)?;
-        let devices = MeasuredDevices::measure(folder, sequence, settings, &mut linear, progress)?;
+        let clipped = clipping::find(sequence, linear, progress)?;
+        let devices = MeasuredDevices::measure(folder, sequence, settings, linear, progress)?;
+        if let Some(inverse) = mixing.and_then(ColourMixingMatrix::inverse) {
+            linear.unmix(inverse, sequence, progress)?;
+        }
         let sampled = Sampled::take(&mut linear.photographs, sequence.shots.len(), progress)?;
-        let registered = registration::register(sequence, &mut linear, progress)?;
+        let registered = registration::register(sequence, linear, progress)?;
         let registration = &registered.registration;
         let pixels = CellPixels::choose(registration, &linear.saturated);
         let photographs = &mut linear.photographs;
@@ -71,10 +128,12 @@ impl CaptureEvidence {
         let cells = found.then(measure).transpose()?;
         let format = &linear.photographs.format;
         let files = (format.file, format.bits);
-        let flood = linear.into_flood();
+        let white = WhitePhotograph::new(linear, registration);
+        let flood = linear.flood_without_black();
         let blur = settings.projector.blur;
         Ok(Self {
             files,
+            response_stated: settings.camera.response != Declared::Unsaid,
             clipped,
             devices: devices.with_blur(sequence.grid, registration, &flood, blur),
             order: order::find(sequence, &sampled),
@@ -82,6 +141,7 @@ impl CaptureEvidence {
             cells,
             registered,
             pixels,
+            white,
             flood,
         })
     }

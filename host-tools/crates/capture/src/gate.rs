@@ -136,6 +136,8 @@ pub enum Evidence {
         values: Vec<(u32, f64)>,
         /// Where the gate's limit lies, if it is one of this number.
         limit: Option<f64>,
+        /// `index` of the first photograph after which all is otherwise, if there is one.
+        from: Option<u32>,
     },
     /// A number for each cell, `rows x cols`, row by row; NaN for none.
     Cells {
@@ -147,6 +149,9 @@ pub enum Evidence {
         cols: usize,
         /// The numbers.
         values: Vec<f64>,
+        /// A number that is worth a look: smaller ones are drawn as small, whatever the
+        /// largest is. 0 where the size says nothing.
+        notable: f64,
     },
     /// Points and a curve that should go through them.
     Curve {
@@ -161,13 +166,14 @@ pub enum Evidence {
 
 impl Evidence {
     /// A number for each cell of a grid.
-    pub(crate) fn cells(what: &'static str, grid: Grid, values: Vec<f64>) -> Self {
+    pub(crate) fn cells(what: &'static str, grid: Grid, values: Vec<f64>, notable: f64) -> Self {
         let (rows, cols) = (grid.rows(), grid.cols());
         Self::Cells {
             what,
             rows,
             cols,
             values,
+            notable,
         }
     }
 }

@@ -43,9 +43,11 @@ pub use cells::cell_pixels::{LeftOut, Why};
 pub use cells::fine_flood::FineFlood;
 pub use cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 pub use cells::noise::{NoiseModel, NoiseSource};
+pub use cells::nonlinearity::Nonlinearity;
 pub use devices::{
     CameraFit, CameraSource, ColourMixingMatrix, Devices, Fall, Probe, Ramp, RampPoint,
 };
+pub use evidence::WhitePhotograph;
 pub use format::calibration_role::{
     CalibrationManifest, CalibrationRole, CalibrationShot, RampChannel,
 };
@@ -82,6 +84,8 @@ use std::path::Path;
 pub struct Examined {
     /// All gates that could be judged, what explains others first.
     pub gates: Vec<Gate>,
+    /// The photograph of white; `None` if the photographs could not be compared.
+    pub white: Option<WhitePhotograph>,
     /// What was measured; `None` if the photographs do not allow it.
     pub measurements: Option<Measurements>,
 }
@@ -133,6 +137,7 @@ pub fn examine(
     let files = selection.find_photographs(folder)?;
     let mut examined = Examined {
         gates: vec![gates::files::judge(&files)],
+        white: None,
         measurements: None,
     };
     // What is there says more, if it is enough to go on with.
@@ -149,6 +154,7 @@ pub fn examine(
             let found = found?;
             cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
             examined.gates.extend(gates::judge(&sequence, &found));
+            examined.white = Some(found.white.clone());
             examined.measurements = found.into_measurements(&sequence, &settings);
         }
     }

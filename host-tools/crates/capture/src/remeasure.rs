@@ -1,20 +1,21 @@
 //! Remeasuring: the light of every cell in photographs of pictures that are no patterns, taken from
 //! anywhere: a Gray code among them says anew where the cells are.
 
-use crate::cells::cell_pixels::{CellPixels, LeftOut};
-use crate::devices::{ColourMixingMatrix, MeasuredDevices};
+use crate::cells::cell_pixels::LeftOut;
+use crate::cells::nonlinearity::Nonlinearity;
+use crate::devices::ColourMixingMatrix;
+use crate::evidence::CaptureEvidence;
 use crate::format::bracket::Bracket;
 use crate::format::error::CaptureError;
 use crate::format::manifest::Shot;
 use crate::format::photo_files::resolve;
 use crate::format::sequence::{CaptureOptions, Selection, Sequence};
 use crate::format::settings::Settings;
-use crate::photographs::clipping;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::registration::cell_map::Registration;
-use crate::registration::register;
-use iltm_picture::progress::Progress;
-use iltm_runtime::Grid;
+use crate::{Gate, gates};
+use iltm_picture::{LightPicture, progress::Progress};
+use iltm_runtime::{FrameSize, Grid};
 use std::path::Path;
 
 /// Light of the cells in one photograph: one entry a channel, in each one a cell, camera
@@ -34,12 +35,35 @@ pub struct CellReadings {
     pub left_out: Vec<LeftOut>,
     /// Where the cells are.
     pub registration: Registration,
+    /// What the gates say of the photographs of the code.
+    pub gates: Vec<Gate>,
+    /// Why light does not add up in them, where it does not.
+    pub cause: Option<Nonlinearity>,
     /// Each photograph of white, ambient light included.
     pub white: Vec<CellPlanes>,
     /// Mean of the photographs of black: ambient light and the projector's black.
     pub black: CellPlanes,
     /// The photographs of the pictures, in their order, ambient light included.
     pub pictures: Vec<CellPlanes>,
+    /// The same photographs for people: every [`CellReadings::step`]th pixel of the camera, the
+    /// mean of those around it.
+    pub views: Vec<LightPicture>,
+    /// Camera pixels along a side of which one of the latter is the mean.
+    pub step: usize,
+}
+
+/// Most pixels across a photograph for people.
+const VIEW_WIDTH: usize = 400;
+
+/// The means of squares of `step` pixels of a plane; what is left at the end is left out.
+fn shrunk(plane: &[f32], (width, height): (usize, usize), step: usize) -> Vec<f32> {
+    let (across, down) = (width / step, height / step);
+    let mean = |at: usize| {
+        let first = at / across * step * width + at % across * step;
+        let rows = (0..step).map(|row| &plane[first + row * width..][..step]);
+        rows.flatten().sum::<f32>() / (step * step) as f32
+    };
+    (0..across * down).map(mean).collect()
 }
 
 /// Registers the cells by the photographs of `code` (white, black, the Gray code of both
@@ -72,18 +96,17 @@ pub fn remeasure(
         .extend(Bracket::of_each(&pictures, sequence.longest));
     let reading = settings.camera.reading();
     let mut linear = LinearPhotographs::read(folder, &sequence, &reading, progress)?;
-    clipping::find(&sequence, &mut linear, progress)?;
-    MeasuredDevices::measure(folder, &sequence, settings, &mut linear, progress)?;
     let known = mixing.map(|matrix| ColourMixingMatrix {
         matrix,
         deviation: 0.0,
         white: None,
     });
-    if let Some(inverse) = known.as_ref().and_then(ColourMixingMatrix::inverse) {
-        linear.unmix(inverse, &sequence, progress)?;
-    }
-    let registered = register(&sequence, &mut linear, progress)?;
-    let cells = CellPixels::choose(&registered.registration, &linear.saturated);
+    let with = (settings, known.as_ref());
+    let found = CaptureEvidence::find(folder, &sequence, with, &mut linear, progress)?;
+    let mut gates = gates::judge(&sequence, &found);
+    let cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
+    gates::settle(&mut gates, cause);
+    let (registration, cells) = (found.registered.registration, found.pixels);
 
     progress.begin("measuring cells", pictures.len() as u64);
     let mut measure = |brackets: &[usize]| -> Result<Vec<CellPlanes>, CaptureError> {
@@ -97,7 +120,21 @@ pub fn remeasure(
         Ok(light)
     };
     let white = measure(&sequence.white().shots)?;
-    let pictures = measure(&(first..sequence.brackets.len()).collect::<Vec<_>>())?;
+    let of_pictures: Vec<usize> = (first..sequence.brackets.len()).collect();
+    let pictures = measure(&of_pictures)?;
+    let camera = registration.camera;
+    let step = camera.0.div_ceil(VIEW_WIDTH).max(1).min(camera.1.max(1));
+    let size = FrameSize::new((camera.0 / step) as u16, (camera.1 / step) as u16);
+    let mut views = Vec::with_capacity(pictures.len());
+    linear
+        .photographs
+        .for_batches(&of_pictures, progress, |photos| {
+            let planes = photos.iter().map(|(_, photo)| {
+                let planes = photo.planes.iter();
+                planes.map(|plane| shrunk(plane, camera, step)).collect()
+            });
+            views.extend(planes.filter_map(|planes| LightPicture::new(size?, planes)));
+        })?;
     progress.end();
     Ok(CellReadings {
         grid: sequence.grid,
@@ -105,8 +142,12 @@ pub fn remeasure(
         black: linear.black.iter().map(|plane| cells.mean(plane)).collect(),
         live: cells.live,
         left_out: cells.left_out,
-        registration: registered.registration,
+        registration,
+        gates,
+        cause,
         white,
         pictures,
+        views,
+        step,
     })
 }

@@ -94,11 +94,14 @@ pub fn build_table_from(
     progress.begin("compiling the table", 0);
     let fine = crate::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), white)?;
+    let provenance = Provenance::new(capture, &measurements, &report, &white);
     let options = CompileOptions {
+        label: provenance.label(),
         projector: measurements.devices.projector.clone(),
+        pixels: measurements.settings.projector.pixels(),
         reference_white: Some(white.light),
         inverse_error: report.predicted_error(),
-        provenance: Provenance::new(capture, &measurements, &report, &white).to_text(),
+        provenance: provenance.to_text(),
         targets: None,
     };
     let compiled = crate::compile(&inverse, fine.as_ref(), &options)?;

@@ -6,9 +6,10 @@ pub use super::quantise::StoredRow;
 use iltm_runtime::{
     image::{
         crc32,
-        layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header},
+        layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, projector},
     },
     operator::layout as segment,
+    placement::ProjectorPixels,
 };
 use std::ops::Range;
 
@@ -57,6 +58,23 @@ impl ImageWriter {
 /// Stores a field.
 pub(super) fn put(bytes: &mut [u8], field: Range<usize>, value: &[u8]) {
     bytes[field].copy_from_slice(value);
+}
+
+/// The bytes of a projector section.
+#[must_use]
+pub fn projector_section(pixels: ProjectorPixels) -> Vec<u8> {
+    let mut bytes = vec![0; projector::SIZE];
+    let size = pixels.size();
+    // Sides of a frame are `u16`s.
+    let (width, height) = (size.width() as u16, size.height() as u16);
+    put(&mut bytes, projector::WIDTH, &width.to_le_bytes());
+    put(&mut bytes, projector::HEIGHT, &height.to_le_bytes());
+    put(
+        &mut bytes,
+        projector::BORDER,
+        &pixels.border().to_le_bytes(),
+    );
+    bytes
 }
 
 /// `u16`s as bytes.

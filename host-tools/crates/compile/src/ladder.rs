@@ -58,7 +58,8 @@ pub struct Tier {
 pub struct Ladder {
     /// Most useful first.
     pub entries: Vec<Entry>,
-    /// Predicted error of gain alone.
+    /// Predicted error of gain alone, at the brightness that suits it best: without the
+    /// operator all is brighter, which is no error of what the picture looks like.
     pub gain_only: f64,
     /// Tiers 1 and up, each with more entries than the one before.
     pub tiers: Vec<Tier>,
@@ -79,10 +80,11 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]
     );
     let mut entries = queue(inverse, &haar, &sigma);
     let judge = Judge::new(inverse, &haar, content, &coefficients);
-    let gain_only = judge.error(&entries);
+    let all = judge.error(&entries);
+    let gain_only = judge.error_as_bright_as_fits(&entries);
     let mut tiers: Vec<Tier> = Vec::new();
     for &target in targets {
-        let last = tiers.last().map_or(gain_only, |tier| tier.error);
+        let last = tiers.last().map_or(all, |tier| tier.error);
         if last <= target {
             continue;
         }
@@ -176,6 +178,46 @@ impl<'a> Judge<'a> {
     }
 
     fn error_in(&self, index: usize, left_out: &[Entry]) -> f64 {
+        let light = self.missing_light(index, left_out);
+        // Light that grows from bounce to bounce cannot be predicted.
+        light.map_or(f64::INFINITY, |light| relative_error(&light, self.content))
+    }
+
+    /// Error when all of `left_out` are missing, each image shown as bright as suits it
+    /// best: mean over the images of `min_t |t shown - wanted| / |wanted|`, all channels
+    /// together.
+    fn error_as_bright_as_fits(&self, left_out: &[Entry]) -> f64 {
+        let channels = 0..self.channels.len();
+        let missing: Option<Vec<_>> = channels
+            .into_par_iter()
+            .map(|channel| self.missing_light(channel, left_out))
+            .collect();
+        let Some(missing) = missing else {
+            return f64::INFINITY;
+        };
+        let images = self.content.ncols();
+        let of_image = |image: usize| {
+            let wanted = self.content.column(image);
+            let (mut both, mut own, mut whole) = (0.0, 0.0, 0.0);
+            for missing in &missing {
+                // What the operator does not take away is there as well.
+                let shown = wanted + missing.column(image);
+                both += shown.dot(&wanted);
+                own += shown.norm_squared();
+                whole += wanted.norm_squared();
+            }
+            if own > 0.0 && whole > 0.0 {
+                (1.0 - both * both / (own * whole)).max(0.0).sqrt()
+            } else {
+                0.0
+            }
+        };
+        (0..images).map(of_image).sum::<f64>() / images.max(1) as f64
+    }
+
+    /// What is on the wall when all of `left_out` are missing, beyond what is wanted;
+    /// `None` if light grows from bounce to bounce.
+    fn missing_light(&self, index: usize, left_out: &[Entry]) -> Option<DMatrix<f64>> {
         let (scale, inverse) = &self.channels[index];
         let mut missing: Vec<PerImage> = vec![[0.0; IMAGES]; self.coefficients.len()];
         for entry in left_out {
@@ -190,9 +232,7 @@ impl<'a> Judge<'a> {
             }
         }
         let missing = DMatrix::from_fn(missing.len(), IMAGES, |row, image| missing[row][image]);
-        let light = inverse.light(&self.haar.synthesise_columns(&missing));
-        // Light that grows from bounce to bounce cannot be predicted.
-        light.map_or(f64::INFINITY, |light| relative_error(&light, self.content))
+        inverse.light(&self.haar.synthesise_columns(&missing))
     }
 
     /// The shortest front of the queue whose rest errs by at most `target`.

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | all of it, from a capture folder | [`build_table`] |
 //! | light of reference white: the brightest even grey, or as asked for | [`reference_white`] |
+//! | how bright that is against the scene without a table | [`brightness`] |
 //! | from which white on the user's own content is cut | [`clip_thresholds`] |
 //! | what video looks like, for choosing and predicting | [`iltm_solve::natural_images`] |
 //! | `K` in the Haar domain, most useful entries first, cut into tiers | [`ladder`] |
@@ -17,6 +18,7 @@
 //! The image is checked by the runtime's own reader before it is returned, so
 //! what leaves here is known to load.
 
+pub mod brightness;
 pub mod build_table;
 pub mod clip_thresholds;
 pub mod cost;
@@ -32,6 +34,7 @@ mod table;
 #[cfg(test)]
 mod test_scene;
 
+pub use brightness::Brightness;
 pub use gain::FineGains;
 pub use ladder::Ladder;
 pub use provenance::{Photographs, PredictedError, Provenance};

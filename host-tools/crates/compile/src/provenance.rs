@@ -1,7 +1,9 @@
 //! Provenance: where a table comes from, as the TOML text that it carries.
 
+use crate::brightness::Brightness;
 use crate::reference_white::ReferenceWhite;
 use iltm_capture::{Measurements, Settings};
+use iltm_runtime::image::Label;
 use iltm_solve::{Recovery, SolveReport};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -55,6 +57,12 @@ pub struct Provenance {
     /// The reference white.
     #[serde(deserialize_with = "if_readable")]
     pub white: Option<ReferenceWhite>,
+    /// How bright its white is against the scene without it.
+    #[serde(
+        deserialize_with = "if_readable",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub brightness: Option<Brightness>,
     /// The `capture.toml` that it was made with.
     #[serde(deserialize_with = "if_readable")]
     pub capture: Option<Settings>,
@@ -123,6 +131,7 @@ impl Provenance {
             recovery: report.recovery,
             mixing: mixing.filter(|_| measurements.devices.unmixed),
             white: Some(*white),
+            brightness: Brightness::of(measurements, white.light),
             capture: Some(measurements.settings.clone()),
         }
     }
@@ -131,6 +140,13 @@ impl Provenance {
     #[must_use]
     pub fn read(text: &str) -> Self {
         toml::from_str(text).unwrap_or_default()
+    }
+
+    /// What people call the table: its scene, and the day when it was made.
+    pub(crate) fn label(&self) -> Label {
+        let scene: String = self.scene.split(char::is_control).collect();
+        let day = self.date.get(..10).unwrap_or_default().replace('-', "");
+        Label::new(&scene, day.parse().unwrap_or(0))
     }
 
     /// The text for a table.
@@ -149,6 +165,18 @@ fn if_readable<'de, T: DeserializeOwned, D: Deserializer<'de>>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_is_called_after_its_scene_and_the_day_when_it_was_made() {
+        let provenance = Provenance {
+            scene: "Großer\u{1b} Saal".to_owned(),
+            date: "2026-11-23 10:30:00 UTC".to_owned(),
+            ..Provenance::default()
+        };
+        let label = provenance.label();
+        assert_eq!((label.name(), label.date()), ("Großer Saal", 20_261_123));
+        assert_eq!(Provenance::default().label(), Label::default());
+    }
 
     #[test]
     fn bounds_of_the_recovery_theorem_survive_and_what_cannot_be_read_is_left_out() {

@@ -21,6 +21,11 @@ pub enum WhiteRequest<'c> {
     },
 }
 
+/// A white that is asked for may be so many times the even grey that every live cell
+/// reaches: content that is dark all over has room for some more, and beyond that nothing
+/// of white is left.
+const MOST_OVER: f64 = 4.0;
+
 /// The reference white of a table, and why it is that.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct ReferenceWhite {
@@ -52,7 +57,8 @@ impl ReferenceWhite {
     /// even grey.
     ///
     /// # Errors
-    /// [`CompileError::Dark`] if no cell can be lit, [`CompileError::GreyContent`] if
+    /// [`CompileError::Dark`] if no cell can be lit, [`CompileError::BeyondReach`] if what
+    /// is asked for is, [`CompileError::GreyContent`] if
     /// content is grey and the scene has colours.
     pub fn new(
         inverse: &InverseTransport,
@@ -69,6 +75,9 @@ impl ReferenceWhite {
         match request {
             None => {}
             Some(WhiteRequest::Light(light)) => {
+                if light > MOST_OVER * uniform {
+                    return Err(CompileError::BeyondReach { light, uniform });
+                }
                 (own.light, own.chosen) = (light, Chosen::Given);
             }
             Some(WhiteRequest::Content { frames, share }) => {

@@ -1,13 +1,15 @@
 //! Signing: the seal behind an image, and the files that keys are in.
 //!
 //! A key is a text file: PKCS#8 in PEM, which OpenSSL reads and writes as well
-//! (`openssl genpkey -algorithm ed25519`).
+//! (`openssl genpkey -algorithm ed25519`). A technician's key has two more blocks behind it:
+//! what the site key says of it, and the site's public key.
 
 use ed25519_dalek::pkcs8::spki::DecodePublicKey;
-use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
+use ed25519_dalek::pkcs8::spki::der::pem::{LineEnding, decode_vec, encode_string};
 use ed25519_dalek::pkcs8::{DecodePrivateKey, EncodePrivateKey, KeypairBytes};
 use ed25519_dalek::{Signature, Signer, SigningKey, VerifyingKey};
 use iltm_runtime::image::{ImageError, Seal, unseal};
+use iltm_runtime::trust::{Certificate, Deed};
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -73,6 +75,12 @@ pub enum KeyError {
         /// Whether it had to be a private one.
         private: bool,
     },
+    /// A technician's key where the site's is needed.
+    #[error("{}: is a technician's key, which signs no tables", path.display())]
+    Technician {
+        /// The file.
+        path: PathBuf,
+    },
     /// The system gives no random bytes.
     #[error("the system has no random bytes for a key: {reason}")]
     Random {
@@ -92,6 +100,7 @@ impl KeyError {
                 "Give a file that `iltm key new` made: signing takes the private key."
             }
             Self::NoKey { .. } => "Give a file that `iltm key new` made.",
+            Self::Technician { .. } => "Give the site's own key.",
             Self::Random { .. } => "Try again later.",
         }
     }
@@ -105,24 +114,91 @@ impl KeyError {
 /// # Panics
 /// Never: every key can be written as PEM.
 pub fn new_key(path: &Path) -> Result<SigningKey, KeyError> {
+    let key = random_key()?;
+    write_new(path, &pem(&key))?;
+    Ok(key)
+}
+
+/// Makes a technician's key in a new file that only its owner may read: with it, whoever
+/// has it may flash tables that the site key signed, confirm and roll back, on one device
+/// (or on any, 0), until versions above `version` count there.
+///
+/// # Errors
+/// [`KeyError`].
+pub fn new_technician(
+    path: &Path,
+    site: &SigningKey,
+    device: u64,
+    version: u32,
+) -> Result<SigningKey, KeyError> {
+    let key = random_key()?;
+    let mut certificate = Certificate {
+        key: key.verifying_key().to_bytes(),
+        device,
+        version,
+        signature: [0; 64],
+    };
+    certificate.signature = site.sign(&certificate.message()).to_bytes();
+    let site = site.verifying_key();
+    let text = [
+        pem(&key),
+        block(CERTIFICATE, &certificate.emit()),
+        block(SITE, site.as_bytes()),
+    ];
+    write_new(path, &text.concat())?;
+    Ok(key)
+}
+
+/// Label of the block with a technician's certificate.
+const CERTIFICATE: &str = "ILTM CERTIFICATE";
+
+/// Label of the block with the public key that certifies it.
+const SITE: &str = "ILTM SITE KEY";
+
+fn block(label: &str, bytes: &[u8]) -> String {
+    encode_string(label, LineEnding::LF, bytes).expect("a block has a form")
+}
+
+/// The block with this label, as it is written.
+fn block_text<'t>(text: &'t str, label: &str) -> Option<&'t str> {
+    let end = format!("-----END {label}-----");
+    let start = text.find(&format!("-----BEGIN {label}-----"))?;
+    let length = text.get(start..)?.find(&end)? + end.len();
+    text.get(start..start + length)
+}
+
+/// The bytes of the block with this label.
+fn find_block(text: &str, label: &str) -> Option<Vec<u8>> {
+    let (_, bytes) = decode_vec(block_text(text, label)?.as_bytes()).ok()?;
+    Some(bytes)
+}
+
+fn random_key() -> Result<SigningKey, KeyError> {
     let mut secret = [0; 32];
     getrandom::fill(&mut secret).map_err(|error| KeyError::Random {
         reason: error.to_string(),
     })?;
-    let key = SigningKey::from_bytes(&secret);
+    Ok(SigningKey::from_bytes(&secret))
+}
+
+fn pem(key: &SigningKey) -> String {
     // Without the public key in it: OpenSSL does not read the version that has one.
-    let pem = KeypairBytes {
-        secret_key: secret,
+    let pair = KeypairBytes {
+        secret_key: key.to_bytes(),
         public_key: None,
     };
-    let pem = pem.to_pkcs8_pem(LineEnding::LF).expect("a key has a form");
+    let pem = pair.to_pkcs8_pem(LineEnding::LF).expect("a key has a form");
+    pem.to_string()
+}
+
+fn write_new(path: &Path, text: &str) -> Result<(), KeyError> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let write = || {
         let mut file = options.open(path)?;
-        file.write_all(pem.as_bytes())?;
+        file.write_all(text.as_bytes())?;
         file.sync_all()
     };
     write().map_err(|source| match source.kind() {
@@ -133,17 +209,84 @@ pub fn new_key(path: &Path) -> Result<SigningKey, KeyError> {
             path: path.to_owned(),
             source,
         },
-    })?;
-    Ok(key)
+    })
 }
 
-/// Reads a private key.
+/// Whoever may show a device with a key the right to do something: the site, or a
+/// technician.
+#[derive(Debug)]
+pub struct RightSigner {
+    key: SigningKey,
+    certificate: Option<Certificate>,
+    site: VerifyingKey,
+}
+
+impl RightSigner {
+    /// Reads the site's key or a technician's.
+    ///
+    /// # Errors
+    /// [`KeyError`].
+    pub fn read(path: &Path) -> Result<Self, KeyError> {
+        let key = any_key(path)?;
+        let text = text(path)?;
+        let Some(certificate) = find_block(&text, CERTIFICATE) else {
+            let site = key.verifying_key();
+            return Ok(Self {
+                key,
+                certificate: None,
+                site,
+            });
+        };
+        let certificate = certificate.as_slice().try_into().ok();
+        let certificate = certificate.map(Certificate::parse);
+        let site = find_block(&text, SITE);
+        let site = site.and_then(|site| VerifyingKey::try_from(site.as_slice()).ok());
+        match (certificate, site) {
+            (Some(certificate), Some(site)) => Ok(Self {
+                key,
+                certificate: Some(certificate),
+                site,
+            }),
+            _ => Err(KeyError::NoKey {
+                path: path.to_owned(),
+                private: true,
+            }),
+        }
+    }
+
+    /// The public key that the device must have, which signs its tables.
+    #[must_use]
+    pub const fn site(&self) -> &VerifyingKey {
+        &self.site
+    }
+
+    /// The right to do something on the device of this number, whose next commit record
+    /// has this sequence number.
+    #[must_use]
+    pub fn right(&self, deed: &Deed, device: u64, sequence: u32) -> Vec<u8> {
+        let signature = self.key.sign(&deed.message(device, sequence));
+        let mut right = signature.to_bytes().to_vec();
+        right.extend(self.certificate.iter().flat_map(Certificate::emit));
+        right
+    }
+}
+
+/// Reads the private key that tables are signed with.
 ///
 /// # Errors
 /// [`KeyError`].
 pub fn read_key(path: &Path) -> Result<SigningKey, KeyError> {
+    if find_block(&text(path)?, CERTIFICATE).is_some() {
+        let path = path.to_owned();
+        return Err(KeyError::Technician { path });
+    }
+    any_key(path)
+}
+
+fn any_key(path: &Path) -> Result<SigningKey, KeyError> {
     let text = text(path)?;
-    SigningKey::from_pkcs8_pem(&text).map_err(|_| KeyError::NoKey {
+    let block = block_text(&text, "PRIVATE KEY").unwrap_or(&text);
+    SigningKey::from_pkcs8_pem(block).map_err(|_| KeyError::NoKey {
         path: path.to_owned(),
         private: true,
     })
@@ -155,7 +298,8 @@ pub fn read_key(path: &Path) -> Result<SigningKey, KeyError> {
 /// [`KeyError`].
 pub fn read_public_key(path: &Path) -> Result<VerifyingKey, KeyError> {
     let text = text(path)?;
-    let private = SigningKey::from_pkcs8_pem(&text).map(|key| key.verifying_key());
+    let block = block_text(&text, "PRIVATE KEY").unwrap_or(&text);
+    let private = SigningKey::from_pkcs8_pem(block).map(|key| key.verifying_key());
     private
         .or_else(|_| VerifyingKey::from_public_key_pem(&text))
         .map_err(|_| KeyError::NoKey {
@@ -180,6 +324,7 @@ fn text(path: &Path) -> Result<String, KeyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use iltm_runtime::trust::{NoRight, Terms, Trust, allows};
 
     #[test]
     fn a_new_key_is_read_again_and_never_overwritten() {
@@ -196,6 +341,41 @@ mod tests {
             let mode = fs::metadata(&path).expect("there").permissions().mode();
             assert_eq!(mode & 0o777, 0o600);
         }
+    }
+
+    #[test]
+    fn a_technicians_key_shows_rights_that_the_runtime_accepts_and_signs_no_tables() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = |name: &str| folder.path().join(name);
+        let site = new_key(&path("site.key")).expect("a new file");
+        new_technician(&path("anna.key"), &site, 9, 40).expect("a new file");
+        let deed = Deed::Confirm { table: 77 };
+        let allowed = |name: &str, device, floor, sequence| {
+            let signer = RightSigner::read(&path(name)).expect("a key");
+            assert_eq!(signer.site(), &site.verifying_key());
+            let key = Some(site.verifying_key().to_bytes());
+            let terms = Terms {
+                trust: Trust { key, device },
+                floor,
+            };
+            let right = signer.right(&deed, device, 5);
+            allows(&right, &deed, sequence, &terms, &mut || {})
+        };
+        for name in ["site.key", "anna.key"] {
+            assert_eq!(allowed(name, 9, 40, 5), Ok(()), "{name}");
+            assert_eq!(allowed(name, 9, 40, 6), Err(NoRight::Signature), "{name}");
+        }
+        assert_eq!(allowed("site.key", 8, 41, 5), Ok(()));
+        let other = NoRight::OtherDevice { device: 9 };
+        assert_eq!(allowed("anna.key", 8, 40, 5), Err(other));
+        let revoked = NoRight::Revoked {
+            version: 40,
+            floor: 41,
+        };
+        assert_eq!(allowed("anna.key", 9, 41, 5), Err(revoked));
+        let refused = read_key(&path("anna.key"));
+        assert!(matches!(refused, Err(KeyError::Technician { .. })));
+        assert!(read_public_key(&path("anna.key")).is_ok());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Compiling: from an inverse to a checked image.
 
 use super::gain::FineGains;
-use super::image::{ImageWriter, halfwords, operator_sections};
+use super::image::{ImageWriter, halfwords, operator_sections, projector_section};
 use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
 use super::reference_white::uniform_white;
@@ -11,10 +11,11 @@ use iltm_picture::ProjectorResponse;
 use iltm_runtime::{
     haar::Basis,
     image::{
-        ImageError, Meta, Table, TierInfo,
+        ImageError, Label, Meta, Table, TierInfo,
         layout::{MAX_PROVENANCE, SectionKind},
     },
     operator::{Bounds, Channels, Operator, OperatorError, Segment},
+    placement::ProjectorPixels,
     units::Light,
 };
 use iltm_solve::{InverseTransport, natural_images};
@@ -26,6 +27,8 @@ use thiserror::Error;
 pub struct CompileOptions {
     /// The projector's response.
     pub projector: ProjectorResponse,
+    /// The projector's pixels, where its size is known.
+    pub pixels: Option<ProjectorPixels>,
     /// Light of reference white in camera units; by default the brightest uniform
     /// grey that every live cell reaches.
     pub reference_white: Option<f64>,
@@ -36,6 +39,8 @@ pub struct CompileOptions {
     pub targets: Option<Vec<f64>>,
     /// Where the table comes from: text for people, at most 64 KiB.
     pub provenance: String,
+    /// What people call the table.
+    pub label: Label,
 }
 
 /// What the image can hold as the light of reference white, camera units.
@@ -68,6 +73,16 @@ pub enum CompileError {
     ReferenceWhite {
         /// The light asked for.
         light: f64,
+    },
+    /// The reference white that was asked for is far from what the projector reaches.
+    #[error(
+        "a reference white of {light} is {:.1} times {uniform:.4}, the brightest even grey that the projector reaches", light / uniform
+    )]
+    BeyondReach {
+        /// The light asked for.
+        light: f64,
+        /// The brightest even grey that every live cell reaches.
+        uniform: f64,
     },
     /// Content to choose the reference white by is grey, and the scene has colours.
     #[error("the content is grey, but the table drives three colours")]
@@ -102,7 +117,7 @@ pub enum CompileError {
     },
     /// A gain is above what the table can hold.
     #[error(
-        "the gain of cell {cell} is {gain:.1} times reference white; at most 65,535 can be stored"
+        "the gain of cell {cell} is {gain:.1} times reference white; at most 32,767 can be stored"
     )]
     Gain {
         /// The cell.
@@ -130,6 +145,9 @@ impl CompileError {
     pub const fn next_step(&self) -> &'static str {
         match self {
             Self::Dark => "Check that the flood photograph shows the projection.",
+            Self::BeyondReach { .. } => {
+                "Leave --white away, or give --content FILE: it finds the brightest white for what you show."
+            }
             Self::ReferenceWhite { .. } => "Leave the reference white to the default.",
             Self::GreyContent => {
                 "Convert it to colour: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`."
@@ -191,6 +209,7 @@ pub fn compile(
         inverse_error: U0F32::saturating_from_num(options.inverse_error.max(0.0)),
         bounds: operator.bounds,
         channel_scales: operator.scales,
+        label: options.label,
     };
     image.section(SectionKind::Meta, 0, head.emit().to_vec());
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));
@@ -213,6 +232,9 @@ pub fn compile(
     }
     let provenance = options.provenance.clone().into_bytes();
     image.section(SectionKind::Provenance, 0, provenance);
+    if let Some(pixels) = options.pixels {
+        image.section(SectionKind::Projector, 0, projector_section(pixels));
+    }
     let image = image.finish();
     Table::check(&image).map_err(CompileError::Image)?;
     Ok(Compiled {
@@ -385,7 +407,7 @@ impl Gains {
             .fold(0.0_f64, |a, b| a.max(*b))
             * white;
         let fits = |fraction: &u8| largest * f64::from(*fraction).exp2() <= f64::from(u16::MAX);
-        let Some(fraction) = (0..=15).rev().find(fits) else {
+        let Some(fraction) = (1..=15).rev().find(fits) else {
             let own = cells.iter().flat_map(|gain| gain.iter().enumerate());
             let cell = own
                 .max_by(|a, b| a.1.total_cmp(b.1))

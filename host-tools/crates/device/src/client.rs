@@ -1,7 +1,7 @@
 //! Client of a device: greeting, status, and subscription to its events.
 
 use super::transport::{Incoming, Patience, Transport, name};
-use super::{DeviceError, Line};
+use super::{Authority, DeviceError, Line};
 use iltm_runtime::link::{Hello, PROTOCOL_VERSION, Request, Response, Status};
 use std::time::Duration;
 
@@ -22,6 +22,8 @@ pub struct Subscription {
 pub struct Client<L> {
     pub(super) transport: Transport<L>,
     device: Hello,
+    /// Whoever signs rights for a device with a key.
+    pub(super) authority: Option<Authority>,
 }
 
 impl<L: Line> Client<L> {
@@ -37,7 +39,11 @@ impl<L: Line> Client<L> {
         match transport.ask(hello)? {
             Response::Hello(device) if device.protocol == PROTOCOL_VERSION => {
                 transport.forget();
-                Ok(Self { transport, device })
+                Ok(Self {
+                    transport,
+                    device,
+                    authority: None,
+                })
             }
             Response::Hello(device) => Err(DeviceError::Protocol {
                 device: device.protocol,
@@ -81,6 +87,11 @@ impl<L: Line> Client<L> {
     #[must_use]
     pub fn into_line(self) -> L {
         self.transport.into_line()
+    }
+
+    /// What is asked of a device with a key is signed by this from now on.
+    pub fn authorise(&mut self, authority: Authority) {
+        self.authority = Some(authority);
     }
 
     /// Who the device is.

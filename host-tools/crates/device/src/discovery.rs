@@ -4,7 +4,7 @@ use super::port::{BAUD, Port};
 use super::port_scan::ListedPort;
 use super::{Client, Patience};
 use super::{DeviceError, Line};
-use iltm_runtime::link::{Hello, Status};
+use iltm_runtime::link::{Hello, Slots, Status};
 use std::thread;
 use std::time::Duration;
 
@@ -28,6 +28,8 @@ pub struct FoundDevice {
     pub device: Hello,
     /// How it is; none if it says hello and nothing more.
     pub status: Option<Status>,
+    /// What is in its slots; none if it takes no tables.
+    pub slots: Option<Slots>,
 }
 
 /// Asks every port at once; returns the devices that answer, and why the other ports
@@ -63,6 +65,7 @@ fn ask_one(port: &ListedPort, baud: Option<u32>) -> Result<FoundDevice, DeviceEr
         baud,
         device: client.device().clone(),
         status: client.status().ok(),
+        slots: client.slots().ok(),
     })
 }
 

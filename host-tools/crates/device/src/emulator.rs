@@ -2,6 +2,7 @@
 
 use super::memory::BoardMemory;
 use iltm_runtime::frame_buffers::psram;
+use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -63,6 +64,12 @@ pub enum EmulatorError {
         /// What the operating system says.
         source: io::Error,
     },
+    /// The firmware is something else.
+    #[error("{}: is no firmware: not an ELF file for Arm processors", path.display())]
+    NoFirmware {
+        /// The file.
+        path: PathBuf,
+    },
     /// QEMU runs and has no port.
     #[error("the emulator does not say where its serial line is; it says: {said}")]
     NoPort {
@@ -96,7 +103,7 @@ impl EmulatorError {
                 "Install it: `sudo apt-get install qemu-system-arm` on Debian and Ubuntu, `brew install qemu` on macOS."
             }
             Self::Start { .. } => "Check that it may be run: `qemu-system-arm --version`.",
-            Self::Firmware { .. } => {
+            Self::Firmware { .. } | Self::NoFirmware { .. } => {
                 "Check the name, or build the firmware: `runtime/firmware/build.sh mps2-an500`."
             }
             Self::Gone { .. } => {
@@ -108,6 +115,9 @@ impl EmulatorError {
         }
     }
 }
+
+/// The processor that an ELF file for Arm names in its head.
+const ARM: [u8; 2] = [40, 0];
 
 /// A running board; it stops when this is dropped.
 #[derive(Debug)]
@@ -128,10 +138,17 @@ impl Emulator {
         firmware: &Path,
         memory: &BoardMemory,
     ) -> Result<Self, EmulatorError> {
-        std::fs::metadata(firmware).map_err(|source| EmulatorError::Firmware {
+        let mut head = [0; 20];
+        let read = File::open(firmware).and_then(|mut file| file.read(&mut head));
+        read.map_err(|source| EmulatorError::Firmware {
             path: firmware.to_owned(),
             source,
         })?;
+        // QEMU runs anything.
+        if !head.starts_with(b"\x7FELF") || !head.ends_with(&ARM) {
+            let path = firmware.to_owned();
+            return Err(EmulatorError::NoFirmware { path });
+        }
         let mut child = command(board, firmware, memory.path())
             .spawn()
             .map_err(|source| match source.kind() {

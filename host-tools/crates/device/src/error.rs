@@ -2,7 +2,7 @@
 
 use iltm_runtime::{
     link::{PROTOCOL_VERSION, Refusal},
-    trust::Rejected,
+    trust::{NoRight, Rejected},
 };
 use std::io;
 
@@ -11,10 +11,12 @@ use std::io;
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// The port could not be opened.
-    #[error("the port cannot be opened: {source}")]
+    #[error("the port cannot be opened: {source}{}", held_by(holder.as_ref()))]
     Open {
         /// What the operating system says.
         source: serialport::Error,
+        /// The program that has it open, where that can be told.
+        holder: Option<String>,
     },
     /// The port was there and is not any more.
     #[error("the port has gone: {source}")]
@@ -60,6 +62,10 @@ pub enum DeviceError {
     },
 }
 
+fn held_by(holder: Option<&String>) -> String {
+    holder.map_or_else(String::new, |holder| format!("; {holder} has it open"))
+}
+
 /// What came over a line while an answer was awaited.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Heard {
@@ -84,6 +90,9 @@ impl DeviceError {
     #[must_use]
     pub fn next_step(&self) -> &'static str {
         match self {
+            Self::Open {
+                holder: Some(_), ..
+            } => "End that program, or ask it to let go of the port, and try again.",
             Self::Open { source, .. } => match source.kind() {
                 serialport::ErrorKind::NoDevice => {
                     "Check the name and the cable, and close other programs that use the port."
@@ -138,6 +147,29 @@ const fn refusal_next_step(refusal: &Refusal) -> &'static str {
         Refusal::KeyLost => {
             "Restart the device. If it says so again, its key has rotted in its flash: it must be written anew through the debug port."
         }
+        Refusal::NoRight(cause) => right_next_step(cause),
+        Refusal::Wear { .. } => {
+            "Find out who keeps writing to the device; restart it, or wait, and try again."
+        }
+    }
+}
+
+/// What to do about a right that a device does not accept.
+const fn right_next_step(cause: &NoRight) -> &'static str {
+    match cause {
+        NoRight::Missing => {
+            "Give --key with the site's key, or with a technician's key that `iltm key technician` made."
+        }
+        NoRight::Signature => {
+            "Try again: the device's state may have changed meanwhile. If that does not help, --key names another key than the device's (`iltm key show FILE`, `iltm status`)."
+        }
+        NoRight::Certificate => {
+            "Give a technician's key that was made with this device's key (`iltm status` shows its id)."
+        }
+        NoRight::OtherDevice { .. } => {
+            "Give a technician's key for this device or for any: `iltm key technician`."
+        }
+        NoRight::Revoked { .. } => "Ask for a new technician's key: `iltm key technician`.",
     }
 }
 

@@ -11,6 +11,7 @@
 //! | requests and answers as frames on a line | `transport` |
 //! | a conversation: hello, status, subscription to events | [`client`] |
 //! | requests about tables | [`tables`] |
+//! | whoever signs what a device with a key is asked | [`Authority`] |
 //! | a table's file on its way, whatever breaks | [`upload`] |
 //! | frames on a line in words, for support | [`transcript`] |
 //! | log messages, with the firmware's ELF file | [`logs`] |
@@ -23,6 +24,7 @@
 //! What goes over the line is defined in [`iltm_runtime::link`], which the device
 //! uses as well.
 
+mod authority;
 pub mod client;
 pub mod discovery;
 #[cfg(unix)]
@@ -43,6 +45,7 @@ mod transport;
 pub mod upload;
 pub mod user;
 
+pub use authority::Authority;
 pub use client::Client;
 pub use error::{DeviceError, rejection_next_step};
 pub use port::{Line, Port};

@@ -2,7 +2,9 @@
 
 use super::DeviceError;
 use serialport::{ClearBuffer, SerialPort};
+use std::fs;
 use std::io::{self, ErrorKind};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Speed of a serial line unless something else is said, bits a second.
@@ -60,7 +62,10 @@ impl Port {
         let port = serialport::new(path, baud)
             .timeout(Duration::from_millis(100))
             .open();
-        let port = port.map_err(|source| DeviceError::Open { source })?;
+        let port = port.map_err(|source| DeviceError::Open {
+            source,
+            holder: holder(Path::new(path)),
+        })?;
         // What waits there was said to somebody else. Not every port can do this,
         // and frames are told from the rest anyway.
         let _ = port.clear(ClearBuffer::All);
@@ -75,8 +80,36 @@ impl Port {
     /// [`DeviceError::Open`] if the port cannot do it.
     pub fn set_speed(&mut self, baud: u32) -> Result<(), DeviceError> {
         let set = self.port.set_baud_rate(baud);
-        set.map_err(|source| DeviceError::Open { source })
+        set.map_err(|source| DeviceError::Open {
+            source,
+            holder: None,
+        })
     }
+}
+
+/// The other program that has a file open, where `/proc` tells: its name and number.
+fn holder(path: &Path) -> Option<String> {
+    let path = path.canonicalize().ok()?;
+    let own = std::process::id().to_string();
+    let processes = fs::read_dir("/proc").ok()?.flatten();
+    let mut holding = processes.filter(|process| {
+        let number = process.file_name();
+        let is_other = number.to_str().is_some_and(|number| {
+            number != own && number.bytes().all(|byte| byte.is_ascii_digit())
+        });
+        let open = |process: &fs::DirEntry| {
+            let mut files = fs::read_dir(process.path().join("fd")).ok()?.flatten();
+            files.find(|file| fs::read_link(file.path()).is_ok_and(|open| open == path))
+        };
+        is_other && open(process).is_some()
+    });
+    let process = holding.next()?;
+    let name = fs::read_to_string(process.path().join("comm")).ok()?;
+    Some(format!(
+        "{} (process {})",
+        name.trim().escape_debug(),
+        process.file_name().display()
+    ))
 }
 
 /// Longest that one write may wait for a line that does not take bytes.
@@ -110,4 +143,25 @@ fn is_nothing(error: &io::Error) -> bool {
         error.kind(),
         ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock
     )
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+    use std::process::{Command, Stdio};
+
+    #[test]
+    fn the_program_that_has_a_file_open_is_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("port");
+        let file = fs::File::create(&path).expect("writable");
+        assert_eq!(holder(&path), None, "this process alone");
+        let mut sleep = Command::new("sleep");
+        let sleep = sleep.arg("60").stdin(Stdio::from(file)).spawn();
+        let mut sleep = sleep.expect("sleep is everywhere");
+        let held = holder(&path);
+        sleep.kill().expect("it runs");
+        sleep.wait().expect("killed");
+        assert_eq!(held, Some(format!("sleep (process {})", sleep.id())));
+    }
 }

@@ -4,6 +4,7 @@
 use super::client::{Client, unexpected};
 use super::{DeviceError, Line, Patience};
 use iltm_runtime::link::{Digest, InUse, Receiving, Refusal, Request, Response, Sectors, Slots};
+use iltm_runtime::trust::Deed;
 use std::time::Duration;
 
 /// A device checks the whole table, signature included, while frames go on; until then
@@ -38,13 +39,40 @@ impl<L: Line> Client<L> {
         }
     }
 
+    /// The right to do something on a device with a key, signed for its next commit
+    /// record; empty where nobody signs or the device has no key.
+    fn right(&mut self, deed: &Deed) -> Result<Vec<u8>, DeviceError> {
+        if self.authority.is_none() {
+            return Ok(Vec::new());
+        }
+        let slots = self.slots()?;
+        let authority = self.authority.as_ref().filter(|_| slots.key.is_some());
+        let right = authority.map(|it| it.right(deed, slots.device, slots.sequence));
+        Ok(right.unwrap_or_default())
+    }
+
+    /// For a request with this right: to verify a signature takes a device a while.
+    fn patience(&self, right: &[u8]) -> Patience {
+        if right.is_empty() {
+            self.transport.patience()
+        } else {
+            CHECK
+        }
+    }
+
     /// Announces a file.
     ///
     /// # Errors
     /// [`DeviceError`]; [`Refusal::OnTrial`] while another table is on trial.
     pub fn begin(&mut self, length: u32, digest: Digest) -> Result<Receiving, DeviceError> {
-        let request = Request::Begin { length, digest };
-        match self.transport.ask(request)? {
+        let right = self.right(&Deed::Begin { length, digest })?;
+        let request = Request::Begin {
+            length,
+            digest,
+            right: &right,
+        };
+        let patience = self.patience(&right);
+        match self.transport.ask_patiently(request, patience)? {
             Response::Receiving(receiving) => Ok(receiving),
             other => Err(unexpected(request, &other)),
         }
@@ -88,8 +116,11 @@ impl<L: Line> Client<L> {
     /// # Errors
     /// [`DeviceError`]; [`Refusal::NotInUse`] if another one is in use by now.
     pub fn confirm(&mut self, table: u32) -> Result<InUse, DeviceError> {
-        let request = Request::Confirm { table };
-        match self.transport.ask(request)? {
+        let right = self.right(&Deed::Confirm { table })?;
+        let right = &right;
+        let request = Request::Confirm { table, right };
+        let patience = self.patience(right);
+        match self.transport.ask_patiently(request, patience)? {
             Response::InUse(in_use) => Ok(in_use),
             other => Err(unexpected(request, &other)),
         }
@@ -100,7 +131,9 @@ impl<L: Line> Client<L> {
     /// # Errors
     /// [`DeviceError`].
     pub fn rollback(&mut self, table: u32) -> Result<InUse, DeviceError> {
-        let request = Request::Rollback { table };
+        let right = self.right(&Deed::Rollback { table })?;
+        let right = &right;
+        let request = Request::Rollback { table, right };
         match self.transport.ask_patiently(request, CHECK)? {
             Response::InUse(in_use) => Ok(in_use),
             // The answer to an earlier copy of the request was lost: the table has gone.
@@ -109,12 +142,23 @@ impl<L: Line> Client<L> {
         }
     }
 
-    /// Gives a device that has none its public key and its number, for good.
+    /// Gives a device that has none its public key and its number, for good; `even_so` if
+    /// the table in use is not signed for it.
     ///
     /// # Errors
-    /// [`DeviceError`]; [`Refusal::HasKey`] if it has others.
-    pub fn provision(&mut self, key: [u8; 32], device: u64) -> Result<(), DeviceError> {
-        let request = Request::Provision { key, device };
+    /// [`DeviceError`]; [`Refusal::HasKey`] if it has others; [`Refusal::Table`] if the
+    /// table in use would be refused from the next start on.
+    pub fn provision(
+        &mut self,
+        key: [u8; 32],
+        device: u64,
+        even_so: bool,
+    ) -> Result<(), DeviceError> {
+        let request = Request::Provision {
+            key,
+            device,
+            even_so,
+        };
         match self.transport.ask_patiently(request, CHECK)? {
             Response::Provisioned => Ok(()),
             other => Err(unexpected(request, &other)),

@@ -120,7 +120,7 @@ fn words(frame: LinkFrame<'_>) -> String {
     }
 }
 
-/// A request, without the bytes of tables and keys.
+/// A request, without the bytes of tables, keys and signatures.
 fn asked(request: Request<'_>) -> String {
     match request {
         Request::Write {
@@ -131,9 +131,30 @@ fn asked(request: Request<'_>) -> String {
             "Write {{ transfer: {transfer:08x}, offset: {offset}, {} bytes }}",
             bytes.len()
         ),
-        Request::Provision { key, device } => {
+        Request::Provision { key, device, .. } => {
             let id = hex(key.get(..KEY_ID).unwrap_or_default());
             format!("Provision {{ key id: {id}, device: {device} }}")
+        }
+        Request::Begin {
+            length,
+            digest,
+            right,
+        } => format!(
+            "Begin {{ length: {length}, digest: {}, right: {} bytes }}",
+            hex(&digest.0),
+            right.len()
+        ),
+        Request::Confirm { table, right } => {
+            format!(
+                "Confirm {{ table: {table:08x}, right: {} bytes }}",
+                right.len()
+            )
+        }
+        Request::Rollback { table, right } => {
+            format!(
+                "Rollback {{ table: {table:08x}, right: {} bytes }}",
+                right.len()
+            )
         }
         other => format!("{other:?}"),
     }

@@ -107,6 +107,11 @@ impl<L: Line> Transport<L> {
         self.ask_patiently(request, self.patience)
     }
 
+    /// The usual patience.
+    pub(super) const fn patience(&self) -> Patience {
+        self.patience
+    }
+
     /// The same with other patience than usual.
     pub(super) fn ask_patiently(
         &mut self,

@@ -1,6 +1,7 @@
 //! PNG files: pictures read and written.
 //!
-//! A picture keeps its size, its 8 or 16 bits and its grey or RGB. A palette, and
+//! A picture keeps its size, its 8 or 16 bits and its grey or RGB; an alpha channel that is
+//! opaque all over, as screenshots have it, is left out. A palette, and
 //! grey of fewer than 8 bits, become RGB and grey of 8 bits, since the result has
 //! colours that they have not. Samples are what the file holds; colour profiles
 //! and gamma chunks are not applied and not written.
@@ -43,7 +44,7 @@ pub enum PngError {
         /// Height in pixels.
         height: u32,
     },
-    /// The picture has an alpha channel or a transparent colour.
+    /// The picture is transparent somewhere.
     #[error("the picture has transparency, which a projector cannot show")]
     Alpha,
     /// The picture is an animation.
@@ -104,12 +105,15 @@ pub fn read(input: impl Read) -> Result<Picture, PngError> {
         });
     }
     let (colour, depth) = reader.output_color_type();
-    if matches!(colour, ColorType::Rgba | ColorType::GrayscaleAlpha) {
-        return Err(PngError::Alpha);
-    }
     let length = reader.output_buffer_size().unwrap_or(0);
     let mut bytes = vec![0; length];
     reader.next_frame(&mut bytes).map_err(malformed)?;
+    let sample = if depth == BitDepth::Sixteen { 2 } else { 1 };
+    match colour {
+        ColorType::Rgba => bytes = opaque(&bytes, 4 * sample, sample)?,
+        ColorType::GrayscaleAlpha => bytes = opaque(&bytes, 2 * sample, sample)?,
+        _ => {}
+    }
     let samples = match depth {
         BitDepth::Sixteen => {
             let (halves, _) = bytes.as_chunks::<2>();
@@ -120,6 +124,19 @@ pub fn read(input: impl Read) -> Result<Picture, PngError> {
     Picture::new(size, samples).ok_or_else(|| PngError::Malformed {
         reason: "it has another number of samples than its header says".to_owned(),
     })
+}
+
+/// The pixels without their last sample, which must be opaque; of so many bytes each.
+fn opaque(bytes: &[u8], pixel: usize, sample: usize) -> Result<Vec<u8>, PngError> {
+    let mut colours = Vec::with_capacity(bytes.len() / pixel * (pixel - sample));
+    for pixel in bytes.chunks_exact(pixel) {
+        let (colour, alpha) = pixel.split_at(pixel.len() - sample);
+        if alpha.iter().any(|byte| *byte != u8::MAX) {
+            return Err(PngError::Alpha);
+        }
+        colours.extend_from_slice(colour);
+    }
+    Ok(colours)
 }
 
 fn size(info: &png::Info<'_>) -> Result<FrameSize, PngError> {

@@ -61,8 +61,8 @@ pub struct TreatedImage {
     pub treatment: Treatment,
     /// Projector input, codes for the projector.
     pub input: Picture,
-    /// Share of the input's samples that were clipped.
-    pub clipped: f64,
+    /// Share of the input's samples that were clipped: at black, and at white.
+    pub clipped: [f64; 2],
     /// The photograph relative to reference white, at [`Comparison::scale`].
     pub photograph: LightPicture,
     /// How far it is from the wanted image.
@@ -102,14 +102,16 @@ impl Example {
                 Treatment::GainOnly => Some(0),
                 Treatment::Compensated => Some(table.top_tier()),
             };
-            let mut clipped = 0.0;
+            let mut clipped = [0.0; 2];
             if tier.is_some() {
                 let settings = CompensateOptions {
                     tier,
                     ..CompensateOptions::default()
                 };
                 let summary = Compensator::new(table, settings)?.picture(&mut input)?;
-                clipped = summary.clipped as f64 / summary.samples.max(1) as f64;
+                let white = summary.clipped_white;
+                clipped = [summary.clipped - white, white]
+                    .map(|count| count as f64 / summary.samples.max(1) as f64);
             }
             let drive = LightPicture::decode(&input, projector.clone());
             let photograph = projection.photograph(&drive);

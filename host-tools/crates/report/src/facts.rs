@@ -6,6 +6,7 @@ use iltm_picture::{
     html::{grouped, number, percent},
     statistics::median,
 };
+use iltm_solve::LambdaTrial;
 
 /// One line: its name and what there is to say.
 pub(super) type Fact = (&'static str, String);
@@ -98,7 +99,10 @@ fn of_the_solve(learned: &BuiltTable) -> [Fact; 6] {
     let white = number(learned.compiled.white);
     [
         ("method", report.method.to_string()),
-        ("weight of sparsity", number(report.lambda)),
+        (
+            "weight of sparsity",
+            ends(report.lambda, &report.lambda_path),
+        ),
         ("coefficients", grouped(report.coefficients as u64)),
         ("iterations", format!("{}, {ended}", report.iterations)),
         ("condition", condition),
@@ -110,6 +114,21 @@ fn of_the_solve(learned: &BuiltTable) -> [Fact; 6] {
             ),
         ),
     ]
+}
+
+/// The weight, and whether the search for it ended at one of its ends.
+fn ends(lambda: f64, tried: &[LambdaTrial]) -> String {
+    let is = |end: Option<&LambdaTrial>| {
+        tried.len() > 1 && end.is_some_and(|trial| trial.lambda.total_cmp(&lambda).is_eq())
+    };
+    let end = if is(tried.last()) {
+        ", the least that is tried: these photographs hardly need any"
+    } else if is(tried.first()) {
+        ", the most that is tried: these photographs say little; take more, or with less noise"
+    } else {
+        ""
+    };
+    format!("{}{end}", number(lambda))
 }
 
 fn listed<'s>(seconds: impl IntoIterator<Item = (&'s str, f64)>) -> String {
@@ -141,5 +160,26 @@ fn noise_source(source: NoiseSource) -> String {
             format!("estimated from {photographs} photographs of white")
         }
         NoiseSource::Texture => "at most: estimated from neighbouring pixels".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn weight_of(lambda: f64) -> String {
+        let trial = |lambda| LambdaTrial {
+            lambda,
+            misfit: 1.0,
+        };
+        ends(lambda, &[0.4, 0.2, 0.1].map(trial))
+    }
+
+    #[test]
+    fn a_weight_at_an_end_of_what_was_tried_says_so() {
+        assert_eq!(weight_of(0.2), "0.2");
+        assert!(weight_of(0.1).contains("the least that is tried"));
+        assert!(weight_of(0.4).contains("the most that is tried"));
+        assert_eq!(ends(0.4, &[]), "0.4");
     }
 }

@@ -11,8 +11,10 @@ use iltm_runtime::{
     },
     operator::{Operator, Segment},
     pipeline::{
-        Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells, compensate_pixels,
+        Encoding, FrameError, FrameJob, FullMemory, RowBuffers, compensate_cells,
+        compensate_pixels, prepare_pixels,
     },
+    placement::PixelArea,
     units::Halfword,
 };
 use iltm_solve::natural_images;
@@ -145,7 +147,9 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
     let mut memory = OperatorMemory::new(table);
     let mut frame = FrameMemory::new(table, size);
     let mut medians = Vec::new();
-    let mut prepared = false;
+    for row in (0..size.height()).take_while(|_| !of_grid) {
+        prepare_pixels(table, size, row, &mut frame.lent())?;
+    }
     for tier in 0..=table.top_tier() {
         let encoding = Encoding::Display;
         let mut runs = Vec::with_capacity(RUNS);
@@ -158,12 +162,11 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
                 let job = FrameJob {
                     table,
                     size,
-                    prepared,
+                    area: PixelArea::all(size),
                     tier,
                     encoding,
                 };
                 compensate_pixels(&job, image, &mut input, &mut frame.lent(), &mut workspace)?;
-                prepared = true;
             }
             runs.push(start.elapsed().as_secs_f64() * 1e6);
         }

@@ -2,9 +2,10 @@
 
 use super::facts::facts;
 use super::{Example, Report, TimedTier, TreatedImage, Treatment};
+use iltm_compile::Brightness;
 use iltm_picture::{
     chart::{Chart, ChartAxis, Series},
-    html::{colour_bar, document, grouped, img_named, number, percent},
+    html::{capitalised, colour_bar, document, grouped, img_named, number, percent},
 };
 use iltm_solve::{Compensation, Prediction};
 use maud::{Markup, html};
@@ -77,7 +78,7 @@ impl Report<'_> {
                 p .lead { (words.scene) }
                 div .numbers {
                     (headline(prediction.uncompensated, "projected as it is", ""))
-                    (headline(prediction.gain_only, "each pixel's brightness and colour corrected", mark(Compensation::GainOnly)))
+                    (headline(self.gains_alone(), "each pixel's brightness and colour corrected", mark(Compensation::GainOnly)))
                     (headline(prediction.compensated, "interreflections cancelled as well", mark(Compensation::Operator)))
                 }
                 p .quiet {
@@ -87,8 +88,21 @@ impl Report<'_> {
                     ", with the one factor s for all pixels and colours that suits the photograph best, so that a "
                     "dim projection alone is no error."
                 }
+                @if let Some(brightness) = self.brightness() {
+                    p { (capitalised(&brightness.words())) "." }
+                }
             }
         }
+    }
+
+    /// Error of gains alone: of the table's tier 0, which is what is said of it elsewhere.
+    fn gains_alone(&self) -> f64 {
+        let first = self.ladder.first();
+        first.map_or(f64::NAN, |tier| tier.cost.total)
+    }
+
+    fn brightness(&self) -> Option<Brightness> {
+        Brightness::of(&self.learned.measurements, self.learned.white.light)
     }
 
     fn scene(&self) -> Markup {
@@ -127,7 +141,7 @@ impl Report<'_> {
                     "Projector inputs are computed by the code that runs on the device, bit for bit. The photographs "
                     "are predicted from them at full resolution with the learned transport, so they show clipping, "
                     "8-bit codes and what the table leaves out. Each is scaled by the one factor that fits the wanted "
-                    "image best; the error is what remains, relative to the wanted image."
+                    "image best, so how bright it is cannot be seen here; the error is what remains, relative to the wanted image."
                 }
                 p {
                     "Light can be added but not taken back: where an image is darker than what arrives from elsewhere "
@@ -404,9 +418,9 @@ fn phone(shown: &TreatedImage) -> Markup {
 }
 
 fn clipping(shown: &TreatedImage) -> String {
-    match shown.treatment {
-        Treatment::None => "The wanted image".to_owned(),
-        _ if shown.clipped == 0.0 => "Nothing clipped".to_owned(),
-        _ => format!("{} of the samples clipped", percent(shown.clipped)),
+    if shown.treatment == Treatment::None {
+        return "The wanted image".to_owned();
     }
+    let [black, white] = shown.clipped.map(percent);
+    format!("{white} of the samples too bright for white, {black} darker than black")
 }

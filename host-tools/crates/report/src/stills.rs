@@ -57,8 +57,8 @@ pub fn test_card(size: FrameSize) -> Wanted {
     Wanted {
         name: "card",
         title: "Test card".to_owned(),
-        remark: "Saturated colours, fine lines, a ramp and lettering: colour bleeds where panels face each other, \
-                 and edges show whether detail survives."
+        remark: "Bars, fine lines, a ramp and lettering: light bleeds from one to the other where panels face \
+                 each other, and edges show whether detail survives."
             .to_owned(),
         picture: lettered(&picture),
     }

@@ -105,6 +105,37 @@ impl UnfilledCapture {
         })
     }
 
+    /// Places of the photographs that are not there yet.
+    ///
+    /// # Errors
+    /// [`FillCaptureError`] if two files could be one photograph.
+    pub fn missing(&self) -> Result<Vec<usize>, FillCaptureError> {
+        let mut missing = Vec::new();
+        for (at, photo) in self.photos.iter().enumerate() {
+            // A camera may have written it under another ending.
+            if find_photo(&self.folder, photo)?.is_none() {
+                missing.push(at);
+            }
+        }
+        Ok(missing)
+    }
+
+    /// Indices of what is shown, in its order.
+    #[must_use]
+    pub fn indices(&self) -> Vec<u32> {
+        self.indices.clone()
+    }
+
+    /// The same with other input codes of every cell for each photograph, in the order of the
+    /// indices; what has none stays.
+    #[must_use]
+    pub fn showing(mut self, codes: Vec<Vec<[u8; 3]>>) -> Self {
+        for (frame, codes) in self.frames.iter_mut().zip(codes) {
+            frame.codes = codes;
+        }
+        self
+    }
+
     /// Takes every photograph that is not there yet; returns how many.
     ///
     /// # Errors
@@ -115,13 +146,7 @@ impl UnfilledCapture {
         progress: &dyn Progress,
     ) -> Result<usize, FillCaptureError> {
         let paths: Vec<PathBuf> = self.photos.iter().map(|p| self.folder.join(p)).collect();
-        let mut missing = Vec::new();
-        for (at, photo) in self.photos.iter().enumerate() {
-            // A camera may have written it under another ending.
-            if find_photo(&self.folder, photo)?.is_none() {
-                missing.push(at);
-            }
-        }
+        let missing = self.missing()?;
         progress.begin("taking photographs", missing.len() as u64);
         let taken = AtomicUsize::new(0);
         camera.take(&self.frames, &missing, |place, photograph| {

@@ -1,7 +1,7 @@
 //! Layout of the cells on the projector's pixels.
 
 use super::PatternsError;
-use iltm_picture::{MAX_PIXELS, Picture, Samples};
+use iltm_picture::{LightPicture, MAX_PIXELS, Picture, Response, Samples};
 use iltm_runtime::{FrameSize, Grid, resample::area::AreaAverage};
 
 /// How pictures of one pixel a cell become pictures of the projector's size: by the
@@ -94,6 +94,50 @@ impl Layout {
                 .copy_from_slice(line);
         }
         Picture::new(self.projector, Samples::Eight(slide))
+    }
+
+    /// What a border leaves of a picture of the projector's size; `None` if it has another
+    /// size or depth.
+    #[must_use]
+    pub fn unframed(&self, picture: &Picture) -> Option<Picture> {
+        let Samples::Eight(samples) = picture.samples() else {
+            return None;
+        };
+        if picture.size() != self.projector {
+            return None;
+        }
+        let channels = picture.channels();
+        let border = usize::from(self.border);
+        let line = self.projector.width() * channels;
+        let lines = samples.chunks_exact(line).skip(border);
+        let inner = lines.take(self.inner.height()).flat_map(|line| {
+            let inner = line.chunks_exact(channels).skip(border);
+            inner.take(self.inner.width()).flatten().copied()
+        });
+        Picture::new(self.inner, Samples::Eight(inner.collect()))
+    }
+
+    /// Mean light of every cell in a picture of the projector's size, `N` entries for each of
+    /// its channels; `None` if it has another size or depth.
+    #[must_use]
+    pub fn cell_light(&self, picture: &Picture, response: Response) -> Option<Vec<Vec<f64>>> {
+        let inner = LightPicture::decode(&self.unframed(picture)?, response);
+        let plane = |plane: &Vec<f32>| {
+            let mut sums = vec![(0.0, 0_u32); self.grid.cells()];
+            for (at, light) in plane.iter().enumerate() {
+                let (x, y) = (at % self.inner.width(), at / self.inner.width());
+                let (sum, count) = sums.get_mut(self.cells.owner(x, y)?)?;
+                *sum += f64::from(*light);
+                *count += 1;
+            }
+            let means = sums.into_iter();
+            Some(
+                means
+                    .map(|(sum, count)| sum / f64::from(count.max(1)))
+                    .collect(),
+            )
+        };
+        inner.planes().iter().map(plane).collect()
     }
 
     /// The projector's picture of a picture of one pixel a cell, 8 bits, grey or

@@ -7,16 +7,16 @@
 //!
 //! A frame of one pixel a cell is compensated cell by cell, any larger one at
 //! full resolution; a smaller one is refused. The result has the size and the
-//! kind of the input.
+//! kind of the input; [`PlacedFrames`] says where a frame goes on a projector, and when
+//! its size changes.
 
 use super::bands::{Bands, Interleaved};
-use super::engine::{Engine, EngineJob};
+use super::engine::{ClippedSamples, Engine, EngineJob};
 use super::live::Live;
-use super::{Input, VideoError};
+use super::{Fit, Input, PlacedFrames, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::sync::Arc;
@@ -31,6 +31,9 @@ pub struct CompensateOptions {
     /// Threads that work on the rows, 0 for one a core. A stream has two more,
     /// which read and write. The result is the same for any number.
     pub threads: usize,
+    /// What becomes of frames whose aspect is not the projector's; they are refused if
+    /// this is unsaid.
+    pub fit: Option<Fit>,
 }
 
 impl Default for CompensateOptions {
@@ -39,6 +42,7 @@ impl Default for CompensateOptions {
             tier: None,
             encoding: Encoding::Display,
             threads: 0,
+            fit: None,
         }
     }
 }
@@ -46,7 +50,7 @@ impl Default for CompensateOptions {
 /// What has been done.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FrameTotals {
-    /// Size of the frames.
+    /// Size of the frames that came out.
     pub size: FrameSize,
     /// How many frames there were.
     pub frames: u64,
@@ -55,6 +59,10 @@ pub struct FrameTotals {
     /// Samples that the projector would have had to show darker than black or
     /// brighter than white.
     pub clipped: u64,
+    /// Those of them that would have had to be brighter than white.
+    pub clipped_white: u64,
+    /// Whether whoever takes the frames has stopped before the last one.
+    pub cut_short: bool,
 }
 
 /// Compensates frames with one table.
@@ -118,12 +126,9 @@ impl<'t, 'a> Compensator<'t, 'a> {
         output: &Path,
         progress: &dyn Progress,
     ) -> Result<FrameTotals, VideoError> {
-        let opened = File::open(input).map_err(|source| VideoError::File {
-            path: input.to_owned(),
-            source,
-        })?;
+        let opened = Input::open(input)?;
         let mut whole = WholeFile::create(output)?;
-        let summary = self.stream(opened, whole.file(), progress)?;
+        let summary = self.input(opened, whole.file(), progress)?;
         whole.finish()?;
         Ok(summary)
     }
@@ -139,7 +144,20 @@ impl<'t, 'a> Compensator<'t, 'a> {
         output: W,
         progress: &dyn Progress,
     ) -> Result<FrameTotals, VideoError> {
-        match Input::of(input)? {
+        self.input(Input::of(input)?, output, progress)
+    }
+
+    /// Compensates an input that has been told apart.
+    ///
+    /// # Errors
+    /// As [`png`](Self::png) and [`y4m`](Self::y4m).
+    pub fn input<R: Read + Send, W: Write + Send>(
+        &self,
+        input: Input<R>,
+        output: W,
+        progress: &dyn Progress,
+    ) -> Result<FrameTotals, VideoError> {
+        match input {
             Input::Png(input) => self.png(input, output),
             Input::Y4m(input) => self.y4m(input, output, progress),
         }
@@ -152,20 +170,45 @@ impl<'t, 'a> Compensator<'t, 'a> {
     /// grid, is grey with a table of three channels, or the output cannot be
     /// written.
     pub fn png(&self, input: impl Read, output: impl Write) -> Result<FrameTotals, VideoError> {
-        let mut picture = png::read(input)?;
-        let summary = self.picture(&mut picture)?;
+        let (picture, totals) = self.frame(png::read(input)?)?;
         png::write(output, &picture)?;
-        Ok(summary)
+        Ok(totals)
     }
 
-    /// Compensates a picture in place.
+    /// Compensates a frame for the projector: its cells are where the table has them, and
+    /// what is outside becomes black.
+    ///
+    /// # Errors
+    /// [`VideoError`] if it has another aspect than the projector, is smaller than the grid,
+    /// or grey with a table of three channels.
+    pub fn frame(&self, picture: Picture) -> Result<(Picture, FrameTotals), VideoError> {
+        let placed = self.place(picture.size())?;
+        let frame = picture.size();
+        let grid = self.table.grid();
+        let mut picture = placed
+            .picture(picture)
+            .ok_or(VideoError::SmallerThanGrid { frame, grid })?;
+        let totals = self.placed(&placed, &mut picture)?;
+        Ok((picture, totals))
+    }
+
+    /// Compensates a picture of the cells and nothing around them, in place.
     ///
     /// # Errors
     /// [`VideoError`] if it is smaller than the grid, or grey with a table of three
     /// channels.
     pub fn picture(&self, picture: &mut Picture) -> Result<FrameTotals, VideoError> {
+        self.placed(&PlacedFrames::whole(picture.size()), picture)
+    }
+
+    /// Compensates a picture that is in its place.
+    fn placed(
+        &self,
+        placed: &PlacedFrames,
+        picture: &mut Picture,
+    ) -> Result<FrameTotals, VideoError> {
         let (size, channels) = (picture.size(), picture.channels());
-        let job = self.job(size, channels)?;
+        let job = self.job(placed, channels)?;
         let width = size.width();
         let clipped = match picture.samples_mut() {
             Samples::Eight(samples) => self.one(
@@ -185,18 +228,22 @@ impl<'t, 'a> Compensator<'t, 'a> {
                 },
             ),
         };
+        let clipped = clipped?;
         Ok(FrameTotals {
             size,
             frames: 1,
             samples: job.samples() as u64,
-            clipped: clipped?,
+            clipped: clipped.black + clipped.white,
+            clipped_white: clipped.white,
+            cut_short: false,
         })
     }
 
     /// Compensates a Y4M stream, frame by frame: memory does not depend on its
     /// length. Reading, computing and writing overlap.
     ///
-    /// `progress` advances by one a frame.
+    /// `progress` advances by one a frame. A reader of the output that ends, such as a player
+    /// that is closed, ends the stream: [`FrameTotals::cut_short`].
     ///
     /// # Errors
     /// [`VideoError`] if the stream is malformed, its frames are smaller than the
@@ -217,28 +264,39 @@ impl<'t, 'a> Compensator<'t, 'a> {
         Ok(summary.frames)
     }
 
-    /// What is to be done to frames of this size and number of colours, if that is
+    /// What is to be done to frames in this place and of this number of colours, if that is
     /// possible.
-    pub(super) fn job(&self, size: FrameSize, colours: usize) -> Result<EngineJob, VideoError> {
+    pub(super) fn job(
+        &self,
+        placed: &PlacedFrames,
+        colours: usize,
+    ) -> Result<EngineJob, VideoError> {
         if colours < usize::from(self.table.channels()) {
             return Err(VideoError::GreyFrame);
         }
-        if !size.holds(self.table.grid()) {
+        let area = placed.area();
+        if !area.size.holds(self.table.grid()) {
             return Err(VideoError::SmallerThanGrid {
-                frame: size,
+                frame: area.size,
                 grid: self.table.grid(),
             });
         }
         Ok(EngineJob {
-            size,
+            size: placed.shown(),
+            area,
             colours,
             tier: self.tier,
             encoding: self.settings.encoding,
         })
     }
 
+    /// Where frames of this size go.
+    pub(super) fn place(&self, size: FrameSize) -> Result<PlacedFrames, VideoError> {
+        PlacedFrames::new(self.table, size, self.settings.fit)
+    }
+
     /// A single frame in place; how many samples were clipped.
-    fn one<P: Bands>(&self, job: EngineJob, frame: &mut P) -> Result<u64, VideoError> {
+    fn one<P: Bands>(&self, job: EngineJob, frame: &mut P) -> Result<ClippedSamples, VideoError> {
         match self.table.channels() {
             1 => self.engine::<P, 1>(job)?.compensate(frame),
             _ => self.engine::<P, 3>(job)?.compensate(frame),

@@ -2,6 +2,7 @@
 
 use super::y4m::Y4mError;
 use iltm_picture::{FileError, png::PngError};
+use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid, image::ImageError, pipeline::FrameError};
 use std::path::PathBuf;
 
@@ -12,6 +13,14 @@ pub enum VideoError {
     /// A file could not be opened or put in its place.
     #[error("{}: {source}", path.display())]
     File {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// An input file could not be opened.
+    #[error("{}: cannot be read: {source}", path.display())]
+    Open {
         /// The file.
         path: PathBuf,
         /// What the operating system says.
@@ -41,6 +50,24 @@ pub enum VideoError {
         /// Grid of the table: rows, then columns.
         grid: Grid,
     },
+    /// The frame has another aspect than the projector that the table was made with.
+    #[error("the frame, {frame}, has another aspect than the projector that the table was \
+        made with, {}{}", projector.size(), border(*projector))]
+    Aspect {
+        /// Size of the frame.
+        frame: FrameSize,
+        /// The projector.
+        projector: ProjectorPixels,
+    },
+    /// The table does not know a projector to fit frames to.
+    #[error("the table does not say how large its projector is, so there is nothing to fit to")]
+    NothingToFit,
+    /// A newer table would put the frames elsewhere on the projector.
+    #[error("it is for another projector or border, and frames would change their size")]
+    Elsewhere,
+    /// A stream ends before its first frame.
+    #[error("the stream has a header and no frame")]
+    NoFrames,
     /// A colour table gives grey light a coloured input, which a grey frame has
     /// no room for.
     #[error(
@@ -74,6 +101,14 @@ pub enum VideoError {
     Runtime(FrameError),
 }
 
+/// What an error about an aspect says of a border.
+fn border(projector: ProjectorPixels) -> String {
+    match projector.border() {
+        0 => String::new(),
+        border => format!(" with a border of {border}"),
+    }
+}
+
 impl From<FileError> for VideoError {
     fn from(FileError { path, source }: FileError) -> Self {
         Self::File { path, source }
@@ -88,6 +123,7 @@ impl VideoError {
             Self::File { .. } => {
                 "Check that the file and its folder exist, may be used, and that the disk has room."
             }
+            Self::Open { .. } => "Check that the file is there and may be read.",
             Self::Read { .. } => "Check that the input can be read to its end.",
             Self::UnknownFormat => {
                 "Convert it: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`, or save the picture as PNG."
@@ -96,6 +132,16 @@ impl VideoError {
             Self::Png(error) => error.next_step(),
             Self::SmallerThanGrid { .. } => {
                 "Scale the frames up to the projector's own size, or at least to one pixel a cell."
+            }
+            Self::Aspect { .. } => {
+                "Say how it is to be shown: --fit letterbox (black bars), crop (edges cut off) or \
+                 stretch; or make it in the projector's aspect."
+            }
+            Self::NothingToFit => "Leave --fit away.",
+            Self::Elsewhere => "Start again with the new table.",
+            Self::NoFrames => {
+                "Look at what the program that makes the stream says: it stopped before its first \
+                 frame."
             }
             Self::GreyFrame => {
                 "Convert it to colour: `ffmpeg -i VIDEO -pix_fmt yuv420p OUT.y4m`, or save the \

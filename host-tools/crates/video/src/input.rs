@@ -23,13 +23,21 @@ impl Input<File> {
     /// A file.
     ///
     /// # Errors
-    /// [`VideoError::File`] if it cannot be opened, and those of [`of`](Self::of).
+    /// [`VideoError::Open`] if it cannot be opened, and those of [`of`](Self::of).
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let file = File::open(path).map_err(|source| VideoError::File {
+        let file = File::open(path).map_err(|source| VideoError::Open {
             path: path.to_owned(),
             source,
         })?;
         Self::of(file)
+    }
+}
+
+impl<R> Input<R> {
+    /// Whether it is a picture.
+    #[must_use]
+    pub const fn is_png(&self) -> bool {
+        matches!(self, Self::Png(_))
     }
 }
 

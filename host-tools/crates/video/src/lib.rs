@@ -7,6 +7,7 @@
 //! |---|---|
 //! | pictures and streams through a table, the front door | [`compensate`] |
 //! | a table that is replaced while a stream runs, a budget of time | [`live`], [`watch`] |
+//! | where frames go on the projector | [`PlacedFrames`], [`Fit`] |
 //! | inputs told apart, and a few frames of one | [`Input`], [`sampled_frames`] |
 //! | Y4M streams | [`y4m`] |
 //! | YUV to RGB and back | [`yuv`] |
@@ -41,6 +42,7 @@ pub mod compensate;
 mod curves;
 mod engine;
 mod error;
+mod fit;
 mod input;
 pub mod live;
 mod planar;
@@ -53,6 +55,7 @@ pub mod yuv;
 pub use compensate::{CompensateOptions, Compensator, FrameTotals};
 pub use engine::OperatorMemory;
 pub use error::VideoError;
+pub use fit::{Fit, PlacedFrames};
 pub use input::{Input, sampled_frames};
 
 #[cfg(test)]

@@ -5,10 +5,11 @@
 //! [`Governor`] may choose another tier, as on the device. A newer table that cannot be
 //! used changes nothing.
 
+use super::engine::ClippedSamples;
 use super::planar::{Planar, PlaneLayout};
 use super::stream::{self, FrameQueue};
-use super::y4m::Reader;
-use super::{Compensator, FrameTotals, Input, VideoError};
+use super::y4m::{Header, Reader};
+use super::{Compensator, FrameTotals, Input, PlacedFrames, VideoError};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
     governor::{Governor, Reason, TierChange},
@@ -87,16 +88,15 @@ impl Compensator<'_, '_> {
     /// only, and with this tier only without a budget.
     ///
     /// # Errors
-    /// Those of [`y4m`](Self::y4m), [`VideoError::UnknownFormat`], and
-    /// [`VideoError::Still`] for a picture.
+    /// Those of [`y4m`](Self::y4m), and [`VideoError::Still`] for a picture.
     pub fn live<R: Read + Send, W: Write + Send>(
         &self,
         live: Live<'_>,
-        input: R,
+        input: Input<R>,
         output: W,
         progress: &dyn Progress,
     ) -> Result<LiveSummary, VideoError> {
-        match Input::of(input)? {
+        match input {
             Input::Png(_) => Err(VideoError::Still),
             Input::Y4m(input) => live.run(self, input, output, progress),
         }
@@ -113,18 +113,26 @@ impl Live<'_> {
         progress: &dyn Progress,
     ) -> Result<LiveSummary, VideoError> {
         let reader = Reader::new(input)?;
-        let (size, layout) = (reader.header().size(), PlaneLayout::new(reader.header()));
-        first.job(size, layout.colours())?;
+        let given = reader.header().clone();
+        let placed = first.place(given.size())?;
+        let shown = given.resized(placed.shown());
+        let layout = PlaneLayout::new(&shown);
+        first.job(&placed, layout.colours())?;
         let mut run = Run {
             live: self,
             layout,
+            given,
+            shown: shown.clone(),
+            placed,
             progress,
             done: LiveSummary {
                 frames: FrameTotals {
-                    size,
+                    size: placed.shown(),
                     frames: 0,
                     samples: 0,
                     clipped: 0,
+                    clipped_white: 0,
+                    cut_short: false,
                 },
                 tiers: Vec::new(),
                 overruns: 0,
@@ -134,7 +142,7 @@ impl Live<'_> {
             },
         };
         progress.begin("compensate", 0);
-        let result = stream::run(reader, output, |frames| {
+        let result = stream::run(reader, shown, output, |frames| {
             let mut newer = run.frames(first, frames)?;
             while let Some(content) = newer {
                 let table = Table::check(&content).map_err(VideoError::Table)?;
@@ -143,7 +151,11 @@ impl Live<'_> {
             Ok(())
         });
         progress.end();
-        result.map(|()| run.done)
+        run.done.frames.cut_short = !result?;
+        if run.done.frames.frames == 0 && !run.done.frames.cut_short {
+            return Err(VideoError::NoFrames);
+        }
+        Ok(run.done)
     }
 }
 
@@ -151,6 +163,9 @@ impl Live<'_> {
 struct Run<'r, 'l> {
     live: Live<'l>,
     layout: PlaneLayout,
+    given: Header,
+    shown: Header,
+    placed: PlacedFrames,
     progress: &'r dyn Progress,
     done: LiveSummary,
 }
@@ -176,7 +191,8 @@ impl Run<'_, '_> {
         frames: &mut FrameQueue,
     ) -> Result<Option<Vec<u8>>, VideoError> {
         let layout = self.layout;
-        let job = compensator.job(self.done.frames.size, layout.colours())?;
+        let placed = compensator.place(self.given.size())?;
+        let job = compensator.job(&placed, layout.colours())?;
         let mut engine = compensator.engine::<Planar, C>(job)?;
         let budget = self.live.budget.map(microseconds);
         let mut governor =
@@ -191,7 +207,9 @@ impl Run<'_, '_> {
             let worked = frames.work(|frame| {
                 let mut planar = Planar {
                     layout,
-                    frame: std::mem::take(frame),
+                    frame: self
+                        .placed
+                        .frame(&self.given, &self.shown, std::mem::take(frame)),
                 };
                 let clipped = engine.compensate_at(tier, &mut planar);
                 *frame = planar.frame;
@@ -241,17 +259,22 @@ impl Run<'_, '_> {
         let content = unseal(bytes)?.0;
         let table = Table::check(content)?;
         let newer = compensator.with_table(&table)?;
-        newer.job(self.done.frames.size, self.layout.colours())?;
+        let placed = newer.place(self.given.size())?;
+        if !placed.moves_like(&self.placed) {
+            return Err(VideoError::Elsewhere.into());
+        }
+        newer.job(&placed, self.layout.colours())?;
         Ok((content.to_vec(), table.id()))
     }
 }
 
 impl LiveSummary {
     /// Counts a frame.
-    fn add(&mut self, tier: u8, took: Duration, samples: usize, clipped: u64) {
+    fn add(&mut self, tier: u8, took: Duration, samples: usize, clipped: ClippedSamples) {
         self.frames.frames += 1;
         self.frames.samples += samples as u64;
-        self.frames.clipped += clipped;
+        self.frames.clipped += clipped.black + clipped.white;
+        self.frames.clipped_white += clipped.white;
         self.slowest = self.slowest.max(took);
         let tier = usize::from(tier);
         self.tiers.resize(self.tiers.len().max(tier + 1), 0);

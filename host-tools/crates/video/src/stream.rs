@@ -6,7 +6,7 @@
 
 use super::VideoError;
 use super::y4m::{Header, Reader, Writer, Y4mError, YuvFrame};
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
@@ -49,16 +49,18 @@ impl FrameQueue {
 }
 
 /// Sends the frames of `reader` through `work`, which takes them one after the other, to
-/// `output`.
+/// `output`, where they are those of `header`.
+///
+/// Says whether all frames were taken: a reader of the output that has ended is no error.
 ///
 /// # Errors
 /// What reading, `work` or writing returns. What came before it has been written.
 pub(super) fn run<R: Read + Send, W: Write + Send>(
     reader: Reader<R>,
+    header: Header,
     output: W,
     work: impl FnOnce(&mut FrameQueue) -> Result<(), VideoError>,
-) -> Result<(), VideoError> {
-    let header = reader.header().clone();
+) -> Result<bool, VideoError> {
     let (free, empty) = sync_channel(FRAMES);
     let (filled, read) = sync_channel(FRAMES);
     let (finished, done) = sync_channel(FRAMES);
@@ -77,9 +79,12 @@ pub(super) fn run<R: Read + Send, W: Write + Send>(
         let worked = work(&mut frames);
         // Both threads end when nobody is at the other end.
         drop(frames);
-        finish(writing.join())?;
+        let taken = match finish(writing.join()) {
+            Err(Y4mError::Write { source, .. }) if source.kind() == ErrorKind::BrokenPipe => false,
+            written => written.map(|()| true)?,
+        };
         finish(reading.join())?;
-        worked
+        worked.map(|()| taken)
     })
 }
 

@@ -13,13 +13,15 @@ use super::active::{Active, Asked, Lost};
 use super::args::Flash;
 use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
+use super::fit::{Fit, ask_fit, not_compensating};
 use super::interrupt;
 use super::output::{Output, read_file};
 use super::words::{self, letter, table_name};
 use crate::device::DeviceError;
 use crate::device::upload::{Parcel, Upload, UploadError, UploadPlan, UploadSummary};
 use crate::user::{Folders, begin_transcript};
-use iltm_runtime::link::{InUse, Refusal};
+use iltm_runtime::link::{Fault, InUse, Refusal};
+use iltm_runtime::trust::NoRight;
 use preflight::{Named, Now};
 use serde_json::json;
 use show::Show;
@@ -61,11 +63,23 @@ fn flash(
 ) -> Result<(), Failure> {
     let slots = connection.client.slots();
     let slots = slots.map_err(|error| connection.failed(&error))?;
+    let site = connection.authorise(arguments.key.as_deref())?;
     let parcel = Parcel::new(bytes);
     let in_use = match table.check(connection.client.device(), &slots)? {
+        Now::Send if slots.key.is_some() => {
+            table.check_signature(bytes, site.as_ref(), &slots)?;
+            if site.is_none() && !arguments.dry_run {
+                let error = DeviceError::Refused {
+                    request: "begin",
+                    refusal: Refusal::NoRight(NoRight::Missing),
+                };
+                return Err(connection.failed(&error));
+            }
+            None
+        }
         Now::Send => None,
         Now::InUse => Some(InUse {
-            table: Some(table.name),
+            table: Some(table.called.name),
             trial_ms: 0,
         }),
         Now::OnTrial => Some(on_trial(arguments, table, &parcel, connection)?),
@@ -103,7 +117,7 @@ fn flash(
     let in_use = bring(connection, &parcel, &plan, &mut ending, &mut lost)?;
     lost.asked = Asked::Confirmation;
     let ended = ending.end(connection, in_use, "is in use");
-    ended.map_err(|failure| match failure.active {
+    ended.map_err(|failure| match failure.active.as_deref() {
         Some(Active::Unknown) => failure.with(Active::Lost(lost)),
         _ => failure,
     })
@@ -210,7 +224,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
         "port": connection.port,
         "baud": connection.baud,
         "board": connection.client.device().board.as_str(),
-        "table": table_name(Some(table.name)),
+        "table": table_name(Some(table.called)),
         "bytes": table.bytes,
         "slot": slot.to_string(),
         "sectors": sectors,
@@ -231,7 +245,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
     };
     output.people(&format!(
         "table    {}, {} bytes, {}\ndevice   {} at {}\nin use   {}\nslot {slot}   {what}\n",
-        table.name,
+        table.called,
         table.bytes,
         table.signer(),
         connection.client.device().board,
@@ -256,6 +270,29 @@ fn duration(seconds: f64) -> String {
     }
 }
 
+/// An error once the table was in use. A device that has restarted since then has ended the
+/// trial.
+fn after_activation(connection: &mut Connection, error: &DeviceError) -> Failure {
+    let mut failure = connection.failed_with_table(error);
+    if let DeviceError::Refused {
+        refusal: Refusal::HelloFirst,
+        ..
+    } = error
+    {
+        let status = connection.client.status().ok();
+        let watchdog = match status.map(|status| status.last_fault) {
+            Some(Some(Fault::Watchdog)) => " (its watchdog restarted it)",
+            _ => "",
+        };
+        failure.message = format!(
+            "{}: the device has restarted{watchdog}, and a trial ends with a restart",
+            connection.port
+        );
+        "Flash again.".clone_into(&mut failure.next_step);
+    }
+    failure
+}
+
 /// What is left to do once the device uses the table.
 struct Ending<'a> {
     arguments: &'a Flash,
@@ -273,9 +310,9 @@ impl Ending<'_> {
         in_use: InUse,
         how: &str,
     ) -> Result<(), Failure> {
-        let name = self.table.name;
+        let table = self.table.called;
         let mut trial_ms = in_use.trial_ms;
-        if in_use.table.is_none_or(|used| used.id != name.id) {
+        if in_use.table.is_none_or(|used| used.id != table.name.id) {
             let message = format!("{}: the device uses another table by now", connection.port);
             return Err(Failure::new(Kind::Device, message, "Run `iltm status`."));
         }
@@ -283,18 +320,30 @@ impl Ending<'_> {
             self.output
                 .event(&json!({ "event": "trial", "seconds": trial_ms.div_ceil(1_000) }));
         }
+        let fit = ask_fit(&mut connection.client);
+        let fit = fit.map_err(|error| after_activation(connection, &error))?;
+        if let Fit::PassThrough(status) = &fit {
+            let slots = connection.client.slots().ok();
+            let failure = not_compensating(&connection.port, table, status, slots.as_ref());
+            if trial_ms > 0 && !self.dry_run {
+                let back = connection.client.rollback(table.name.id);
+                back.map_err(|error| connection.failed_with_table(&error))?;
+            }
+            return Err(failure);
+        }
         if self.arguments.confirm && trial_ms > 0 && !self.dry_run {
-            let kept = connection.client.confirm(name.id);
-            kept.map_err(|error| connection.failed_with_table(&error))?;
+            let kept = connection.client.confirm(table.name.id);
+            kept.map_err(|error| after_activation(connection, &error))?;
             trial_ms = 0;
         }
         let mut text = match (trial_ms, self.arguments.confirm && in_use.trial_ms > 0) {
-            (0, true) => format!("Table {name} {how}, confirmed.\n"),
-            (0, false) => format!("Table {name} {how}.\n"),
+            (0, true) => format!("Table {table} {how}, confirmed.{}\n", fit.remark()),
+            (0, false) => format!("Table {table} {how}.{}\n", fit.remark()),
             (trial_ms, _) => format!(
-                "Table {name} {how}, on trial for {} s. Look at the wall, then run `iltm confirm`;\n\
-                 without it the device goes back to what it showed before. `iltm rollback` does so now.\n",
-                trial_ms.div_ceil(1_000)
+                "Table {table} {how}, on trial for {} s. Look at the wall, then run `iltm confirm`;\n\
+                 without it the device goes back to what it showed before. `iltm rollback` does so now.{}\n",
+                trial_ms.div_ceil(1_000),
+                fit.remark()
             ),
         };
         if self.dry_run {
@@ -303,8 +352,9 @@ impl Ending<'_> {
         let data = json!({
             "event": "done",
             "dry_run": self.dry_run,
-            "active": Active::Known { table: Some(name), trial_ms }.data(),
+            "active": Active::Known { table: Some(table), trial_ms }.data(),
             "confirmed": trial_ms == 0,
+            "compensating": fit.data(),
             "sent": self.summary.sent,
             "skipped": self.summary.skipped,
             "restarts": self.summary.restarts,

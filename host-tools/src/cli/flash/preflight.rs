@@ -2,11 +2,13 @@
 
 use super::super::failure::{Failure, Kind};
 use super::super::tables::check_sealed;
-use super::super::words::{key_id, uses};
+use super::super::words::{CalledTable, key_id, uses};
+use crate::compile::sign::is_signed_by;
 use crate::device::rejection_next_step;
+use ed25519_dalek::VerifyingKey;
 use iltm_runtime::{
     image::{Seal, layout::FORMAT_VERSION},
-    link::{Hello, Slots, TableName},
+    link::{FrameKind, Hello, Slots, TableAbout, TableName},
     trust::Rejected,
 };
 use std::path::{Path, PathBuf};
@@ -15,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub(super) struct Named {
     path: PathBuf,
-    pub(super) name: TableName,
+    pub(super) called: CalledTable,
     pub(super) bytes: usize,
     cells: usize,
     seal: Option<Seal>,
@@ -38,9 +40,19 @@ impl Named {
         let (table, seal) = check_sealed(path, bytes)?;
         Ok(Self {
             path: path.to_owned(),
-            name: TableName {
-                id: table.id(),
-                version: seal.map_or(0, |seal| seal.version),
+            called: CalledTable {
+                name: TableName {
+                    id: table.id(),
+                    version: seal.map_or(0, |seal| seal.version),
+                },
+                about: Some(TableAbout {
+                    label: *table.label(),
+                    frames: FrameKind {
+                        width: table.grid().cols() as u16,
+                        height: table.grid().rows() as u16,
+                        channels: table.channels(),
+                    },
+                }),
             },
             bytes: bytes.len(),
             cells: table.grid().cells(),
@@ -56,10 +68,10 @@ impl Named {
         )
     }
 
-    /// Whether the device will take it, as far as that can be told from here: the
-    /// signature itself is the device's to verify.
+    /// Whether the device will take it, as far as its terms tell;
+    /// [`check_signature`](Self::check_signature) looks at the signature.
     pub(super) fn check(&self, device: &Hello, slots: &Slots) -> Result<Now, Failure> {
-        if uses(slots, self.name, self.bytes) {
+        if uses(slots, self.called.name, self.bytes) {
             if slots.trial_ms > 0 {
                 return Ok(Now::OnTrial);
             }
@@ -111,6 +123,28 @@ impl Named {
             ),
             None => Ok(Now::Send),
         }
+    }
+
+    /// Whether the signature is good, where the public key is known: the device would say
+    /// so only when all has been sent.
+    pub(super) fn check_signature(
+        &self,
+        file: &[u8],
+        site: Option<&VerifyingKey>,
+        slots: &Slots,
+    ) -> Result<(), Failure> {
+        let same = |key: &&VerifyingKey| slots.key == Some(Seal::key_id(key.as_bytes()));
+        let good = match (site.filter(same), &self.seal) {
+            (Some(site), Some(seal)) => is_signed_by(file, seal, site),
+            _ => true,
+        };
+        if good {
+            return Ok(());
+        }
+        let rejected = Rejected::Signature;
+        let message = format!("{}: {rejected}", self.path.display());
+        let next_step = rejection_next_step(&rejected);
+        Err(Failure::new((&rejected).into(), message, next_step))
     }
 
     /// A device decides on one table at a time.

@@ -2,13 +2,15 @@
 
 use super::super::words;
 use crate::device::logs::LogMessage;
-use iltm_runtime::link::{Event, Hello, TableReason, TierReason};
+use iltm_runtime::link::{Event, Hello, Slots, TierReason};
 use serde_json::{Value, json};
 
 /// Something that happened to or at a device.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum MonitorEvent {
     Connected(Hello),
+    /// What is in the slots, and how long the table in use is on trial yet.
+    Slots(Box<Slots>),
     /// The device says so.
     Device(Event),
     Log(LogMessage),
@@ -37,6 +39,14 @@ impl MonitorEvent {
                     device.board, device.firmware
                 )
             }
+            Self::Slots(slots) => match words::in_use(slots) {
+                Some(table) if slots.trial_ms > 0 => format!(
+                    "table {table} is on trial for {} s more",
+                    slots.trial_ms.div_ceil(1_000)
+                ),
+                Some(table) => format!("table {table} is in use"),
+                None => "no table is in use".to_owned(),
+            },
             Self::Device(event) => match event {
                 Event::Status(_) => return None,
                 Event::TierChanged {
@@ -77,6 +87,11 @@ impl MonitorEvent {
             Self::Connected(device) => {
                 let mut data = words::identity(device);
                 data["event"] = json!("connected");
+                data
+            }
+            Self::Slots(slots) => {
+                let mut data = words::slots_data(slots);
+                data["event"] = json!("slots");
                 data
             }
             Self::Device(event) => from_device(event),
@@ -127,12 +142,7 @@ fn from_device(event: &Event) -> Value {
         } => json!({
             "event": "table",
             "table": words::table_name(*table),
-            "reason": match reason {
-                TableReason::Trial => "trial",
-                TableReason::Confirmed => "confirmed",
-                TableReason::TrialOver => "trial-over",
-                TableReason::RolledBack => "rolled-back",
-            },
+            "reason": words::table_reason(*reason),
             "frame": frame,
         }),
     }

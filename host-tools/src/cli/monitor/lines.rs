@@ -5,7 +5,7 @@ use super::super::words;
 use super::Show;
 use super::event::MonitorEvent;
 use super::view::Rates;
-use iltm_runtime::link::Event;
+use iltm_runtime::link::{Event, Slots, TableName};
 use std::io::{self, Write};
 
 /// One JSON object a line.
@@ -22,6 +22,9 @@ impl Show for Json {
 #[derive(Debug, Default)]
 pub(super) struct Plain {
     rates: Rates,
+    /// The table in use and whether it is on trial, as last said.
+    table: Option<(Option<TableName>, bool)>,
+    trial_s: u32,
     /// Whether it was said that there is a log that cannot be read.
     hinted: bool,
 }
@@ -33,10 +36,14 @@ impl Show for Plain {
                 self.rates.add(status);
                 let time = status.frame_time;
                 line(&format!(
-                    "{} {}, tier {} of {}, {}, \
+                    "{} {}{}, tier {} of {}, {}, \
                      {:.1} of {:.1} ms, {:.2} % clipped, {} late, {} dropped, {} broken",
                     words::duration(status.uptime_ms),
                     status.mode,
+                    match self.trial_s {
+                        0 => String::new(),
+                        left => format!(", {left} s of trial left"),
+                    },
                     status.tier,
                     status.top_tier,
                     self.rates.words(),
@@ -52,9 +59,23 @@ impl Show for Plain {
                 self.rates = Rates::default();
                 line(&event.words().unwrap_or_default())
             }
+            MonitorEvent::Slots(slots) => self.slots(slots, event),
             MonitorEvent::UnreadLog { .. } if std::mem::replace(&mut self.hinted, true) => Ok(()),
             other => line(&other.words().unwrap_or_default()),
         }
+    }
+}
+
+impl Plain {
+    /// Says which table is in use where that has changed.
+    fn slots(&mut self, slots: &Slots, event: &MonitorEvent) -> io::Result<()> {
+        self.trial_s = slots.trial_ms.div_ceil(1_000);
+        let table = words::in_use(slots).map(|table| table.name);
+        let now = Some((table, slots.trial_ms > 0));
+        if std::mem::replace(&mut self.table, now) == now {
+            return Ok(());
+        }
+        line(&event.words().unwrap_or_default())
     }
 }
 

@@ -171,10 +171,16 @@ impl<'l> MonitoredDevice<'l> {
     fn until_lost(&mut self, show: &mut dyn Show) -> io::Result<Option<DeviceError>> {
         // What was queued during the subscription comes out at once.
         let mut renew = Instant::now() + self.renewal;
+        if let Err(error) = self.ask_slots(show)? {
+            return Ok(Some(error));
+        }
         while !interrupt::stopped() {
             if Instant::now() >= renew {
                 renew = Instant::now() + self.renewal;
                 if let Err(error) = self.client.subscribe(self.period) {
+                    return Ok(Some(error));
+                }
+                if let Err(error) = self.ask_slots(show)? {
                     return Ok(Some(error));
                 }
             }
@@ -187,6 +193,18 @@ impl<'l> MonitoredDevice<'l> {
         // The device would stop by itself; asking is kinder to whoever is next.
         let _ = self.client.subscribe(Duration::ZERO);
         Ok(None)
+    }
+
+    /// Names of tables and the time left of a trial, which a status does not say.
+    fn ask_slots(&mut self, show: &mut dyn Show) -> io::Result<Result<(), DeviceError>> {
+        match self.client.slots() {
+            Ok(slots) => show.show(&MonitorEvent::Slots(Box::new(slots))).map(Ok),
+            Err(DeviceError::Refused {
+                refusal: Refusal::ReadOnly,
+                ..
+            }) => Ok(Ok(())),
+            Err(error) => Ok(Err(error)),
+        }
     }
 
     fn show(&self, incoming: Incoming, show: &mut dyn Show) -> io::Result<()> {

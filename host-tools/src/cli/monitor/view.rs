@@ -5,8 +5,9 @@ use super::super::words;
 use super::event::MonitorEvent;
 use chrono::Local;
 use console::{StyledObject, style, truncate_str};
-use iltm_runtime::link::{Event, Hello, Mode, Status};
+use iltm_runtime::link::{Event, Hello, Mode, Slots, Status};
 use std::collections::VecDeque;
+use std::time::Instant;
 
 /// Events and log lines that are kept: more than any terminal has rows.
 const KEPT: usize = 200;
@@ -56,6 +57,8 @@ pub(super) struct View {
     port: String,
     device: Option<Hello>,
     status: Option<Status>,
+    /// And when the device said so.
+    slots: Option<(Slots, Instant)>,
     rates: Rates,
     lost: Option<String>,
     events: VecDeque<String>,
@@ -68,6 +71,7 @@ impl View {
             port: port.to_owned(),
             device: None,
             status: None,
+            slots: None,
             rates: Rates::default(),
             lost: None,
             events: VecDeque::new(),
@@ -81,6 +85,9 @@ impl View {
             MonitorEvent::Device(Event::Status(status)) => {
                 self.rates.add(status);
                 self.status = Some(status.clone());
+            }
+            MonitorEvent::Slots(slots) => {
+                self.slots = Some(((**slots).clone(), Instant::now()));
             }
             MonitorEvent::Connected(device) => {
                 self.device = Some(device.clone());
@@ -150,7 +157,7 @@ impl View {
         list(&mut lines, "events", &self.events, rest - for_log);
         list(&mut lines, "log", &self.log, for_log);
         lines.truncate(height);
-        let cut = |line: &String| truncate_str(line, width, "").into_owned();
+        let cut = |line: &String| truncate_str(line, width, "…").into_owned();
         lines.iter().map(cut).collect()
     }
 
@@ -177,11 +184,26 @@ impl View {
         let Some(status) = &self.status else {
             return style("waiting for the first status").dim().to_string();
         };
+        let slots = self.slots.as_ref().map(|(slots, _)| slots);
+        let mode = style(words::mode(status, slots));
         let mode = match status.mode {
-            Mode::Compensating => style(status.mode.to_string()).green(),
-            Mode::PassThrough(_) => style(status.mode.to_string()).yellow(),
+            Mode::Compensating => mode.green(),
+            Mode::PassThrough(_) => mode.red(),
         };
-        format!("{mode}, up {}", words::duration(status.uptime_ms))
+        let trial = match self.trial_s() {
+            0 => String::new(),
+            left => format!(", {}", style(format!("{left} s of trial left")).yellow()),
+        };
+        format!("{mode}{trial}, up {}", words::duration(status.uptime_ms))
+    }
+
+    /// Seconds that the table in use is on trial yet.
+    fn trial_s(&self) -> u64 {
+        let left = self.slots.as_ref().map_or(0, |(slots, asked)| {
+            let since = u64::try_from(asked.elapsed().as_millis()).unwrap_or(u64::MAX);
+            u64::from(slots.trial_ms).saturating_sub(since)
+        });
+        left.div_ceil(1_000)
     }
 
     fn figures(&self, status: &Status) -> Vec<String> {
@@ -244,7 +266,7 @@ impl View {
                 "table",
                 format!(
                     "{}   slots {}",
-                    words::table_in_use(status),
+                    words::table_in_use(status, self.slots.as_ref().map(|(slots, _)| slots)),
                     words::slot_states(status)
                 ),
             ),
@@ -338,8 +360,10 @@ fn ladder(tier: u8, top: u8) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use iltm_runtime::link::{Device, Fault, FaultyFrame, Mode, PassThrough, TierReason};
-    use iltm_tests::fake_device::FakeDevice;
+    use iltm_runtime::link::{
+        Device, Fault, FaultyFrame, Mode, PassThrough, Request, Response, TierReason,
+    };
+    use iltm_tests::fake_device::{FakeDevice, FakeTables};
 
     /// The view without its times of day.
     fn shown(view: &View, width: usize, height: usize) -> String {
@@ -401,6 +425,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_of_a_trial_counts_down() {
+        let mut view = View::new("/dev/ttyACM0");
+        view.take(&MonitorEvent::Device(Event::Status(status(4_000))));
+        let mut device = FakeDevice::with_tables(FakeTables::default());
+        let Response::Slots(mut slots) = device.carry_out(Request::Slots, 0) else {
+            panic!("not to a question for the slots");
+        };
+        slots.trial_ms = 77_000;
+        view.take(&MonitorEvent::Slots(Box::new(slots.clone())));
+        assert!(view.lines(80, 24)[1].contains(", 77 s of trial left, up"));
+        slots.trial_ms = 0;
+        view.take(&MonitorEvent::Slots(Box::new(slots)));
+        assert!(!view.lines(80, 24)[1].contains("trial"));
+    }
+
+    #[test]
     fn a_lost_device_says_so_until_it_is_back() {
         let mut view = View::new("/dev/ttyACM0");
         let connected = MonitorEvent::Connected(FakeDevice::default().identity());
@@ -433,6 +473,9 @@ mod tests {
         status.mode = Mode::PassThrough(PassThrough::NoTable);
         status.table = None;
         view.take(&MonitorEvent::Device(Event::Status(status)));
-        assert!(view.lines(80, 24)[1].contains("pass-through: there is no table"));
+        assert!(
+            view.lines(80, 24)[1]
+                .contains("NOT COMPENSATING, frames pass unchanged: there is no table")
+        );
     }
 }

@@ -100,11 +100,8 @@ fn full<const C: usize>(
 ) -> Result<([u64; 4], u32), FrameError> {
     let pipeline = FullPipeline::<C>::new(table, size)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
-    let prepared = memory.is_prepared(table, size);
-    let (mut frame, mut workspace) = memory.full(C, table.grid().cells(), size.width());
-    if !prepared {
-        pipeline.prepare(&mut frame)?;
-    }
+    let (mut frame, mut workspace) = memory.full(0, C, table.grid().cells(), size.width());
+    pipeline.prepare(&mut frame)?;
     let mut laps = Laps::new(clock);
     if pipeline.operates(tier) {
         pipeline.average_frame(ENCODING, wanted, &mut frame)?;

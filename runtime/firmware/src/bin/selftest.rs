@@ -58,6 +58,8 @@ mod order {
     pub(super) const PANIC: usize = 12;
     /// CRC-32 of every output that is to be shown from some frame on.
     pub(super) const NEW_OUTPUT: usize = 13;
+    /// Starts after which the first frame hangs. Each takes one off.
+    pub(super) const HANGS: usize = 14;
 }
 
 /// Indices of the findings.
@@ -223,6 +225,13 @@ impl FrameHooks for Orders {
     fn during_frame(&mut self, sequence: u32, tier: u8, clock: &impl Clock) {
         if sequence == self.words.load(order::HANG) {
             self.words.store(order::HANG, 0);
+            loop {
+                cortex_m::asm::nop();
+            }
+        }
+        let hangs = self.words.load(order::HANGS);
+        if hangs > 0 {
+            self.words.store(order::HANGS, hangs - 1);
             loop {
                 cortex_m::asm::nop();
             }

@@ -18,6 +18,9 @@ impl Board for Mps2 {
         "mps2-an500"
     };
 
+    /// Six frames at 24 a second.
+    const WATCHDOG_MS: u32 = 250;
+
     type Clock = Timer;
     type Source = PsramSource;
     type Sink = PsramSink;

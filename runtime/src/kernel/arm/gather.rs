@@ -28,7 +28,8 @@ struct Context {
 /// Runs `rows` rows of one number of pairs (or of any) from `words`.
 type Loop = unsafe extern "C" fn(words: *const c_void, context: *const Context, rows: u32);
 
-/// Adds rows to the sums; `false`, and nothing done, if that has to be done the plain way.
+/// Adds rows to the sums; `false`, and nothing done, if there is no loop for them: rows
+/// for all channels behind others.
 ///
 /// `fresh` says that the sums are zero. The rows are those of a segment that was checked
 /// against a grid of `sums.cells` cells, and inputs and sums have that many elements for
@@ -55,17 +56,12 @@ pub(crate) fn gather<'a>(
         *slot = scale.to_bits();
     }
     for rows in rows {
-        // Tables lie at multiples of four in flash; `ldm` needs it. What holds for the
-        // first rows of a segment holds for all.
-        if !rows.words.as_ptr().cast::<u32>().is_aligned() {
-            return false;
-        }
         // A checked segment has no rows of other lengths.
         let Some(run) = loops.get(usize::from(rows.pairs)) else {
             continue;
         };
-        // SAFETY: the segment was checked, so `words` holds `count` rows as the loop
-        // reads them, every row's index is below `sums.cells` and every pair's below
+        // SAFETY: the segment was checked, so `words` is aligned and holds `count` rows as
+        // the loop reads them, every row's index is below `sums.cells` and every pair's below
         // `sums.cells - 1`; the caller made sure that `inputs` and `sums` have
         // `sums.cells` elements for each scale. The table lies in flash that nobody
         // writes while a `Table` borrows it. Words of two inputs need no alignment.

@@ -13,9 +13,10 @@ mod state;
 use super::journal::Journal;
 use super::record::Identity;
 use super::transfer::Transfer;
+use super::wear::WearLimit;
 use super::{Map, Slot, TableSlots};
 use crate::link::{Fault, Refusal, Request, Response, SlotState, TableName, TableReason};
-use crate::trust::{Accepted, Trust};
+use crate::trust::{Accepted, Rejected, Trust};
 use embedded_storage::nor_flash::NorFlash;
 
 /// Both slots, the records, and what a host may do with them.
@@ -32,8 +33,14 @@ pub struct Updater<F> {
     tables: [Option<Accepted>; 2],
     broken: [bool; 2],
     in_use: Option<Slot>,
+    /// The slot of a table that is not used because the device crashed with it.
+    suspect: Option<Slot>,
+    /// When sectors were compared last.
+    compared_ms: Option<u64>,
     transfer: Option<Transfer>,
     trial: Option<Trial>,
+    ended: Option<Ended>,
+    wear: WearLimit,
     fault: Option<Fault>,
     change: Option<TableChange>,
 }
@@ -45,6 +52,14 @@ struct Trial {
     transfer: u32,
     /// What frames go through when it ends.
     before: Option<Slot>,
+}
+
+/// A trial that ended without confirmation.
+#[derive(Clone, Copy, Debug)]
+struct Ended {
+    table: u32,
+    reason: TableReason,
+    at_ms: u64,
 }
 
 /// Another table in use.
@@ -71,19 +86,27 @@ impl<F: NorFlash> Updater<F> {
                 Err(Refusal::KeyLost)
             }
             Request::Slots => Ok(Response::Slots(self.slots(now_ms))),
-            Request::Sectors { length, first } => self.sectors(length, first, slots),
-            Request::Begin { length, digest } => self.begin(length, digest),
+            Request::Sectors { length, first } => self.sectors(length, first, now_ms, slots),
+            Request::Begin {
+                length,
+                digest,
+                right,
+            } => self.begin(length, digest, right, slots),
             Request::Write {
                 transfer,
                 offset,
                 bytes,
-            } => self.write(transfer, offset, bytes, slots),
+            } => self.write(transfer, offset, bytes, now_ms, slots),
             Request::Activate { transfer, trial_s } => {
                 self.activate(transfer, trial_s, now_ms, slots)
             }
-            Request::Confirm { table } => self.confirm(table, now_ms),
-            Request::Rollback { table } => self.roll_back(table, now_ms, slots),
-            Request::Provision { key, device } => self.provision(Identity { key, device }, slots),
+            Request::Confirm { table, right } => self.confirm(table, right, now_ms, slots),
+            Request::Rollback { table, right } => self.roll_back(table, right, now_ms, slots),
+            Request::Provision {
+                key,
+                device,
+                even_so,
+            } => self.provision(Identity { key, device }, even_so, slots),
             // The session answers these.
             Request::Hello { .. } | Request::Status | Request::Subscribe { .. } => {
                 Err(Refusal::Unknown)
@@ -95,8 +118,32 @@ impl<F: NorFlash> Updater<F> {
     /// Ends a trial whose time is over.
     pub fn poll(&mut self, now_ms: u64, slots: &mut impl TableSlots<F>) {
         if let Some(trial) = self.trial.filter(|trial| now_ms >= trial.ends_ms) {
-            self.end_trial(trial, TableReason::TrialOver, slots);
+            self.end_trial(trial, TableReason::TrialOver, now_ms, slots);
         }
+    }
+
+    /// The table in use is no longer what was checked: bits have rotted under it. Frames
+    /// go through the one that was confirmed before it, if that is still whole, or pass.
+    pub fn abandon(&mut self, slots: &mut impl TableSlots<F>) {
+        let Some(slot) = self.in_use else {
+            return;
+        };
+        self.trial = None;
+        self.transfer = None;
+        *slot.of_mut(&mut self.tables) = None;
+        *slot.of_mut(&mut self.broken) = true;
+        let cause = Rejected::Damaged;
+        self.fault = Some(Fault::Table {
+            slot: slot as u8,
+            cause,
+        });
+        let other = slot.other();
+        let there = *other.of(&self.tables);
+        let there = there.filter(|there| self.has_counted(other, there.id));
+        let terms = self.terms();
+        let taken = there.filter(|there| self.take(other, there.length, &terms, slots).is_ok());
+        self.use_slot(taken.map(|_| other), TableReason::Damaged, slots);
+        slots.unload(slot);
     }
 
     /// The last change that nobody has asked for yet.
@@ -160,7 +207,7 @@ impl<F: NorFlash> Updater<F> {
             } else if slot.of(&self.tables).is_none() {
                 SlotState::Empty
             } else if self.in_use != Some(slot) {
-                SlotState::Valid
+                self.state_of_other(slot)
             } else if self.trial.is_some() {
                 SlotState::Trial
             } else {

@@ -6,15 +6,28 @@ use crate::link::{Fault, PassThrough};
 use crate::store::identity::Found;
 use crate::store::journal::Journal;
 use crate::store::record::{Commit, Identity};
+use crate::store::wear::WearLimit;
 use crate::store::{Map, Slot, TableSlots, flash, identity};
-use crate::trust::{Rejected, Terms, Trust};
+use crate::trust::{Accepted, Rejected, Terms, Trust};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<F: NorFlash> Updater<F> {
     /// After a start: finds the table that counts, checks it and has it used; with
     /// the other one if that fails, or none.
+    pub fn start(flash: F, map: Map, slots: &mut impl TableSlots<F>) -> Self {
+        Self::start_after(false, flash, map, slots)
+    }
+
+    /// [`start`](Self::start) of a device that may have crashed again and again: then the
+    /// table that counts is neither looked at nor used, nor is another one in its place,
+    /// which may be to blame as little or as much. The next table goes into its slot.
     #[inline(never)]
-    pub fn start(mut flash: F, map: Map, slots: &mut impl TableSlots<F>) -> Self {
+    pub fn start_after(
+        crashes: bool,
+        mut flash: F,
+        map: Map,
+        slots: &mut impl TableSlots<F>,
+    ) -> Self {
         let journal = Journal::find(&mut flash, map.records());
         let found = identity::find(&mut flash, map.identity(), journal.last());
         let trust = match found {
@@ -35,16 +48,26 @@ impl<F: NorFlash> Updater<F> {
             tables: [None; 2],
             broken: [false; 2],
             in_use: None,
+            suspect: None,
+            compared_ms: None,
             transfer: None,
             trial: None,
+            ended: None,
+            wear: WearLimit::new(map.slot_bytes() / map.sector().max(1)),
             fault: None,
             change: None,
         };
         updater.settle();
+        if crashes {
+            let counts = updater.journal.last().and_then(|last| last.table);
+            updater.suspect = Some(counts.map_or(Slot::A, |(slot, _)| slot));
+        }
         for slot in Slot::ALL {
             updater.look(slot, slots);
         }
-        updater.in_use = updater.choose();
+        if !crashes {
+            updater.in_use = updater.choose();
+        }
         if updater.has_lost_key {
             updater.fault = Some(Fault::KeyLost);
         }
@@ -75,14 +98,22 @@ impl<F: NorFlash> Updater<F> {
         }
         let last = self.journal.last();
         let meant = last.and_then(|last| last.table);
-        if self.has_lost_key && meant.is_none_or(|(meant, _)| meant != slot) {
-            // Who signed it cannot be told. What was confirmed may run on.
+        let unknown = self.has_lost_key && meant.is_none_or(|(meant, _)| meant != slot);
+        // Without a record, which of the two was used is not known.
+        let suspect = self.suspect.is_some_and(|it| it == slot || meant.is_none());
+        if unknown || suspect {
+            // Who signed it cannot be told, while what was confirmed may run on; or the
+            // check itself may be what the device crashes in.
             *slot.of_mut(&mut self.broken) = true;
             return;
         }
         let noted = last.map(|last| *slot.of(&last.lengths));
-        let length = noted.filter(|length| *length > 0);
-        let loaded = slots.load(&self.flash, slot, length, &self.terms());
+        let noted = noted.filter(|length| *length > 0);
+        let mut loaded = self.load(slot, noted, slots);
+        // The length is that of the table before, if this one was on trial at a restart.
+        if loaded.is_err() && noted.is_some() && meant.is_none_or(|(meant, _)| meant != slot) {
+            loaded = self.load(slot, None, slots);
+        }
         let loaded = loaded.and_then(|accepted| match meant {
             // Something else was put there past this code.
             Some((meant, id)) if meant == slot && id != accepted.id => {
@@ -102,6 +133,28 @@ impl<F: NorFlash> Updater<F> {
                 }
             }
         }
+    }
+
+    /// Checks the file of this length, or of the one that it states itself.
+    fn load(
+        &mut self,
+        slot: Slot,
+        length: Option<u32>,
+        slots: &mut impl TableSlots<F>,
+    ) -> Result<Accepted, Rejected> {
+        let part = self.map.slot(slot);
+        // It will be read like memory: flash with ECC faults there at a unit that was cut, where
+        // [`read`](embedded_storage::nor_flash::ReadNorFlash::read) gives an error.
+        let bytes = length.unwrap_or(part.length);
+        let readable = flash::read(&mut self.flash, part, 0, bytes, |_| {
+            slots.yield_now();
+            true
+        });
+        if readable.is_err() {
+            slots.unload(slot);
+            return Err(Rejected::Damaged);
+        }
+        slots.load(&self.flash, slot, length, &self.terms())
     }
 
     /// The table that counts; where it cannot be used, the other one. Without any
@@ -125,7 +178,9 @@ impl<F: NorFlash> Updater<F> {
 
     /// Why no table is in use.
     pub(super) fn absence(&self) -> PassThrough {
-        if self.fault.is_some() {
+        if self.suspect.is_some() {
+            PassThrough::CrashLoop
+        } else if self.fault.is_some() {
             PassThrough::BrokenTable
         } else {
             PassThrough::NoTable

@@ -1,9 +1,10 @@
 //! State of an updater: the slot in use, the trial, the record that counts.
 
-use super::{TableChange, Trial, Updater};
-use crate::link::{InUse, Refusal, Response, TableName, TableReason};
+use super::{Ended, TableChange, Trial, Updater};
+use crate::link::{InUse, Refusal, Response, SlotState, TableName, TableReason};
 use crate::store::record::Commit;
 use crate::store::{Slot, StoreError, TableSlots};
+use crate::trust::{Deed, allows};
 use embedded_storage::nor_flash::NorFlash;
 
 impl<F: NorFlash> Updater<F> {
@@ -21,12 +22,24 @@ impl<F: NorFlash> Updater<F> {
 
     /// The slot that the next table goes to: not the one in use.
     pub(super) fn target(&self) -> Slot {
-        self.in_use.map_or(Slot::A, Slot::other)
+        match (self.in_use, self.suspect) {
+            (Some(slot), _) => slot.other(),
+            (None, Some(suspect)) => suspect,
+            (None, None) => Slot::A,
+        }
     }
 
-    /// The lowest version of a table that may come: not below the one that counts,
-    /// and not a revoked one. Without a key nobody vouches for versions: any. With a
-    /// lost one, none.
+    /// Whether the table of this id in a slot was confirmed, last or before.
+    pub(super) fn has_counted(&self, slot: Slot, id: u32) -> bool {
+        self.journal.last().is_some_and(|last| match last.table {
+            Some((counts, table)) if counts == slot => table == id,
+            _ => last.other == Some(id),
+        })
+    }
+
+    /// The lowest version of a table that may come: not below the one in use, not below
+    /// any that was ever confirmed, and not a revoked one. Without a key nobody vouches for
+    /// versions: any. With a lost one, none.
     pub(super) fn oldest(&self) -> u32 {
         if self.has_lost_key {
             return u32::MAX;
@@ -35,7 +48,8 @@ impl<F: NorFlash> Updater<F> {
             return 0;
         }
         let used = self.in_use.and_then(|slot| *slot.of(&self.tables));
-        let floor = self.terms().floor;
+        let last = self.journal.last().unwrap_or_default();
+        let floor = last.floor.max(last.newest);
         used.map_or(floor, |table| table.version.max(floor))
     }
 
@@ -51,9 +65,15 @@ impl<F: NorFlash> Updater<F> {
         &mut self,
         trial: Trial,
         reason: TableReason,
+        now_ms: u64,
         slots: &mut impl TableSlots<F>,
     ) {
         self.trial = None;
+        self.ended = self.table().map(|table| Ended {
+            table: table.id,
+            reason,
+            at_ms: now_ms,
+        });
         self.use_slot(trial.before, reason, slots);
     }
 
@@ -96,8 +116,54 @@ impl<F: NorFlash> Updater<F> {
             lengths: Slot::ALL.map(|slot| slot.of(&self.tables).map_or(0, |table| table.length)),
             erases: self.erases,
             has_key: self.trust.key.is_some(),
+            newest: self.newest(slot),
         };
         self.append(commit)
+    }
+
+    /// The highest version ever confirmed, once the table of this slot is.
+    fn newest(&self, slot: Option<Slot>) -> u32 {
+        let newest = self.journal.last().map_or(0, |last| last.newest);
+        if self.trust.key.is_none() {
+            return newest;
+        }
+        let version = slot.and_then(|slot| slot.of(&self.tables).map(|table| table.version));
+        newest.max(version.unwrap_or(0))
+    }
+
+    /// How a whole table is that is not in use.
+    pub(super) fn state_of_other(&self, slot: Slot) -> SlotState {
+        let id = slot.of(&self.tables).map(|table| table.id);
+        let confirmed = self.journal.last().is_none_or(|last| {
+            let counts = last.table.filter(|(counts, _)| *counts == slot);
+            counts.map_or(last.other, |(_, id)| Some(id)) == id
+        });
+        if confirmed {
+            SlotState::Valid
+        } else {
+            SlotState::Unconfirmed
+        }
+    }
+
+    /// What the next right must be signed for: the number of the next record.
+    pub(super) fn sequence(&self) -> u32 {
+        let last = self.journal.last();
+        last.map_or(0, |last| last.sequence.saturating_add(1))
+    }
+
+    /// Whether a request shows the right to do this.
+    #[inline(never)]
+    pub(super) fn need_right(
+        &self,
+        right: &[u8],
+        deed: &Deed,
+        slots: &mut impl TableSlots<F>,
+    ) -> Result<(), Refusal> {
+        let terms = self.terms();
+        // Of the same type as for the check of a table: signatures are verified by one function.
+        let yield_now: &mut dyn FnMut() = &mut || slots.yield_now();
+        let allowed = allows(right, deed, self.sequence(), &terms, yield_now);
+        allowed.map_err(Refusal::NoRight)
     }
 
     /// Writes the record that counts once more; it says then whether there is a key.

@@ -16,13 +16,15 @@ mod wire;
 
 pub(super) use op::OP;
 
-use super::files::{Owner, files};
-use crate::flash_simulator::{NorSimulator, Violations};
+use super::files::{Owner, files, keys, signer};
+use crate::flash_simulator::{NorSimulator, Violations, Wear};
 use crate::slots::{SimDevice, SlotLayout};
+use ed25519_dalek::{Signer, SigningKey};
 use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
 use iltm_runtime::store::Slot;
+use iltm_runtime::trust::{Certificate, Deed};
 use model::{Model, Record, Sizes};
-use op::{MAX_OPS, Op, Twist, Which};
+use op::{MAX_OPS, Op, Proof, Twist, Which};
 use wire::{Noise, Said, Wire, framed, payload};
 
 /// What happens to a device: the first byte says what its flash is like, every four
@@ -70,6 +72,14 @@ fn live<const W: usize, const E: usize>(slot: usize, weak: bool, ops: impl Itera
     trial.restart();
 }
 
+/// What is wrong with a flash.
+struct Harm {
+    /// Bits that a cut caught in motion read as either.
+    weak: bool,
+    /// Records or the key's sector are worn: a request that writes there may be refused.
+    worn: bool,
+}
+
 /// A device, its models, and the host's end of the line.
 struct Trial<const W: usize, const E: usize> {
     wire: Option<Wire<W, E>>,
@@ -86,7 +96,7 @@ struct Trial<const W: usize, const E: usize> {
     last: Option<Held>,
     /// The last request was answered, and nothing has happened since.
     fresh: bool,
-    weak: bool,
+    harm: Harm,
     /// Steps of the flash in a request until the power fails.
     cut_after: Option<u64>,
 }
@@ -123,7 +133,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             together: 0,
             last: None,
             fresh: false,
-            weak,
+            harm: Harm { weak, worn: false },
             cut_after: None,
         }
     }
@@ -144,27 +154,37 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             Op::Slots => self.request(&Request::Slots),
             Op::Subscribe { period_ms } => self.request(&Request::Subscribe { period_ms }),
             Op::Sectors { length, first } => self.request(&Request::Sectors { length, first }),
-            Op::Begin { file, more } => self.begin(file, more),
+            Op::Begin { file, more, proof } => self.begin(file, more, proof),
             Op::Write { file, chunk, twist } => self.write(file, chunk, twist),
             Op::Send { file, sparing } => self.send(file, sparing),
             Op::Activate { file, trial_s } => {
                 let transfer = files()[file].digest.transfer();
                 self.request(&Request::Activate { transfer, trial_s });
             }
-            Op::Confirm { table } => {
+            Op::Confirm { table, proof } => {
                 let table = self.which(table);
-                self.request(&Request::Confirm { table });
+                let right = &self.right(&Deed::Confirm { table }, proof);
+                self.request(&Request::Confirm { table, right });
             }
-            Op::Rollback { table } => {
+            Op::Rollback { table, proof } => {
                 let table = self.which(table);
-                self.request(&Request::Rollback { table });
+                let right = &self.right(&Deed::Rollback { table }, proof);
+                self.request(&Request::Rollback { table, right });
             }
-            Op::Provision { key, device } => self.request(&Request::Provision { key, device }),
+            Op::Provision {
+                key,
+                device,
+                even_so,
+            } => self.request(&Request::Provision {
+                key,
+                device,
+                even_so,
+            }),
             Op::Again => self.again(fresh),
             Op::Together { count } => {
                 self.flush();
-                // Which of several requests was cut is hard to tell.
-                if self.cut_after.is_none() {
+                // Which of several requests was cut or refused is hard to tell.
+                if self.cut_after.is_none() && !self.harm.worn {
                     self.together = count;
                 }
             }
@@ -182,6 +202,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             }
             Op::Rot { slot, at, bits } => self.rot(slot, at, bits),
             Op::RotRecords { bits } => self.rot_records(bits),
+            Op::Wear { sector, how } => self.wear(sector, how),
             Op::Put { slot, file } => self.put(slot, file),
         }
     }
@@ -212,12 +233,61 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         }
     }
 
-    fn begin(&mut self, file: usize, more: i32) {
+    fn begin(&mut self, file: usize, more: i32, proof: Proof) {
         let file = &files()[file];
+        let length = (file.bytes.len() as u32).saturating_add_signed(more);
+        let digest = file.digest;
+        let right = &self.right(&Deed::Begin { length, digest }, proof);
         self.request(&Request::Begin {
-            length: (file.bytes.len() as u32).saturating_add_signed(more),
-            digest: file.digest,
+            length,
+            digest,
+            right,
         });
+    }
+
+    /// What the device wants to see signed next.
+    fn sequence(&mut self) -> u32 {
+        match self.wire().device.ask(Request::Slots) {
+            Response::Slots(slots) => slots.sequence,
+            other => panic!("not to a question for the slots: {other:?}"),
+        }
+    }
+
+    /// A right, or something like it, to do this on the device as it is now.
+    fn right(&mut self, deed: &Deed, proof: Proof) -> Vec<u8> {
+        let sequence = self.sequence();
+        let Some(owner) = self.model().owner else {
+            return vec![7; 64];
+        };
+        // Nobody has the third key.
+        let site = signer((keys()[1] == owner.key).into());
+        let stranger = signer(4);
+        let by = |key: &SigningKey, sequence| {
+            let signature = key.sign(&deed.message(owner.device, sequence));
+            signature.to_bytes().to_vec()
+        };
+        let certified = |by: &SigningKey, device, version| {
+            let mut certificate = Certificate {
+                key: stranger.verifying_key().to_bytes(),
+                device,
+                version,
+                signature: [0; 64],
+            };
+            certificate.signature = by.sign(&certificate.message()).to_bytes();
+            certificate.emit().to_vec()
+        };
+        match proof {
+            Proof::Owner => by(&site, sequence),
+            Proof::Technician { device, version } => {
+                [by(&stranger, sequence), certified(&site, device, version)].concat()
+            }
+            Proof::Stranger { certified: false } => by(&stranger, sequence),
+            Proof::Stranger { certified: true } => {
+                [by(&stranger, sequence), certified(&stranger, 0, 9)].concat()
+            }
+            Proof::Stale => by(&site, sequence.wrapping_sub(1)),
+            Proof::None { length } => by(&site, sequence)[..length].to_vec(),
+        }
     }
 
     fn chunk(&mut self) -> usize {
@@ -250,7 +320,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
     }
 
     fn send(&mut self, file: usize, sparing: bool) {
-        self.begin(file, 0);
+        self.begin(file, 0, Proof::Owner);
         let size = self.chunk();
         let sector = self.wire().device.updater.map().sector() as usize;
         let file = &files()[file];
@@ -303,10 +373,14 @@ impl<const W: usize, const E: usize> Trial<W, E> {
                 length: 300,
                 first: 1,
             },
-            Request::Confirm { table: 77 },
+            Request::Confirm {
+                table: 77,
+                right: &[],
+            },
             Request::Provision {
                 key: [9; 32],
                 device: 1 << 60,
+                even_so: true,
             },
         ];
         let mut payload = payload(&requests[usize::from(request) % requests.len()]);
@@ -405,6 +479,10 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         let mut expected = Vec::new();
         let before = self.models.clone();
         let now = self.wire().device.now_ms;
+        let sequence = self.sequence();
+        for model in &mut self.models {
+            model.sequence = Some(sequence);
+        }
         for held in &held {
             bytes.extend(framed(Channel::Request, held.sequence, &held.payload));
             if self.noise.frame() {
@@ -428,7 +506,11 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         assert_eq!(numbers(&said), wanted, "one answer to each request");
         let said_last = wanted.last().copied();
         for ((_, mut response), (_, predicted)) in said.responses.into_iter().zip(expected) {
-            self.compare(&mut response, &predicted);
+            if self.was_too_worn(&held, &response) {
+                self.models = unchanged(&before, &self.models);
+            } else {
+                self.compare(&mut response, &predicted);
+            }
         }
         self.fresh = said_last == held.last().map(|held| held.sequence);
         self.agree("after a request");
@@ -441,7 +523,41 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             return false;
         };
         let request = Request::parse(&held.payload);
-        !self.weak || !matches!(request, Ok(Request::Write { .. }))
+        // What a cut leaves and what wear leaves are two questions.
+        !self.harm.worn && (!self.harm.weak || !matches!(request, Ok(Request::Write { .. })))
+    }
+
+    /// Whether a request was refused because its record or the key could not be written.
+    fn was_too_worn(&self, held: &[Held], response: &Response) -> bool {
+        let [held] = held else {
+            return false;
+        };
+        let writes = matches!(
+            Request::parse(&held.payload),
+            Ok(Request::Begin { .. }
+                | Request::Confirm { .. }
+                | Request::Rollback { .. }
+                | Request::Provision { .. })
+        );
+        let refusal = matches!(
+            response,
+            Response::Refused(Refusal::ReadOnly | Refusal::Flash { .. })
+        );
+        self.harm.worn && writes && refusal
+    }
+
+    fn wear(&mut self, sector: usize, how: Wear) {
+        self.flush();
+        if self.harm.worn {
+            return;
+        }
+        self.harm.worn = true;
+        self.cut_after = None;
+        let first = self.layout.slot(Slot::B).end / self.layout.sector;
+        let flash = self.wire().device.updater.flash_mut();
+        let erases = flash.erases(first + sector).expect("there");
+        let worn = flash.wear_out(first + sector, erases, how);
+        worn.expect("there");
     }
 
     /// What each model says to a request.
@@ -487,7 +603,12 @@ impl<const W: usize, const E: usize> Trial<W, E> {
             // How often it was erased since it was made is known after a cut only
             // roughly.
             slots.record_erases = 0;
-            slots.slots.iter_mut().for_each(|slot| slot.erases = 0);
+            for slot in &mut slots.slots {
+                slot.erases = 0;
+                // What a table is called is for `tests/tests/device/slots.rs`.
+                slot.about = None;
+            }
+            slots.sequence = 0;
         }
         match predicted {
             Predicted::All(wanted) => assert_eq!(response, wanted, "a response"),
@@ -536,16 +657,7 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         for (before, after) in before.iter_mut().zip(&after) {
             before.touched.clone_from(&after.touched);
         }
-        // The first record comes before a key: there may be the one without the other.
-        let mut noted = Vec::new();
-        for (before, after) in before.iter().zip(&after) {
-            if before.owner != after.owner {
-                let mut between = before.clone();
-                between.record = after.record;
-                noted.push(between);
-            }
-        }
-        before.extend(noted);
+        before = unchanged(&before, &after);
         before.extend(after);
         for model in &mut before {
             if let Some((slot, range)) = model.touched.clone() {
@@ -610,6 +722,9 @@ impl<const W: usize, const E: usize> Trial<W, E> {
 
     fn rot_records(&mut self, bits: usize) {
         self.flush();
+        if self.harm.worn {
+            return;
+        }
         let start = self.layout.slot(Slot::B).end;
         let end = start + 2 * self.layout.sector;
         let models = std::mem::take(&mut self.models);
@@ -624,6 +739,20 @@ impl<const W: usize, const E: usize> Trial<W, E> {
         }
         self.again_with(|flash| flash.rot(start as u32..end as u32, bits).expect("it fits"));
     }
+}
+
+/// Models after a request that was not carried out, from those before it and those after it
+/// was. The first record comes before a key: there may be the one without the other.
+fn unchanged(before: &[Model], after: &[Model]) -> Vec<Model> {
+    let mut all = before.to_vec();
+    for (before, after) in before.iter().zip(after) {
+        if before.owner != after.owner {
+            let mut between = before.clone();
+            between.record = after.record;
+            all.push(between);
+        }
+    }
+    all
 }
 
 /// What must come of a request.

@@ -5,10 +5,12 @@
 //! known from how they were made ([`files`](crate::fuzz::files)).
 
 use crate::fuzz::files::{Facts, Owner, files, judge};
+use ed25519_dalek::{Signature, VerifyingKey};
 use iltm_runtime::link::{
-    InUse, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState, Slots, TableName,
+    EndedTrial, InUse, Receiving, Refusal, Request, Response, Sectors, SlotInfo, SlotState, Slots,
+    TableName, TableReason,
 };
-use iltm_runtime::trust::Rejected;
+use iltm_runtime::trust::{NoRight, Rejected};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -31,6 +33,8 @@ pub(super) struct Record {
     pub(super) floor: u32,
     /// Of the files in the slots; 0 if unknown.
     pub(super) lengths: [u32; 2],
+    /// The highest version that was confirmed while there was an owner.
+    pub(super) newest: u32,
 }
 
 /// What is in a slot, as far as a device knows.
@@ -76,6 +80,14 @@ pub(super) struct Model {
     pub(super) in_use: Option<usize>,
     trial: Option<Trial>,
     transfer: Option<Transfer>,
+    ended: Option<(u32, TableReason, u64)>,
+    /// Erases that are allowed yet, and since when they are counted up.
+    erases: (u32, u64),
+    /// What a right must be signed for, which is the device's to choose; `None` once a
+    /// record was written since it said so: no right from before counts then.
+    pub(super) sequence: Option<u32>,
+    /// When sectors were compared last.
+    compared_ms: Option<u64>,
     /// Bytes of a slot that the last request may have changed.
     pub(super) touched: Option<(usize, Range<usize>)>,
 }
@@ -92,6 +104,10 @@ impl Model {
             in_use: None,
             trial: None,
             transfer: None,
+            ended: None,
+            erases: (16 * (sizes.slot / sizes.sector), 0),
+            sequence: None,
+            compared_ms: None,
             touched: None,
         }
     }
@@ -100,6 +116,9 @@ impl Model {
     pub(super) fn start(&mut self) {
         self.trial = None;
         self.transfer = None;
+        self.ended = None;
+        self.erases = (16 * (self.sizes.slot / self.sizes.sector), 0);
+        self.compared_ms = None;
         self.touched = None;
         self.look(0);
         self.look(1);
@@ -124,6 +143,12 @@ impl Model {
         let noted = Some(record.lengths[slot]).filter(|length| *length > 0);
         let bytes = &self.slots[slot];
         let found = judge(bytes, noted, self.owner, record.floor);
+        // A table that nobody confirmed has its own length.
+        let confirmed = record.table.is_some_and(|(confirmed, _)| confirmed == slot);
+        let found = found.or_else(|| {
+            let own = noted.is_some() && !confirmed;
+            own.then(|| judge(bytes, None, self.owner, record.floor))?
+        });
         // Only the very table that was confirmed counts in its slot.
         let found = found.filter(|found| match record.table {
             Some((confirmed, id)) => confirmed != slot || id == found.id,
@@ -141,8 +166,86 @@ impl Model {
         if let Some(trial) = self.trial
             && now_ms >= trial.ends_ms
         {
-            self.trial = None;
-            self.in_use = trial.before;
+            self.end_trial(trial, TableReason::TrialOver, now_ms);
+        }
+    }
+
+    fn end_trial(&mut self, trial: Trial, reason: TableReason, now_ms: u64) {
+        self.ended = self.facts().map(|facts| (facts.id, reason, now_ms));
+        self.trial = None;
+        self.in_use = trial.before;
+    }
+
+    /// One more erase, of which there may be sixteen times a slot's after a start and then
+    /// one in half an hour.
+    fn erase(&mut self, now_ms: u64) -> Result<(), Refusal> {
+        const HALF_HOUR: u64 = 1_800_000;
+        let most = 16 * (self.sizes.slot / self.sizes.sector);
+        let (mut left, mut since) = self.erases;
+        if left < most {
+            let more = (now_ms - since) / HALF_HOUR;
+            left = most.min(left.saturating_add(more.min(u64::from(most)) as u32));
+            since += more * HALF_HOUR;
+        }
+        if left == most {
+            since = now_ms;
+        }
+        self.erases = (left, since);
+        if left == 0 {
+            let wait_s = (since + HALF_HOUR - now_ms).div_ceil(1_000) as u32;
+            return Err(Refusal::Wear { wait_s });
+        }
+        self.erases.0 -= 1;
+        Ok(())
+    }
+
+    /// Whether somebody may do this: what the signature must be over is written down here
+    /// once more.
+    fn may(&self, right: &[u8], kind: u32, subject: u32, digest: [u8; 16]) -> Result<(), Refusal> {
+        let Some(owner) = self.owner else {
+            return Ok(());
+        };
+        let refuse = |cause| Err(Refusal::NoRight(cause));
+        let good = |key: &[u8; 32], message: &[u8], signature: &[u8]| {
+            let key = VerifyingKey::from_bytes(key);
+            let signature = Signature::from_slice(signature).expect("64 bytes");
+            key.is_ok_and(|key| key.verify_strict(message, &signature).is_ok())
+        };
+        let mut key = owner.key;
+        match right.len() {
+            64 => {}
+            172 => {
+                let (fields, signature) = right[64..].split_at(44);
+                let device = u64::from_le_bytes(fields[32..40].try_into().expect("8"));
+                let version = u32::from_le_bytes(fields[40..].try_into().expect("4"));
+                if device != 0 && device != owner.device {
+                    return refuse(NoRight::OtherDevice { device });
+                }
+                let floor = self.floor();
+                if version < floor {
+                    return refuse(NoRight::Revoked { version, floor });
+                }
+                let message = [b"iltm technician1", fields].concat();
+                if !good(&owner.key, &message, signature) {
+                    return refuse(NoRight::Certificate);
+                }
+                key = fields[..32].try_into().expect("32");
+            }
+            _ => return refuse(NoRight::Missing),
+        }
+        let Some(sequence) = self.sequence else {
+            return refuse(NoRight::Signature);
+        };
+        let mut message = b"iltm right 1".to_vec();
+        message.extend(kind.to_le_bytes());
+        message.extend(owner.device.to_le_bytes());
+        message.extend(sequence.to_le_bytes());
+        message.extend(subject.to_le_bytes());
+        message.extend(digest);
+        if good(&key, &message, &right[..64]) {
+            Ok(())
+        } else {
+            refuse(NoRight::Signature)
         }
     }
 
@@ -184,7 +287,9 @@ impl Model {
     fn oldest(&self) -> u32 {
         let used = self.facts().map_or(0, |facts| facts.version);
         match self.owner {
-            Some(_) => used.max(self.floor()),
+            Some(_) => used
+                .max(self.floor())
+                .max(self.record.map_or(0, |record| record.newest)),
             None => 0,
         }
     }
@@ -194,7 +299,18 @@ impl Model {
         [0, 1].map(|slot| match self.known[slot] {
             Known::Nothing => SlotState::Empty,
             Known::Broken => SlotState::Broken,
-            Known::Whole(_) if self.in_use != Some(slot) => SlotState::Valid,
+            Known::Whole(facts) if self.in_use != Some(slot) => match self.record {
+                Some(Record {
+                    table: Some((confirmed, id)),
+                    ..
+                }) if confirmed == slot && id == facts.id => SlotState::Valid,
+                Some(Record {
+                    table: Some((confirmed, _)),
+                    ..
+                }) if confirmed == slot => SlotState::Unconfirmed,
+                Some(Record { other, .. }) if other != Some(facts.id) => SlotState::Unconfirmed,
+                _ => SlotState::Valid,
+            },
             Known::Whole(_) if self.trial.is_some() => SlotState::Trial,
             Known::Whole(_) => SlotState::Active,
         })
@@ -217,17 +333,25 @@ impl Model {
         self.touched = None;
         let answer = match *request {
             Request::Slots => Ok(self.slots_now(now_ms)),
-            Request::Sectors { length, first } => self.sectors(length, first),
-            Request::Begin { length, digest } => self.begin(length, digest.0),
+            Request::Sectors { length, first } => self.sectors(length, first, now_ms),
+            Request::Begin {
+                length,
+                digest,
+                right,
+            } => self.begin(length, digest.0, right),
             Request::Write {
                 transfer,
                 offset,
                 bytes,
-            } => self.write(transfer, offset, bytes),
+            } => self.write(transfer, offset, bytes, now_ms),
             Request::Activate { transfer, trial_s } => self.activate(transfer, trial_s, now_ms),
-            Request::Confirm { table } => self.confirm(table, now_ms),
-            Request::Rollback { table } => self.roll_back(table, now_ms),
-            Request::Provision { key, device } => self.provision(Owner { key, device }),
+            Request::Confirm { table, right } => self.confirm(table, right, now_ms),
+            Request::Rollback { table, right } => self.roll_back(table, right, now_ms),
+            Request::Provision {
+                key,
+                device,
+                even_so,
+            } => self.provision(Owner { key, device }, even_so),
             Request::Hello { .. } | Request::Status | Request::Subscribe { .. } => {
                 unreachable!("not about tables")
             }
@@ -242,6 +366,7 @@ impl Model {
             table: self.whole(slot).map(name),
             length: self.whole(slot).map_or(0, |facts| facts.length),
             erases: 0,
+            about: None,
         };
         Response::Slots(Slots {
             slots: [info(0), info(1)],
@@ -254,14 +379,27 @@ impl Model {
             device: self.owner.map_or(0, |owner| owner.device),
             sector: self.sizes.sector,
             record_erases: 0,
+            sequence: 0,
+            ended: self.ended.map(|(table, reason, at_ms)| EndedTrial {
+                table,
+                reason,
+                ago_ms: u32::try_from(now_ms - at_ms).unwrap_or(u32::MAX),
+            }),
         })
     }
 
-    fn sectors(&self, length: u32, first: u32) -> Result<Response, Refusal> {
+    fn sectors(&mut self, length: u32, first: u32, now_ms: u64) -> Result<Response, Refusal> {
         self.fits(length)?;
+        // Whoever asks again at once is given one at a time.
+        let before = self.compared_ms.replace(now_ms);
+        let most = if before.is_some_and(|before| now_ms < before + 2) {
+            1
+        } else {
+            16
+        };
         let slot = &self.slots[self.target()][..length as usize];
         let sectors = slot.chunks(self.sizes.sector as usize);
-        let crcs = sectors.skip(first as usize).take(16).map(crc32);
+        let crcs = sectors.skip(first as usize).take(most).map(crc32);
         let crcs = crcs.collect();
         Ok(Response::Sectors(Sectors { first, crcs }))
     }
@@ -274,17 +412,19 @@ impl Model {
         Ok(())
     }
 
-    fn begin(&mut self, length: u32, digest: [u8; 16]) -> Result<Response, Refusal> {
+    fn begin(&mut self, length: u32, digest: [u8; 16], right: &[u8]) -> Result<Response, Refusal> {
         if self.trial.is_some() {
             return Err(Refusal::OnTrial);
         }
         self.fits(length)?;
-        // From the first transfer on it is noted which table counts.
-        if self.record.is_none() {
-            self.note(self.in_use, 0);
-        }
         let goes_on = |old: &Transfer| (old.length, old.digest) == (length, digest);
         if !self.transfer.as_ref().is_some_and(goes_on) {
+            self.may(right, 1, length, digest)?;
+            // From the first transfer on it is noted which table counts.
+            if self.record.is_none() {
+                self.note(self.in_use, 0);
+            }
+            self.sequence = None;
             self.transfer = Some(Transfer {
                 length,
                 digest,
@@ -298,7 +438,13 @@ impl Model {
         }))
     }
 
-    fn write(&mut self, number: u32, offset: u32, bytes: &[u8]) -> Result<Response, Refusal> {
+    fn write(
+        &mut self,
+        number: u32,
+        offset: u32,
+        bytes: &[u8],
+        now_ms: u64,
+    ) -> Result<Response, Refusal> {
         let slot = self.target();
         let running = self.transfer.as_mut();
         let running = running.filter(|running| running.number() == number);
@@ -308,9 +454,13 @@ impl Model {
         if !offset.is_multiple_of(self.sizes.chunk) || left == 0 || bytes.len() != wanted {
             return Err(Refusal::Chunk);
         }
+        let sector = offset / self.sizes.sector;
+        if !running.erased.contains(&sector) {
+            self.erase(now_ms)?;
+        }
         // What was there is gone, whatever comes of it.
         self.known[slot] = Known::Broken;
-        let sector = offset / self.sizes.sector;
+        let running = self.transfer.as_mut().expect("it runs");
         let start = (sector * self.sizes.sector) as usize;
         let range = start..start + self.sizes.sector as usize;
         self.touched = Some((slot, range.clone()));
@@ -347,6 +497,7 @@ impl Model {
             .iter()
             .find(|file| file.digest.0 == running.digest && file.bytes == held);
         let file = file.ok_or(Refusal::Incomplete)?;
+        self.erase(now_ms)?;
         let verdict = file.verdict(self.owner, self.oldest());
         self.known[slot] = match (verdict, self.known[slot]) {
             (Ok(facts), _) => Known::Whole(facts),
@@ -364,6 +515,7 @@ impl Model {
             before: self.in_use,
         });
         self.transfer = None;
+        self.ended = None;
         self.in_use = Some(slot);
         Ok(self.now_in_use(now_ms))
     }
@@ -376,18 +528,21 @@ impl Model {
         Err(Refusal::NotInUse { table: used })
     }
 
-    fn confirm(&mut self, table: u32, now_ms: u64) -> Result<Response, Refusal> {
+    fn confirm(&mut self, table: u32, right: &[u8], now_ms: u64) -> Result<Response, Refusal> {
         self.meant(table)?;
-        if self.trial.take().is_some() {
+        if self.trial.is_some() {
+            self.may(right, 2, table, [0; 16])?;
+            self.trial = None;
             self.note(self.in_use, self.facts().map_or(0, |facts| facts.oldest));
         }
         Ok(self.now_in_use(now_ms))
     }
 
-    fn roll_back(&mut self, table: u32, now_ms: u64) -> Result<Response, Refusal> {
+    fn roll_back(&mut self, table: u32, right: &[u8], now_ms: u64) -> Result<Response, Refusal> {
         self.meant(table)?;
-        if let Some(trial) = self.trial.take() {
-            self.in_use = trial.before;
+        if let Some(trial) = self.trial {
+            self.may(right, 3, table, [0; 16])?;
+            self.end_trial(trial, TableReason::RolledBack, now_ms);
             return Ok(self.now_in_use(now_ms));
         }
         let slot = self.target();
@@ -395,6 +550,8 @@ impl Model {
         let other = self.whole(slot);
         let other = other.filter(|facts| facts.id != table && Some(facts.id) == confirmed);
         let facts = other.ok_or(Refusal::NoOther)?;
+        self.may(right, 3, table, [0; 16])?;
+        self.erase(now_ms)?;
         // It must be one that may run now; one that must not is no table.
         if let Err(rejected) = self.vouched(slot, facts) {
             self.known[slot] = Known::Broken;
@@ -420,11 +577,18 @@ impl Model {
         }
     }
 
-    fn provision(&mut self, owner: Owner) -> Result<Response, Refusal> {
+    fn provision(&mut self, owner: Owner, even_so: bool) -> Result<Response, Refusal> {
         if self.trial.is_some() && self.owner.is_none() {
             return Err(Refusal::OnTrial);
         }
         if self.owner.is_none() {
+            // A table that would be lost at the next start.
+            if let Some((slot, facts)) = self.in_use.zip(self.facts()).filter(|_| !even_so) {
+                self.owner = Some(owner);
+                let kept = self.vouched(slot, facts);
+                self.owner = None;
+                kept.map_err(Refusal::Table)?;
+            }
             // From then on it is noted whether there is a key.
             if self.record.is_none() {
                 self.note(self.in_use, 0);
@@ -444,7 +608,11 @@ impl Model {
     }
 
     fn note(&mut self, slot: Option<usize>, oldest: u32) {
+        self.sequence = None;
         let id = |slot| Some((slot, self.whole(slot)?.id));
+        let version = slot.and_then(|slot| self.whole(slot));
+        let version = version.filter(|_| self.owner.is_some());
+        let version = version.map_or(0, |facts| facts.version);
         let before = self.record.unwrap_or_default();
         let other = match before.table {
             Some((old, _)) if Some(old) == slot => before.other,
@@ -456,6 +624,7 @@ impl Model {
             other,
             floor: self.floor().max(oldest),
             lengths: [0, 1].map(|slot| self.whole(slot).map_or(0, |facts| facts.length)),
+            newest: before.newest.max(version),
         });
     }
 }

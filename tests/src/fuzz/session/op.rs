@@ -1,5 +1,6 @@
 //! Session operations: what happens to a device, decoded from any bytes.
 
+use crate::flash_simulator::Wear;
 use crate::fuzz::files::{DEVICES, GOOD, files, keys};
 
 /// Bytes of an operation; what a mutation moves as one.
@@ -25,6 +26,7 @@ pub(super) enum Op {
         file: usize,
         /// Added to its length.
         more: i32,
+        proof: Proof,
     },
     Write {
         file: usize,
@@ -43,13 +45,16 @@ pub(super) enum Op {
     },
     Confirm {
         table: Which,
+        proof: Proof,
     },
     Rollback {
         table: Which,
+        proof: Proof,
     },
     Provision {
         key: [u8; 32],
         device: u64,
+        even_so: bool,
     },
     /// The last request once more, under the same number.
     Again,
@@ -90,6 +95,12 @@ pub(super) enum Op {
     RotRecords {
         bits: usize,
     },
+    /// A sector of the records, or that of the key, stands no further erase.
+    Wear {
+        /// Counted from the first of the records.
+        sector: usize,
+        how: Wear,
+    },
     /// A file is put into a slot through the debug port, as in a factory.
     Put {
         slot: usize,
@@ -106,6 +117,42 @@ pub(super) enum Twist {
     Long,
     Bytes,
     Transfer,
+}
+
+/// What a request shows of a right.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Proof {
+    /// Signed by the device's owner.
+    Owner,
+    /// Signed by a technician with this device's number, or another, and of this version.
+    Technician { device: u64, version: u32 },
+    /// Signed by somebody else, who certifies himself or not.
+    Stranger { certified: bool },
+    /// Signed for another record.
+    Stale,
+    /// None, or half of one.
+    None { length: usize },
+}
+
+impl Proof {
+    const fn of(number: u8) -> Self {
+        match number % 16 {
+            0 => Self::None { length: 0 },
+            1 => Self::None { length: 63 },
+            2 => Self::Stale,
+            3 => Self::Stranger { certified: false },
+            4 => Self::Stranger { certified: true },
+            5 | 6 => Self::Technician {
+                device: 0,
+                version: number as u32 / 16,
+            },
+            7 => Self::Technician {
+                device: DEVICES[number as usize / 16 % 2],
+                version: 9,
+            },
+            _ => Self::Owner,
+        }
+    }
 }
 
 /// The table that a request is about.
@@ -153,6 +200,7 @@ impl Op {
                     9 => 600,
                     _ => 0,
                 },
+                proof: Proof::of(c),
             },
             7..=10 => Self::Write {
                 file,
@@ -176,13 +224,16 @@ impl Op {
             },
             19..=22 => Self::Confirm {
                 table: Which::of(a),
+                proof: Proof::of(b),
             },
             23..=25 => Self::Rollback {
                 table: Which::of(a),
+                proof: Proof::of(b),
             },
             26 => Self::Provision {
                 key: keys()[usize::from(a) % 3 * usize::from(c % 4 == 0)],
                 device: DEVICES[usize::from(b % 8 == 0)],
+                even_so: b % 4 != 1,
             },
             27 => Self::Again,
             28 => Self::Together {
@@ -213,6 +264,12 @@ impl Op {
             38 => match a % 8 {
                 0 => Self::RotRecords {
                     bits: usize::from(b % 4),
+                },
+                1 | 2 => Self::Wear {
+                    sector: usize::from(b % 3),
+                    // A stuck bit is a unit that is not erased: a record over it counts as
+                    // a broken rule in the simulator.
+                    how: [Wear::LostBits, Wear::Refuses][usize::from(c % 2)],
                 },
                 _ => Self::Restart,
             },

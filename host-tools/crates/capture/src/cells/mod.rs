@@ -78,7 +78,13 @@ impl CellEvidence {
         Ok(Self {
             nonlinearity: off.then(find),
             sums,
-            banding: mains_banding::find(registration, &steadiness.models),
+            banding: mains_banding::find(
+                sequence,
+                registration,
+                &pixels.live,
+                &steadiness.models,
+                &light.channels,
+            ),
             steadiness,
             channels: observed.channels,
             noise: observed.noise,

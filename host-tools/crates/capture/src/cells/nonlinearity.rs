@@ -15,6 +15,12 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 /// What must be left of a misfit at most for its cause to be found.
 const EXPLAINED: f64 = 0.5;
 
+/// Ambient light, of white's, from which it tells camera and projector apart.
+const LEAST_AMBIENT: f64 = 0.005;
+
+/// What one cause may leave of what another one leaves to be preferred.
+const CLEARLY: f64 = 0.5;
+
 /// How many times its scatter the brightness of pairs must be off white's.
 const STEADY: f64 = 3.0;
 
@@ -23,7 +29,7 @@ const OUTSHINE: f64 = 1.03;
 
 /// Why light does not add up.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) enum Nonlinearity {
+pub enum Nonlinearity {
     /// The light that was read follows this power of the true light's inverse.
     Curve {
         /// Light would add up if it were raised to this power.
@@ -35,11 +41,25 @@ pub(crate) enum Nonlinearity {
     Projector,
     /// One of the last two.
     Either,
+    /// A curve of this power, or brightness that follows the picture: both explain it.
+    CurveOrExposure {
+        /// Light would add up if it were raised to this power.
+        gamma: f64,
+    },
     /// None of these.
     Unknown,
 }
 
 impl Nonlinearity {
+    /// The cause once it is known whether single pixels add up better with another `curve` than
+    /// the declared one, whatever the exposure.
+    pub(crate) const fn given(self, curve: bool) -> Self {
+        match self {
+            Self::CurveOrExposure { gamma } if curve => Self::Curve { gamma },
+            cause => cause,
+        }
+    }
+
     /// Whether it says why brightness differs from photograph to photograph.
     pub(crate) const fn is_known(self) -> bool {
         !matches!(self, Self::Unknown)
@@ -90,11 +110,13 @@ pub(crate) fn find(
     let off = median(factors.iter().map(|f| (f - middle).abs()).collect()).unwrap_or(0.0);
     let follows = followed < EXPLAINED * before && (middle - 1.0).abs() > STEADY * off;
     let bent = curved < EXPLAINED * before;
-    // A curve that brightens explains as much as a factor does where the scene is even;
-    // but it leaves nothing brighter than white.
-    let either = middle > 1.0 && bent;
-    if pairs.outshine() || follows && !either && followed < 1.2 * curved {
+    // Where the scene is even a curve that brightens explains as much as a factor does; but it
+    // leaves nothing brighter than white.
+    let alike = middle > 1.0 && bent && follows;
+    if pairs.outshine() || follows && !alike && followed < 1.2 * curved {
         ambient(sequence, sampled)
+    } else if alike && curved > CLEARLY * followed {
+        Nonlinearity::CurveOrExposure { gamma }
     } else if bent {
         Nonlinearity::Curve { gamma }
     } else {
@@ -206,9 +228,13 @@ fn ambient(sequence: &Sequence, sampled: &Sampled) -> Nonlinearity {
     // A camera that exposes for the picture exposes black longest of all: then black has
     // more ambient light than the pairs, or looks like white.
     let total = |squares: &[f64]| squares.iter().sum::<f64>();
-    if total(&black) > 0.5 * total(&white) || followed < -0.2 {
+    let share = total(&black) / total(&white);
+    if share > 0.5 || followed < -0.2 && share > LEAST_AMBIENT {
         Nonlinearity::Exposure
-    } else if !followed.is_finite() || error > 0.2 * (factors[0] - 1.0).abs() {
+    } else if share < LEAST_AMBIENT {
+        // Too little ambient light to see what it follows.
+        Nonlinearity::Either
+    } else if !followed.is_finite() || error > 0.1 * (factors[0] - 1.0).abs() {
         Nonlinearity::Either
     } else if followed > 0.6 {
         Nonlinearity::Exposure

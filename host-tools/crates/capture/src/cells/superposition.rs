@@ -10,7 +10,7 @@ pub(crate) const NOTABLE: f64 = 0.015;
 
 /// How much more single cells may be off than all together: good rigs hold 1 to
 /// 1.8 % in blocks of 16 x 16 pixels.
-const CELLS: f64 = 1.7;
+pub(crate) const CELLS: f64 = 1.7;
 
 /// How far each Gray code pattern and its inverse together exceed white, summed
 /// over all cells and relative to white, one number a pair and channel.

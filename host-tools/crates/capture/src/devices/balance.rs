@@ -123,13 +123,33 @@ impl Balances {
             .collect()
     }
 
+    /// Mean light of each group in white, the third of the values; 0 where there is none.
+    pub(crate) fn white(&self, response: &Lookup) -> Vec<f64> {
+        let white = |b: &Balance| f64::from(b.weights[2].abs()) * response.light(b.values[2]);
+        self.groups()
+            .map(|group| group.iter().map(white).sum::<f64>() / group.len() as f64)
+            .collect()
+    }
+
     /// How far the groups are from nothing under a response, relative to their
     /// light: root mean square over groups.
+    ///
+    /// White may be brighter or darker than it should be, by one factor in all groups: a lamp
+    /// that loses light, or an exposure that follows the picture, says nothing about the
+    /// camera's curve.
     pub(crate) fn misfit(&self, response: &Lookup) -> f64 {
         let (sums, light) = (self.sums(response), self.light(response));
-        let relative = sums.iter().zip(&light).filter(|(_, light)| **light > 0.0);
-        let squares: Vec<f64> = relative.map(|(sum, light)| (sum / light).powi(2)).collect();
-        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+        let white = self.white(response);
+        let relative: Vec<(f64, f64)> = (sums.iter().zip(&white).zip(&light))
+            .filter(|(_, light)| **light > 0.0)
+            .map(|((sum, white), light)| (sum / light, white / light))
+            .collect();
+        let dot = |of: fn(&(f64, f64)) -> f64| relative.iter().map(of).sum::<f64>();
+        let factor = dot(|(sum, white)| sum * white) / dot(|(_, white)| white * white).max(1e-9);
+        let squares = relative
+            .iter()
+            .map(|(sum, white)| (sum - factor * white).powi(2));
+        (squares.sum::<f64>() / relative.len().max(1) as f64).sqrt()
     }
 
     pub(crate) fn misfit_of(&self, response: &DeviceResponse) -> f64 {

@@ -185,7 +185,8 @@ impl CaptureError {
             }
             Self::Settings { .. } => {
                 "Correct capture.toml; it may hold camera.response, camera.full_scale, \
-                 projector.response, projector.blur and scene.name."
+                 projector.response, projector.blur, projector.size, projector.border and \
+                 scene.name."
             }
             Self::ResponseUnknown {
                 device: "camera", ..

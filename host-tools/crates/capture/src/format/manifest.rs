@@ -52,7 +52,7 @@ impl ListedRole for Role {
     }
 
     fn unknown(role: &str) -> String {
-        format!("unknown role \"{role}\"")
+        format!("unknown role {role:?}")
     }
 }
 
@@ -162,7 +162,13 @@ impl<R: ListedRole> ManifestOf<R> {
                 format!("the file is longer than {MAX_BYTES} bytes"),
             ));
         }
+        // Spreadsheets of countries that write decimals with a comma separate by semicolons.
+        let header = bytes
+            .split(|byte| *byte == b'\n')
+            .find(|line| !line.trim_ascii().is_empty());
+        let semicolons = header.is_some_and(|line| line.contains(&b';') && !line.contains(&b','));
         let mut reader = csv::ReaderBuilder::new()
+            .delimiter(if semicolons { b';' } else { b',' })
             .trim(csv::Trim::All)
             .flexible(true)
             .has_headers(false)
@@ -308,6 +314,13 @@ fn shot<R: ListedRole>(
     };
     let inside = |file: &str| {
         inside_folder(file).ok_or_else(|| {
+            if inside_folder(&file.replace('\\', "/")).is_some() {
+                let reason = format!("{file:?} separates its folder by \\");
+                return (
+                    reason,
+                    "Write / instead of \\ in capture.csv, on Windows too.",
+                );
+            }
             let reason = format!(
                 "{file:?} is not a relative path inside the capture without \\ : \" % {{ }} or \
                  control characters"
@@ -327,9 +340,9 @@ fn shot<R: ListedRole>(
     })
 }
 
-/// A number of seconds, or of another unit.
+/// A number of seconds, or of another unit, with a point or a comma.
 fn exposure(text: &str) -> Option<f64> {
-    let exposure: f64 = text.parse().ok()?;
+    let exposure: f64 = text.replace(',', ".").parse().ok()?;
     // Neither zero nor so far out that a ratio of two would be.
     (1e-9..=1e9).contains(&exposure).then_some(exposure)
 }
@@ -377,7 +390,7 @@ impl ListedRole for RoleName {
     }
 
     fn unknown(role: &str) -> String {
-        format!("the role \"{role}\" is no name")
+        format!("the role {role:?} is no name")
     }
 }
 
@@ -413,6 +426,16 @@ mod tests {
         parse(&format!("index,role,pattern,photo\n{lines}"))
             .unwrap_err()
             .to_string()
+    }
+
+    #[test]
+    fn semicolons_separate_too_and_a_backslash_is_named() {
+        let text = "index;role;pattern;photo;exposure\r\n0;white;p/0.png;f/0.png;0,5\r\n";
+        let shots = parse(text).unwrap().shots;
+        assert_eq!(shots[0].photo, Path::new("f/0.png"));
+        assert_eq!(shots[0].exposure, Some(0.5));
+        let said = refusal("0,white,p/0.png,f\\0.png\n");
+        assert!(said.contains("separates its folder by"), "{said}");
     }
 
     #[test]

@@ -7,12 +7,23 @@
 use super::bracket::Bracket;
 use super::error::CaptureError;
 use super::manifest::{Shot, ShotOf};
-use super::picture_file::FileFormat;
+use super::picture_file::{FileFormat, MAX_PIXELS};
 use super::role::Role;
 use std::collections::HashMap;
 use std::ffi::OsStr;
+use std::fs::File;
 use std::hash::{DefaultHasher, Hasher};
+use std::io::Read;
 use std::path::{Path, PathBuf};
+
+/// Extensions of files that cameras write and this program does not read, lower case.
+const RAW_EXTENSIONS: [&str; 14] = [
+    "nef", "nrw", "cr2", "cr3", "crw", "dng", "arw", "raf", "orf", "rw2", "pef", "heic", "heif",
+    "avif",
+];
+
+/// Bytes of files that are compared whole: no photograph is longer.
+const MAX_BYTES: u64 = MAX_PIXELS * 16;
 
 /// The file that stands for `named` (relative to `folder`), relative to
 /// `folder`; `None` if it is missing.
@@ -40,6 +51,11 @@ pub fn find_photo(folder: &Path, named: &Path) -> Result<Option<PathBuf>, Captur
 /// the order of their names.
 #[must_use]
 pub fn pictures_of_stem(folder: &Path, named: &Path) -> Vec<PathBuf> {
+    of_stem(folder, named, &FileFormat::EXTENSIONS)
+}
+
+/// All files of the stem of `named` with one of some extensions.
+fn of_stem(folder: &Path, named: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let parent = named.parent().unwrap_or(Path::new(""));
     let entries = std::fs::read_dir(folder.join(parent));
     let names = entries
@@ -47,22 +63,25 @@ pub fn pictures_of_stem(folder: &Path, named: &Path) -> Vec<PathBuf> {
         .flatten()
         .filter_map(|entry| Some(entry.ok()?.file_name()));
     let mut found: Vec<PathBuf> = names
-        .filter(|name| stands_for(Path::new(name), named.file_stem()))
+        .filter(|name| stands_for(Path::new(name), named.file_stem(), extensions))
         .map(|name| parent.join(name))
         .collect();
     found.sort();
     found
 }
 
-/// Whether a file name has this stem and a picture's extension.
-fn stands_for(name: &Path, stem: Option<&OsStr>) -> bool {
+/// The raw file of the stem of `named` in its place, relative to `folder`.
+fn raw(folder: &Path, named: &Path) -> Option<PathBuf> {
+    of_stem(folder, named, &RAW_EXTENSIONS).into_iter().next()
+}
+
+/// Whether a file name has this stem and one of some extensions.
+fn stands_for(name: &Path, stem: Option<&OsStr>, extensions: &[&str]) -> bool {
     let extension = name.extension().and_then(OsStr::to_str);
-    let picture = extension.is_some_and(|extension| {
-        FileFormat::EXTENSIONS
-            .iter()
-            .any(|known| extension.eq_ignore_ascii_case(known))
+    let known = extension.is_some_and(|extension| {
+        (extensions.iter()).any(|known| extension.eq_ignore_ascii_case(known))
     });
-    picture && name.file_stem() == stem
+    known && name.file_stem() == stem
 }
 
 /// Names in each shot the file that stands for its photograph; one that is missing
@@ -85,6 +104,9 @@ pub(crate) struct PhotoFiles {
     pub(crate) listed: usize,
     /// Photographs that are not there, in the order of their lines.
     pub(crate) missing: Vec<PathBuf>,
+    /// Files beside those that are missing, of the same stem and of a kind that is not read:
+    /// raw files, which somebody has to develop.
+    pub(crate) raw: Vec<PathBuf>,
     /// Photographs that are exact copies of others, which come first, and should show
     /// another pattern; not looked for if some are missing.
     pub(crate) copies: Vec<(PathBuf, PathBuf)>,
@@ -121,6 +143,10 @@ pub(super) fn find_all(
         } else {
             Vec::new()
         },
+        raw: missing
+            .iter()
+            .filter_map(|shot| raw(folder, &shot.photo))
+            .collect(),
         missing: missing.into_iter().map(|shot| shot.photo).collect(),
     })
 }
@@ -130,7 +156,12 @@ pub(super) fn find_all(
 fn copies(folder: &Path, shots: &[&Shot]) -> Vec<(PathBuf, PathBuf)> {
     let mut by_size: HashMap<u64, Vec<&Shot>> = HashMap::new();
     for &shot in shots {
-        if let Ok(data) = folder.join(&shot.photo).metadata() {
+        // What is no regular file has no end; reading it says so.
+        let data = folder.join(&shot.photo).metadata();
+        if let Some(data) = data
+            .ok()
+            .filter(|data| data.is_file() && data.len() <= MAX_BYTES)
+        {
             by_size.entry(data.len()).or_default().push(shot);
         }
     }
@@ -162,17 +193,45 @@ fn alike(folder: &Path, a: &Shot, b: &Shot) -> bool {
     (a.role == b.role && a.role != Role::Bernoulli) || of(a) == of(b)
 }
 
-/// A hash of a file's bytes.
+/// A hash of a regular file's bytes.
 fn hash(path: &Path) -> Option<u64> {
+    if !path.metadata().ok()?.is_file() {
+        return None;
+    }
     let mut hasher = DefaultHasher::new();
-    hasher.write(&std::fs::read(path).ok()?);
-    Some(hasher.finish())
+    let mut file = File::open(path).ok()?.take(MAX_BYTES);
+    let mut bytes = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut bytes).ok()? {
+            0 => return Some(hasher.finish()),
+            count => hasher.write(&bytes[..count]),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fs;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_file_without_an_end_is_not_read_to_compare_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let zero = folder.path().join("zero");
+        std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
+        assert_eq!(hash(&zero), None);
+    }
+
+    #[test]
+    fn a_raw_file_beside_a_missing_photograph_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("photos")).unwrap();
+        let named = Path::new("photos/070.png");
+        assert_eq!(raw(folder.path(), named), None);
+        fs::write(folder.path().join("photos/070.NEF"), "").unwrap();
+        assert_eq!(raw(folder.path(), named), Some("photos/070.NEF".into()));
+    }
 
     #[test]
     fn what_the_camera_wrote_stands_for_what_the_manifest_names() {

@@ -16,12 +16,19 @@ use image::{DynamicImage, ImageDecoder, ImageResult, Limits};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Pixels a picture may have: the largest medium-format sensors.
 pub(crate) const MAX_PIXELS: u64 = 160_000_000;
 
-/// Bytes the widest pixel takes: floating point with alpha.
-const WIDEST_PIXEL: u64 = 16;
+/// Bytes a picture's pixels may take: [`MAX_PIXELS`] in colour with 16 bits.
+const MAX_DECODED: u64 = 1 << 30;
+
+/// Bytes from which pictures are decoded one after the other, whoever asks for them.
+const LARGE: u64 = 128 << 20;
+
+/// Held while a large picture is decoded.
+static DECODING_LARGE: Mutex<()> = Mutex::new(());
 
 /// Bytes the decoder may allocate beside the pixels themselves.
 const DECODER_BYTES: u64 = 32 << 20;
@@ -152,7 +159,7 @@ impl Opened {
         if !metadata.is_file() {
             return Err(refuse("it is not a regular file".to_owned()));
         }
-        let most = MAX_PIXELS * WIDEST_PIXEL + DECODER_BYTES;
+        let most = MAX_DECODED + DECODER_BYTES;
         if metadata.len() > most {
             return Err(refuse(format!("it has more than {most} bytes")));
         }
@@ -170,6 +177,14 @@ impl Opened {
                 height,
                 limit: MAX_PIXELS,
             });
+        }
+        let bytes = decoder.decoded_bytes();
+        if bytes > MAX_DECODED {
+            return Err(refuse(format!(
+                "its pixels take {} MB of memory; at most {} are read",
+                bytes >> 20,
+                MAX_DECODED >> 20
+            )));
         }
         if width == 0 || height == 0 {
             return Err(refuse("it has no pixels".to_owned()));
@@ -227,6 +242,13 @@ impl Opened {
             next_step,
         };
         let (width, channels) = (decoder.size().0 as usize, decoder.channels());
+        let large = decoder.decoded_bytes() > LARGE;
+        // Nothing is behind the lock that a thread could have left half done.
+        let _one = large.then(|| {
+            DECODING_LARGE
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        });
         let samples = match decoder {
             Decoder::Image(decoder) => DynamicImage::from_decoder(decoder)
                 .map_err(|error| (unreadable(format, &error), EXPORT))
@@ -250,7 +272,7 @@ impl Decoder {
     /// Reads the header of a file of this format.
     fn new(format: FileFormat, file: File) -> Result<Self, String> {
         let mut limits = Limits::no_limits();
-        limits.max_alloc = Some(MAX_PIXELS * WIDEST_PIXEL + DECODER_BYTES);
+        limits.max_alloc = Some(MAX_DECODED + DECODER_BYTES);
         let words = |error: image::ImageError| unreadable(format, &error);
         if format == FileFormat::Tiff
             && let Some(grey) = GreyFloat::new(file.try_clone().map_err(|e| e.to_string())?)?
@@ -280,6 +302,14 @@ impl Decoder {
         match self {
             Self::Image(decoder) => decoder.dimensions(),
             Self::GreyFloat(grey) => grey.size,
+        }
+    }
+
+    /// Bytes of all pixels once they are decoded.
+    fn decoded_bytes(&self) -> u64 {
+        match self {
+            Self::Image(decoder) => decoder.total_bytes(),
+            Self::GreyFloat(grey) => 4 * u64::from(grey.size.0) * u64::from(grey.size.1),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::error::CaptureError;
 use super::manifest::read_small;
 use iltm_picture::{Declared, DeviceResponse};
+use iltm_runtime::{FrameSize, placement::ProjectorPixels};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
@@ -134,6 +135,15 @@ pub struct ProjectorSettings {
     pub border: u16,
 }
 
+impl ProjectorSettings {
+    /// The projector's pixels; `None` where its size is unsaid, or no pixel is left.
+    #[must_use]
+    pub fn pixels(&self) -> Option<ProjectorPixels> {
+        let [width, height] = self.size?;
+        ProjectorPixels::new(FrameSize::new(width, height)?, self.border)
+    }
+}
+
 /// Whether there is no border to speak of.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 const fn is_zero(border: &u16) -> bool {
@@ -191,7 +201,19 @@ impl Settings {
             return Err(refuse(format!("it is longer than {MAX_BYTES} bytes")));
         }
         let text = std::str::from_utf8(bytes).map_err(|error| refuse(error.to_string()))?;
-        toml::from_str(text).map_err(|error| refuse(error.to_string().trim_end().to_owned()))
+        let settings: Self = toml::from_str(text)
+            .map_err(|error| refuse(error.to_string().trim_end().to_owned()))?;
+        let projector = &settings.projector;
+        match (projector.size, projector.pixels()) {
+            (Some([width, height]), None) => Err(refuse(format!(
+                "a projector of {width} x {height} pixels with a border of {} has no pixel left",
+                projector.border
+            ))),
+            (None, _) if projector.border > 0 => Err(refuse(
+                "the projector has a border and no size; state both".to_owned(),
+            )),
+            _ => Ok(settings),
+        }
     }
 }
 
@@ -246,6 +268,21 @@ mod tests {
             let error = parse(&text).unwrap_err();
             assert!(error.contains("a gamma from 0.2 to 5"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_border_needs_a_size_and_leaves_pixels() {
+        for text in [
+            "border = 3",
+            "size = [20, 30]\nborder = 10",
+            "size = [0, 30]",
+        ] {
+            let error = parse(&format!("[projector]\n{text}\n")).unwrap_err();
+            assert!(error.contains("projector"), "{error}");
+        }
+        let settings = parse("[projector]\nsize = [20, 30]\nborder = 9\n").unwrap();
+        let pixels = settings.projector.pixels().unwrap();
+        assert_eq!((pixels.inner().width(), pixels.inner().height()), (2, 12));
     }
 
     #[test]

@@ -72,7 +72,7 @@ pub(super) fn judge(
     let values = (0..cells).map(value).collect();
     Gate {
         what,
-        evidence: Evidence::cells("camera pixels used for each cell", grid, values),
+        evidence: Evidence::cells("camera pixels used for each cell", grid, values, 0.0),
         ..Gate::of_share(
             GateName::Coverage,
             verdict,

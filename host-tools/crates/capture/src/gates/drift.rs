@@ -38,6 +38,11 @@ pub(super) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
             100.0 * steadiness.dark
         );
     }
+    let darkest = steadiness
+        .slow
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
     let shots = steadiness.shots.iter().zip(&steadiness.gains);
     let next_step = "Let the projector warm up for 20 minutes, keep daylight out, and take the \
          capture again.";
@@ -48,7 +53,9 @@ pub(super) fn judge(sequence: &Sequence, steadiness: &Steadiness) -> Gate {
             values: shots
                 .map(|(&shot, gain)| (sequence.shots[shot].index, 100.0 * (gain - 1.0)))
                 .collect(),
-            limit: None,
+            // So much above the darkest is too much.
+            limit: Some(100.0 * (darkest - 1.0 + MOST)),
+            from: None,
         },
         ..Gate::of_share(GateName::Drift, verdict, (size, MOST), next_step)
     }

@@ -22,13 +22,26 @@ pub(crate) fn judge(files: &PhotoFiles) -> Gate {
             MOST_NAMED,
         );
         let what = format!("{count} of {all} photographs missing: {names}");
+        if let Some(raw) = files.raw.first() {
+            let what = format!(
+                "{what}; there is {}, a raw file or one of another kind, which is not read",
+                raw.display()
+            );
+            let next_step = "Develop it to a PNG or TIFF of the listed name, linear (without a tone \
+                 curve), and all others in the same way.";
+            return gate(Verdict::Fail, count, what, next_step);
+        }
         let next_step = "Take the missing photographs: `iltm capture` goes on where it stopped.";
         return gate(Verdict::Fail, count, what, next_step);
     }
     if let Some((first, second)) = files.copies.first() {
         let count = files.copies.len();
+        let copies = match count {
+            1 => "one photograph is an exact copy of one that shows".to_owned(),
+            count => format!("{count} photographs are exact copies of others that show"),
+        };
         let what = format!(
-            "{count} photographs are exact copies of others that show another pattern: {} is {}",
+            "{copies} another pattern: {} is {}",
             second.display(),
             first.display()
         );
@@ -47,12 +60,16 @@ pub(crate) fn refuse_format(error: &CaptureError) -> Gate {
 }
 
 /// Judges the kind of the files, all of which have one size, and the `bits` of their
-/// samples.
-pub(crate) fn judge_format(file: FileFormat, bits: u8) -> Gate {
+/// samples; `stated` is whether `capture.toml` says how they follow the light.
+pub(crate) fn judge_format(file: FileFormat, bits: u8, stated: bool) -> Gate {
     if file == FileFormat::Jpeg {
         let what = "photographs are JPEG: the camera has curved and compressed their light";
-        let next_step = "Take raw photographs and develop them linearly to 16-bit TIFF or PNG if \
-             the camera can; otherwise state [camera] response = \"srgb\" in capture.toml.";
+        let next_step = if stated {
+            "Take raw photographs and develop them linearly to 16-bit TIFF or PNG if the camera can."
+        } else {
+            "Take raw photographs and develop them linearly to 16-bit TIFF or PNG if the camera can; \
+             otherwise state [camera] response = \"srgb\" in capture.toml."
+        };
         return gate(
             GateName::Format,
             Verdict::Warn,

@@ -20,7 +20,8 @@ pub(super) fn judge(
     bands: Option<&MainsBanding>,
 ) -> Gate {
     let name = GateName::Flicker;
-    if steadiness.models.is_empty() {
+    let compared = !steadiness.models.is_empty();
+    if !compared && bands.is_none() {
         return Gate::not_judged(
             name,
             "there are too few photographs to compare with each other",
@@ -29,15 +30,24 @@ pub(super) fn judge(
     let offs: Vec<f64> = (steadiness.gains.iter().zip(&steadiness.slow))
         .map(|(gain, slow)| gain / slow - 1.0)
         .collect();
-    let scatter = scatter(&offs, &steadiness.errors);
+    let scatter = if compared {
+        scatter(&offs, &steadiness.errors)
+    } else {
+        0.0
+    };
     // The root mean square of a sine is its amplitude over the root of 2.
     let striped = bands.map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
     let number = scatter.max(striped);
     let verdict = Verdict::of(number, WARN, MOST);
     let what = match (verdict, bands) {
+        (Verdict::Pass, _) if !compared => format!(
+            "no bands above {:.2} % run across the photographs; too few were taken to compare their \
+             brightness",
+            100.0 * number
+        ),
         (Verdict::Pass, _) => format!(
             "brightness jumps by {:.2} % from photograph to photograph",
-            100.0 * scatter
+            100.0 * number
         ),
         (
             _,
@@ -74,6 +84,7 @@ pub(super) fn judge(
                     .map(|(&shot, off)| (sequence.shots[shot].index, 100.0 * off))
                     .collect(),
                 limit: Some(100.0 * MOST),
+                from: None,
             },
         },
         ..Gate::of_share(name, verdict, (number, MOST), next_step)

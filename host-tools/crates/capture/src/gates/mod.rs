@@ -30,9 +30,10 @@ mod saturation;
 mod superposition;
 
 use crate::cells::nonlinearity::Nonlinearity;
+use crate::devices::CameraFit;
 use crate::evidence::CaptureEvidence;
 use crate::format::sequence::Sequence;
-use crate::gate::{Gate, GateName, Verdict};
+use crate::gate::{Gate, GateName};
 
 /// Judges all that the phases found.
 pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
@@ -41,13 +42,19 @@ pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
     let counts = pixels.counts();
     let live = pixels.live.iter().filter(|live| **live).count();
     let mut gates = vec![
-        files::judge_format(file, bits),
+        files::judge_format(file, bits, found.response_stated),
         saturation::judge(&found.clipped, &pixels.left_out, live),
         order::judge(sequence, found.order.as_ref()),
         coverage::judge(sequence, &pixels.live, &counts, &pixels.left_out),
     ];
     if let Some(cells) = &found.cells {
-        let (steadiness, cause) = (&cells.steadiness, cells.nonlinearity);
+        let curve = found
+            .devices
+            .camera_fit
+            .as_ref()
+            .is_some_and(CameraFit::contradicts);
+        let cause = cells.nonlinearity.map(|cause| cause.given(curve));
+        let steadiness = &cells.steadiness;
         let sums = cells.sums.as_ref();
         gates.extend([
             movement::judge(sequence, found.moved.as_ref()),
@@ -67,7 +74,8 @@ pub(crate) fn settle(gates: &mut [Gate], cause: Option<Nonlinearity>) {
     gates.sort_by_key(|gate| gate.name);
     let fails = |name: GateName| gates.iter().any(|gate| gate.name == name && gate.fails());
     let (order, movement) = (fails(GateName::Order), fails(GateName::Movement));
-    let known = cause.is_some_and(Nonlinearity::is_known) && fails(GateName::Superposition);
+    let superposition = fails(GateName::Superposition);
+    let known = cause.is_some_and(Nonlinearity::is_known) && superposition;
     let flicker = fails(GateName::Flicker);
     for gate in gates {
         let because = match gate.name {
@@ -81,9 +89,10 @@ pub(crate) fn settle(gates: &mut [Gate], cause: Option<Nonlinearity>) {
             GateName::Superposition | GateName::Response | GateName::Noise if !known && flicker => {
                 Some(GateName::Flicker)
             }
+            GateName::Response if superposition => Some(GateName::Superposition),
             _ => None,
         };
-        if let Some(because) = because.filter(|_| gate.verdict != Verdict::Pass) {
+        if let Some(because) = because {
             let why = format!("cannot be judged before `{because}` passes");
             *gate = Gate::not_judged(gate.name, why);
         }

@@ -3,6 +3,7 @@
 use crate::format::sequence::Sequence;
 use crate::gate::{Evidence, Gate, GateName, Verdict};
 use crate::registration::movement::Moved;
+use iltm_picture::statistics::median;
 
 /// Shift from which it is worth a word, in parts of a cell's side.
 const WARN: f64 = 0.03;
@@ -17,6 +18,9 @@ const FLOOR: f64 = 0.15;
 /// wide stripes, on curved scenes by half a pixel, each another way. Twice the limit is a bump whatever the scatter.
 const SURE: f64 = 4.0;
 
+/// Photographs on one side of a step that are few.
+const FEW: usize = 10;
+
 /// Judges what was found.
 pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
     let name = GateName::Movement;
@@ -29,12 +33,15 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
         (MOST * moved.cell).max(2.0 * FLOOR),
     );
     let sure = (SURE * bump.scatter).min(2.0 * limit);
+    // Wide stripes and random patterns do not lie alike: a few at one end are no bump yet.
+    let side = bump.before.min(moved.shifts.len() - bump.before);
+    let sure = if side < FEW { 2.0 * limit } else { sure };
     let (warn, limit) = (warn.max(sure), limit.max(sure));
     let verdict = Verdict::of(bump.size, warn, limit);
     let photo = |at: usize| sequence.shots[moved.shifts[at].0].photo.display();
     let what = match verdict {
         Verdict::Pass => format!(
-            "nothing moved: photographs lie on each other within {:.2} pixels",
+            "nothing moved: the picture's position makes no step above {:.2} pixels",
             bump.size
         ),
         _ => format!(
@@ -46,10 +53,15 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
             photo(bump.before)
         ),
     };
-    let values = moved.shifts.iter().map(|&(shot, [x, y])| {
-        let index = sequence.shots[shot].index;
-        (index, x.hypot(y))
-    });
+    // Against those before the step, so that what comes after it lies beyond the limit.
+    let before = |axis: usize| {
+        let of = moved.shifts[..bump.before].iter();
+        median(of.map(|(_, shift)| shift[axis]).collect()).unwrap_or(0.0)
+    };
+    let still = [before(0), before(1)];
+    let index = |at: usize| sequence.shots[moved.shifts[at].0].index;
+    let values = (moved.shifts.iter().enumerate())
+        .map(|(at, (_, [x, y]))| (index(at), (x - still[0]).hypot(y - still[1])));
     let next_step = "Fix tripod, projector and scene, use a remote release, and take the capture \
          again; photographs from before and after a bump do not belong together.";
     Gate {
@@ -58,9 +70,10 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
         unit: "pixels",
         what,
         evidence: Evidence::Photographs {
-            what: "shift against the session's mean, pixels",
+            what: "shift against the first photographs, pixels",
             values: values.collect(),
-            limit: None,
+            limit: Some(limit),
+            from: (verdict != Verdict::Pass).then(|| index(bump.before)),
         },
         ..Gate::of_share(name, verdict, (0.0, 0.0), next_step)
     }

@@ -56,7 +56,7 @@ pub(super) fn judge(
     let of = "noise of one observation under white, % of its light";
     Gate {
         what,
-        evidence: Evidence::cells(of, grid, values),
+        evidence: Evidence::cells(of, grid, values, 100.0 * MOST),
         ..Gate::of_share(GateName::Noise, verdict, (error, MOST), next_step)
     }
 }

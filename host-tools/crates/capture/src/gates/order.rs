@@ -27,6 +27,7 @@ pub(super) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
                 .map(|(shot, distance)| (sequence.shots[shot].index, *distance))
                 .collect(),
             limit: Some(order.none),
+            from: None,
         },
     };
     let photo = |shot: usize| sequence.shots[shot].photo.display();

@@ -2,13 +2,13 @@
 //! projector shows a colour as the sum of its primaries.
 
 use crate::cells::nonlinearity::Nonlinearity;
-use crate::devices::{CameraFit, Devices, Ramp};
+use crate::devices::{CameraFit, Devices};
 use crate::format::calibration_role::RampChannel;
 use crate::gate::{Evidence, Gate, GateName, Verdict};
 
 /// Misfit of the declared camera response beyond that of the best one.
-const WARN: f64 = 0.01;
-const MOST: f64 = 0.03;
+const WARN: f64 = 0.006;
+const MOST: f64 = 0.012;
 
 /// Steps of 255 that the projector's measured response may be off the declared one.
 const WARN_STEPS: f64 = 2.5;
@@ -27,10 +27,17 @@ pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
         .as_ref()
         .filter(|fit| curved && fit.contradicts());
     let steps = devices.projector_steps();
-    let complaints = devices
-        .ramp
-        .as_ref()
-        .map_or_else(Vec::new, Ramp::complaints);
+    // A camera whose curve is not the declared one, or that exposes for the picture, sees
+    // colours that do not add up whatever the projector does.
+    let blamed = camera.is_some()
+        || matches!(
+            cause,
+            Some(Nonlinearity::Curve { .. } | Nonlinearity::Exposure)
+        );
+    let complaints = match &devices.ramp {
+        Some(ramp) if !blamed => ramp.complaints(),
+        _ => Vec::new(),
+    };
     let gate = |verdict, number, limit, unit, what, next_step| Gate {
         name,
         verdict,
@@ -45,8 +52,14 @@ pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
     let camera_verdict = camera.map(|fit| Verdict::of(beyond(fit), WARN, MOST));
     let steps_verdict = steps.map(|steps| Verdict::of(steps, WARN_STEPS, MOST_STEPS));
     if let Some(complaint) = complaints.first() {
-        let next_step = "Choose the projector's sRGB, film or photo mode, switch off dynamic \
-             contrast, iris, brilliant colour and eco modes, and take the capture again.";
+        let next_step = if devices.camera_fit.as_ref().is_some_and(CameraFit::tells) {
+            "Choose the projector's sRGB, film or photo mode, switch off dynamic contrast, iris, \
+             brilliant colour and eco modes, and take the capture again."
+        } else {
+            "Check first that [camera] response in capture.toml is the camera's: these photographs \
+             do not tell it. If it is, choose the projector's sRGB, film or photo mode, switch off \
+             dynamic contrast, iris, brilliant colour and eco modes, and take the capture again."
+        };
         let number = complaints.len() as f64;
         let what = complaint.clone();
         return gate(Verdict::Fail, number, 0.0, "complaints", what, next_step);

@@ -2,7 +2,7 @@
 //! and black together.
 
 use crate::cells::nonlinearity::Nonlinearity;
-use crate::cells::superposition::{NOTABLE, Sums};
+use crate::cells::superposition::{CELLS, NOTABLE, Sums};
 use crate::format::sequence::Sequence;
 use crate::gate::{Evidence, Gate, GateName, Verdict};
 
@@ -28,8 +28,9 @@ pub(super) fn judge(
     let verdict = Verdict::of(number, NOTABLE, MOST);
     let what = match verdict {
         Verdict::Pass => format!(
-            "patterns and their inverses add up to white within {:.1} %",
-            100.0 * number
+            "patterns and their inverses add up to white within {:.2} %",
+            // Never within nothing.
+            (1e4 * number).ceil().max(1.0) / 100.0
         ),
         _ => format!(
             "light does not add up: patterns and their inverses together are {:+.1} % off white \
@@ -46,6 +47,7 @@ pub(super) fn judge(
             "pattern and inverse against white and black, %",
             sequence.grid,
             values.collect(),
+            100.0 * CELLS * MOST,
         ),
         ..Gate::of_share(name, verdict, (number, MOST), next_step(cause))
     }
@@ -74,6 +76,11 @@ fn words(cause: Option<Nonlinearity>) -> String {
         Some(Nonlinearity::Curve { gamma }) => format!(
             "they would add up if the light were raised to the power {gamma:.2}, so that the \
              camera's gamma is not the declared one"
+        ),
+        Some(Nonlinearity::CurveOrExposure { gamma }) => format!(
+            "they would add up if the light were raised to the power {gamma:.2} (the camera's gamma \
+             is not the declared one), and as well if automatic exposure or a \"vivid\" mode made \
+             pictures brighter: these photographs cannot tell which"
         ),
         Some(Nonlinearity::Exposure) => {
             "all cells and ambient light by the same factor, so that the \

@@ -147,12 +147,10 @@ impl<'a> LinearPhotographs<'a> {
     }
 
     /// White minus black, one plane a channel.
-    pub(crate) fn into_flood(mut self) -> Vec<Vec<f32>> {
-        for (flood, black) in self.flood.iter_mut().zip(&self.black) {
-            for (flood, black) in flood.iter_mut().zip(black) {
-                *flood -= black;
-            }
-        }
-        self.flood
+    pub(crate) fn flood_without_black(&self) -> Vec<Vec<f32>> {
+        let planes = self.flood.iter().zip(&self.black);
+        planes
+            .map(|(flood, black)| flood.iter().zip(black).map(|(w, b)| w - b).collect())
+            .collect()
     }
 }

@@ -2,14 +2,17 @@
 //!
 //! Some pixels are given to cells by their whole series: each pixel goes to the cell
 //! whose on and off over all photographs its own light follows best. That needs no
-//! Gray code and survives some photographs that show another pattern; where all
-//! after one are shifted, the shift that fits best is tried. Then every photograph
-//! is compared with every pattern.
+//! Gray code and survives some photographs that show another pattern. Where all after one
+//! are shifted, the place and the shift that make the series likeliest are tried too; a Gray
+//! code looks much like itself two photographs later, so that all pixels together decide and
+//! not how many follow some cell. Then every photograph is compared with every pattern, in the
+//! cells in which the pattern differs from the photograph's own.
 
-use super::sampled::{SIDE, Sampled};
+use super::sampled::Sampled;
 use crate::format::sequence::Sequence;
 use iltm_picture::statistics::median;
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 
 /// Pixels that are given to cells.
 const MOST_PIXELS: usize = 1024;
@@ -20,6 +23,12 @@ const LEAST_SHOTS: usize = 24;
 /// Photographs that one may be taken too early or too late by.
 const MOST_SHIFT: isize = 2;
 
+/// Places of the session from which photographs may be shifted, evenly.
+const PLACES: usize = 8;
+
+/// How many times as likely the series must be with a shift, in logarithms.
+const LIKELIER: f64 = 1.25;
+
 /// Correlation of a pixel's series with its cell's from which it is used.
 const LEAST_ALIKE: f64 = 0.5;
 
@@ -29,15 +38,18 @@ const WELL_ALIKE: f64 = 0.8;
 /// Pixels that must be left.
 const LEAST_PIXELS: usize = 24;
 
-/// Distance to the own pattern, in those to the best other, from which the other one
-/// is shown.
-const OTHER: f64 = 1.5;
+/// Cells in which another pattern must differ for a photograph to tell them apart.
+const LEAST_CELLS: usize = 6;
 
-/// Distance to a pattern, of the range between dark and lit squared, below which it may
-/// be the one that is shown; one half is another random pattern's.
-const NONE: f64 = 0.2;
+/// How much nearer a photograph must be to another pattern than to its own, in the cells in
+/// which they differ: 1 if it shows the other one, -1 if its own.
+const OTHER: f64 = 0.3;
 
-/// Distance to the own pattern from which no pattern is shown.
+/// The same in standard errors over these cells.
+const SURE: f64 = 5.0;
+
+/// Distance to the own pattern, of the range between dark and lit squared, from which no
+/// pattern is shown; one half is another random pattern's.
 const UNLIKE: f64 = 0.35;
 
 /// The same, in those of the session's other photographs: where cells are a few pixels
@@ -71,20 +83,44 @@ pub(crate) fn find(sequence: &Sequence, sampled: &Sampled) -> Option<Order> {
         return None;
     }
     let light = light(sampled);
-    let shifts = (0..=MOST_SHIFT).flat_map(|shift| [shift, -shift]);
-    let best = shifts
+    let unshifted = Assigned::new(&light, &patterns, Shift::NONE);
+    let best = Shift::all(patterns.len())
         .map(|shift| Assigned::new(&light, &patterns, shift))
-        // The first of equals: no shift at all.
-        .fold(None, |best: Option<Assigned>, next| match best {
-            Some(best) if best.alike >= 1.05 * next.alike => Some(best),
-            Some(best) if best.shift == -next.shift && best.shift == 0 => Some(best),
-            Some(best) if next.alike <= 1.05 * best.alike => Some(best),
-            _ => Some(next),
-        })?;
+        .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))
+        .filter(|best| best.likelihood > LIKELIER * unshifted.likelihood)
+        .unwrap_or(unshifted);
     if best.pixels.len() < LEAST_PIXELS {
         return None;
     }
     Some(best.compare(&light, &patterns))
+}
+
+/// From a place of the session on, photographs show a pattern so many later than their line.
+#[derive(Clone, Copy, Debug)]
+struct Shift {
+    from: usize,
+    by: isize,
+}
+
+impl Shift {
+    const NONE: Self = Self { from: 0, by: 0 };
+
+    /// All that are tried in a session of so many shots.
+    fn all(shots: usize) -> impl Iterator<Item = Self> {
+        let by = (1..=MOST_SHIFT).flat_map(|by| [by, -by]);
+        by.flat_map(move |by| {
+            (0..PLACES).map(move |place| Self {
+                from: place * shots / PLACES,
+                by,
+            })
+        })
+    }
+
+    /// The pattern that a shot shows.
+    fn shown(self, shot: usize, patterns: &[Vec<bool>]) -> Option<&Vec<bool>> {
+        let by = if shot < self.from { 0 } else { self.by };
+        patterns.get(shot.checked_add_signed(by)?)
+    }
 }
 
 /// Which cells are lit in each shot.
@@ -99,39 +135,30 @@ fn patterns(sequence: &Sequence) -> Vec<Vec<bool>> {
     patterns
 }
 
-/// Light of some of the sampled pixels, `pixels x shots`: the middle ones of each
-/// square's quarters.
+/// Light of some of the sampled pixels, `pixels x shots`, evenly over all squares.
 fn light(sampled: &Sampled) -> DMatrix<f32> {
-    let quarter = SIDE / 4;
-    let places: Vec<usize> = (0..sampled.squares())
-        .flat_map(|square| {
-            (0..4).map(move |k| {
-                let (row, col) = (quarter + k / 2 * 2 * quarter, quarter + k % 2 * 2 * quarter);
-                square * SIDE * SIDE + row * SIDE + col
-            })
-        })
-        .collect();
-    let step = places.len().div_ceil(MOST_PIXELS).max(1);
-    let places: Vec<usize> = places.into_iter().step_by(step).collect();
+    // An odd step takes another column of the squares each time.
+    let step = (sampled.pixels.len() / MOST_PIXELS) | 1;
+    let places: Vec<usize> = (0..sampled.pixels.len()).step_by(step).collect();
     DMatrix::from_fn(places.len(), sampled.shots.len(), |pixel, shot| {
         sampled.shots[shot][places[pixel]]
     })
 }
 
-/// Pixels and their cells, if photograph `s` shows the pattern of shot `s + shift`.
+/// Pixels and their cells, if photographs show the patterns of a shift.
 struct Assigned {
-    shift: isize,
+    shift: Shift,
     /// Pixels that follow a cell, and that cell.
     pixels: Vec<(usize, usize)>,
-    /// Sum over the pixels of how well they do.
-    alike: f64,
+    /// Logarithm of how likely the series of all pixels are if each follows its cell but for
+    /// noise, a photograph: minus half that of what the cell leaves unexplained.
+    likelihood: f64,
 }
 
 impl Assigned {
-    fn new(light: &DMatrix<f32>, patterns: &[Vec<bool>], shift: isize) -> Self {
+    fn new(light: &DMatrix<f32>, patterns: &[Vec<bool>], shift: Shift) -> Self {
         let cells = patterns[0].len();
-        let shown =
-            |shot: usize| -> Option<&Vec<bool>> { patterns.get(shot.checked_add_signed(shift)?) };
+        let shown = |shot: usize| shift.shown(shot, patterns);
         let shots: Vec<usize> = (0..patterns.len())
             .filter(|&s| shown(s).is_some())
             .collect();
@@ -160,14 +187,17 @@ impl Assigned {
             }
             (pixel, cell, f64::from(most))
         });
-        let mut best: Vec<(usize, usize, f64)> = best.filter(|b| b.2 > LEAST_ALIKE).collect();
+        let mut best: Vec<(usize, usize, f64)> = best.collect();
+        let unexplained = |b: &(usize, usize, f64)| (1.0 - b.2 * b.2).max(1e-4);
+        let likelihood = best.iter().map(|b| -0.5 * unexplained(b).ln()).sum();
+        best.retain(|b| b.2 > LEAST_ALIKE);
         let well = |b: &&(usize, usize, f64)| b.2 > WELL_ALIKE;
-        if best.iter().filter(well).count() >= 4 * LEAST_PIXELS {
+        if best.iter().filter(well).count() >= LEAST_PIXELS {
             best.retain(|b| b.2 > WELL_ALIKE);
         }
         Self {
             shift,
-            alike: best.iter().map(|b| b.2).sum(),
+            likelihood,
             pixels: best
                 .into_iter()
                 .map(|(pixel, cell, _)| (pixel, cell))
@@ -178,10 +208,7 @@ impl Assigned {
     /// Compares every photograph with every pattern.
     fn compare(&self, light: &DMatrix<f32>, patterns: &[Vec<bool>]) -> Order {
         let shots = patterns.len();
-        let shown = |shot: usize| {
-            let at = shot.checked_add_signed(self.shift)?;
-            patterns.get(at)
-        };
+        let shown = |shot: usize| self.shift.shown(shot, patterns);
         // How far each pixel is from dark to lit in each photograph.
         let rows = self.pixels.iter().map(|&(pixel, cell)| {
             let middle = |lit: bool| {
@@ -207,16 +234,44 @@ impl Assigned {
         let distances: Vec<f64> = (0..shots).map(|s| distance(s, &patterns[s])).collect();
         let typical = median(distances.clone()).unwrap_or(0.0);
         let none = UNLIKE.max(STRANGE * typical);
+        let nearer = |shot: usize, other: usize| {
+            let mut cells: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+            for (row, &(_, cell)) in rows.iter().zip(&self.pixels) {
+                let own = patterns[shot][cell];
+                if patterns[other][cell] != own {
+                    let toward = if own {
+                        1.0 - 2.0 * row[shot]
+                    } else {
+                        2.0 * row[shot] - 1.0
+                    };
+                    let sum = cells.entry(cell).or_default();
+                    *sum = (sum.0 + toward, sum.1 + 1.0);
+                }
+            }
+            significant(
+                &cells
+                    .into_values()
+                    .map(|(sum, count)| sum / count)
+                    .collect::<Vec<f64>>(),
+            )
+        };
         let wrong = (0..shots).filter_map(|shot| {
             let own = distances[shot];
             // What fits well needs no comparison.
-            if own < 0.25 * NONE {
+            if own < 0.25 * OTHER {
                 return None;
             }
             let all = (0..shots).map(|other| (other, distance(shot, &patterns[other])));
-            let (best, least) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
-            let near = NONE.max(OTHER * typical);
-            let other = patterns[best] != patterns[shot] && own > OTHER * least && least < near;
+            let least = all
+                .clone()
+                .map(|(_, distance)| distance)
+                .fold(own, f64::min);
+            // Of equal patterns the one that was shown about then.
+            let best = all
+                .filter(|(_, distance)| *distance <= least)
+                .min_by_key(|(other, _)| other.abs_diff(shot))?
+                .0;
+            let other = patterns[best] != patterns[shot] && nearer(shot, best);
             // White is brighter than any sum of its parts, and black darker.
             let even = patterns[shot].iter().all(|lit| *lit == patterns[shot][0]);
             match (other, own > none && !even) {
@@ -240,4 +295,16 @@ impl Assigned {
             none,
         }
     }
+}
+
+/// Whether cells say surely that a photograph shows another pattern: 1 is a cell that does,
+/// -1 one that does not.
+fn significant(cells: &[f64]) -> bool {
+    let count = cells.len() as f64;
+    if cells.len() < LEAST_CELLS {
+        return false;
+    }
+    let mean = cells.iter().sum::<f64>() / count;
+    let variance = cells.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    mean > OTHER && mean > SURE * (variance / count).sqrt()
 }

@@ -53,11 +53,6 @@ impl Sampled {
         })
     }
 
-    /// Squares.
-    pub(crate) fn squares(&self) -> usize {
-        self.pixels.len() / (SIDE * SIDE)
-    }
-
     /// Mean of some photographs.
     pub(crate) fn mean(&self, shots: &[usize]) -> Vec<f32> {
         let share = 1.0 / shots.len().max(1) as f32;

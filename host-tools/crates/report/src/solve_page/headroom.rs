@@ -39,7 +39,7 @@ pub(super) fn section(
             p {
                 "With even white nothing is cut. A picture that is dark elsewhere lends less light to its bright "
                 "places, which then need more than the projector has: with content of your own ("
-                code { "--content VIDEO.y4m" } ") white is chosen for that, and this page shows where it is cut."
+                code .formula { "--content VIDEO.y4m" } ") white is chosen for that, and this page shows where it is cut."
             }
         }
         @for preview in &previews {
@@ -49,8 +49,8 @@ pub(super) fn section(
                     (preview.frames) @if preview.frames == 1 { " frame: " } @else { " frames: " }
                     (percent(preview.cut.0)) " of the samples cut at the projector's white, "
                     (percent(preview.cut.1)) " at its black"
-                    @if let Some(own) = cut_in_full(table, &preview.content.frames) {
-                        "; at the content's own resolution " (percent(own)) " in all"
+                    @if let Some((bright, dark)) = cut_in_full(table, &preview.content.frames) {
+                        "; at the content's own resolution " (percent(bright)) " and " (percent(dark))
                     }
                     "."
                 }
@@ -114,16 +114,19 @@ fn previews<'c>(
     previews
 }
 
-/// Share of the samples that the runtime itself cuts; `None` if it cannot show them.
-fn cut_in_full(table: &Table<'_>, frames: &[Picture]) -> Option<f64> {
+/// Shares of the samples that the runtime itself cuts at white and at black; `None` if it
+/// cannot show them.
+fn cut_in_full(table: &Table<'_>, frames: &[Picture]) -> Option<(f64, f64)> {
     let compensator = Compensator::new(table, CompensateOptions::default()).ok()?;
-    let (mut clipped, mut samples) = (0, 0);
+    let (mut clipped, mut white, mut samples) = (0, 0, 0);
     for frame in frames {
         let summary = compensator.picture(&mut frame.clone()).ok()?;
         clipped += summary.clipped;
+        white += summary.clipped_white;
         samples += summary.samples;
     }
-    (samples > 0).then(|| clipped as f64 / samples as f64)
+    let share = |count: u64| count as f64 / samples as f64;
+    (samples > 0).then(|| (share(white), share(clipped - white)))
 }
 
 /// A frame with the shares painted over it.

@@ -1,7 +1,6 @@
 //! Advice in one line: the cheapest tier that is good enough.
 
 use super::{Point, Sweep};
-use iltm_compile::cost::{CLOCK, RATE};
 use iltm_picture::numbers::percent;
 
 /// One step of an 8-bit code.
@@ -10,8 +9,8 @@ const TARGET: f64 = 1.0 / 255.0;
 /// A tier that errs by no more than this times the least error is as good.
 const AS_GOOD: f64 = 1.05;
 
-/// A gain below this, in decibels, is none.
-const LEAST_GAIN: f64 = 0.05;
+/// An error above this times the one before is no better.
+const LEAST_GAIN: f64 = 0.97;
 
 /// See [`Tradeoff::advice`](super::Tradeoff::advice).
 pub(super) fn advice(points: &[Point]) -> String {
@@ -65,9 +64,8 @@ fn tier(point: &Point) -> String {
 
 fn cost(point: &Point) -> String {
     format!(
-        "{} of a {RATE} Hz frame on a {} MHz part",
-        percent(point.share()),
-        CLOCK / 1_000_000
+        "{} of a frame\u{2019}s time on the reference device",
+        percent(point.share())
     )
 }
 
@@ -80,16 +78,15 @@ fn doubling(points: &[Point], chosen: &Point) -> String {
     let best = affordable
         .map(|point| point.predicted)
         .fold(chosen.predicted, f64::min);
-    let gain = 20.0 * (chosen.predicted / best).log10();
     // Written so that no error at all gains nothing either.
-    if gain >= LEAST_GAIN {
-        format!("doubling the time buys {gain:.1} dB")
+    if best < LEAST_GAIN * chosen.predicted {
+        format!("with twice the time the error is {}", fraction(best))
     } else {
-        "doubling the time buys nothing".to_owned()
+        "more time makes it no better".to_owned()
     }
 }
 
-/// An error as people say it: 1/131, or per cent where it is large.
+/// An error as people say it.
 pub(super) fn fraction(error: f64) -> String {
     if error > 0.0 && error < 0.1 {
         format!("1/{:.0}", 1.0 / error)
@@ -133,14 +130,13 @@ pub(super) mod tests {
             point(Sweep::Table, 2, 0.01, 0.2),
             point(Sweep::Table, 3, 0.0039, 0.41),
             point(Sweep::Table, 4, 0.0030, 0.95),
-            // 20 log10(.0039 / .00377) = .29 dB
-            point(Sweep::Tiers, 9, 0.00377, 0.8),
+            point(Sweep::Tiers, 9, 0.0036, 0.8),
             point(Sweep::Photographs, 5, 0.001, 0.5),
         ];
         assert_eq!(
             advice(&points),
-            "tier 3 meets 1/255 at 41 % of a 60 Hz frame on a 216 MHz part; \
-             doubling the time buys 0.3 dB"
+            "tier 3 meets 1/255 at 41 % of a frame\u{2019}s time on the reference device; \
+             with twice the time the error is 1/278"
         );
     }
 
@@ -156,8 +152,8 @@ pub(super) mod tests {
         }
         assert_eq!(
             advice(&points),
-            "tier 3 errs by 1/128, within 5 % of the best tier, at 1.2 % of a 60 Hz frame on a \
-             216 MHz part; doubling the time buys nothing; 1/255 is out of reach of any tier, \
+            "tier 3 errs by 1/128, within 5 % of the best tier, at 1.2 % of a frame\u{2019}s time \
+             on the reference device; more time makes it no better; 1/255 is out of reach of any tier, \
              since the inverse itself errs by 1/133"
         );
     }
@@ -167,8 +163,8 @@ pub(super) mod tests {
         let points = [point(Sweep::Table, 0, 0.2, 0.004)];
         assert_eq!(
             advice(&points),
-            "gain only (tier 0) errs by 20 %, at 0.4 % of a 60 Hz frame on a 216 MHz part; \
-             doubling the time buys nothing; 1/255 is out of reach of this table"
+            "gain only (tier 0) errs by 20 %, at 0.4 % of a frame\u{2019}s time on the reference device; \
+             more time makes it no better; 1/255 is out of reach of this table"
         );
     }
 

@@ -119,12 +119,13 @@ impl Tradeoff {
                 h2 { "What the numbers are" }
                 ul .terms {
                     li { b { "Predicted error" } ": the root of the sum of squares of the inverse\u{2019}s own error, by "
-                        "photographs that its solve had not seen, and of what a tier leaves out, on natural images." }
+                        "photographs that its solve had not seen, and of what a tier leaves out, on natural images; of gains alone (tier 0) at the brightness that "
+                        "suits it best, for without the operator all is brighter." }
                     @if self.has_truth() {
                         li { b { "True error" } ": natural images from a fifth of reference white up, compensated and "
                             "clipped, through the transport in the capture\u{2019}s reference: "
                             span .formula { "mean \u{2016}T p \u{2212} d\u{2016} / \u{2016}d\u{2016}" }
-                            ". The reference has noise of its own." }
+                            ". The reference has noise of its own, and no brightness is free, so that gains alone come out worse." }
                     }
                     li { b { "Instructions" } ": of a frame of one pixel a cell (" (self.grid) ", "
                         @if self.channels == 1 { "grey" } @else { "colour" }

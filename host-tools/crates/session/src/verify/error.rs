@@ -1,5 +1,6 @@
 //! Errors of a verification: why there is no verdict.
 
+use super::Cause;
 use crate::PatternsError;
 use iltm_capture::CaptureError;
 use iltm_picture::FolderError;
@@ -71,6 +72,21 @@ pub enum VerifyError {
         /// Number of the test image.
         image: u8,
     },
+    /// A folder of wanted images was made for another table.
+    #[error("{}: the folder was not made for this table, whose id is {own}", path.display())]
+    NotOfTable {
+        /// The file that names the table.
+        path: PathBuf,
+        /// The id of the table that was given.
+        own: String,
+    },
+    /// The table does not tell what light comes of an input, so that a chain that compensates
+    /// cannot be told from one that does not.
+    #[error("{}: the table does not tell what light comes of an input, so that nothing says what a chain did", path.display())]
+    Untold {
+        /// The manifest.
+        path: PathBuf,
+    },
     /// The folder was made for another grid.
     #[error("{}: its pictures are of {found} cells, the table is for {expected}", path.display())]
     Grid {
@@ -103,6 +119,14 @@ pub enum VerifyError {
         shows: String,
         /// Role that its line has.
         own: String,
+    },
+    /// Too few of the table's cells were found, because white is overexposed.
+    #[error("{}: {what}", path.display())]
+    Overexposed {
+        /// The folder.
+        path: PathBuf,
+        /// What the gate says.
+        what: String,
     },
     /// Too few of the table's cells were found.
     #[error("{}: only {found} of the {live} cells that the table knows were found", path.display())]
@@ -139,7 +163,10 @@ impl VerifyError {
             Self::Unpaired { .. } | Self::NoImages { .. } | Self::Picture { .. } => {
                 "Make the folder anew with `iltm verify TABLE.iltm -o FOLDER`.".to_owned()
             }
-            Self::OtherTable { .. } | Self::Grid { .. } => {
+            Self::Untold { .. } => {
+                "Verify without --wanted: the table's own slides are compared with the wall.".to_owned()
+            }
+            Self::OtherTable { .. } | Self::NotOfTable { .. } | Self::Grid { .. } => {
                 "Verify with the table that the folder was made with, or make a folder with this \
                  one and photograph it."
                     .to_owned()
@@ -152,6 +179,7 @@ impl VerifyError {
             Self::Order { .. } => {
                 "Put the photographs in the order of verify.csv, or take them again.".to_owned()
             }
+            Self::Overexposed { .. } => Cause::Clipped.next_step().to_owned(),
             Self::TooFewCells { .. } => {
                 "Point the camera so that it sees the whole projection, in focus.".to_owned()
             }

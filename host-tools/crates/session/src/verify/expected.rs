@@ -128,6 +128,32 @@ impl<'t, 'a> Expected<'t, 'a> {
         Some(light)
     }
 
+    /// The same of a picture that lies elsewhere on the wall than the cells: `onto` brings its
+    /// planes to the cells, and `back` those of the cells to it. Bounced light and gains are
+    /// smooth and may be looked up between cells; what is projected is not.
+    pub(super) fn photograph_elsewhere(
+        &mut self,
+        input: &CellPlanes,
+        onto: impl Fn(&CellPlanes) -> CellPlanes,
+        back: impl Fn(&CellPlanes) -> CellPlanes,
+    ) -> Option<CellPlanes> {
+        let mut light = self.photograph(&onto(input))?;
+        for (light, ambient) in light.iter_mut().zip(&self.ambient) {
+            light.iter_mut().zip(ambient).for_each(|(l, a)| *l -= a);
+        }
+        let mut received = back(&self.received(&light));
+        let (gain, ambient) = (back(&self.gain), back(&self.ambient));
+        for (channel, plane) in received.iter_mut().enumerate() {
+            for (cell, light) in plane.iter_mut().enumerate() {
+                let gain = gain[channel][cell];
+                let lit = input[channel][cell] + *light;
+                let own = if gain > 0.0 { lit / gain } else { 0.0 };
+                *light = own.max(0.0) + ambient[channel][cell];
+            }
+        }
+        Some(received)
+    }
+
     /// `(p + K l) / g`; dark where the table knows nothing.
     fn reflect(&self, input: &CellPlanes, received: Option<&CellPlanes>) -> CellPlanes {
         let channels = self.gain.iter().zip(input).enumerate();

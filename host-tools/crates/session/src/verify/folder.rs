@@ -1,19 +1,22 @@
 //! Verification folder: writes the pictures that a table is verified with.
 
-use super::images::test_images;
+use super::images::{MOST_CLIPPED, RANGES, test_images};
 use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
 use super::{TestImage, VerifyError};
 use crate::{Layout, slide_name};
 use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, pattern_set};
-use iltm_picture::{Picture, WholeFolder, progress::Progress};
+use iltm_picture::{Picture, Response, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
-use iltm_video::Compensator;
+use iltm_video::{Compensator, VideoError};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// What stands in the folder for whoever takes the photographs.
 const README: &str = include_str!("README.txt");
+
+/// The same for a chain that compensates.
+const README_WANTED: &str = include_str!("README-wanted.txt");
 
 /// What was written.
 #[derive(Clone, Debug)]
@@ -28,6 +31,9 @@ pub struct Written {
 /// that a good table seems four times worse than it is, and more of them bring little.
 const BERNOULLI: usize = 32;
 
+/// Random patterns after the last image: as many as movement is found by.
+const AFTER_IMAGES: usize = 4;
+
 /// What they follow from: any number but those of captures.
 const SEED: u64 = 0x5EE;
 
@@ -40,8 +46,21 @@ struct VerifySlide {
     full: Picture,
 }
 
-/// Writes the folder `out`, whole or not at all: for each test image the picture as it is
-/// and as `table` compensates it, white, black, a Gray code and some random patterns.
+/// What the slides of a folder are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Slides {
+    /// Each test image as it is and as the table compensates it: for a projector alone.
+    Both,
+    /// Each test image as it should look: for a chain that compensates.
+    Wanted,
+}
+
+/// File that says which table a folder of wanted images is for: nothing else in it does.
+pub(super) const TABLE_FILE: &str = "table.txt";
+
+/// Writes the folder `out`, whole or not at all: the test images, white, black, a Gray code
+/// and some random patterns. For a chain that compensates, white and black are two greys that
+/// every cell can show.
 ///
 /// # Errors
 /// [`VerifyError::Folder`] if something is in its place or it cannot be written,
@@ -49,16 +68,23 @@ struct VerifySlide {
 pub fn write(
     table: &Table<'_>,
     layout: &Layout,
-    settings: &Settings,
+    (settings, kind): (&Settings, Slides),
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Written, VerifyError> {
     let images = test_images(table)?;
+    let mut settings = settings.clone();
+    let size = layout.projector();
+    settings.projector.size = Some([size.width() as u16, size.height() as u16]);
+    settings.projector.border = layout.border();
     let folder = WholeFolder::create(out)?;
     for name in ["patterns", "slides", "photos", "wanted"] {
         folder.folder(name)?;
     }
-    let slides = slides(table, layout, &images)?;
+    let slides = match kind {
+        Slides::Both => slides(table, layout, &images)?,
+        Slides::Wanted => wanted_slides(table, layout, &images)?,
+    };
     progress.begin("writing the pictures", slides.len() as u64);
     let written = slides.par_iter().enumerate().map(|(index, slide)| {
         folder.picture(numbered("patterns", index as u32), &slide.cells)?;
@@ -73,8 +99,18 @@ pub fn write(
     let manifest = VerifyManifest::numbered("patterns", (0..).zip(slides.iter().map(|s| s.role)));
     folder.file(VERIFY_FILE, manifest.to_csv())?;
     // Numbers and strings always have a TOML form.
-    folder.file(SETTINGS_FILE, toml::to_string(settings).unwrap_or_default())?;
-    let readme = README.replace("PHOTOGRAPHS", &slides.len().to_string());
+    folder.file(
+        SETTINGS_FILE,
+        toml::to_string(&settings).unwrap_or_default(),
+    )?;
+    let readme = match kind {
+        Slides::Both => README,
+        Slides::Wanted => {
+            folder.file(TABLE_FILE, format!("{:08x}\n", table.id()))?;
+            README_WANTED
+        }
+    };
+    let readme = readme.replace("PHOTOGRAPHS", &slides.len().to_string());
     folder.file("README.md", readme)?;
     folder.finish()?;
     progress.end();
@@ -90,7 +126,8 @@ pub(super) fn wanted_file(image: u8) -> PathBuf {
 }
 
 /// All pictures in the order in which they are shown: white and black also in the middle
-/// and at the end, so that a lamp that changes meanwhile is noticed.
+/// and at the end, so that a lamp that changes meanwhile is noticed; random patterns also
+/// between the images and after them, so that a camera that moves there is.
 fn slides(
     table: &Table<'_>,
     layout: &Layout,
@@ -112,7 +149,10 @@ fn slides(
     let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
     // White and black.
     let ends = || all(&coded[..2]);
-    let mut slides = all(&coded)?;
+    let between = 2 * images.len() + AFTER_IMAGES;
+    let (first, rest) = coded.split_at(coded.len() - between);
+    let mut rest = rest.iter();
+    let mut slides = all(first)?;
     slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);
@@ -126,14 +166,82 @@ fn slides(
             full: layout.slide(&plain)?,
             cells: plain,
         });
+        slides.extend(rest.next().map(code).transpose()?);
         slides.push(VerifySlide {
             role: VerifyRole::Compensated(image),
             cells: test.compensated.clone(),
             full,
         });
+        slides.extend(rest.next().map(code).transpose()?);
     }
+    slides.extend(all(rest.as_slice())?);
     slides.extend(ends()?);
     Ok(slides)
+}
+
+/// All slides for a chain that compensates, in the order in which they are shown.
+fn wanted_slides(
+    table: &Table<'_>,
+    layout: &Layout,
+    images: &[TestImage],
+) -> Result<Vec<VerifySlide>, VerifyError> {
+    let coded = pattern_set(table.grid(), BERNOULLI, SEED);
+    let levels = levels(table)?;
+    let code = |(role, pattern): &(Role, Pattern)| -> Result<VerifySlide, VerifyError> {
+        let lit = |cell: usize, _| 255 * u8::from(pattern.lit[cell]);
+        Ok(VerifySlide {
+            role: VerifyRole::Code(*role),
+            full: layout.slide(&grey(table, levels, &pattern.lit))?,
+            cells: Picture::of_codes(FrameSize::of_grid(table.grid()), 1, lit),
+        })
+    };
+    let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
+    let (first, rest) = coded.split_at(coded.len() - images.len() - AFTER_IMAGES);
+    let mut rest = rest.iter();
+    let mut slides = all(first)?;
+    slides.extend(all(&coded[..2])?);
+    for (image, test) in (0..).zip(images) {
+        slides.push(VerifySlide {
+            role: VerifyRole::Wanted(image),
+            full: layout.slide(&test.wanted)?,
+            cells: test.wanted.clone(),
+        });
+        slides.extend(rest.next().map(code).transpose()?);
+    }
+    slides.extend(all(rest.as_slice())?);
+    slides.extend(all(&coded[..2])?);
+    Ok(slides)
+}
+
+/// sRGB codes of a pattern between two lights, in as many channels as the table has.
+pub(super) fn grey(table: &Table<'_>, levels: [f64; 2], lit: &[bool]) -> Picture {
+    let codes = levels.map(|light| (Response::Srgb.value(light) * 255.0).round() as u8);
+    let size = FrameSize::of_grid(table.grid());
+    Picture::of_codes(size, table.channels().into(), |cell, _| {
+        codes[usize::from(lit[cell])]
+    })
+}
+
+/// The darkest and the brightest light between which a table can show the patterns, farthest
+/// apart.
+pub(super) fn levels(table: &Table<'_>) -> Result<[f64; 2], VideoError> {
+    let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
+    let most = super::Expected::new(table).even_grey().min(1.0);
+    let coded = pattern_set(table.grid(), BERNOULLI, SEED);
+    let mut levels = [most; 2];
+    for (dark, bright) in RANGES {
+        levels = [most * dark, most * bright];
+        let mut worst = 0.0_f64;
+        for (_, pattern) in &coded {
+            let mut shown = grey(table, levels, &pattern.lit);
+            let totals = compensator.picture(&mut shown)?;
+            worst = worst.max(totals.clipped as f64 / totals.samples.max(1) as f64);
+        }
+        if worst <= MOST_CLIPPED {
+            break;
+        }
+    }
+    Ok(levels)
 }
 
 /// A wanted picture as a projector is sent it that is not compensated: the same light,

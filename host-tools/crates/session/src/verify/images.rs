@@ -16,10 +16,10 @@ use iltm_video::{CompensateOptions, Compensator, VideoError};
 const NATURAL: usize = 3;
 
 /// Share of an image's samples that the table may have to cut.
-const MOST_CLIPPED: f64 = 0.005;
+pub(super) const MOST_CLIPPED: f64 = 0.005;
 
 /// Darkest and brightest light that images are squeezed between, until they fit.
-const RANGES: [(f64, f64); 6] = [
+pub(super) const RANGES: [(f64, f64); 6] = [
     (0.2, 1.0),
     (0.2, 0.85),
     (0.3, 0.85),

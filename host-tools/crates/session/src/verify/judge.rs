@@ -6,19 +6,29 @@
 //! known: the table's own predicted error, what the projector's range and its 8-bit codes
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
+use super::outcome::decide;
 use super::readings::Shown;
-use super::{Expected, Readings, VerifyError};
-use iltm_capture::CellPlanes;
+use super::{Cause, ChainFault, Expected, Outcome, Readings, VerifyError};
+use iltm_capture::{CellPlanes, Gate};
 use iltm_picture::LightPicture;
 use iltm_report::{Comparison, tier_costs};
 use iltm_runtime::{FrameSize, image::Table};
 use std::path::Path;
 
 /// How much larger than expected an error may be.
-const MARGIN: f64 = 1.5;
+pub(super) const MARGIN: f64 = 1.5;
 
-/// Largest change of white from cell to cell that a camera standing elsewhere explains.
-pub(super) const MOST_VIEWPOINT: f64 = 0.01;
+/// Most that the noise of the photographs may add to what the table promises, as a multiple of
+/// it. Good sessions stay below, and the smallest bump of a tripod that spoils an error is above:
+/// `docs/verify.md` has the study.
+pub(super) const MOST_NOISE: f64 = 1.5;
+
+/// Most that finding the cells again may add, as a multiple of what the table promises: white
+/// differs by more than twice that where cells have few pixels.
+pub(super) const MOST_VIEWPOINT: f64 = 2.5;
+
+/// The most in any case: beyond, it is a change of the scene.
+const MOST_VIEWPOINT_OF_ALL: f64 = 0.01;
 
 /// Where the table predicts nothing: share of the error before that may remain.
 const UNPREDICTED: f64 = 0.5;
@@ -45,12 +55,43 @@ pub struct Bound {
     /// Error that the noise of these photographs makes, mean over the images; `None` with
     /// a single photograph of white.
     pub noise: Option<f64>,
-    /// Error of finding the cells again: what white differs by from cell to cell, which a
-    /// camera elsewhere sees other parts of; at most 1 %, beyond which it is
-    /// a change of the scene.
+    /// Error of finding the cells again: what white differs by from cell to cell and neighbours
+    /// do not share, since a camera elsewhere sees other parts of them; at most 1 %, beyond
+    /// which it is a change of the scene.
     pub viewpoint: f64,
-    /// All of them together: root of the sum of squares, mean over the images.
+    /// Error that the table promises on this projector: what it predicts and what range and
+    /// codes leave. Where it predicts none, that of the limit without its margin.
+    pub promise: f64,
+    /// Error that the photographs themselves make: noise and viewpoint.
+    pub added: f64,
+    /// Promise and as much of the latter as may be added: root of the sum of squares; `None`
+    /// if the table predicts none.
     pub expected: Option<f64>,
+    /// The largest error that the promise and all faults of the photographs explain: what is
+    /// beyond it is on the wall. At least the limit.
+    pub doubt: f64,
+}
+
+impl Bound {
+    /// What the photographs add too much of for a table to pass on them.
+    pub(super) fn unsure(&self) -> Option<Cause> {
+        if self.noise.unwrap_or(0.0) > MOST_NOISE * self.promise {
+            Some(Cause::Noise)
+        } else if self.viewpoint > MOST_VIEWPOINT * self.promise {
+            Some(Cause::Viewpoint)
+        } else {
+            None
+        }
+    }
+
+    /// The larger of what the photographs add.
+    pub(super) fn worst(&self) -> Cause {
+        if self.noise.unwrap_or(0.0) >= self.viewpoint {
+            Cause::Noise
+        } else {
+            Cause::Viewpoint
+        }
+    }
 }
 
 /// A test image on the wall.
@@ -92,27 +133,59 @@ pub struct WhiteChange {
     pub level: Vec<f64>,
     /// The same from cell to cell once that is divided out: root mean square.
     pub shape: f64,
+    /// The part of it that neighbouring cells do not share: what a camera elsewhere explains,
+    /// which sees other parts of each cell. Paint changes neighbours alike.
+    pub alone: f64,
     /// Of each cell, mean over the channels; `None` where it was not compared.
     pub cells: Vec<Option<f64>>,
+}
+
+impl WhiteChange {
+    /// The part of [`shape`](Self::shape) that neighbouring cells share: paint, lamps, things
+    /// that were moved.
+    #[must_use]
+    pub fn shared(&self) -> f64 {
+        (self.shape.powi(2) - self.alone.powi(2)).max(0.0).sqrt()
+    }
 }
 
 /// A cell with a large error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct WorstCell {
-    /// Its row, from 0.
+    /// Its row, from 0 at the top.
     pub row: usize,
-    /// Its column, from 0.
+    /// Its column, from 0 at the left.
     pub col: usize,
     /// Error with compensation, relative to reference white: root mean square over images
     /// and channels.
     pub error: f64,
 }
 
+/// A curve of camera or projector that nobody declared.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Curve {
+    /// The power that the light of the photographs is best raised to; 1 for none.
+    pub power: f64,
+    /// Mean error of the compensated images that it leaves.
+    pub left: f64,
+}
+
 /// The answer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct TableVerdict {
     /// Whether the table keeps its promise.
-    pub passed: bool,
+    pub outcome: Outcome,
+    /// Why it did not pass.
+    pub cause: Option<Cause>,
+    /// The power of light that the compensated photographs would fit best with.
+    pub curve: Curve,
+    /// What the chain that was to compensate did instead.
+    pub chain: Option<ChainFault>,
+    /// Whether such a chain was verified; then the errors without compensation are what the
+    /// table expects.
+    pub wanted: bool,
+    /// What a capture's gates say of the photographs.
+    pub gates: Vec<Gate>,
     /// Mean error of the images without and with compensation.
     pub error: [f64; 2],
     /// What the latter is held against.
@@ -121,6 +194,9 @@ pub struct TableVerdict {
     pub images: Vec<ImageVerdict>,
     /// What has changed.
     pub drift: Drift,
+    /// Light of wanted white on the wall, of that under the projector's own white; mean over
+    /// the cells and colours.
+    pub brightness: f64,
     /// The worst cells, the worst first.
     pub worst: Vec<WorstCell>,
     /// Cells compared, and cells that the table knows.
@@ -167,23 +243,66 @@ pub fn judge(
         images.iter().map(of).sum::<f64>() / images.len().max(1) as f64
     };
     let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
-    let drift = drift(readings, &mut expected, white, &lit);
-    let shape = drift.white.as_ref().map_or(0.0, |white| white.shape);
-    let viewpoint = shape.min(MOST_VIEWPOINT);
+    let cols = table.grid().cols();
+    let drift = drift(readings, &mut expected, (white, cols), &lit);
+    let alone = drift.white.as_ref().map_or(0.0, |white| white.alone);
+    let viewpoint = alone.min(MOST_VIEWPOINT_OF_ALL);
     let bound = self::bound(table, readings, &images, (error[0], bound), viewpoint, &lit);
+    let curve = curve(readings, &lit);
+    let found = (&readings.revisited, &drift, curve);
+    let (mut outcome, mut cause) = decide(error[1], &bound, found);
+    let search = readings.wanted && outcome != Outcome::Passed;
+    let chain = if search && !cause.is_some_and(super::outcome::Cause::spoils_pictures) {
+        let images = super::test_images(table)?;
+        super::chain::find(table, &images, readings, &mut expected, &lit)?
+    } else {
+        None
+    };
+    if chain.is_some() {
+        (outcome, cause) = (Outcome::Failed, Some(Cause::Chain));
+    }
     Ok(TableVerdict {
-        passed: error[1] <= bound.limit,
+        curve,
+        chain,
+        wanted: readings.wanted,
+        outcome,
+        cause,
+        gates: readings.revisited.gates.clone(),
         error,
         bound,
         drift,
+        brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),
         cells: (lit.0.len(), known),
         images,
     })
 }
 
+/// The power of light with which the compensated photographs fit best.
+fn curve(readings: &Readings, lit: &LiveCells) -> Curve {
+    let left = |power: f64| {
+        let error = |shown: &Shown| {
+            let raise = |light: &f64| light.max(0.0).powf(power);
+            let planes = shown.seen[1].iter();
+            let raised = planes.map(|plane| plane.iter().map(raise).collect());
+            lit.compare(&raised.collect(), &shown.wanted).error
+        };
+        readings.shown.iter().map(error).sum::<f64>() / readings.shown.len().max(1) as f64
+    };
+    let powers = (-60..=60).map(|step| (f64::from(step) * 0.01).exp());
+    let tried = powers.map(|power| Curve {
+        power,
+        left: left(power),
+    });
+    let best = tried.min_by(|a, b| a.left.total_cmp(&b.left));
+    best.unwrap_or(Curve {
+        power: 1.0,
+        left: 1.0,
+    })
+}
+
 /// The cells that are compared.
-struct LiveCells(Vec<usize>);
+pub(super) struct LiveCells(Vec<usize>);
 
 impl LiveCells {
     fn new(live: &[bool]) -> Self {
@@ -201,7 +320,7 @@ impl LiveCells {
         }
     }
 
-    fn compare(&self, seen: &CellPlanes, wanted: &CellPlanes) -> Comparison {
+    pub(super) fn compare(&self, seen: &CellPlanes, wanted: &CellPlanes) -> Comparison {
         Comparison::new(&self.light(seen), &self.light(wanted))
     }
 
@@ -273,23 +392,32 @@ fn bound(
     let noise_of = |image: usize| noise.as_ref().map_or(0.0, |noise| noise[image]);
     let range_of = |image: usize| images[image].modelled.map_or(0.0, |modelled| modelled[1]);
     let modelled = images.iter().all(|image| image.modelled.is_some());
-    let expected = predicted.map(|predicted| {
-        mean(&|image| {
-            predicted
-                .hypot(range_of(image))
-                .hypot(noise_of(image))
-                .hypot(viewpoint)
-        })
+    let unpredicted = given.unwrap_or(UNPREDICTED * before) / MARGIN;
+    let promise_of = |image: usize| match (given, predicted) {
+        (None, Some(predicted)) => predicted.hypot(range_of(image)),
+        _ => unpredicted,
+    };
+    let added_of = |image: usize| noise_of(image).hypot(viewpoint);
+    let expected = mean(&|image| {
+        let promise = promise_of(image);
+        let noise = noise_of(image).min(MOST_NOISE * promise);
+        let viewpoint = viewpoint.min(MOST_VIEWPOINT * promise);
+        promise.hypot(noise).hypot(viewpoint)
     });
-    let limit = given.or(expected.map(|expected| MARGIN * expected));
+    let expected = predicted.filter(|_| given.is_none()).map(|_| expected);
+    let limit = expected.map_or(MARGIN * unpredicted, |expected| MARGIN * expected);
+    let explained = mean(&|image| promise_of(image).hypot(added_of(image)));
     Bound {
-        limit: limit.unwrap_or(UNPREDICTED * before),
+        limit,
         given: given.is_some(),
         predicted,
         range: modelled.then(|| mean(&range_of)),
         viewpoint,
         noise: noise.is_some().then(|| mean(&noise_of)),
+        promise: mean(&promise_of),
+        added: mean(&added_of),
         expected,
+        doubt: (MARGIN * explained).max(limit),
     }
 }
 
@@ -328,13 +456,21 @@ fn check_order(
     lit: &LiveCells,
 ) -> Result<(), VerifyError> {
     let named = |image: u8, half: usize| {
-        let role = [super::VerifyRole::Plain, super::VerifyRole::Compensated][half];
+        let role = if readings.wanted {
+            super::VerifyRole::Wanted
+        } else {
+            [super::VerifyRole::Plain, super::VerifyRole::Compensated][half]
+        };
         role(image).to_string()
     };
     for (own, shown) in readings.shown.iter().enumerate() {
-        for half in 0..2 {
+        for half in usize::from(readings.wanted)..2 {
             let error = |model: &CellPlanes| lit.compare(model, &shown.seen[half]).error;
-            let of_own = error(&models[own][half]);
+            let mut of_own = error(&models[own][half]);
+            if readings.wanted {
+                // Perhaps nothing compensates.
+                of_own = of_own.min(error(&models[own][0]));
+            }
             // Plain and compensated pictures of one image differ by too little to tell
             // them apart where the table may be wrong.
             let others = models.iter().enumerate().filter(|(other, _)| *other != own);
@@ -362,7 +498,7 @@ fn check_order(
 fn drift(
     readings: &Readings,
     expected: &mut Expected<'_, '_>,
-    white: f64,
+    (white, cols): (f64, usize),
     lit: &LiveCells,
 ) -> Drift {
     let seen = &readings.revisited.white;
@@ -374,10 +510,9 @@ fn drift(
     };
     let first = seen.first().map_or(0.0, total).max(1e-12);
     let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
-    let ones = vec![vec![1.0; readings.live.len()]; readings.revisited.channels];
-    let flood = expected.photograph(&ones);
+    let flood = expected.photograph(&readings.flood);
     Drift {
-        white: flood.map(|flood| white_change(readings, &flood, white, lit)),
+        white: flood.map(|flood| white_change(readings, &flood, (white, cols), lit)),
         session: changes.fold(0.0, f64::max),
     }
 }
@@ -385,13 +520,13 @@ fn drift(
 fn white_change(
     readings: &Readings,
     flood: &CellPlanes,
-    white: f64,
+    (white, cols): (f64, usize),
     lit: &LiveCells,
 ) -> WhiteChange {
     let seen = &readings.revisited.white;
     let mut level = Vec::new();
     let mut change = vec![0.0; lit.0.len()];
-    let mut square = 0.0;
+    let (mut square, mut shared) = (0.0, 0.0);
     for (channel, plane) in flood.iter().enumerate() {
         let mean = |cell: &usize| {
             seen.iter().map(|light| light[channel][*cell]).sum::<f64>() / seen.len().max(1) as f64
@@ -404,13 +539,65 @@ fn white_change(
             *change += off / flood.len() as f64;
             square += off * off;
         }
+        let off = |ratio: &f64| (ratio / median.max(1e-12) - 1.0) as f32;
+        let off: Vec<f32> = ratios.iter().map(off).collect();
+        shared += shared_by_neighbours(&lit.among(readings.live.len(), &off), cols);
         level.push(median);
     }
+    let channels = flood.len().max(1) as f64;
+    let square = square / (lit.0.len().max(1) as f64 * channels);
     let change: Vec<f32> = change.into_iter().map(|change| change as f32).collect();
     WhiteChange {
         level,
-        shape: (square / (lit.0.len() * flood.len()).max(1) as f64).sqrt(),
+        shape: square.sqrt(),
+        alone: (square - shared / channels).max(0.0).sqrt(),
         cells: lit.among(readings.live.len(), &change),
+    }
+}
+
+/// Mean product of the values of neighbouring cells, at least 0.
+fn shared_by_neighbours(cells: &[Option<f64>], cols: usize) -> f64 {
+    let pairs = (0..cells.len()).flat_map(|cell| {
+        let right = ((cell + 1) % cols != 0).then_some(cell + 1);
+        [right, Some(cell + cols)].map(|other| Some(cells[cell]? * (*cells.get(other?)?)?))
+    });
+    let (sum, count) = pairs
+        .flatten()
+        .fold((0.0, 0_usize), |(sum, n), product| (sum + product, n + 1));
+    (sum / count.max(1) as f64).max(0.0)
+}
+
+/// How bright wanted white is, of the projector's own.
+fn brightness(
+    readings: &Readings,
+    images: &[ImageVerdict],
+    expected: &mut Expected<'_, '_>,
+    lit: &LiveCells,
+) -> f64 {
+    let ones = vec![vec![1.0; readings.live.len()]; readings.revisited.channels];
+    // Where the projector's own white was not photographed, the table says it.
+    let own = readings
+        .wanted
+        .then(|| expected.photograph(&ones))
+        .flatten();
+    if let Some(own) = own {
+        let light = own.iter().flat_map(|plane| lit.of(plane));
+        let (sum, count) = light.fold((0.0, 0_usize), |(sum, n), light| (sum + light, n + 1));
+        return count as f64 / sum.max(1e-12);
+    }
+    let mut whites: Vec<f64> = images.iter().map(|image| image.white).collect();
+    whites.sort_by(f64::total_cmp);
+    let wanted = whites.get(whites.len() / 2).copied().unwrap_or(0.0);
+    let flood = readings.revisited.white.iter().flatten();
+    let (mut own, mut count) = (0.0, 0_usize);
+    for light in flood.flat_map(|plane| lit.of(plane)) {
+        own += light;
+        count += 1;
+    }
+    if own > 0.0 {
+        wanted * count as f64 / own
+    } else {
+        0.0
     }
 }
 

@@ -13,7 +13,7 @@ pub type VerifyShot = ShotOf<VerifyRole>;
 ///
 /// [`fmt::Display`] writes and [`VerifyRole::from_name`] reads the name that stands
 /// there: `white`, `black`, `column-B`, `column-B-inverse`, `row-B`, `row-B-inverse`,
-/// `bernoulli`, `plain-K`, `compensated-K`.
+/// `bernoulli`, `plain-K`, `compensated-K`, `wanted-K`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum VerifyRole {
     /// To find the cells: any role of `capture.csv`.
@@ -22,6 +22,8 @@ pub enum VerifyRole {
     Plain(u8),
     /// Test image K, compensated.
     Compensated(u8),
+    /// Test image K as it should look, for a chain that compensates.
+    Wanted(u8),
 }
 
 impl VerifyRole {
@@ -45,6 +47,9 @@ impl VerifyRole {
         if let Some(digits) = name.strip_prefix("compensated-") {
             return number(digits).map(Self::Compensated);
         }
+        if let Some(digits) = name.strip_prefix("wanted-") {
+            return number(digits).map(Self::Wanted);
+        }
         Role::from_name(name).map(Self::Code)
     }
 }
@@ -55,6 +60,7 @@ impl fmt::Display for VerifyRole {
             Self::Code(role) => role.fmt(f),
             Self::Plain(image) => write!(f, "plain-{image}"),
             Self::Compensated(image) => write!(f, "compensated-{image}"),
+            Self::Wanted(image) => write!(f, "wanted-{image}"),
         }
     }
 }
@@ -69,7 +75,7 @@ impl ListedRole for VerifyRole {
     fn unknown(role: &str) -> String {
         format!(
             "unknown role \"{role}\"; it must be white, black, column-B, row-B (the latter \
-             two also with -inverse), bernoulli, plain-K or compensated-K"
+             two also with -inverse), bernoulli, plain-K, compensated-K or wanted-K"
         )
     }
 }
@@ -87,7 +93,8 @@ mod tests {
         let codes = [Role::White, Role::Black, stripes].map(VerifyRole::Code);
         let images = [0, 1, 10, 255].map(VerifyRole::Plain);
         let compensated = [0, 1, 10, 255].map(VerifyRole::Compensated);
-        for role in [&codes[..], &images, &compensated].concat() {
+        let wanted = [0, 1, 10, 255].map(VerifyRole::Wanted);
+        for role in [&codes[..], &images, &compensated, &wanted].concat() {
             assert_eq!(VerifyRole::from_name(&role.to_string()), Some(role));
         }
     }

@@ -1,11 +1,11 @@
-//! Pictures of a verdict: maps of the cells, and the test images as the wall showed
-//! them.
+//! Pictures of a verdict: maps of the cells, and the photographs of the wall.
 
 use super::judge::over_images;
 use super::{Readings, TableVerdict};
-use iltm_capture::CellPlanes;
+use iltm_capture::NO_CELL;
 use iltm_picture::{
     ColourScale, LightPicture, Palette, Picture,
+    canvas::{Canvas, Colour, FontWeight, RasterHeight, Type},
     html::{PictureFile, picture_file},
 };
 use iltm_runtime::{FrameSize, Grid, image::Table};
@@ -16,8 +16,14 @@ const MAP_SIDE: usize = 480;
 /// Grey of cells that were not compared.
 const UNKNOWN: [u8; 3] = [88, 92, 100];
 
-/// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `drift`, and
-/// of each test image `K-wanted`, `K-before`, `K-after`.
+/// Worst cells that are marked.
+pub(super) const MARKED: usize = 3;
+
+/// Colour of marks: seen on light and dark.
+const MARK: Colour = [255, 64, 32];
+
+/// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `worst-seen`,
+/// `drift`, and of each test image `K-wanted`, `K-before`, `K-after`.
 #[must_use]
 pub fn pictures(
     table: &Table<'_>,
@@ -33,7 +39,7 @@ pub fn pictures(
         )
     };
     let mut files = vec![
-        picture_file("worst-cells", &errors(1)),
+        picture_file("worst-cells", &marked_map(grid, &errors(1), verdict)),
         picture_file("worst-cells-before", &errors(0)),
     ];
     if let Some(white) = &verdict.drift.white {
@@ -41,17 +47,133 @@ pub fn pictures(
         let change = map(grid, &drift_scale(verdict), &change);
         files.push(picture_file("drift", &change));
     }
+    let scale = display_scale(readings);
     for (shown, image) in readings.shown.iter().zip(&verdict.images) {
+        let Some(seen) = &shown.views[1] else {
+            continue;
+        };
         let number = image.image;
-        let wall = |half: usize| as_seen(grid, &shown.seen[half], &shown.wanted, &readings.live);
-        files.push(picture_file(
-            &format!("{number}-wanted"),
-            &lit(grid, &shown.wanted),
-        ));
-        files.push(picture_file(&format!("{number}-before"), &wall(0)));
-        files.push(picture_file(&format!("{number}-after"), &wall(1)));
+        let size = seen.size();
+        let wanted = LightPicture::from_fn(size, shown.wanted.len(), |channel, at| {
+            let cell = cell_at(readings, size, at).map(|cell| shown.wanted[channel][cell]);
+            (scale * image.white * cell.unwrap_or(0.0)) as f32
+        });
+        let [before, after] = shown.views.each_ref().map(|view| {
+            let view = view.as_ref();
+            view.map(|view| view.scaled(scale))
+        });
+        let all = [
+            ("wanted", Some(wanted)),
+            ("before", before),
+            ("after", after),
+        ];
+        for (name, light) in all {
+            let name = format!("{number}-{name}");
+            files.extend(light.map(|light| picture_file(&name, &light.for_display())));
+        }
+    }
+    // The most even image shows the marks best.
+    let last = readings.shown.iter().rev().find(|shown| {
+        let light = shown.wanted.iter().flatten();
+        let least = light.clone().fold(f64::INFINITY, |a, b| a.min(*b));
+        light.fold(0.0_f64, |a, b| a.max(*b)) - least < 1e-6
+    });
+    let shown = last.or_else(|| readings.shown.first());
+    if let Some(view) = shown.and_then(|shown| shown.views[1].as_ref()) {
+        let picture = marked_view(&view.scaled(scale), readings, verdict);
+        files.push(picture_file("worst-seen", &picture));
     }
     files
+}
+
+/// What photographs are multiplied by on a screen: all by the same, so that one that is darker
+/// looks darker.
+fn display_scale(readings: &Readings) -> f64 {
+    let views = readings
+        .shown
+        .iter()
+        .flat_map(|shown| shown.views.iter().flatten());
+    let bright = views.map(|view| view.quantile(0.995));
+    1.0 / bright.fold(0.0, f64::max).max(1e-12)
+}
+
+/// The cell that a pixel of a photograph for people sees.
+fn cell_at(readings: &Readings, size: FrameSize, at: usize) -> Option<usize> {
+    let step = readings.revisited.step;
+    let (x, y) = (at % size.width(), at / size.width());
+    let (x, y) = (x * step + step / 2, y * step + step / 2);
+    let registration = &readings.revisited.registration;
+    let cell = registration.seen_cell.get(y * registration.camera.0 + x)?;
+    (*cell != NO_CELL).then_some(*cell as usize)
+}
+
+const LETTERS: Type = Type {
+    height: RasterHeight::Size16,
+    weight: FontWeight::Bold,
+    colour: MARK,
+};
+
+/// A photograph with the worst cells outlined and numbered.
+fn marked_view(view: &LightPicture, readings: &Readings, verdict: &TableVerdict) -> Picture {
+    let size = view.size();
+    let cols = readings.revisited.grid.cols();
+    let mut canvas = Canvas::new(size, [0; 3]);
+    canvas.place(0, 0, &view.for_display());
+    let cells: Vec<Option<usize>> = (0..size.pixels())
+        .map(|at| cell_at(readings, size, at))
+        .collect();
+    for (number, worst) in verdict.worst.iter().take(MARKED).enumerate() {
+        let own = Some(worst.row * cols + worst.col);
+        let inside = |x: usize, y: usize| {
+            x < size.width() && y < size.height() && cells[y * size.width() + x] == own
+        };
+        let mut right = None;
+        for at in (0..size.pixels()).filter(|at| cells[*at] == own) {
+            let (x, y) = (at % size.width(), at / size.width());
+            right = right.max(Some((x, y)));
+            let around = [
+                (x + 1, y),
+                (x.wrapping_sub(1), y),
+                (x, y + 1),
+                (x, y.wrapping_sub(1)),
+            ];
+            if around.iter().any(|(x, y)| !inside(*x, *y)) {
+                canvas.set(x, y, MARK);
+            }
+        }
+        if let Some((x, y)) = right {
+            canvas.write(
+                x + 3,
+                y.saturating_sub(8),
+                &(number + 1).to_string(),
+                LETTERS,
+            );
+        }
+    }
+    canvas.finish()
+}
+
+/// A map of cells with the worst framed and numbered.
+fn marked_map(grid: Grid, map: &Picture, verdict: &TableVerdict) -> Picture {
+    let size = map.size();
+    let (width, height) = (size.width() / grid.cols(), size.height() / grid.rows());
+    let mut canvas = Canvas::new(size, [0; 3]);
+    canvas.place(0, 0, map);
+    for (number, worst) in verdict.worst.iter().take(MARKED).enumerate() {
+        let (left, top) = (worst.col * width, worst.row * height);
+        for x in 0..width {
+            for edge in [0, 1, height.saturating_sub(2), height.saturating_sub(1)] {
+                canvas.set(left + x, top + edge, MARK);
+            }
+        }
+        for y in 0..height {
+            for edge in [0, 1, width.saturating_sub(2), width.saturating_sub(1)] {
+                canvas.set(left + edge, top + y, MARK);
+            }
+        }
+        canvas.write(left + 4, top + 3, &(number + 1).to_string(), LETTERS);
+    }
+    canvas.finish()
 }
 
 /// Colours of the map of errors with (1) or without (0) compensation: each has its own, or
@@ -82,33 +204,6 @@ fn map(grid: Grid, scale: &ColourScale, cells: &[Option<f64>]) -> Picture {
     blocks(&Picture::from_fn(size, |col, row| {
         colour(cells[row * grid.cols() + col])
     }))
-}
-
-/// A photograph's cells at the brightness that suits the wanted image best, as its error is
-/// taken.
-fn as_seen(grid: Grid, seen: &CellPlanes, wanted: &CellPlanes, live: &[bool]) -> Picture {
-    let pairs = || {
-        let planes = seen.iter().zip(wanted);
-        let cells = planes.flat_map(|(seen, wanted)| seen.iter().zip(wanted).zip(live));
-        cells.filter(|(_, live)| **live).map(|(pair, _)| pair)
-    };
-    let both: f64 = pairs().map(|(seen, wanted)| seen * wanted).sum();
-    let own: f64 = pairs().map(|(seen, _)| seen * seen).sum();
-    let scale = if own > 0.0 { both / own } else { 0.0 };
-    let light = |plane: &Vec<f64>| {
-        let cells = plane.iter().zip(live);
-        let scaled = cells.map(|(light, live)| if *live { scale * light } else { 0.0 });
-        scaled.collect()
-    };
-    lit(grid, &seen.iter().map(light).collect())
-}
-
-/// Light of the cells as a screen shows it.
-fn lit(grid: Grid, light: &CellPlanes) -> Picture {
-    let light = LightPicture::from_fn(FrameSize::of_grid(grid), light.len(), |channel, cell| {
-        light[channel][cell] as f32
-    });
-    blocks(&light.for_display())
 }
 
 /// Cells as squares of pixels.

@@ -9,10 +9,13 @@
 //!          folder     pictures to project, verify.csv, README.md
 //! photographs -> session   what verify.csv and the pictures say, read back and checked
 //!                expected  the light that the table expects of any input
-//!                judge     errors before and after, drift, the verdict
+//!                judge     errors before and after, drift, what they are held against
+//!                chain     what a chain did that was to compensate
+//!                outcome   passed, failed, or these photographs cannot tell; and why
 //!                page      all of it for people, with maps of the worst cells
 //! ```
 
+mod chain;
 mod error;
 mod expected;
 mod folder;
@@ -20,6 +23,7 @@ mod images;
 mod judge;
 mod manifest;
 mod maps;
+mod outcome;
 mod page;
 mod readings;
 mod response;
@@ -27,13 +31,15 @@ mod response;
 #[path = "../../../compile/src/test_scene.rs"]
 mod test_scene;
 
+pub use chain::ChainFault;
 pub use error::VerifyError;
 pub use expected::Expected;
-pub use folder::{Written, write};
+pub use folder::{Slides, Written, write};
 pub use images::{TestImage, test_images};
-pub use judge::{Bound, Drift, ImageVerdict, TableVerdict, WhiteChange, WorstCell, judge};
+pub use judge::{Bound, Curve, Drift, ImageVerdict, TableVerdict, WhiteChange, WorstCell, judge};
 pub use manifest::{VerifyManifest, VerifyRole, VerifyShot};
 pub use maps::pictures;
-pub use page::{html, reason};
+pub use outcome::{Cause, Outcome, refused};
+pub use page::{Handover, brightness_words, html, reason};
 pub use readings::{Readings, Shown};
 pub use response::ProjectorCurves;

@@ -1,10 +1,25 @@
 //! Page of a verdict: one HTML file with everything inside.
 
-use super::maps::{drift_scale, error_scale};
-use super::{ImageVerdict, TableVerdict, TestImage};
-use iltm_picture::html::{PictureFile, colour_bar, document, img_named, percent};
+use super::judge::{MOST_NOISE, MOST_VIEWPOINT};
+use super::maps::{MARKED, drift_scale, error_scale};
+use super::outcome::colour;
+use super::{Cause, ImageVerdict, Outcome, TableVerdict, TestImage};
+use iltm_compile::Provenance;
+use iltm_picture::html::{PictureFile, capitalised, colour_bar, document, img_named, percent};
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
+
+/// Who verified what, and when: what photographs do not tell.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Handover {
+    /// The table's file.
+    pub table: String,
+    /// When the verdict was given, for people.
+    pub date: String,
+    /// Board, number, firmware, table and mode of the device, one entry each; `None` if none
+    /// was asked.
+    pub device: Option<Vec<(String, String)>>,
+}
 
 /// The page of a verdict. `images` are those that the table makes, in the order of their
 /// numbers; `files` the [`pictures`](super::pictures). Complete in itself.
@@ -14,18 +29,17 @@ pub fn html(
     verdict: &TableVerdict,
     images: &[TestImage],
     files: &[PictureFile],
+    handover: &Handover,
 ) -> String {
-    let answer = if verdict.passed {
-        "The table keeps its promise"
-    } else {
-        "The table does not keep its promise"
-    };
+    let answer = verdict.outcome.words();
     let body = html! { main {
         (opening(answer, verdict))
+        (identity(table, verdict, handover))
         (pictures(verdict, images, files))
         (worst(verdict, files))
+        (unchecked(verdict, handover))
         (drift(verdict, files))
-        (origin(table))
+        (details(table, verdict))
         footer { "Written by iltm " (env!("CARGO_PKG_VERSION")) "." }
     } };
     document(answer, include_str!("page.css"), &body)
@@ -33,16 +47,83 @@ pub fn html(
 
 fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
     let [before, after] = verdict.error;
-    let bound = &verdict.bound;
+    let colour = match verdict.outcome {
+        Outcome::Passed => "best",
+        Outcome::Failed => "bad",
+        Outcome::Inconclusive => "open",
+    };
     html! { header {
         p .over { "iltm verify" }
-        h1 { (answer) }
+        h1 .verdict.(colour) { (answer) }
+        p .lead { (reason(verdict)) }
+        @if let Some(cause) = verdict.cause { p { b { "Next: " } (cause.next_step()) } }
         div .numbers {
-            div .number { b { (percent(before)) } span { "error of the wall as it is" } }
-            div .number .(if verdict.passed { "best" } else { "bad" }) { b { (percent(after)) } span { "with the table" } }
-            div .number { b { (percent(bound.limit)) } span { "the most that passes" } }
+            div .number { b { (percent(before)) } span { @if verdict.wanted { "error without the table, expected" } @else { "error of the wall as it is" } } }
+            div .number.(colour) { b { (percent(after)) } span { "with the table" } }
+            div .number { b { (percent(verdict.bound.limit)) } span { "the most that passes" } }
         }
-        p { (reason(verdict)) }
+        p { (brightness_words(verdict)) }
+    } }
+}
+
+/// How bright white is with the table.
+#[must_use]
+pub fn brightness_words(verdict: &TableVerdict) -> String {
+    format!(
+        "White is {:.0} % of what the projector makes alone.",
+        100.0 * verdict.brightness
+    )
+}
+
+/// What was verified, and a place to sign.
+fn identity(table: &Table<'_>, verdict: &TableVerdict, handover: &Handover) -> Markup {
+    let provenance = Provenance::read(table.provenance());
+    let scene = if provenance.scene.is_empty() {
+        "no name"
+    } else {
+        provenance.scene.as_str()
+    };
+    html! { section .identity {
+        h2 { "What was verified" }
+        table .facts { tbody {
+            tr { td { "scene" } td { (scene) } }
+            tr { td { "date" } td { (handover.date) } }
+            tr { td { "table" } td { (handover.table) ", id " b { (format!("{:08x}", table.id())) } ", " (table.grid()) " cells, made " (provenance.date) } }
+            @match &handover.device {
+                Some(lines) => { @for (name, value) in lines { tr { td { (name) } td { (value) } } } },
+                None => { tr { td { "device" } td { "not asked" } } },
+            }
+            tr { td { "tool" } td { "iltm " (env!("CARGO_PKG_VERSION")) } }
+            tr { td { "outcome" } td { (verdict.outcome.words()) } }
+            tr .sign { td { "name, signature" } td {} }
+        } }
+    } }
+}
+
+/// What this verification says nothing of.
+fn unchecked(verdict: &TableVerdict, handover: &Handover) -> Markup {
+    let (compared, known) = verdict.cells;
+    html! { section {
+        h2 { "What was not checked" }
+        ul {
+            @if verdict.wanted {
+                li { "The wall without compensation: its errors are what the table expects, not photographs. So is the projector's own white." }
+                li { "The camera's response: a chain that compensates leaves nothing to tell it by." }
+            } @else { li { "The player and the device: the slides were compensated by this program. A chain that scales, shifts or does not compensate shows another picture than these photographs; `iltm verify --wanted` looks at it." } }
+            @if handover.device.is_none() { li { "Which table is on a device: none was asked." } }
+            li { "Tiers below the table's top one, which a device uses when time is short." }
+            @if compared < known { li { (known - compared) " of the table's " (known) " cells, which the camera did not see clearly." } }
+            li { "Detail within a cell, and creases: a cell's mean light is compared." }
+            li { "Content other than the test images: darker or more saturated pictures may be cut." }
+            li { "Other places to stand, glossy surfaces from there, and other light in the room than during these photographs." }
+        }
+    } }
+}
+
+/// How the verdict was reached.
+fn details(table: &Table<'_>, verdict: &TableVerdict) -> Markup {
+    html! { section .details {
+        h2 { "How the verdict was reached" }
         p .quiet {
             "Photographs of " (verdict.images.len()) " test images, each projected as it is and compensated, compared "
             "with what was wanted in " (verdict.cells.0) " of " (verdict.cells.1) " cells: "
@@ -51,7 +132,12 @@ fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
         }
         table .facts { tbody {
             @for (name, value) in expectation(verdict) { tr { td { (name) } td { (value) } } }
+            @for gate in &verdict.gates {
+                tr { td { "gate " code { (gate.name.name()) } } td { (gate.verdict.name()) ": " (gate.what) } }
+            }
         } }
+        h3 { "The table" }
+        pre { (table.provenance().trim_end()) }
     } }
 }
 
@@ -83,61 +169,112 @@ fn expectation(verdict: &TableVerdict) -> Vec<(&'static str, String)> {
         "the most that passes",
         match (bound.given, bound.expected) {
             (true, _) => format!("{}, as asked for", percent(bound.limit)),
-            (false, Some(_)) => format!("{}: 1.5 times what is expected", percent(bound.limit)),
+            (false, Some(_)) => format!(
+                "{}: 1.5 times what is expected, where noise counts up to {MOST_NOISE} times the \
+                 promise, and finding the cells again up to {MOST_VIEWPOINT} times",
+                percent(bound.limit),
+            ),
             (false, None) => format!("{}: half of the error before", percent(bound.limit)),
         },
     ));
     lines
 }
 
-/// Why it passed or failed, a sentence or two.
+/// Why it passed or not, a sentence or two.
 #[must_use]
 pub fn reason(verdict: &TableVerdict) -> String {
     let [before, after] = verdict.error;
-    let drift = &verdict.drift;
-    if verdict.passed {
-        return format!(
-            "The error is {:.1} times smaller than without the table.",
-            before / after.max(1e-9)
-        );
-    }
-    let Some(white) = &drift.white else {
-        return "The table does not tell how bright white should be, so that nothing says whether the \
-                scene has changed since it was made."
-            .to_owned();
-    };
-    let levels = &white.level;
-    let colour = levels.iter().fold(0.0_f64, |a, b| a.max(*b))
-        / levels
-            .iter()
-            .fold(f64::INFINITY, |a, b| a.min(*b))
-            .max(1e-12)
-        - 1.0;
-    let changed = if white.shape > 2.0 * verdict.bound.limit.max(0.01) {
-        format!(
-            "White now differs from what the table expects by {} from cell to cell: the projector, \
-             its picture mode, the scene or something in it has moved or changed since the table \
-             was made, or it is a table of another scene.",
-            percent(white.shape)
-        )
-    } else if colour > 0.03 {
-        format!(
-            "The colours of white differ from those that the table expects by {}: the camera's \
-             white balance, the projector's colour mode or its lamp has changed.",
-            percent(colour)
-        )
-    } else {
-        "White is as the table expects it, so the scene is the same: the projector's response \
-         (picture mode, gamma) may have changed, or the table was learned from too few or too \
-         noisy photographs."
-            .to_owned()
-    };
     let harm = if after >= before {
         "With the table the error is larger than without. "
     } else {
         ""
     };
-    format!("{harm}{changed}")
+    let bound = &verdict.bound;
+    let level = verdict.drift.white.iter().flat_map(|white| &white.level);
+    let level: Vec<f64> = level.copied().collect();
+    let shape = verdict
+        .drift
+        .white
+        .as_ref()
+        .map_or(0.0, |white| white.shape);
+    let apart = |what: &str| {
+        format!(
+            "{what} {}, and the table promises {}.",
+            percent(bound.added),
+            percent(bound.promise)
+        )
+    };
+    let why = match verdict.cause {
+        None => {
+            let of = if verdict.wanted {
+                "The chain that was photographed compensates"
+            } else {
+                "Slides that this program compensated; player and device were not verified"
+            };
+            return format!(
+                "The error is {}, {:.1} times smaller than without the table. {of}.",
+                percent(after),
+                before / after.max(1e-9)
+            );
+        }
+        Some(Cause::Noise) => apart("Photographs of the same picture differ among themselves by"),
+        Some(Cause::Viewpoint) => apart(
+            "From where the camera stands, white differs from what the table expects from cell to \
+             cell by",
+        ),
+        Some(Cause::Response) => format!(
+            "The photographs would fit if their light were raised to the power {:.2}, with an error of \
+             {}: the camera's response is not the declared one, or the projector's is not the one \
+             that the table was made for.",
+            verdict.curve.power,
+            percent(verdict.curve.left)
+        ),
+        Some(Cause::Scene) => format!(
+            "White now differs from what the table expects by {} from cell to cell: the projector, \
+             its picture mode, the scene or something in it has moved or changed since the table \
+             was made, or it is a table of another scene.",
+            percent(shape)
+        ),
+        Some(Cause::Colour) => format!(
+            "The colours of white differ from those that the table expects by {}: the camera's \
+             white balance, the projector's colour mode or its lamp has changed.",
+            percent(colour(&level))
+        ),
+        Some(Cause::ProjectorResponse) => {
+            "White is as the table expects it, so the scene is the same: the projector's response \
+             (picture mode, gamma) may have changed, or the table was learned from too few or too \
+             noisy photographs."
+                .to_owned()
+        }
+        Some(Cause::Chain) => verdict
+            .chain
+            .map_or_else(String::new, |chain| chain.to_string()),
+        Some(Cause::Unknown) => {
+            "The table does not tell how bright white should be, so that nothing says whether the \
+             scene has changed since it was made."
+                .to_owned()
+        }
+        Some(cause) => {
+            let refusal = verdict.gates.iter().find(|gate| gate.fails());
+            let what = refusal.map_or("", |gate| gate.what.as_str());
+            let what = capitalised(what);
+            if cause == Cause::DynamicProjector {
+                format!("{what}.")
+            } else {
+                format!(
+                    "{what}. The error that they show, {}, is theirs as much as the table's, which \
+                     promises {}.",
+                    percent(after),
+                    percent(bound.promise)
+                )
+            }
+        }
+    };
+    if verdict.outcome == Outcome::Failed {
+        format!("{harm}{why}")
+    } else {
+        why
+    }
 }
 
 fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile]) -> Markup {
@@ -147,19 +284,19 @@ fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile])
             .map(|test| test.title.as_str())
     };
     html! { section {
-        h2 { "On the wall" }
-        p { "The cells' mean light in the photographs, each at the brightness that suits it best." }
+        h2 { "The wall in the photographs" }
+        p { "All at the same brightness. On the left the wanted light, drawn where the camera sees each cell." }
         @for image in &verdict.images {
             div .example {
                 h3 { (title(image).unwrap_or("Test image")) }
                 div .three {
                     figure { (img_named(files, &format!("{}-wanted", image.image), "Wanted")) figcaption { "Wanted" } }
-                    figure {
-                        (img_named(files, &format!("{}-before", image.image), "Photograph without compensation"))
+                    @if !verdict.wanted { figure {
+                        (img_named(files, &format!("{}-before", image.image), "Photograph of the wall without compensation"))
                         figcaption .error { "As it is: error " b { (percent(image.error[0])) } }
-                    }
+                    } }
                     figure {
-                        (img_named(files, &format!("{}-after", image.image), "Photograph with compensation"))
+                        (img_named(files, &format!("{}-after", image.image), "Photograph of the wall with compensation"))
                         figcaption .error { "Compensated: error " b { (percent(image.error[1])) } }
                     }
                 }
@@ -171,15 +308,23 @@ fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile])
 fn worst(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
     html! { section {
         h2 { "Where it is worst" }
-        p { "Error of every cell over all test images, relative to reference white. Grey cells could not be compared." }
+        p { "Error of every cell over all test images, relative to reference white. Rows and columns count from 1 at the top left of the projected picture. Grey cells could not be compared." }
         div .half {
-            figure { (img_named(files, "worst-cells-before", "Error of each cell without compensation")) (colour_bar(&error_scale(verdict, 0), false)) figcaption { "As it is" } }
-            figure { (img_named(files, "worst-cells", "Error of each cell with compensation")) (colour_bar(&error_scale(verdict, 1), false)) figcaption { "Compensated; the colours have another scale" } }
+            figure { (img_named(files, "worst-seen", "Photograph of the wall with the worst cells outlined")) figcaption { "The worst cells on the wall" } }
+            figure .cells { (img_named(files, "worst-cells", "Error of each cell with compensation")) (colour_bar(&error_scale(verdict, 1), false)) figcaption { "The same cells in the projected picture, compensated" } }
         }
-        div .scroll { table {
-            thead { tr { th { "row" } th { "column" } th { "error, of white" } } }
-            tbody { @for cell in &verdict.worst { tr { td { (cell.row) } td { (cell.col) } td { (percent(cell.error)) } } } }
-        } }
+        div .half {
+            div .scroll { table {
+                thead { tr { th { "mark" } th { "row" } th { "column" } th { "error, of white" } } }
+                tbody { @for (at, cell) in verdict.worst.iter().enumerate() {
+                    tr {
+                        td { @if at < MARKED { (at + 1) } }
+                        td { (cell.row + 1) } td { (cell.col + 1) } td { (percent(cell.error)) }
+                    }
+                } }
+            } }
+            figure .cells { (img_named(files, "worst-cells-before", "Error of each cell without compensation")) (colour_bar(&error_scale(verdict, 0), false)) figcaption { "As it is; the colours have another scale" } }
+        }
     } }
 }
 
@@ -194,7 +339,7 @@ fn drift(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
     };
     let levels: Vec<String> = white.level.iter().map(|level| percent(*level)).collect();
     html! { section .split {
-        figure {
+        figure .cells {
             (img_named(files, "drift", "Change of white since the table was made"))
             (colour_bar(&drift_scale(verdict), false))
         }
@@ -211,12 +356,5 @@ fn drift(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
             }
             p .quiet { "During this session white changed by " (session) "." }
         }
-    } }
-}
-
-fn origin(table: &Table<'_>) -> Markup {
-    html! { section {
-        h2 { "The table" }
-        pre { (table.provenance().trim_end()) }
     } }
 }

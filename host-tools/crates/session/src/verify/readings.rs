@@ -1,9 +1,9 @@
 //! A verification folder with its photographs, read back and checked.
 
-use super::folder::{plain, wanted_file};
+use super::folder::{TABLE_FILE, grey, levels, plain, wanted_file};
 use super::manifest::{VerifyManifest, VerifyRole, VerifyShot};
 use super::response::ProjectorCurves;
-use super::{Expected, VerifyError};
+use super::{Cause, Expected, VerifyError, refused};
 use iltm_capture::VERIFY_FILE;
 use iltm_capture::{CaptureError, CellPlanes, CellReadings, Settings, Shot, find_photo, remeasure};
 use iltm_compile::Provenance;
@@ -25,10 +25,13 @@ pub struct Shown {
     /// Input of the projector for the picture as it is, and compensated, relative to its
     /// white.
     pub input: [CellPlanes; 2],
-    /// What was photographed of either, camera units, ambient light included.
+    /// What was photographed of either, camera units, ambient light included. Of a chain that
+    /// compensates, the first is what the table expects.
     pub seen: [CellPlanes; 2],
     /// The photographs, relative to the folder.
     pub photos: [PathBuf; 2],
+    /// The photographs for people, where there are some.
+    pub views: [Option<LightPicture>; 2],
 }
 
 /// Everything that the photographs of a verification folder say.
@@ -40,6 +43,10 @@ pub struct Readings {
     pub revisited: CellReadings,
     /// Cells that the table has gains for and that were measured, length `N`.
     pub live: Vec<bool>,
+    /// Whether a chain that compensates was given the wanted images.
+    pub wanted: bool,
+    /// The projector's input under what stands for white, relative to its white.
+    pub flood: CellPlanes,
 }
 
 /// Share of the table's cells that must be found.
@@ -65,11 +72,16 @@ impl Readings {
         let mixing = Provenance::read(table.provenance()).mixing;
         let mut code: Vec<Shot> = Vec::new();
         let mut images: BTreeMap<u8, [Option<VerifyShot>; 2]> = BTreeMap::new();
+        let mut wanted = false;
         for shot in manifest.shots {
             match shot.role {
                 VerifyRole::Code(role) => code.push(with_role(&shot, role)),
                 VerifyRole::Plain(image) => images.entry(image).or_default()[0] = Some(shot),
                 VerifyRole::Compensated(image) => images.entry(image).or_default()[1] = Some(shot),
+                VerifyRole::Wanted(image) => {
+                    wanted = true;
+                    images.insert(image, [Some(shot.clone()), Some(shot)]);
+                }
             }
         }
         let path = || folder.join(VERIFY_FILE);
@@ -89,31 +101,89 @@ impl Readings {
             pairs.push((image, [own, compensated]));
         }
         check_all_there(folder, &code, &pairs)?;
-        let pictures = pictures(folder, table, &pairs)?;
+        let pictures = if wanted {
+            wanted_pictures(folder, table, &pairs)?
+        } else {
+            pictures(folder, table, &pairs)?
+        };
         // Of the shots of pictures, only photograph and line are looked at.
-        let flat = pairs.iter().flat_map(|(_, pair)| pair);
+        let flat = pairs
+            .iter()
+            .flat_map(|(_, pair)| &pair[usize::from(wanted)..]);
         let shots: Vec<Shot> = flat
             .map(|shot| with_role(shot, iltm_capture::Role::White))
             .collect();
         let revisited = remeasure(folder, &settings, mixing, (&code, &shots), progress)?;
         let live = live(folder, table, &revisited)?;
-        let shown = pairs
-            .into_iter()
-            .zip(pictures)
-            .zip(revisited.pictures.chunks_exact(2));
-        let shown = shown.map(|(((image, pair), picture), seen)| Shown {
-            image,
-            wanted: picture.wanted,
-            input: picture.input,
-            seen: [seen[0].clone(), seen[1].clone()],
-            photos: pair.map(|shot| shot.photo),
-        });
+        let mut expected = Expected::new(table);
+        let photographed = if wanted { 1 } else { 2 };
+        let mut shown = Vec::with_capacity(pairs.len());
+        for (at, ((image, pair), picture)) in pairs.into_iter().zip(pictures).enumerate() {
+            let last = photographed * (at + 1) - 1;
+            let first = photographed * at;
+            let view = |at: usize| revisited.views.get(at).cloned();
+            let plain = if wanted {
+                let light = expected.photograph(&picture.input[0]);
+                light.ok_or_else(|| VerifyError::Untold { path: path() })?
+            } else {
+                revisited.pictures[first].clone()
+            };
+            shown.push(Shown {
+                image,
+                wanted: picture.wanted,
+                input: picture.input,
+                seen: [plain, revisited.pictures[last].clone()],
+                photos: pair.map(|shot| shot.photo),
+                views: [view(first).filter(|_| !wanted), view(last)],
+            });
+        }
         Ok(Self {
-            shown: shown.collect(),
+            shown,
             live,
+            flood: flood(table, wanted)?,
+            wanted,
             revisited,
         })
     }
+}
+
+/// The projector's input under what stands for white.
+fn flood(table: &Table<'_>, wanted: bool) -> Result<CellPlanes, VideoError> {
+    let cells = table.grid().cells();
+    if !wanted {
+        return Ok(vec![vec![1.0; cells]; table.channels().into()]);
+    }
+    let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
+    let mut white = grey(table, levels(table)?, &vec![true; cells]);
+    compensator.picture(&mut white)?;
+    Ok(input(&white, &ProjectorCurves::new(table)))
+}
+
+/// What the pictures of a folder of wanted images say, and what this table makes of them.
+fn wanted_pictures(
+    folder: &Path,
+    table: &Table<'_>,
+    pairs: &[(u8, [VerifyShot; 2])],
+) -> Result<Vec<Pictures>, VerifyError> {
+    let path = folder.join(TABLE_FILE);
+    let own = format!("{:08x}", table.id());
+    let made_with = std::fs::read_to_string(&path).unwrap_or_default();
+    if made_with.trim() != own {
+        return Err(VerifyError::NotOfTable { path, own });
+    }
+    let curves = ProjectorCurves::new(table);
+    let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
+    let of_image = |(image, _): &(u8, [VerifyShot; 2])| {
+        let wanted = read(folder, &wanted_file(*image), table)?;
+        let mut made = wanted.clone();
+        compensator.picture(&mut made)?;
+        Ok(Pictures {
+            wanted: light(&LightPicture::decode(&wanted, Response::Srgb)),
+            // Who does not compensate sends the codes as they are.
+            input: [&wanted, &made].map(|picture| input(picture, &curves)),
+        })
+    };
+    pairs.iter().map(of_image).collect()
 }
 
 fn with_role(shot: &VerifyShot, role: iltm_capture::Role) -> Shot {
@@ -231,7 +301,7 @@ fn light(picture: &LightPicture) -> CellPlanes {
 }
 
 /// The projector's input that codes stand for.
-fn input(picture: &Picture, curves: &ProjectorCurves) -> CellPlanes {
+pub(super) fn input(picture: &Picture, curves: &ProjectorCurves) -> CellPlanes {
     let Samples::Eight(samples) = picture.samples() else {
         unreachable!("`read` takes 8 bits only");
     };
@@ -269,7 +339,14 @@ fn live(
     let both = known.iter().zip(&revisited.live);
     let live: Vec<bool> = both.map(|(known, seen)| *known && *seen).collect();
     let count = |cells: &[bool]| cells.iter().filter(|live| **live).count();
-    if (count(&live) as f64) < LEAST_FOUND * count(&known) as f64 || count(&live) == 0 {
+    let too_few = (count(&live) as f64) < LEAST_FOUND * count(&known) as f64 || count(&live) == 0;
+    if let (true, Some((Cause::Clipped, gate))) = (too_few, refused(revisited)) {
+        return Err(VerifyError::Overexposed {
+            path: path(),
+            what: gate.what.clone(),
+        });
+    }
+    if too_few {
         return Err(VerifyError::TooFewCells {
             path: path(),
             found: count(&live),

@@ -2,7 +2,7 @@
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;
-use super::{EngineJob, OperatorMemory};
+use super::{ClippedSamples, EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, GridPipeline},
@@ -34,7 +34,7 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
         job: &EngineJob,
         operator: &mut OperatorMemory,
         frame: &mut P,
-    ) -> Result<u64, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         let (width, colours) = (job.size.width(), job.colours);
         let strip_len = STRIP * width * colours;
         let rows = job.size.height().next_multiple_of(STRIP);
@@ -45,7 +45,7 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
                 band.unpack(strip, &mut memory, codes);
             }
         }
-        let mut clipped = 0;
+        let mut clipped = ClippedSamples::default();
         for group in 0..colours / C {
             let place = |cell: usize, channel: usize| {
                 let (row, col) = (cell / width, cell % width);
@@ -54,13 +54,22 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
             for (cell, wanted) in self.wanted.iter_mut().enumerate() {
                 *wanted = std::array::from_fn(|channel| self.codes[place(cell, channel)]);
             }
-            clipped += u64::from(self.pipeline.compensate(
+            let workspace = &mut operator.workspace();
+            let all = self.pipeline.compensate(
                 job.tier,
                 job.encoding,
                 &self.wanted,
                 &mut self.input,
-                &mut operator.workspace(),
-            )?);
+                workspace,
+            )?;
+            let white =
+                self.pipeline
+                    .too_bright(job.tier, job.encoding, &self.wanted, workspace)?;
+            clipped = clipped
+                + ClippedSamples {
+                    black: u64::from(all.saturating_sub(white)),
+                    white: u64::from(white),
+                };
             for (cell, input) in self.input.iter().enumerate() {
                 for (channel, code) in input.iter().enumerate() {
                     self.codes[place(cell, channel)] = *code;

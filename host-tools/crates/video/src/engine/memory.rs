@@ -120,7 +120,7 @@ impl<S: Copy + Default, M: Default> Memories<S, M> {
         BandMemory {
             conversion: M::default(),
             codes: vec![S::default(); STRIP * width * colours],
-            row: RowMemory::new(self.line, width),
+            row: RowMemory::new(self.line, self.job.area.size.width()),
             sums: vec![0; self.cells * colours],
         }
     }

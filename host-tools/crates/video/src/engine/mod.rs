@@ -23,6 +23,7 @@ use iltm_runtime::{
     FrameSize,
     image::Table,
     pipeline::{Encoding, FrameError},
+    placement::PixelArea,
 };
 use rayon::ThreadPool;
 use rows::FullFrames;
@@ -34,10 +35,31 @@ pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
     path: EnginePath<'t, 'a, P, C>,
 }
 
+/// Samples that the projector would have had to show darker than black or brighter than
+/// white.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(super) struct ClippedSamples {
+    pub(super) black: u64,
+    pub(super) white: u64,
+}
+
+impl std::ops::Add for ClippedSamples {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            black: self.black + other.black,
+            white: self.white + other.white,
+        }
+    }
+}
+
 /// What frames there will be and what is to be done to them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EngineJob {
     pub(super) size: FrameSize,
+    /// Where in a frame the cells lie; what is outside becomes black.
+    pub(super) area: PixelArea,
     /// Colours of a pixel: as many as the table has channels, or three for a table
     /// of one, which is then used for each of them.
     pub(super) colours: usize,
@@ -83,13 +105,17 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
     }
 
     /// The same as [`compensate`](Self::compensate) at another tier, from now on.
-    pub(super) fn compensate_at(&mut self, tier: u8, frame: &mut P) -> Result<u64, VideoError> {
+    pub(super) fn compensate_at(
+        &mut self,
+        tier: u8,
+        frame: &mut P,
+    ) -> Result<ClippedSamples, VideoError> {
         self.job.tier = tier;
         self.compensate(frame)
     }
 
     /// Compensates a frame in place; returns how many samples were clipped.
-    pub(super) fn compensate(&mut self, frame: &mut P) -> Result<u64, VideoError> {
+    pub(super) fn compensate(&mut self, frame: &mut P) -> Result<ClippedSamples, VideoError> {
         let clipped = match &mut self.path {
             EnginePath::Cells(cells) => cells.compensate(&self.job, &mut self.operator, frame),
             EnginePath::Full(full) => full.compensate(&self.job, &mut self.operator, frame),

@@ -8,10 +8,11 @@
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
 use super::memory::{BandMemory, Memories, RowMemory};
-use super::{EngineJob, OperatorMemory};
+use super::{ClippedSamples, EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, FullPipeline},
+    placement::PixelArea,
     units::Light,
 };
 use pulp::{Arch, NullaryFnOnce};
@@ -39,6 +40,8 @@ pub(super) struct FullFrames<'t, 'a, P: Bands, const C: usize> {
 /// What is done to every row.
 struct RowStages<'t, 'a, S: Code, const C: usize> {
     pipeline: FullPipeline<'t, 'a, C>,
+    /// Pixels of a row of a frame.
+    width: usize,
     /// Colours of a pixel.
     colours: usize,
     curves: Curves<S>,
@@ -52,11 +55,12 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
         threads: &'t ThreadPool,
         job: &EngineJob,
     ) -> Result<Self, FrameError> {
-        let pipeline = FullPipeline::new(table, job.size)?;
+        let pipeline = FullPipeline::within(table, job.size, job.area)?;
         let (cells, pixels) = (table.grid().cells(), job.size.pixels());
         Ok(Self {
             stages: RowStages {
                 pipeline,
+                width: job.size.width(),
                 colours: job.colours,
                 curves: Curves::new(table, job.encoding),
                 gains: threads.install(|| expand_gains(&pipeline)),
@@ -76,7 +80,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
         job: &EngineJob,
         operator: &mut OperatorMemory,
         frame: &mut P,
-    ) -> Result<u64, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         self.read(frame);
         self.memories.take_sums(&mut self.sums);
         let group = C * self.stages.cells();
@@ -116,7 +120,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
         });
     }
 
-    fn write(&self, frame: &mut P) -> u64 {
+    fn write(&self, frame: &mut P) -> ClippedSamples {
         let (stages, arch, memories) = (&self.stages, self.arch, &self.memories);
         let corrections = &self.corrections;
         self.threads.install(|| {
@@ -137,7 +141,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
                     })
                 })
             });
-            clipped.sum()
+            clipped.reduce(ClippedSamples::default, std::ops::Add::add)
         })
     }
 }
@@ -145,7 +149,14 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
 impl<S: Code, const C: usize> RowStages<'_, '_, S, C> {
     /// Samples of a row.
     fn row_len(&self) -> usize {
-        self.pipeline.frame().width() * self.colours
+        self.width * self.colours
+    }
+
+    /// The row of cells' pixels that row `y` of a frame is; `None` outside of them.
+    #[inline(always)]
+    fn row_of_area(&self, y: usize) -> Option<usize> {
+        let area = self.pipeline.area();
+        y.checked_sub(area.top).filter(|y| *y < area.size.height())
     }
 
     /// Cells of the grid.
@@ -173,7 +184,8 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
     #[inline(always)]
     fn call(self) {
         let (stages, memory) = (self.stages, self.memory);
-        let (width, colours) = (stages.pipeline.frame().width(), stages.colours);
+        let (width, colours) = (stages.width, stages.colours);
+        let PixelArea { left, size, .. } = stages.pipeline.area();
         let cells = stages.cells();
         let strips = self.light.chunks_mut(STRIP * stages.row_len());
         for (strip, light) in strips.enumerate() {
@@ -182,6 +194,11 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
             let lines = codes.chunks_exact(width).zip(light.chunks_exact_mut(width));
             for (line, (codes, light)) in lines.enumerate() {
                 let y = self.first_row + STRIP * strip + line / colours;
+                let Some(y) = stages.row_of_area(y) else {
+                    continue;
+                };
+                let codes = &codes[left..][..size.width()];
+                let light = &mut light[left..][..size.width()];
                 let (colour, channel) = (line % colours, line % colours % C);
                 let (mut row, _) = memory.row.split();
                 stages.curves.decode(codes, light);
@@ -205,31 +222,48 @@ struct WriteBand<'w, 't, 'a, B: Band, const C: usize> {
 }
 
 impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
-    type Output = u64;
+    type Output = ClippedSamples;
 
     #[inline(always)]
-    fn call(self) -> u64 {
+    fn call(self) -> ClippedSamples {
         let (stages, memory) = (self.stages, self.memory);
-        let (width, colours) = (stages.pipeline.frame().width(), stages.colours);
+        let (width, colours) = (stages.width, stages.colours);
+        let PixelArea { left, size, .. } = stages.pipeline.area();
+        let bordered = size.width() < width;
         let cells = stages.cells();
         let strips = self.light.chunks(STRIP * stages.row_len());
-        let mut clipped = 0;
+        let mut clipped = ClippedSamples::default();
         for (strip, light) in strips.enumerate() {
             let codes = &mut memory.codes[..light.len()];
             let lines = codes.chunks_exact_mut(width).zip(light.chunks_exact(width));
             for (line, (codes, light)) in lines.enumerate() {
                 let y = self.first_row + STRIP * strip + line / colours;
+                let Some(y) = stages.row_of_area(y) else {
+                    codes.fill(B::Code::default());
+                    continue;
+                };
+                if bordered {
+                    codes[..left].fill(B::Code::default());
+                    codes[left + size.width()..].fill(B::Code::default());
+                }
+                let codes = &mut codes[left..][..size.width()];
+                let light = &light[left..][..size.width()];
                 let (colour, channel) = (line % colours, line % colours % C);
-                let gain = &stages.gains[(y * C + channel) * width..][..width];
+                let gain = &stages.gains[(y * C + channel) * size.width()..][..size.width()];
                 let (mut row, drives) = memory.row.split();
-                clipped += u64::from(stages.pipeline.finish_row(
+                let row_clipped = stages.pipeline.finish_row(
                     y,
                     light,
                     gain,
                     &self.corrections[colour * cells..][..cells],
                     &mut row,
                     drives,
-                ));
+                );
+                clipped = clipped
+                    + ClippedSamples {
+                        black: row_clipped.black.into(),
+                        white: row_clipped.white.into(),
+                    };
                 stages.curves.encode(channel, drives, codes);
             }
             self.band.pack(strip, &mut memory.conversion, codes);

@@ -128,9 +128,31 @@ fn palettes_and_few_bits_become_eight_bits() {
 }
 
 #[test]
-fn transparent_pictures_are_refused() {
+fn transparent_pictures_are_refused_and_opaque_ones_are_their_colours() {
     for (colour, channels) in [(ColorType::Rgba, 4), (ColorType::GrayscaleAlpha, 2)] {
-        let file = png_file(colour, BitDepth::Eight, &vec![255; 8 * channels]);
+        for (depth, bytes) in [(BitDepth::Eight, 1), (BitDepth::Sixteen, 2)] {
+            let sample = |at: usize| {
+                let alpha = at / bytes % channels == channels - 1;
+                if alpha { 255 } else { at as u8 }
+            };
+            let samples: Vec<u8> = (0..8 * channels * bytes).map(sample).collect();
+            let whole = png::read(&png_file(colour, depth, &samples)[..]).unwrap();
+            assert_eq!(whole.channels(), channels - 1);
+            let plain = match colour {
+                ColorType::Rgba => ColorType::Rgb,
+                _ => ColorType::Grayscale,
+            };
+            let colours = samples.chunks_exact(bytes).enumerate();
+            let colours = colours.filter(|(at, _)| at % channels != channels - 1);
+            let colours: Vec<u8> = colours.flat_map(|(_, sample)| sample.to_vec()).collect();
+            assert_eq!(
+                whole,
+                png::read(&png_file(plain, depth, &colours)[..]).unwrap()
+            );
+        }
+        let mut samples = vec![255; 8 * channels];
+        *samples.last_mut().unwrap() = 254;
+        let file = png_file(colour, BitDepth::Eight, &samples);
         let error = png::read(&file[..]).unwrap_err();
         assert!(matches!(error, PngError::Alpha));
         assert!(error.next_step().contains("-alpha off"));

@@ -1,10 +1,12 @@
 //! Tables replaced while a stream runs, and tiers that follow a budget.
 
 use super::*;
+use crate::Input;
 use crate::live::{Live, LiveEvent, LiveSummary};
 use crate::watch::FileWatch;
 use crate::y4m::Header;
 use iltm_picture::progress::Silent;
+use iltm_runtime::placement::ProjectorPixels;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -80,6 +82,7 @@ fn live(
         },
         said: &mut events_of,
     };
+    let input = Input::of(input).unwrap();
     let summary = compensator.live(live, input, &mut output, &Silent);
     (output, summary.unwrap(), events)
 }
@@ -152,6 +155,27 @@ fn what_is_no_table_or_does_not_suit_the_stream_keeps_the_old_one() {
         frames(LINE, &output)[7],
         frames(LINE, &fixed(&second, None, &input))[7]
     );
+}
+
+#[test]
+fn a_newer_table_may_have_another_border_but_not_move_the_frames() {
+    let bordered = |border| {
+        let mut table = MadeUp::of_all_kinds(grid(13, 21), 3, 5, 1);
+        table.projector = ProjectorPixels::new(size(126, 82), border);
+        table.image()
+    };
+    let [first, second] = [4, 8].map(bordered);
+    let input = stream(LINE, 3);
+    let (output, summary, _) = live(&first, None, &[(1, &second)], &input);
+    assert_eq!((summary.tables, summary.refused), (1, 0));
+    let old = fixed(&first, None, &input);
+    let new = fixed(&second, None, &input);
+    let [output, old, new] = [&output, &old, &new].map(|stream| frames(LINE, stream));
+    assert!(output[0] == old[0] && output[2] == new[2] && old[2] != new[2]);
+    // A stream of the size inside the border is put there, which another border would not do.
+    let line = "YUV4MPEG2 W118 H74 C420jpeg";
+    let (_, summary, _) = live(&first, None, &[(1, &second)], &stream(line, 3));
+    assert_eq!((summary.tables, summary.refused), (0, 1));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Tests of the whole way through a table.
 
 mod exactness;
+mod fit;
 mod kinds;
 mod live;
 mod reference;

@@ -5,7 +5,7 @@ use crate::test_scene::TestScene;
 use crate::y4m::{Header, Reader, Y4mError, YuvFrame};
 use iltm_picture::progress::Progress;
 use proptest::prelude::*;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A stream of frames of random bytes between two codes.
@@ -235,15 +235,39 @@ fn a_reader_that_goes_away_ends_an_endless_stream() {
 }
 
 #[test]
-fn a_stream_without_frames_has_none() {
+fn a_stream_without_frames_is_refused_as_what_wrote_it_has_failed() {
     let table = MadeUp::new(grid(2, 2), 3);
-    let (output, summary) =
-        video(&table, CompensateOptions::default(), b"YUV4MPEG2 W6 H4\n").unwrap();
-    assert_eq!(output, b"YUV4MPEG2 W6 H4\n");
-    assert_eq!(
-        (summary.frames, summary.samples, summary.clipped),
-        (0, 0, 0)
-    );
+    let error = video(&table, CompensateOptions::default(), b"YUV4MPEG2 W6 H4\n").unwrap_err();
+    assert!(matches!(error, VideoError::NoFrames), "{error}");
+}
+
+/// A player that is closed after so many bytes.
+struct Closed(usize);
+
+impl Write for Closed {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 = self
+            .0
+            .checked_sub(bytes.len())
+            .ok_or(std::io::ErrorKind::BrokenPipe)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_player_that_is_closed_is_no_failure_and_the_lost_frames_are_told() {
+    let table = MadeUp::new(grid(2, 2), 3).image();
+    let table = Table::check(&table).unwrap();
+    let compensator = Compensator::new(&table, CompensateOptions::default()).unwrap();
+    for (bytes, cut_short) in [(1_000, true), (0, true), (1_000_000, false)] {
+        let input = stream("YUV4MPEG2 W6 H4 C444", 30, 0..=255);
+        let totals = compensator.y4m(&input[..], Closed(bytes), &Counter::default());
+        assert_eq!(totals.unwrap().cut_short, cut_short, "{bytes}");
+    }
 }
 
 #[test]

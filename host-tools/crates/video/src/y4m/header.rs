@@ -113,6 +113,27 @@ impl Header {
         })
     }
 
+    /// The same for frames of another size.
+    #[must_use]
+    pub fn resized(&self, size: FrameSize) -> Self {
+        let mut line = Vec::with_capacity(self.line.len());
+        for (at, tag) in self.line.split(|byte| *byte == b' ').enumerate() {
+            if at > 0 {
+                line.push(b' ');
+            }
+            match tag.first() {
+                Some(b'W') => line.extend(format!("W{}", size.width()).into_bytes()),
+                Some(b'H') => line.extend(format!("H{}", size.height()).into_bytes()),
+                _ => line.extend(tag),
+            }
+        }
+        Self {
+            line,
+            size,
+            ..self.clone()
+        }
+    }
+
     /// The line as it was read, without the newline.
     #[must_use]
     pub fn line(&self) -> &[u8] {

@@ -65,6 +65,9 @@ fn offsets(range: Range<usize>) -> Range<u32> {
 }
 
 impl TableFlash for PsramFlash {
+    // A sector of 4 KiB takes some hundred thousand instructions.
+    const LONGEST_MS: u32 = 50;
+
     fn map(&self) -> Result<Map, MapError> {
         Map::new(
             self,

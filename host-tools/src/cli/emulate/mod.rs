@@ -1,7 +1,14 @@
 //! `iltm emulate`
+//!
+//! | what | file |
+//! |---|---|
+//! | the board: its memory, firmware and port | here |
+//! | frames that go through it | [`film`] |
+
+mod film;
 
 use super::args::Emulate;
-use super::failure::{Failure, Kind, cannot_read, cannot_write};
+use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
 use super::output::{Output, read_file};
 use super::tables::check;
@@ -9,10 +16,10 @@ use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameFeed;
 use crate::device::memory::BoardMemory;
-use crate::device::playback::{Playback, PlaybackError};
+use crate::device::playback::PlaybackError;
 use crate::user::Folders;
 use crate::user::emulated::register;
-use crate::video::VideoError;
+use film::Film;
 use iltm_runtime::{
     FrameSize,
     frame_buffers::{Format, psram},
@@ -45,13 +52,13 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     if let (Some(path), Some(image)) = (&arguments.table, &image) {
         put_table(&memory, path, image)?;
     }
-    let mut frames = frames(arguments, table.as_ref())?;
-    let format = format(&frames)?;
+    let frames = frames(arguments, table.as_ref())?;
     let firmware = match &arguments.firmware {
         Some(firmware) => firmware.clone(),
         None => build(arguments.board, output)?,
     };
-    let mut playback = Playback::new(&memory, format).map_err(|error| playback_failure(&error))?;
+    let follows = arguments.frames.is_none() && arguments.size.is_none();
+    let mut film = Film::new(&memory, frames, follows)?;
     interrupt::catch();
     let started = Emulator::start(arguments.board, &firmware, &memory);
     let mut emulator = started.map_err(|error| emulator_failure(&error))?;
@@ -62,13 +69,13 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
         output.remark(&format!("`iltm ports` will not find this board: {error}"));
     }
     report(arguments, &emulator, &firmware, output);
-    let played = play(&mut emulator, &mut playback, &mut frames);
+    let played = play(&mut emulator, &mut film);
     // Ctrl-C goes to the emulator as well, which may be the first to notice.
     if !interrupt::stopped() {
         thread::sleep(Duration::from_millis(100));
     }
     if interrupt::stopped() {
-        let counts = playback.counts();
+        let counts = film.counts();
         let data = json!({ "event": "end", "given": counts.given, "shown": counts.shown });
         let text = format!("{} frames given, {} shown\n", counts.given, counts.shown);
         output.result(&data, &text);
@@ -127,24 +134,25 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameFeed, F
     let channels = table.map(Table::channels);
     if let Some(path) = &arguments.frames {
         let frames = FrameFeed::file(path, channels, arguments.fps);
-        return frames.map_err(|error| match error {
-            VideoError::File { path, source } => cannot_read(&path, &source),
-            error => error.into(),
-        });
+        return Ok(frames?);
     }
     let size = arguments.size.unwrap_or_else(|| scene_size(table));
     let rate = arguments.fps.unwrap_or(RATE);
     Ok(FrameFeed::scene(size, channels.unwrap_or(3), rate))
 }
 
-/// A size that the emulated board can keep up with.
+/// A size that the emulated board can keep up with, in the aspect of the table's projector.
 fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
     let grid = table.map(|table| FrameSize::of_grid(table.grid()));
     let side = |least: u16, side: fn(FrameSize) -> usize| {
         grid.map_or(least, |grid| least.max(side(grid) as u16))
     };
     let width = side(128, FrameSize::width);
-    FrameSize::new(width, side(96, FrameSize::height)).expect("neither side is zero")
+    let height = side(96, FrameSize::height);
+    let size = FrameSize::new(width, height).expect("neither side is zero");
+    let projector = table.and_then(Table::projector);
+    let around = projector.and_then(|projector| projector.around(size));
+    around.unwrap_or(size)
 }
 
 fn format(frames: &FrameFeed) -> Result<Format, Failure> {
@@ -236,23 +244,15 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 }
 
 /// Frames at their rate, until somebody stops it or the board ends.
-fn play(
-    emulator: &mut Emulator,
-    playback: &mut Playback<'_>,
-    frames: &mut FrameFeed,
-) -> Result<(), Failure> {
-    let period = Duration::from_secs_f64(1.0 / frames.rate());
+fn play(emulator: &mut Emulator, film: &mut Film<'_>) -> Result<(), Failure> {
+    let period = Duration::from_secs_f64(1.0 / film.rate());
     let mut due = Instant::now();
     while !interrupt::stopped() {
         emulator.check().map_err(|error| emulator_failure(&error))?;
-        let frame = frames.next_frame()?;
         wait_until(due);
         // After a pause, go on from now rather than make up for it in a burst.
         due = (due + period).max(Instant::now());
-        let passed = playback
-            .give(&frame)
-            .and_then(|()| playback.show(|_, _| ()));
-        passed.map_err(|error| playback_failure(&error))?;
+        film.turn()?;
     }
     Ok(())
 }

@@ -1,0 +1,260 @@
+//! Outcome: a table keeps its promise, breaks it, or the photographs cannot tell.
+//!
+//! The photographs are judged before the table: a capture's gates look at those of the code.
+//! A table passes only on photographs that every gate accepts. It fails where the error is
+//! larger than everything that the photographs' own faults explain. Between the two, nobody
+//! knows.
+
+use super::{Bound, Curve, Drift};
+use iltm_capture::{CellReadings, Gate, GateName, Nonlinearity};
+use strum::IntoStaticStr;
+
+/// What a verification says of a table.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Outcome {
+    /// The error on the wall is within what the table promises.
+    Passed,
+    /// It is not.
+    Failed,
+    /// These photographs cannot tell.
+    Inconclusive,
+}
+
+/// Why a table did not pass.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Cause {
+    /// Camera, projector or scene moved between the photographs.
+    Moved,
+    /// Photographs show the patterns of other lines.
+    Order,
+    /// White is beyond the camera's full scale.
+    Clipped,
+    /// Brightness jumps from photograph to photograph or runs across them in bands.
+    Flicker,
+    /// Brightness changed over the session.
+    Drift,
+    /// The camera exposes each photograph for its own brightness.
+    AutoExposure,
+    /// The camera's values follow another curve than is declared.
+    CameraResponse,
+    /// A curve explains the error: the camera's, or the projector's.
+    Response,
+    /// Light does not add up, and nothing says why.
+    Superposition,
+    /// Photographs of the same picture differ among themselves.
+    Noise,
+    /// White looks different from cell to cell than the table expects, by no more than another
+    /// place of the camera explains.
+    Viewpoint,
+    /// The projector's light follows the picture.
+    DynamicProjector,
+    /// Player, device and projector do something else than to compensate the slides once.
+    Chain,
+    /// White is another than when the table was made: projector, scene, or another table.
+    Scene,
+    /// The colours of white are others than when the table was made.
+    Colour,
+    /// White is as it was, and the images are not: the projector's response, or a bad table.
+    ProjectorResponse,
+    /// The table does not tell how bright white should be.
+    Unknown,
+}
+
+impl Outcome {
+    /// Its name for programs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// In words, a sentence without its point.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Passed => "The table keeps its promise",
+            Self::Failed => "The table does not keep its promise",
+            Self::Inconclusive => "These photographs cannot tell",
+        }
+    }
+}
+
+impl Cause {
+    /// Its name for programs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Whether it lies in the photographs and not on the wall.
+    #[must_use]
+    pub const fn of_photographs(self) -> bool {
+        matches!(
+            self,
+            Self::Moved
+                | Self::Order
+                | Self::Clipped
+                | Self::Flicker
+                | Self::Drift
+                | Self::AutoExposure
+                | Self::CameraResponse
+                | Self::Response
+                | Self::Superposition
+                | Self::Noise
+                | Self::Viewpoint
+        )
+    }
+
+    /// Whether photographs with it cannot even be told from each other.
+    pub(super) const fn spoils_pictures(self) -> bool {
+        matches!(self, Self::Moved | Self::Order | Self::Clipped)
+    }
+
+    /// What to do about it, a sentence or two.
+    #[must_use]
+    pub const fn next_step(self) -> &'static str {
+        match self {
+            Self::Moved => {
+                "Fix tripod, projector and scene, use a remote release, and take all photographs \
+                 again."
+            }
+            Self::Order => "Put the photographs in the order of verify.csv, or take them again.",
+            Self::Clipped => {
+                "Take the photographs again with a shorter exposure: white at about 80 % of full \
+                 scale."
+            }
+            Self::Flicker => {
+                "Set a longer exposure that is a multiple of the projector's refresh period and of \
+                 the mains' (1/25 or 1/30 s and longer), switch lamps off, and photograph again."
+            }
+            Self::Drift => {
+                "Let the projector warm up for 20 minutes, keep daylight out, and photograph again."
+            }
+            Self::AutoExposure => {
+                "Set exposure, gain (ISO) and white balance by hand, and photograph again."
+            }
+            Self::CameraResponse | Self::Response => {
+                "State the camera's response in capture.toml ([camera] response = \"srgb\" for camera \
+                 JPEGs, a gamma number, or \"measure\") and verify again; no new photographs are \
+                 needed."
+            }
+            Self::Superposition => {
+                "Set exposure, gain (ISO) and white balance by hand, switch off the projector's \
+                 dynamic modes, keep other light out, and photograph again."
+            }
+            Self::Noise => {
+                "Expose longer or lower the camera's gain (ISO) until white reaches 80 % of full \
+                 scale, keep other light out, and photograph again."
+            }
+            Self::Viewpoint => {
+                "Put the camera where it stood for the table's own photographs, and photograph \
+                 again."
+            }
+            Self::DynamicProjector => {
+                "Choose the projector's sRGB, film or photo mode, switch off dynamic contrast, iris \
+                 and eco modes, and photograph again."
+            }
+            Self::Chain => {
+                "Set player, device and projector so that exactly one of them compensates, and no \
+                 one after it scales, shifts or mirrors the picture; then photograph again."
+            }
+            Self::Scene | Self::Colour | Self::ProjectorResponse | Self::Unknown => {
+                "Put the projector back as it was when the table was made and verify again; if it is \
+                 as it was, take a new capture and solve it."
+            }
+        }
+    }
+}
+
+/// A gate that refuses the photographs, as a cause.
+fn blamed(gate: &Gate, nonlinearity: Option<Nonlinearity>) -> Option<Cause> {
+    let cause = match gate.name {
+        GateName::Movement => Cause::Moved,
+        GateName::Order => Cause::Order,
+        GateName::Saturation => Cause::Clipped,
+        GateName::Flicker => Cause::Flicker,
+        GateName::Drift => Cause::Drift,
+        GateName::Response => Cause::CameraResponse,
+        GateName::Superposition => match nonlinearity {
+            Some(Nonlinearity::Curve { .. }) => Cause::CameraResponse,
+            Some(Nonlinearity::Exposure) => Cause::AutoExposure,
+            Some(Nonlinearity::Projector) => Cause::DynamicProjector,
+            Some(
+                Nonlinearity::Either | Nonlinearity::CurveOrExposure { .. } | Nonlinearity::Unknown,
+            )
+            | None => Cause::Superposition,
+        },
+        // What these measure is in the noise of the photographs and the cells that are compared.
+        GateName::Complete | GateName::Format | GateName::Coverage | GateName::Noise => {
+            return None;
+        }
+    };
+    gate.fails().then_some(cause)
+}
+
+/// The first cause for which the photographs cannot be believed, and its gate.
+#[must_use]
+pub fn refused(readings: &CellReadings) -> Option<(Cause, &Gate)> {
+    let of_gate = |gate| Some((blamed(gate, readings.cause)?, gate));
+    readings.gates.iter().find_map(of_gate)
+}
+
+/// Part of an error that a curve must leave at most to be its cause.
+const EXPLAINED: f64 = 0.7;
+
+/// Powers of light up to this one, or its inverse, cannot be seen where patterns and their
+/// inverses add up.
+const UNSEEN: f64 = 1.15;
+
+/// What follows from an error with compensation.
+pub(super) fn decide(
+    error: f64,
+    bound: &Bound,
+    (readings, drift, curve): (&CellReadings, &Drift, Curve),
+) -> (Outcome, Option<Cause>) {
+    let refused = refused(readings).map(|(cause, _)| cause);
+    let fits = error <= bound.limit;
+    let bent = error > bound.promise && curve.left < EXPLAINED * error && curve.left <= bound.limit;
+    match refused {
+        Some(Cause::DynamicProjector) => (Outcome::Failed, refused),
+        // Light adds up once it is bent back, and the error is gone with that.
+        Some(Cause::Superposition) if bent => (Outcome::Inconclusive, Some(Cause::CameraResponse)),
+        // Brightness that follows the picture is one factor a photograph, which errors leave out.
+        Some(Cause::Superposition) if error > bound.doubt => {
+            (Outcome::Failed, Some(changed(bound, drift)))
+        }
+        Some(_) => (Outcome::Inconclusive, refused),
+        None if bent && (fits || curve.power.ln().abs() < UNSEEN.ln()) => {
+            (Outcome::Inconclusive, Some(Cause::Response))
+        }
+        None if error > bound.doubt => (Outcome::Failed, Some(changed(bound, drift))),
+        // Photographs that differ by many times what is promised tell nothing, however small
+        // the error is.
+        None if fits => match bound.unsure() {
+            None => (Outcome::Passed, None),
+            why => (Outcome::Inconclusive, why),
+        },
+        None => (Outcome::Inconclusive, Some(bound.worst())),
+    }
+}
+
+/// Part of which the levels of white's colours may differ.
+const SAME_COLOUR: f64 = 0.03;
+
+/// How far apart the colours of white lie from those that the table expects.
+pub(super) fn colour(level: &[f64]) -> f64 {
+    let most = level.iter().fold(0.0_f64, |a, b| a.max(*b));
+    let least = level.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+    most / least.max(1e-12) - 1.0
+}
+
+/// What is not as it was when the table was made.
+fn changed(bound: &Bound, drift: &Drift) -> Cause {
+    match &drift.white {
+        None => Cause::Unknown,
+        Some(white) if white.shared() > bound.limit => Cause::Scene,
+        Some(white) if colour(&white.level) > SAME_COLOUR => Cause::Colour,
+        Some(_) => Cause::ProjectorResponse,
+    }
+}

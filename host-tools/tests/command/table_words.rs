@@ -1,0 +1,219 @@
+//! What a table is said to be, and where its frames go: the words and the pixels that a
+//! technician gets.
+
+use super::user::{User, contains};
+use image::{GrayImage, Luma};
+use std::sync::OnceLock;
+
+/// With a table `b.iltm` of a projector of 320 x 200 pixels with a border of 20, learned
+/// from photographs of slides that had it.
+fn bordered() -> &'static User {
+    static USER: OnceLock<User> = OnceLock::new();
+    USER.get_or_init(|| {
+        let user = User::new();
+        let size = "--projector 320x200 --border 20 --camera linear --no-calibration";
+        user.says(&format!(
+            "patterns -o c --rows 13 --cols 21 --photos 40 {size}"
+        ));
+        user.says("simulate SCENES/m-panels.toml --photograph c");
+        user.says("solve c -o b.iltm");
+        user
+    })
+}
+
+fn grey(user: &User, name: &str, (width, height): (u32, u32)) {
+    let picture = GrayImage::from_pixel(width, height, Luma([200]));
+    picture.save(user.path(name)).expect("writable");
+}
+
+#[test]
+fn a_border_stays_black_and_frames_of_the_size_inside_it_are_put_there() {
+    let user = bordered();
+    for size in [(320, 200), (280, 160)] {
+        grey(user, "w.png", size);
+        user.says("compensate b.iltm w.png -o p.png");
+        let made = user.picture("p.png").into_luma8();
+        assert_eq!(made.dimensions(), (320, 200));
+        for (x, y, pixel) in made.enumerate_pixels() {
+            let inside = (20..300).contains(&x) && (20..180).contains(&y);
+            assert!(inside || pixel.0 == [0], "{x} {y}: {}", pixel.0[0]);
+        }
+        // Where the panels' left wedge is folded, least light is needed of its own; it is a
+        // little less than half way from the middle of the cells to their edge.
+        let darkest = (30..160).min_by_key(|x| made.get_pixel(*x, 100).0[0]);
+        let darkest = darkest.expect("some");
+        assert!((80..115).contains(&darkest), "{darkest}");
+    }
+    let inspected = user.json("inspect b.iltm");
+    assert_eq!(inspected["projector"]["border"], 20);
+}
+
+#[test]
+fn another_aspect_is_refused_everywhere_unless_it_is_said_how() {
+    let user = bordered();
+    grey(user, "wide.png", (192, 108));
+    let said = user.fails(8, "compensate b.iltm wide.png -o p.png");
+    contains(&said, &["192 x 108", "320 x 200", "--fit letterbox"]);
+    let said = user.fails(8, "solve c -o never.iltm --content wide.png");
+    contains(&said, &["wide.png", "192 x 108", "--fit letterbox"]);
+    assert!(!user.path("never.iltm").exists());
+    for (fit, size) in [
+        ("letterbox", (192, 120)),
+        ("crop", (173, 108)),
+        ("stretch", (192, 108)),
+    ] {
+        user.says(&format!("compensate b.iltm wide.png -o p.png --fit {fit}"));
+        let made = user.picture("p.png");
+        assert_eq!((made.width(), made.height()), size, "{fit}");
+    }
+    user.says("solve c -o fitted.iltm --content wide.png --fit crop");
+    user.fails(2, "solve c -o never.iltm --fit crop");
+    user.fails(2, "compensate b.iltm wide.png -o p.png --fit zoom");
+    // A table that knows no projector.
+    let plain = User::with_table();
+    grey(&plain, "wide.png", (192, 108));
+    plain.says("compensate t.iltm wide.png -o p.png");
+    plain.fails(2, "compensate t.iltm wide.png -o p.png --fit crop");
+}
+
+#[test]
+fn a_solve_says_how_good_and_how_bright_in_few_lines_and_all_else_when_asked() {
+    let user = User::new();
+    let few = user.says("solve SAMPLE -o t.iltm");
+    contains(
+        &few,
+        &[
+            "good ",
+            "without a table",
+            "brightness ",
+            "% as bright",
+            "13 x 21 cells",
+            "ms a frame",
+            "iltm verify t.iltm",
+        ],
+    );
+    for theory in ["kappa", "Gershgorin", "condition", "Gray code", "lambda"] {
+        assert!(!few.contains(theory), "{few}");
+    }
+    assert!(few.lines().count() <= 7, "{few}");
+    let inspected = user.says("inspect t.iltm");
+    assert!(inspected.lines().count() <= 7, "{inspected}");
+    assert!(!inspected.contains("made_by"), "{inspected}");
+    // The same words of the same table.
+    for line in few.lines().take(4) {
+        assert!(inspected.contains(line), "{line}: {inspected}");
+    }
+    contains(
+        &user.says("solve SAMPLE -o t.iltm -v"),
+        &["kappa", "condition", "Gray code"],
+    );
+    contains(
+        &user.says("inspect t.iltm -v"),
+        &["overflow proof", "made_by", "tier"],
+    );
+}
+
+#[test]
+fn gains_alone_have_one_number_that_is_better_than_nothing() {
+    let user = User::with_table();
+    let inspected = user.json("inspect t.iltm");
+    let gains = inspected["tiers"][0]["total_error"]
+        .as_f64()
+        .expect("a number");
+    let nothing = inspected["provenance"]["predicted_error"]["uncompensated"].as_f64();
+    assert!(gains < nothing.expect("a number"), "{inspected}");
+    let said = user.says("inspect t.iltm");
+    let end = said.find(" % with gains alone").expect("said");
+    let start = said[..end].rfind(' ').expect("a word before") + 1;
+    let percent: f64 = said[start..end].parse().expect("a number");
+    assert!((percent / (100.0 * gains) - 1.0).abs() < 0.01, "{said}");
+}
+
+#[test]
+fn what_is_cut_off_is_told_apart_and_advice_is_for_white() {
+    let user = User::with_table();
+    let half = GrayImage::from_fn(210, 130, |x, _| Luma([if x < 105 { 255 } else { 0 }]));
+    half.save(user.path("w.png")).expect("writable");
+    let said = user.says("compensate t.iltm w.png -o p.png");
+    contains(
+        &said,
+        &[
+            "% as bright",
+            "too bright for the projector's white",
+            "darker than its black",
+        ],
+    );
+    let data = user.json("compensate t.iltm w.png -o p.png");
+    let number = |name: &str| data[name].as_u64().expect("a number");
+    assert!(number("clipped") > number("clipped_white"), "{data}");
+    let black = GrayImage::new(210, 130);
+    black.save(user.path("b.png")).expect("writable");
+    let said = user.says("compensate t.iltm b.png -o p.png");
+    contains(&said, &["0.00 % of the samples are too bright"]);
+    assert!(!said.contains("--content"), "{said}");
+}
+
+#[test]
+fn options_that_would_be_dropped_are_refused() {
+    let user = User::with_table();
+    for terms in [
+        "--for-device 3",
+        "--table-version 7",
+        "--revoke-below 1",
+        "--method direct --lambda 0.1",
+    ] {
+        user.fails(2, &format!("solve SAMPLE -o u.iltm {terms}"));
+    }
+    user.write("scene.toml", super::simulate::CORNER);
+    user.says("simulate scene.toml -o c --photos 12");
+    for command in [
+        "simulate scene.toml --photograph c -o d",
+        "simulate scene.toml --photograph c --photos 3",
+        "simulate scene.toml --explain --fault tripod",
+        "simulate scene.toml --explain --photos 3",
+        "capture c --list --timeout 3",
+        "compensate t.iltm w.png -o p.png --verbose",
+    ] {
+        user.fails(2, command);
+    }
+    assert!(!user.path("d").exists() && !user.path("u.iltm").exists());
+    // A folder that lacks nothing: no light is computed.
+    let said = user.says("simulate scene.toml --photograph c");
+    contains(&said, &["every photograph is there"]);
+}
+
+#[test]
+fn the_help_of_capture_fits_eighty_columns_and_its_commands_can_be_copied() {
+    let help = User::new().run("capture --help").out;
+    let from = help.find("Commands are run by the shell").expect("there");
+    for line in help[from..].lines() {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    // A line that goes on says so to the shell.
+    let gphoto = help.find("gphoto2").expect("there");
+    let end = gphoto + help[gphoto..].find('\'').expect("quoted");
+    let (first, rest) = help[gphoto..end].split_once('\n').expect("two lines");
+    assert!(
+        first.ends_with('\\') && rest.contains("{stem}.jpg"),
+        "{help}"
+    );
+}
+
+#[test]
+fn what_cannot_be_is_said_before_the_work_and_with_the_right_code() {
+    let user = User::with_table();
+    let said = user.fails(9, "solve SAMPLE -o no/folder/t.iltm");
+    contains(&said, &["there is no folder no/folder"]);
+    std::fs::create_dir(user.path("taken")).expect("made");
+    contains(&user.fails(9, "solve SAMPLE -o taken"), &["it is a folder"]);
+    let said = user.fails(3, "solve SAMPLE -o u.iltm --content missing.y4m");
+    assert_eq!(said.matches("missing.y4m").count(), 1, "{said}");
+    let said = user.fails(2, "solve SAMPLE -o u.iltm --white 5");
+    contains(&said, &["times", "--content"]);
+    user.write("header.y4m", "YUV4MPEG2 W64 H40 F25:1\n");
+    let said = user.fails(8, "compensate t.iltm header.y4m -o out.y4m");
+    contains(&said, &["no frame"]);
+    assert!(!user.path("out.y4m").exists());
+    let said = user.fails(2, "compensate t.iltm header.y4m -o out.png");
+    contains(&said, &["out.png", "Y4M"]);
+}

@@ -1,0 +1,110 @@
+//! Verdicts of `iltm verify`: sessions with every fault at several sizes, and what is really on
+//! the wall: `cargo run --release -p iltm-tests --bin verdicts`.
+//!
+//! Words choose the sessions whose scene and name together contain one of them.
+
+use iltm::scene::description::Scene;
+use iltm::verify::Outcome;
+use iltm_tests::simulated::scene;
+use iltm_tests::verdicts::{HEAD, VerdictRig, study};
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let wall = "name = \"right wall\"\ncorners = [[0, 2.4, 0], [2.4, 2.4, 0], [2.4, 0, 0], [0, 0, 0]]\nalbedo = 0.7";
+    let painted = |to: &str| [(wall, wall.replace("0.7", to))];
+    let of = |pairs: &[(&str, String)]| -> Scene {
+        let pairs: Vec<(&str, &str)> = pairs.iter().map(|(a, b)| (*a, b.as_str())).collect();
+        scene("installation", &pairs)
+    };
+    let foyer = of(&[]);
+    let sixteen = [
+        ("bits = 8\n", "bits = 16\n".to_owned()),
+        ("response = \"srgb\"", "response = \"linear\"".to_owned()),
+    ];
+    let noisy = [("full_well = 15000.0", "full_well = 4000.0".to_owned())];
+    let rigs = [
+        ("installation", foyer, vec![2.2, 2.3, 2.0, 1.8, 1.4, 1.0]),
+        (
+            "installation, 16 bits, linear",
+            of(&sixteen),
+            vec![1.02, 1.05, 1.1, 1.2, 1.4, 2.2],
+        ),
+        ("installation, noisy camera", of(&noisy), vec![2.0, 1.8]),
+        (
+            "m-panels",
+            scene("m-panels", &[]),
+            vec![1.02, 1.05, 1.1, 1.2, 1.4, 2.2],
+        ),
+    ];
+    let seen = |from: &str, to: &str| {
+        of(&[
+            ("position = [2.2, 2.1, 2.9]", format!("position = [{from}]")),
+            ("look_at = [0.0, 0.75, 0.0]", format!("look_at = [{to}]")),
+        ])
+    };
+    let others = [
+        (
+            "good, camera put down 3 cm away",
+            seen("2.23, 2.1, 2.9", "0.01, 0.75, 0.0"),
+            &[Outcome::Passed][..],
+        ),
+        (
+            "good, camera put down 10 cm away",
+            seen("2.12, 2.15, 2.95", "0.0, 0.77, 0.0"),
+            &[Outcome::Passed][..],
+        ),
+        (
+            "good, camera put down 40 cm away",
+            seen("1.9, 2.3, 3.1", "0.05, 0.75, 0.0"),
+            &[Outcome::Passed][..],
+        ),
+        (
+            "right wall of albedo 0.68 instead of 0.7",
+            of(&painted("0.68")),
+            &[Outcome::Failed, Outcome::Inconclusive][..],
+        ),
+        (
+            "right wall of albedo 0.6 instead of 0.7",
+            of(&painted("0.6")),
+            &[Outcome::Failed][..],
+        ),
+        (
+            "right wall of albedo 0.4 instead of 0.7",
+            of(&painted("0.4")),
+            &[Outcome::Failed][..],
+        ),
+    ];
+    let mut wrong = 0;
+    for (name, scene, gammas) in rigs {
+        let chosen = |case: &str| {
+            let all = format!("{name}: {case}");
+            words.is_empty() || words.iter().any(|word| all.contains(word.as_str()))
+        };
+        let rig = VerdictRig::new(scene);
+        let others = if name == "installation" {
+            &others[..]
+        } else {
+            &[]
+        };
+        let mut cases = study(&rig, &gammas, others);
+        if name == "installation" {
+            for quality in [100, 95, 90, 80, 60] {
+                let mut case = rig.good(&format!("good, JPEG of quality {quality}"), 4);
+                case.jpeg = Some(quality);
+                if quality < 80 {
+                    // What such files lose is noise.
+                    case.right = vec![Outcome::Passed, Outcome::Inconclusive];
+                }
+                cases.push(case);
+            }
+        }
+        println!("\n{name}\n\n{HEAD}");
+        for case in cases.into_iter().filter(|case| chosen(&case.name)) {
+            let session = rig.judge(case);
+            let mark = if session.is_right() { "" } else { " WRONG" };
+            wrong += usize::from(!session.is_right());
+            println!("{}{mark}", session.line());
+        }
+    }
+    println!("\n{wrong} sessions with an outcome that they must not have");
+}

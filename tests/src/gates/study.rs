@@ -1,0 +1,180 @@
+//! Many sessions at once, each on a thread of its own, and what became of them.
+
+use super::fault::StudiedFault;
+use super::session::{StudiedSession, failing};
+use iltm::capture::{Gate, Verdict};
+use std::fmt::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// How many sessions.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Seed of the first session; the others follow.
+    pub first: u64,
+    /// Good sessions.
+    pub good: usize,
+    /// Of these, the first so many are taken again with each fault.
+    pub faulty: usize,
+    /// The faults.
+    pub faults: Vec<StudiedFault>,
+    /// Sessions at the same time.
+    pub threads: usize,
+}
+
+/// What became of the sessions.
+#[derive(Clone, Default, Debug)]
+pub struct StudyResult {
+    /// Good sessions.
+    pub good: usize,
+    /// Good sessions that were refused, in words.
+    pub refused: Vec<String>,
+    /// Gates of good sessions by verdict: pass, not judged, remark, fail; one entry a gate.
+    pub verdicts: Vec<(String, [usize; 4])>,
+    /// For each fault: sessions, found by the right gate, and those that were not, in words.
+    pub faults: Vec<(usize, usize, Vec<String>)>,
+}
+
+impl Study {
+    /// Takes and judges all sessions; `say` is told of what went wrong as it comes.
+    ///
+    /// # Panics
+    /// If a thread panicked.
+    pub fn run(&self, say: &(dyn Fn(&str) + Sync)) -> StudyResult {
+        let next = AtomicUsize::new(0);
+        let result = Mutex::new(StudyResult {
+            faults: vec![(0, 0, Vec::new()); self.faults.len()],
+            ..StudyResult::default()
+        });
+        std::thread::scope(|threads| {
+            for _ in 0..self.threads {
+                threads.spawn(|| {
+                    loop {
+                        let at = next.fetch_add(1, Ordering::Relaxed);
+                        if at >= self.good {
+                            break;
+                        }
+                        self.one(at, &result, say);
+                    }
+                });
+            }
+        });
+        let mut result = result.into_inner().expect("no thread panicked");
+        // Threads end in any order.
+        result.refused.sort();
+        for (_, _, missed) in &mut result.faults {
+            missed.sort();
+        }
+        result
+    }
+
+    /// One session, good and with every fault.
+    fn one(&self, at: usize, result: &Mutex<StudyResult>, say: &(dyn Fn(&str) + Sync)) {
+        let start = Instant::now();
+        let session = StudiedSession::new(self.first + at as u64);
+        let simulation = session.simulation();
+        let good = session.examined(&simulation, None);
+        let good = good.unwrap_or_else(|error| panic!("{}: {error}", session.words));
+        let seconds = start.elapsed().as_secs_f64();
+        let mut said = String::new();
+        {
+            let mut result = result.lock().expect("no thread panicked");
+            result.good += 1;
+            count(&mut result.verdicts, &good.gates);
+            if let Some(words) = words(&session, "good", &failing(&good.gates)) {
+                result.refused.push(words.clone());
+                said += &words;
+            }
+        }
+        let measured = good.measurements.is_some();
+        for (k, fault) in self.faults.iter().enumerate() {
+            if at >= self.faulty || !measured {
+                break;
+            }
+            let made = session.fault(fault.kind, fault.size, &good);
+            let (gates, found) = match session.examined(&simulation, Some(made)) {
+                Ok(examined) => (examined.gates.clone(), fault.found(&examined.gates)),
+                // Exchanged photographs of white and black are one alike.
+                Err(error) => (Vec::new(), error.next_step().contains("exchanged")),
+            };
+            let mut result = result.lock().expect("no thread panicked");
+            let entry = &mut result.faults[k];
+            entry.0 += 1;
+            entry.1 += usize::from(found);
+            if !found {
+                let not_passed: Vec<&Gate> = gates
+                    .iter()
+                    .filter(|g| g.verdict >= Verdict::Warn)
+                    .collect();
+                let words = words(&session, &made.to_string(), &not_passed).unwrap_or_else(|| {
+                    format!("{:06} {made} silent | {}\n", session.seed, session.words)
+                });
+                said += &words;
+                entry.2.push(words);
+            }
+        }
+        let all = start.elapsed().as_secs_f64();
+        say(&format!(
+            "{:06} {seconds:.2} s, {all:.2} s\n{said}",
+            session.seed
+        ));
+    }
+}
+
+/// What some gates say of a session; `None` without any.
+fn words(session: &StudiedSession, what: &str, gates: &[&Gate]) -> Option<String> {
+    let mut text = String::new();
+    for gate in gates {
+        let _ = writeln!(
+            text,
+            "{:06} {what}: {} {} {} {:.240} -> {:.60} | {}",
+            session.seed,
+            gate.verdict.name(),
+            gate.name,
+            gate.number_and_limit(),
+            gate.what,
+            gate.next_step,
+            session.words
+        );
+    }
+    (!text.is_empty()).then_some(text)
+}
+
+fn count(verdicts: &mut Vec<(String, [usize; 4])>, gates: &[Gate]) {
+    for gate in gates {
+        let name = gate.name.to_string();
+        let at = verdicts.iter().position(|known| known.0 == name);
+        let at = at.unwrap_or_else(|| {
+            verdicts.push((name, [0; 4]));
+            verdicts.len() - 1
+        });
+        verdicts[at].1[gate.verdict as usize] += 1;
+    }
+}
+
+impl StudyResult {
+    /// The table of the gates' page.
+    pub fn table(&self, study: &Study) -> String {
+        let mut text = format!(
+            "| sessions | how many | outcome |\n|---|---|---|\n| good | {} | {} refused |\n",
+            self.good,
+            self.refused.len()
+        );
+        for (fault, (all, found, _)) in study.faults.iter().zip(&self.faults) {
+            let _ = writeln!(
+                text,
+                "| `{}`, {} {} | {all} | {found} found ({:.1} %) |",
+                fault.kind,
+                fault.size,
+                fault.words,
+                100.0 * *found as f64 / (*all).max(1) as f64
+            );
+        }
+        text += "\n| gate, of good sessions | passes | not judged | remark | fails |\n|---|---|---|---|---|\n";
+        for (name, [pass, not, warn, fail]) in &self.verdicts {
+            let _ = writeln!(text, "| `{name}` | {pass} | {not} | {warn} | {fail} |");
+        }
+        text
+    }
+}

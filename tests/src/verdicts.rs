@@ -1,0 +1,300 @@
+//! Verdicts of `iltm verify` against the truth: a table is learned from simulated photographs,
+//! verified with others that have a fault on purpose, and what is really on the wall is known.
+
+use crate::simulated::{self, cell_means, simulation};
+use iltm::build_table::BuiltTable;
+use iltm::capture::Settings;
+use iltm::progress::Silent;
+use iltm::scene::description::Scene;
+use iltm::scene::{CaptureFault, Effect, Forced, InjectedFault, VirtualCamera, fill_capture};
+use iltm::session::Layout;
+use iltm::verify::{Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, judge, write};
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use image::codecs::jpeg::JpegEncoder;
+use nalgebra::DMatrix;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Random patterns that tables are learned from.
+const BERNOULLI: usize = 80;
+
+/// A table that was learned, and the scene that it is for.
+pub struct VerdictRig {
+    scene: Scene,
+    learned: BuiltTable,
+    place: TempDir,
+}
+
+/// What is wrong in one session.
+#[derive(Clone, Debug)]
+pub struct VerdictCase {
+    /// For people.
+    pub name: String,
+    /// The scene as the verification finds it.
+    pub scene: Scene,
+    /// What goes wrong with the photographs.
+    pub faults: Vec<InjectedFault>,
+    /// Of the noise.
+    pub seed: u64,
+    /// Photographs are JPEG of this quality.
+    pub jpeg: Option<u8>,
+    /// What must come of it; with both, either.
+    pub right: Vec<Outcome>,
+}
+
+/// One session, judged.
+#[derive(Debug)]
+pub struct VerdictSession {
+    /// What was wrong.
+    pub case: VerdictCase,
+    /// What `verify` says.
+    pub verdict: Result<TableVerdict, VerifyError>,
+    /// Error that is on the wall.
+    pub truth: f64,
+}
+
+impl VerdictSession {
+    /// Whether the outcome is one that it may be, and a table that passes is as good as the
+    /// page says.
+    pub fn is_right(&self) -> bool {
+        match &self.verdict {
+            Ok(verdict) => {
+                let passed = verdict.outcome == Outcome::Passed;
+                self.case.right.contains(&verdict.outcome)
+                    && !(passed && self.truth > verdict.bound.limit)
+            }
+            Err(_) => self.case.right.contains(&Outcome::Inconclusive),
+        }
+    }
+
+    /// A line of a table.
+    pub fn line(&self) -> String {
+        let percent = |value: f64| format!("{:.2} %", 100.0 * value);
+        let mut line = format!("| {} | {} |", self.case.name, percent(self.truth));
+        match &self.verdict {
+            Ok(verdict) => {
+                let cause = verdict.cause.map_or("", Cause::name);
+                let (bound, name) = (&verdict.bound, verdict.outcome.name());
+                let _ = write!(
+                    line,
+                    " {} | {} | {} | {} | {name} | {cause} |",
+                    percent(verdict.error[1]),
+                    percent(bound.limit),
+                    percent(bound.promise),
+                    percent(bound.added),
+                );
+            }
+            Err(error) => {
+                let _ = write!(line, " - | - | - | - | no verdict | {error} |");
+            }
+        }
+        line
+    }
+}
+
+/// The head of a table of [`VerdictSession::line`].
+pub const HEAD: &str = "| session | error on the wall | measured | most that passes | promised | photographs add | outcome | cause |\n|---|---|---|---|---|---|---|---|";
+
+impl VerdictRig {
+    /// Learns a table.
+    pub fn new(scene: Scene) -> Self {
+        let place = tempfile::tempdir().expect("a folder");
+        let capture = place.path().join("capture");
+        simulated::photograph(&scene, BERNOULLI, 3, &capture);
+        let learned = simulated::learned(&capture);
+        Self {
+            scene,
+            learned,
+            place,
+        }
+    }
+
+    /// A session without fault that must pass.
+    pub fn good(&self, name: &str, seed: u64) -> VerdictCase {
+        VerdictCase {
+            name: name.to_owned(),
+            scene: self.scene.clone(),
+            faults: Vec::new(),
+            seed,
+            jpeg: None,
+            right: vec![Outcome::Passed],
+        }
+    }
+
+    /// A session with a fault of which something must come.
+    pub fn faulty(&self, kind: CaptureFault, size: f64, right: &[Outcome]) -> VerdictCase {
+        let fault = InjectedFault { kind, size };
+        VerdictCase {
+            faults: vec![fault],
+            right: right.to_vec(),
+            ..self.good(&fault.to_string(), 11)
+        }
+    }
+
+    /// A session in another scene.
+    pub fn changed(&self, name: &str, scene: Scene, right: &[Outcome]) -> VerdictCase {
+        VerdictCase {
+            scene,
+            right: right.to_vec(),
+            ..self.good(name, 11)
+        }
+    }
+
+    /// Takes the photographs of a session and judges them.
+    pub fn judge(&self, case: VerdictCase) -> VerdictSession {
+        let table = Table::check(&self.learned.compiled.image).expect("a table");
+        let folder = self.place.path().join("verify");
+        let _ = fs::remove_dir_all(&folder);
+        let size = FrameSize::new(320, 240).expect("sides above zero");
+        let layout = Layout::new(table.grid(), size, 0).expect("cells fit");
+        let settings = Settings {
+            camera: self.learned.measurements.settings.camera.clone(),
+            ..Settings::default()
+        };
+        write(&table, &layout, (&settings, Slides::Both), &folder, &Silent).expect("written");
+        let simulation = simulation(&case.scene, Forced::default());
+        let camera = VirtualCamera::new(&case.scene, &simulation, case.seed).expect("light");
+        let camera = camera.with_faults(&case.faults);
+        let session = fill_capture::UnfilledCapture::read(&folder, simulation.grid());
+        let session = session.expect("a folder to fill");
+        session.take_missing(&camera, &Silent).expect("taken");
+        if let Some(quality) = case.jpeg {
+            as_jpeg(&folder.join("photos"), quality);
+        }
+        let readings = Readings::read(&folder, &table, &Silent);
+        let truth = self.truth(&case, &folder);
+        let verdict = readings.and_then(|readings| judge(&folder, &table, &readings, None));
+        VerdictSession {
+            case,
+            verdict,
+            truth,
+        }
+    }
+
+    /// Mean error of the compensated images on the wall, without noise and faults of the
+    /// camera, in the cells where they were when the table was learned.
+    fn truth(&self, case: &VerdictCase, folder: &Path) -> f64 {
+        let table = Table::check(&self.learned.compiled.image).expect("a table");
+        let images = iltm::verify::test_images(&table).expect("images");
+        let curves = iltm::verify::ProjectorCurves::new(&table);
+        // The wall as it is now, from where the camera stood then.
+        let mut wall = case.scene.clone();
+        wall.camera = self.scene.camera.clone();
+        let quiet = Forced::default().with(Effect::Noise, false);
+        let simulation = simulation(&wall, quiet);
+        let (cells, channels) = (table.grid().cells(), usize::from(table.channels()));
+        let light = |picture: &iltm::picture::Picture, of: &dyn Fn(usize, u8) -> f64| {
+            let iltm::picture::Samples::Eight(codes) = picture.samples() else {
+                panic!("8 bits in {}", folder.display());
+            };
+            let plane = |channel: usize| -> Vec<f64> {
+                let own = codes.iter().skip(channel).step_by(channels);
+                own.map(|code| of(channel, *code)).collect()
+            };
+            (0..channels).map(plane).collect::<Vec<_>>()
+        };
+        let drive = |channel, code| curves.drive(channel, code);
+        let inputs: Vec<_> = images
+            .iter()
+            .map(|i| light(&i.compensated, &drive))
+            .collect();
+        let projected: Vec<DMatrix<f64>> = (0..channels)
+            .map(|c| DMatrix::from_fn(cells, inputs.len(), |cell, k| inputs[k][c][cell]))
+            .collect();
+        let projected = if channels == 1 {
+            projected
+        } else {
+            [0, 1, 2].map(|c| projected[c].clone()).to_vec()
+        };
+        let lamp = vec![1.0; inputs.len()];
+        let exposed = simulation
+            .expose_projected(&projected, &lamp)
+            .expect("light");
+        let live: Vec<bool> = self.learned.measurements.live.repeat(channels);
+        let srgb = |_, code: u8| iltm::picture::Response::Srgb.light(f64::from(code) / 255.0);
+        let registration = &self.learned.measurements.registration;
+        let errors = images.iter().enumerate().map(|(k, image)| {
+            let planes = simulation.photograph(&exposed, k);
+            let seen: Vec<f64> = (planes.iter())
+                .flat_map(|plane| cell_means(registration, plane, cells))
+                .collect();
+            let wanted: Vec<f64> = light(&image.wanted, &srgb).concat();
+            simulated::error(&seen, &wanted, &live)
+        });
+        errors.sum::<f64>() / images.len() as f64
+    }
+}
+
+/// Turns the photographs of a folder into JPEG files.
+fn as_jpeg(photos: &Path, quality: u8) {
+    let files: Vec<PathBuf> = (fs::read_dir(photos).expect("photographs"))
+        .map(|entry| entry.expect("a file").path())
+        .collect();
+    for path in files {
+        let picture = image::open(&path).expect("a photograph");
+        let out = fs::File::create(path.with_extension("jpg")).expect("a file");
+        JpegEncoder::new_with_quality(out, quality)
+            .encode_image(&picture.into_luma8())
+            .expect("encoded");
+        fs::remove_file(path).expect("removed");
+    }
+}
+
+/// The sessions of the study in one scene: many good ones, and every fault from its smallest
+/// size up. `gammas` are those that the camera has and nobody declared; `others` the scene as it
+/// was changed since, or seen from another place.
+pub fn study(
+    rig: &VerdictRig,
+    gammas: &[f64],
+    others: &[(&str, Scene, &[Outcome])],
+) -> Vec<VerdictCase> {
+    use CaptureFault as F;
+    use Outcome::{Failed, Inconclusive, Passed};
+    let mut cases: Vec<VerdictCase> = (1..=6)
+        .map(|seed| rig.good(&format!("good, seed {seed}"), seed))
+        .collect();
+    // Tiny faults may pass, as long as the wall is what the page says.
+    let any = &[Passed, Inconclusive];
+    for size in [0.05, 0.1, 0.2, 0.3, 0.5, 0.7] {
+        cases.push(rig.faulty(F::Tripod, size, any));
+    }
+    for size in [1.0, 2.0, 3.0, 4.0] {
+        cases.push(rig.faulty(F::Tripod, size, &[Inconclusive]));
+    }
+    for size in [0.002, 0.005, 0.01] {
+        cases.push(rig.faulty(F::Flicker, size, any));
+    }
+    for size in [0.02, 0.03, 0.06] {
+        cases.push(rig.faulty(F::Flicker, size, &[Inconclusive]));
+    }
+    for gamma in gammas {
+        cases.push(rig.faulty(F::Gamma, *gamma, any));
+    }
+    for size in [0.01, 0.02, 0.05, 0.1] {
+        cases.push(rig.faulty(F::AutoExposure, size, any));
+    }
+    for size in [0.3, 1.0] {
+        cases.push(rig.faulty(F::AutoExposure, size, &[Inconclusive]));
+    }
+    for size in [0.0, 0.01, 0.05, 0.15, 0.3] {
+        cases.push(rig.faulty(F::Vivid, size, &[Failed]));
+    }
+    for size in [1.1, 1.2, 1.3] {
+        cases.push(rig.faulty(F::Clipped, size, any));
+    }
+    for size in [1.6, 2.5] {
+        cases.push(rig.faulty(F::Clipped, size, &[Inconclusive]));
+    }
+    for kind in [F::Skipped, F::Swapped, F::Dropped] {
+        for size in [0.3, 0.6, 0.9] {
+            cases.push(rig.faulty(kind, size, &[Inconclusive]));
+        }
+    }
+    for (name, scene, right) in others {
+        cases.push(rig.changed(name, scene.clone(), right));
+    }
+    cases
+}

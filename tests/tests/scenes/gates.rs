@@ -1,0 +1,79 @@
+//! Gates before a solve: good sessions pass, and faults are found by the gate that is meant to.
+
+use iltm::capture::{self, CaptureOptions, Gate, GateName, SETTINGS_FILE, Verdict};
+use iltm::progress::Silent;
+use iltm::scene::fill_capture::UnfilledCapture;
+use iltm::scene::{Forced, VirtualCamera};
+use iltm::session::{self, Layout, OrderOptions, order};
+use iltm_runtime::FrameSize;
+use iltm_tests::gates::{StudiedFault, Study};
+use iltm_tests::simulated::{scene, simulation};
+use std::path::Path;
+
+/// The short form of the study that docs/gates.md shows.
+#[test]
+fn random_good_sessions_pass_and_every_fault_is_found() {
+    let study = Study {
+        first: 5_000,
+        good: 16,
+        faulty: 2,
+        faults: StudiedFault::ALL.to_vec(),
+        threads: 2,
+    };
+    let result = study.run(&|_| {});
+    assert!(result.refused.is_empty(), "{:#?}", result.refused);
+    for (fault, (all, found, missed)) in study.faults.iter().zip(&result.faults) {
+        assert!(all == found, "{}: {missed:#?}", fault.kind);
+    }
+}
+
+fn gates(folder: &Path, bernoulli: Option<usize>) -> Vec<Gate> {
+    let options = CaptureOptions {
+        bernoulli,
+        ..CaptureOptions::default()
+    };
+    capture::examine(folder, &options, &Silent).unwrap().gates
+}
+
+/// The guide's foyer. With few random patterns the Gray code looks much like itself two
+/// photographs later, and declared linear the camera's curve makes colours not add up.
+#[test]
+fn few_patterns_accuse_no_photograph_and_a_curved_camera_no_projector() {
+    let scene = scene("installation", &[]);
+    let simulation = simulation(&scene, Forced::default());
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("foyer");
+    let options = OrderOptions {
+        bernoulli: 60,
+        ..OrderOptions::default()
+    };
+    let size = FrameSize::new(32, 24).unwrap();
+    let layout = Layout::new(simulation.grid(), size, 0).unwrap();
+    let slides = order(simulation.grid(), &options);
+    let camera = capture::CameraSettings {
+        response: scene.camera.response.into(),
+        ..capture::CameraSettings::default()
+    };
+    session::write(&slides, &layout, &camera, &folder, &Silent).unwrap();
+    let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
+    let unfilled = UnfilledCapture::read(&folder, simulation.grid()).unwrap();
+    unfilled.take_missing(&camera, &Silent).unwrap();
+    for bernoulli in [10, 15, 20] {
+        let gates = gates(&folder, Some(bernoulli));
+        let failed: Vec<&Gate> = gates.iter().filter(|gate| gate.fails()).collect();
+        assert!(failed.is_empty(), "{bernoulli}: {failed:#?}");
+    }
+    let settings = folder.join(SETTINGS_FILE);
+    let text = std::fs::read_to_string(&settings).unwrap();
+    let linear = text.replacen("response = \"srgb\"", "response = \"linear\"", 1);
+    assert_ne!(text, linear);
+    std::fs::write(&settings, linear).unwrap();
+    let gates = gates(&folder, Some(20));
+    let gate = |name: GateName| gates.iter().find(|gate| gate.name == name).unwrap();
+    assert!(
+        gate(GateName::Superposition)
+            .next_step
+            .contains("[camera] response")
+    );
+    assert_eq!(gate(GateName::Response).verdict, Verdict::NotJudged);
+}
