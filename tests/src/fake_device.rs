@@ -450,6 +450,12 @@ impl FakePort {
         seen.recv().expect("the device is there")
     }
 
+    /// Restarts the device, and waits until it has.
+    pub fn restart(&self) {
+        self.order(Order::Restart);
+        self.look(|_| ());
+    }
+
     /// Does something to the device.
     pub fn order(&self, order: Order) {
         // A device that has vanished takes no orders.
@@ -495,7 +501,11 @@ fn run(line: &mut (impl Read + Write), mut device: FakeDevice, orders: &Receiver
             match order {
                 Order::Event(event) => session.event(&event),
                 Order::Log(bytes) => session.log(&bytes),
-                Order::Restart => restart = true,
+                Order::Restart => {
+                    restart = true;
+                    // What is ordered after it finds it done.
+                    break;
+                }
                 Order::Noise(bytes) => {
                     let _ = line.write_all(&bytes);
                 }

@@ -6,7 +6,7 @@ use ed25519_dalek::SigningKey;
 use iltm::user::Folders;
 use iltm::user::emulated::{self, BoardRegistration};
 use iltm_runtime::link::{FrameKind, SlotState};
-use iltm_tests::fake_device::{FakeDevice, FakePort, FakeTables, Order, SECTOR, slot};
+use iltm_tests::fake_device::{FakeDevice, FakePort, FakeTables, SECTOR, slot};
 use iltm_tests::{key_file, named_table, signing_key, wedge_table};
 use serde_json::Value;
 use std::fs::{self, File};
@@ -602,7 +602,7 @@ fn a_confirmation_that_comes_too_late_is_an_error() {
     let ended = format!("the trial of {b} ended ");
     contains(&said, &[&ended, " s ago", &back, again]);
     // After a restart it is known that nobody confirmed it.
-    device.order(Order::Restart);
+    device.restart();
     let said = user.fails(27, &device.at("confirm"));
     let gone = format!("{b} is not in use: the device has restarted");
     contains(&said, &[&gone, "a trial ends with a restart", &back, again]);
