@@ -15,8 +15,8 @@ use std::path::Path;
 fn random_good_sessions_pass_and_every_fault_is_found() {
     let study = Study {
         first: 5_000,
-        good: 16,
-        faulty: 2,
+        good: 8,
+        faulty: 1,
         faults: StudiedFault::ALL.to_vec(),
         threads: 2,
     };
