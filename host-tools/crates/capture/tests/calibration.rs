@@ -237,6 +237,7 @@ fn an_eight_bit_gamma_camera_that_measures_itself_is_as_good_as_one_declared() {
     let found = wrong.gates.iter().find(|gate| gate.fails()).unwrap();
     let accused = "the camera's gamma is not the declared one";
     assert!(found.what.contains(accused), "{found}");
+    assert!(found.what.contains("raised to the power 2."), "{found}");
 }
 
 /// A default capture with every photograph taken at each of `times`.

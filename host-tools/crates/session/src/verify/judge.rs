@@ -244,7 +244,7 @@ pub fn judge(
     };
     let error = [mean(&|image| image.error[0]), mean(&|image| image.error[1])];
     let cols = table.grid().cols();
-    let drift = drift(readings, &mut expected, (white, cols), &lit);
+    let drift = drift(readings, &mut expected, white, cols, &lit);
     let alone = drift.white.as_ref().map_or(0.0, |white| white.alone);
     let viewpoint = alone.min(MOST_VIEWPOINT_OF_ALL);
     let bound = self::bound(table, readings, &images, (error[0], bound), viewpoint, &lit);
@@ -498,7 +498,8 @@ fn check_order(
 fn drift(
     readings: &Readings,
     expected: &mut Expected<'_, '_>,
-    (white, cols): (f64, usize),
+    white: f64,
+    cols: usize,
     lit: &LiveCells,
 ) -> Drift {
     let seen = &readings.revisited.white;
@@ -512,7 +513,7 @@ fn drift(
     let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
     let flood = expected.photograph(&readings.flood);
     Drift {
-        white: flood.map(|flood| white_change(readings, &flood, (white, cols), lit)),
+        white: flood.map(|flood| white_change(readings, &flood, white, cols, lit)),
         session: changes.fold(0.0, f64::max),
     }
 }
@@ -520,7 +521,8 @@ fn drift(
 fn white_change(
     readings: &Readings,
     flood: &CellPlanes,
-    (white, cols): (f64, usize),
+    white: f64,
+    cols: usize,
     lit: &LiveCells,
 ) -> WhiteChange {
     let seen = &readings.revisited.white;
@@ -534,13 +536,13 @@ fn white_change(
         let ratio = |cell: &usize| mean(cell) / (white * plane[*cell]).max(1e-12);
         let ratios: Vec<f64> = lit.0.iter().map(ratio).collect();
         let median = median(ratios.clone());
-        for (change, ratio) in change.iter_mut().zip(&ratios) {
-            let off = ratio / median.max(1e-12) - 1.0;
+        let off = |ratio: &f64| (ratio / median.max(1e-12) - 1.0) as f32;
+        let off: Vec<f32> = ratios.iter().map(off).collect();
+        for (change, off) in change.iter_mut().zip(&off) {
+            let off = f64::from(*off);
             *change += off / flood.len() as f64;
             square += off * off;
         }
-        let off = |ratio: &f64| (ratio / median.max(1e-12) - 1.0) as f32;
-        let off: Vec<f32> = ratios.iter().map(off).collect();
         shared += shared_by_neighbours(&lit.among(readings.live.len(), &off), cols);
         level.push(median);
     }
