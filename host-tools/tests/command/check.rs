@@ -23,7 +23,8 @@ fn the_sample_passes_every_gate_and_has_a_page() {
     );
     let data = user.json("check SAMPLE");
     assert_eq!(data["pass"], true);
-    assert_eq!(data["not_judged"].as_array().map(Vec::len), Some(0));
+    // They add up within 2.6 % only: too little to tell responses apart.
+    assert_eq!(data["not_judged"], serde_json::json!(["response"]));
     assert_eq!(data["cells"]["live"], 273);
 }
 

@@ -53,6 +53,13 @@ impl StudiedFault {
         })
     }
 
+    /// Whether nothing fails because a gate that is meant to find it says that it cannot judge.
+    pub fn left_open(self, gates: &[Gate]) -> bool {
+        let (names, _) = named_by(self.kind);
+        let open = |gate: &Gate| names.contains(&gate.name) && gate.verdict == Verdict::NotJudged;
+        gates.iter().any(open) && !gates.iter().any(Gate::fails)
+    }
+
     /// Whether a gate has a remark at least.
     pub fn noticed(gates: &[Gate]) -> bool {
         gates.iter().any(|gate| gate.verdict >= Verdict::Warn)
@@ -67,7 +74,10 @@ pub fn named_by(kind: CaptureFault) -> (&'static [GateName], &'static [&'static 
         CaptureFault::Gamma => (&[G::Superposition, G::Response], &["[camera] response"]),
         CaptureFault::AutoExposure => (&[G::Superposition], &["Set exposure"]),
         CaptureFault::Tripod => (&[G::Movement], &["take the capture again"]),
-        CaptureFault::Swapped => (&[G::Order], &["Exchange the two files"]),
+        CaptureFault::Swapped => (
+            &[G::Order],
+            &["Exchange the two files", "put them in their places"],
+        ),
         CaptureFault::Dropped => (&[G::Complete], &["Take the missing photographs"]),
         CaptureFault::Skipped => (
             &[G::Order],

@@ -3,9 +3,7 @@
 
 use crate::simulated::{host_tools, simulation};
 use fastrand::Rng;
-use iltm::capture::{
-    self, CameraSettings, CaptureError, CaptureOptions, Examined, Gate, NO_CELL, listed,
-};
+use iltm::capture::{self, CameraSettings, CaptureError, CaptureOptions, Examined, Gate, listed};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::UnfilledCapture;
@@ -145,7 +143,11 @@ impl StudiedSession {
     pub fn fault(&self, kind: CaptureFault, size: f64, good: &Examined) -> InjectedFault {
         let mut dice = Rng::with_seed(self.seed ^ 0xFA17);
         let size = match kind {
-            CaptureFault::Tripod => size * cell_side(good),
+            CaptureFault::Tripod => {
+                let measured = good.measurements.as_ref().expect("a good session");
+                let registration = &measured.registration;
+                size * registration.binning as f64 * registration.cell_side()
+            }
             CaptureFault::Swapped | CaptureFault::Dropped => self.scene_place(&mut dice, good),
             CaptureFault::Skipped => dice.f64(),
             CaptureFault::Gamma => size * gamma(&self.scene),
@@ -179,22 +181,6 @@ fn gamma(scene: &Scene) -> f64 {
         iltm::picture::Response::Srgb => 2.2,
         iltm::picture::Response::Gamma(gamma) => gamma,
     }
-}
-
-/// Side of a cell in pixels of the photographs.
-fn cell_side(good: &Examined) -> f64 {
-    let registration = &good
-        .measurements
-        .as_ref()
-        .expect("a good session")
-        .registration;
-    let seen = registration
-        .seen_cell
-        .iter()
-        .filter(|c| **c != NO_CELL)
-        .count();
-    let cells = registration.centre.iter().flatten().count().max(1);
-    registration.binning as f64 * (seen as f64 / cells as f64).sqrt()
 }
 
 /// The gates that fail.

@@ -30,10 +30,34 @@ pub struct StudyResult {
     pub good: usize,
     /// Good sessions that were refused, in words.
     pub refused: Vec<String>,
-    /// Gates of good sessions by verdict: pass, not judged, remark, fail; one entry a gate.
-    pub verdicts: Vec<(String, [usize; 4])>,
-    /// For each fault: sessions, found by the right gate, and those that were not, in words.
-    pub faults: Vec<(usize, usize, Vec<String>)>,
+    /// Gates of good sessions.
+    pub verdicts: Vec<GateCount>,
+    /// For each fault.
+    pub faults: Vec<FaultCount>,
+}
+
+/// What a gate said of good sessions.
+#[derive(Clone, Default, Debug)]
+pub struct GateCount {
+    /// The gate.
+    pub name: String,
+    /// Sessions by verdict: pass, not judged, remark, fail.
+    pub verdicts: [usize; 4],
+    /// The largest number, of the limit.
+    pub most: f64,
+}
+
+/// What became of sessions with a fault.
+#[derive(Clone, Default, Debug)]
+pub struct FaultCount {
+    /// Sessions.
+    pub all: usize,
+    /// Found by the right gate.
+    pub found: usize,
+    /// The gate that finds it said that it could not judge.
+    pub left_open: usize,
+    /// Those that were not found, in words.
+    pub missed: Vec<String>,
 }
 
 impl Study {
@@ -44,7 +68,7 @@ impl Study {
     pub fn run(&self, say: &(dyn Fn(&str) + Sync)) -> StudyResult {
         let next = AtomicUsize::new(0);
         let result = Mutex::new(StudyResult {
-            faults: vec![(0, 0, Vec::new()); self.faults.len()],
+            faults: vec![FaultCount::default(); self.faults.len()],
             ..StudyResult::default()
         });
         std::thread::scope(|threads| {
@@ -63,8 +87,8 @@ impl Study {
         let mut result = result.into_inner().expect("no thread panicked");
         // Threads end in any order.
         result.refused.sort();
-        for (_, _, missed) in &mut result.faults {
-            missed.sort();
+        for count in &mut result.faults {
+            count.missed.sort();
         }
         result
     }
@@ -82,6 +106,10 @@ impl Study {
             let mut result = result.lock().expect("no thread panicked");
             result.good += 1;
             count(&mut result.verdicts, &good.gates);
+            for gate in good.gates.iter().filter(|gate| gate.limit > 0.0) {
+                let _ = write!(said, "{} {:.2} ", gate.name, gate.number / gate.limit);
+            }
+            said += "of the limit\n";
             if let Some(words) = words(&session, "good", &failing(&good.gates)) {
                 result.refused.push(words.clone());
                 said += &words;
@@ -100,8 +128,9 @@ impl Study {
             };
             let mut result = result.lock().expect("no thread panicked");
             let entry = &mut result.faults[k];
-            entry.0 += 1;
-            entry.1 += usize::from(found);
+            entry.all += 1;
+            entry.found += usize::from(found);
+            entry.left_open += usize::from(!found && fault.left_open(&gates));
             if !found {
                 let not_passed: Vec<&Gate> = gates
                     .iter()
@@ -111,7 +140,7 @@ impl Study {
                     format!("{:06} {made} silent | {}\n", session.seed, session.words)
                 });
                 said += &words;
-                entry.2.push(words);
+                entry.missed.push(words);
             }
         }
         let all = start.elapsed().as_secs_f64();
@@ -141,15 +170,22 @@ fn words(session: &StudiedSession, what: &str, gates: &[&Gate]) -> Option<String
     (!text.is_empty()).then_some(text)
 }
 
-fn count(verdicts: &mut Vec<(String, [usize; 4])>, gates: &[Gate]) {
+fn count(counts: &mut Vec<GateCount>, gates: &[Gate]) {
     for gate in gates {
         let name = gate.name.to_string();
-        let at = verdicts.iter().position(|known| known.0 == name);
+        let at = counts.iter().position(|known| known.name == name);
         let at = at.unwrap_or_else(|| {
-            verdicts.push((name, [0; 4]));
-            verdicts.len() - 1
+            counts.push(GateCount {
+                name,
+                ..GateCount::default()
+            });
+            counts.len() - 1
         });
-        verdicts[at].1[gate.verdict as usize] += 1;
+        let count = &mut counts[at];
+        count.verdicts[gate.verdict as usize] += 1;
+        if gate.limit > 0.0 {
+            count.most = count.most.max(gate.number / gate.limit);
+        }
     }
 }
 
@@ -161,19 +197,37 @@ impl StudyResult {
             self.good,
             self.refused.len()
         );
-        for (fault, (all, found, _)) in study.faults.iter().zip(&self.faults) {
+        for (fault, count) in study.faults.iter().zip(&self.faults) {
+            let FaultCount {
+                all,
+                found,
+                left_open,
+                ..
+            } = count;
+            let judged = (all - left_open).max(1);
             let _ = writeln!(
                 text,
-                "| `{}`, {} {} | {all} | {found} found ({:.1} %) |",
+                "| `{}`, {} {} | {all} | {found} found, {left_open} not judged ({:.1} % of those \
+                 that are) |",
                 fault.kind,
                 fault.size,
                 fault.words,
-                100.0 * *found as f64 / (*all).max(1) as f64
+                100.0 * *found as f64 / judged as f64
             );
         }
-        text += "\n| gate, of good sessions | passes | not judged | remark | fails |\n|---|---|---|---|---|\n";
-        for (name, [pass, not, warn, fail]) in &self.verdicts {
-            let _ = writeln!(text, "| `{name}` | {pass} | {not} | {warn} | {fail} |");
+        text += "\n| gate, of good sessions | passes | not judged | remark | fails | largest number, of \
+                 the limit |\n|---|---|---|---|---|---|\n";
+        for count in &self.verdicts {
+            let [pass, not, warn, fail] = count.verdicts;
+            let most = match count.most {
+                0.0 => "-".to_owned(),
+                most => format!("{:.0} %", 100.0 * most),
+            };
+            let _ = writeln!(
+                text,
+                "| `{}` | {pass} | {not} | {warn} | {fail} | {most} |",
+                count.name
+            );
         }
         text
     }

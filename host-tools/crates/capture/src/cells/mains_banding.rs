@@ -53,7 +53,7 @@ pub(crate) fn find(
     heights.sort_by(f64::total_cmp);
     let (first, last) = (*heights.first()?, *heights.last()?);
     // A cell averages over its height: shorter waves than three cells are not seen.
-    let cell = (registration.camera.0 as f64 * height / heights.len() as f64).sqrt() / height;
+    let cell = registration.cell_side() / height;
     let most = (1.0 / (3.0 * cell)).min(MOST_CYCLES);
     let least = 0.75 / (last - first).max(1e-6);
     let tried: Vec<f64> = (1..)

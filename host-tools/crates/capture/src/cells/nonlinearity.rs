@@ -7,8 +7,10 @@
 //! is the cause. Camera and projector are told apart by ambient light, which only
 //! the camera's factor changes.
 
+use crate::devices::CameraFit;
 use crate::format::sequence::Sequence;
 use crate::photographs::sampled::{SIDE, Sampled};
+use iltm_picture::DeviceResponse;
 use iltm_picture::statistics::median;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
@@ -20,6 +22,10 @@ const LEAST_AMBIENT: f64 = 0.005;
 
 /// What one cause may leave of what another one leaves to be preferred.
 const CLEARLY: f64 = 0.5;
+
+/// Misfit of the declared response, of the best one's, from which the best one is it whatever
+/// else may explain a part.
+const PLAINLY: f64 = 5.0;
 
 /// How many times its scatter the brightness of pairs must be off white's.
 const STEADY: f64 = 3.0;
@@ -51,18 +57,51 @@ pub enum Nonlinearity {
 }
 
 impl Nonlinearity {
-    /// The cause once it is known whether single pixels add up better with another `curve` than
+    /// The cause once it is known whether single pixels add up better with another curve than
     /// the declared one, whatever the exposure.
-    pub(crate) const fn given(self, curve: bool) -> Self {
-        match self {
-            Self::CurveOrExposure { gamma } if curve => Self::Curve { gamma },
-            cause => cause,
+    pub(crate) const fn given(self, curve: CurveOfPixels) -> Self {
+        match (self, curve) {
+            (Self::CurveOrExposure { gamma }, CurveOfPixels::Other | CurveOfPixels::Plain(_)) => {
+                Self::Curve { gamma }
+            }
+            (Self::Curve { gamma }, CurveOfPixels::Declared)
+            | (Self::Exposure, CurveOfPixels::Plain(gamma)) => Self::CurveOrExposure { gamma },
+            (cause, _) => cause,
         }
     }
 
     /// Whether it says why brightness differs from photograph to photograph.
     pub(crate) const fn is_known(self) -> bool {
         !matches!(self, Self::Unknown)
+    }
+}
+
+/// What single pixels say of the camera's curve.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum CurveOfPixels {
+    /// Nothing against the declared one.
+    Declared,
+    /// Another one adds up better.
+    Other,
+    /// Another one adds up, the light that was read raised to this power, and the declared one
+    /// does not.
+    Plain(f64),
+}
+
+impl CurveOfPixels {
+    /// By what was recovered from pixels.
+    pub(crate) fn of(fit: Option<&CameraFit>) -> Self {
+        let Some(fit) = fit.filter(|fit| fit.contradicts()) else {
+            return Self::Declared;
+        };
+        let plain = matches!(fit.best, DeviceResponse::Known(_));
+        if plain && fit.declared_misfit > PLAINLY * fit.best_misfit {
+            // Of the light that was read.
+            let half = |response: &DeviceResponse| response.light(0.5).ln();
+            Self::Plain(half(&fit.best) / half(&fit.declared))
+        } else {
+            Self::Other
+        }
     }
 }
 
@@ -229,14 +268,16 @@ fn ambient(sequence: &Sequence, sampled: &Sampled) -> Nonlinearity {
     // more ambient light than the pairs, or looks like white.
     let total = |squares: &[f64]| squares.iter().sum::<f64>();
     let share = total(&black) / total(&white);
-    if share > 0.5 || followed < -0.2 && share > LEAST_AMBIENT {
+    // And it makes no picture darker that is darker than white.
+    let longest_for_black = followed < -0.2 && share > LEAST_AMBIENT;
+    if factors[0] > 1.0 && (share > 0.5 || longest_for_black) {
         Nonlinearity::Exposure
     } else if share < LEAST_AMBIENT {
         // Too little ambient light to see what it follows.
         Nonlinearity::Either
     } else if !followed.is_finite() || error > 0.1 * (factors[0] - 1.0).abs() {
         Nonlinearity::Either
-    } else if followed > 0.6 {
+    } else if followed > 0.6 && factors[0] > 1.0 {
         Nonlinearity::Exposure
     } else if followed < 0.4 {
         Nonlinearity::Projector

@@ -29,8 +29,7 @@ mod response;
 mod saturation;
 mod superposition;
 
-use crate::cells::nonlinearity::Nonlinearity;
-use crate::devices::CameraFit;
+use crate::cells::nonlinearity::{CurveOfPixels, Nonlinearity};
 use crate::evidence::CaptureEvidence;
 use crate::format::sequence::Sequence;
 use crate::gate::{Gate, GateName};
@@ -48,11 +47,7 @@ pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
         coverage::judge(sequence, &pixels.live, &counts, &pixels.left_out),
     ];
     if let Some(cells) = &found.cells {
-        let curve = found
-            .devices
-            .camera_fit
-            .as_ref()
-            .is_some_and(CameraFit::contradicts);
+        let curve = CurveOfPixels::of(found.devices.camera_fit.as_ref());
         let cause = cells.nonlinearity.map(|cause| cause.given(curve));
         let steadiness = &cells.steadiness;
         let sums = cells.sums.as_ref();
@@ -77,8 +72,15 @@ pub(crate) fn settle(gates: &mut [Gate], cause: Option<Nonlinearity>) {
     let superposition = fails(GateName::Superposition);
     let known = cause.is_some_and(Nonlinearity::is_known) && superposition;
     let flicker = fails(GateName::Flicker);
+    let number = |name: GateName| {
+        let gate = gates.iter().find(|gate| gate.name == name);
+        gate.map_or(0.0, |gate| gate.number)
+    };
+    // Dark photographs are copies of each other where all patterns are shifted.
+    let shifted = order && number(GateName::Order) > 2.0 * number(GateName::Complete);
     for gate in gates {
         let because = match gate.name {
+            GateName::Complete if shifted && gate.fails() => Some(GateName::Order),
             GateName::Order | GateName::Complete | GateName::Format | GateName::Saturation => None,
             _ if order => Some(GateName::Order),
             GateName::Movement | GateName::Coverage => None,

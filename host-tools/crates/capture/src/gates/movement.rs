@@ -21,6 +21,52 @@ const SURE: f64 = 4.0;
 /// Photographs on one side of a step that are few.
 const FEW: usize = 10;
 
+const NEXT_STEP: &str = "Fix tripod, projector and scene, use a remote release, and take the \
+                         capture again; photographs from before and after a bump do not belong \
+                         together.";
+
+/// Shifts from which a remark and a refusal are made, in pixels.
+fn limits(moved: &Moved) -> (f64, f64) {
+    (
+        (WARN * moved.cell).max(FLOOR),
+        (MOST * moved.cell).max(2.0 * FLOOR),
+    )
+}
+
+/// Judges how far white lies beside the stripes: a bump before the first patterns leaves too few
+/// photographs on one side for a step. A curve that nobody declared moves outlines a little: twice
+/// the limits count.
+fn beside(sequence: &Sequence, moved: &Moved) -> Option<Gate> {
+    let (shot, [x, y]) = moved.white?;
+    let (size, (warn, limit)) = (x.hypot(y), limits(moved));
+    let (warn, limit) = (2.0 * warn, 2.0 * limit);
+    let photo = &sequence.shots[shot];
+    let what = format!(
+        "camera, projector or scene moved by {size:.2} pixels (a cell is {:.0} wide) between \
+         white, {}, and the patterns",
+        moved.cell,
+        photo.photo.display()
+    );
+    Some(Gate {
+        number: size,
+        limit,
+        unit: "pixels",
+        what,
+        evidence: Evidence::Photographs {
+            what: "shift of white against the patterns, pixels",
+            values: vec![(photo.index, size)],
+            limit: Some(limit),
+            from: None,
+        },
+        ..Gate::of_share(
+            GateName::Movement,
+            Verdict::of(size, warn, limit),
+            (0.0, 0.0),
+            NEXT_STEP,
+        )
+    })
+}
+
 /// Judges what was found.
 pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
     let name = GateName::Movement;
@@ -28,16 +74,16 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
     let Some((moved, bump)) = bump else {
         return Gate::not_judged(name, "too few photographs or edges to see movement by");
     };
-    let (warn, limit) = (
-        (WARN * moved.cell).max(FLOOR),
-        (MOST * moved.cell).max(2.0 * FLOOR),
-    );
+    let (warn, limit) = limits(moved);
     let sure = (SURE * bump.scatter).min(2.0 * limit);
     // Wide stripes and random patterns do not lie alike: a few at one end are no bump yet.
     let side = bump.before.min(moved.shifts.len() - bump.before);
-    let sure = if side < FEW { 2.0 * limit } else { sure };
+    let sure = if side < FEW { 3.0 * limit } else { sure };
     let (warn, limit) = (warn.max(sure), limit.max(sure));
     let verdict = Verdict::of(bump.size, warn, limit);
+    if let Some(white) = beside(sequence, moved).filter(|white| white.verdict > verdict) {
+        return white;
+    }
     let photo = |at: usize| sequence.shots[moved.shifts[at].0].photo.display();
     let what = match verdict {
         Verdict::Pass => format!(
@@ -62,8 +108,6 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
     let index = |at: usize| sequence.shots[moved.shifts[at].0].index;
     let values = (moved.shifts.iter().enumerate())
         .map(|(at, (_, [x, y]))| (index(at), (x - still[0]).hypot(y - still[1])));
-    let next_step = "Fix tripod, projector and scene, use a remote release, and take the capture \
-         again; photographs from before and after a bump do not belong together.";
     Gate {
         number: bump.size,
         limit,
@@ -75,6 +119,6 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
             limit: Some(limit),
             from: (verdict != Verdict::Pass).then(|| index(bump.before)),
         },
-        ..Gate::of_share(name, verdict, (0.0, 0.0), next_step)
+        ..Gate::of_share(name, verdict, (0.0, 0.0), NEXT_STEP)
     }
 }

@@ -7,8 +7,8 @@ use crate::format::calibration_role::RampChannel;
 use crate::gate::{Evidence, Gate, GateName, Verdict};
 
 /// Misfit of the declared camera response beyond that of the best one.
-const WARN: f64 = 0.006;
-const MOST: f64 = 0.012;
+const WARN: f64 = 0.004;
+const MOST: f64 = 0.008;
 
 /// Steps of 255 that the projector's measured response may be off the declared one.
 const WARN_STEPS: f64 = 2.5;
@@ -20,7 +20,11 @@ pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
     // A camera that exposes for the picture looks like one with another curve.
     let curved = matches!(
         cause,
-        None | Some(Nonlinearity::Curve { .. } | Nonlinearity::Unknown)
+        None | Some(
+            Nonlinearity::Curve { .. }
+                | Nonlinearity::CurveOrExposure { .. }
+                | Nonlinearity::Unknown
+        )
     );
     let camera = devices
         .camera_fit
@@ -52,7 +56,15 @@ pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
     let camera_verdict = camera.map(|fit| Verdict::of(beyond(fit), WARN, MOST));
     let steps_verdict = steps.map(|steps| Verdict::of(steps, WARN_STEPS, MOST_STEPS));
     if let Some(complaint) = complaints.first() {
-        let next_step = if devices.camera_fit.as_ref().is_some_and(CameraFit::tells) {
+        let darker = (devices.ramp.as_ref())
+            .is_some_and(|ramp| ramp.fall.is_none() && ramp.white_excess < Some(0.0));
+        let tells = devices.camera_fit.as_ref().is_some_and(CameraFit::tells);
+        let next_step = if darker {
+            "Check first that [camera] response in capture.toml is the camera's: a curve that is \
+             not declared makes white darker than its parts. If it is, choose the projector's sRGB, \
+             film or photo mode, switch off dynamic contrast, iris, brilliant colour and eco modes, \
+             and take the capture again."
+        } else if tells {
             "Choose the projector's sRGB, film or photo mode, switch off dynamic contrast, iris, \
              brilliant colour and eco modes, and take the capture again."
         } else {
@@ -89,6 +101,7 @@ pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
         return gate(verdict, steps, MOST_STEPS, "steps", what, next_step);
     }
     match &devices.camera_fit {
+        Some(fit) if !fit.tells() => Gate::not_judged(name, fit.words()),
         Some(fit) => {
             let number = 100.0 * beyond(fit);
             gate(Verdict::Pass, number, 100.0 * MOST, "%", fit.words(), "")

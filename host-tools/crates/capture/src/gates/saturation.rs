@@ -16,7 +16,9 @@ const MOST_CELLS: f64 = 0.05;
 
 /// Judges what was found, and the cells that were lost by it.
 pub(super) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gate {
-    let is_saturated = |out: &&LeftOut| matches!(out.why, Why::Saturated { .. });
+    // Where white is clipped nowhere, what cells are lost by are photographs of other patterns.
+    let is_saturated =
+        |out: &&LeftOut| clipped.count > 0 && matches!(out.why, Why::Saturated { .. });
     let lost = left_out.iter().filter(is_saturated).count();
     let pixels = clipped.count as f64 / clipped.lit.max(1) as f64;
     let cells = lost as f64 / (live + lost).max(1) as f64;

@@ -80,7 +80,8 @@ fn words(cause: Option<Nonlinearity>) -> String {
         Some(Nonlinearity::CurveOrExposure { gamma }) => format!(
             "they would add up if the light were raised to the power {gamma:.2} (the camera's gamma \
              is not the declared one), and as well if automatic exposure or a \"vivid\" mode made \
-             pictures brighter: these photographs cannot tell which"
+             pictures {}: these photographs cannot tell which",
+            if gamma > 1.0 { "brighter" } else { "darker" }
         ),
         Some(Nonlinearity::Exposure) => {
             "all cells and ambient light by the same factor, so that the \

@@ -25,6 +25,16 @@ pub struct Registration {
     pub centre: Vec<Option<[f64; 2]>>,
 }
 
+impl Registration {
+    /// Side of a cell in registered pixels, of the mean area of those that are seen.
+    #[must_use]
+    pub fn cell_side(&self) -> f64 {
+        let seen = self.seen_cell.iter().filter(|cell| **cell != NO_CELL);
+        let cells = self.centre.iter().flatten().count();
+        (seen.count() as f64 / cells.max(1) as f64).sqrt()
+    }
+}
+
 /// A camera pixel with a cell, while its registration is worked out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {

@@ -4,13 +4,18 @@
 //! lit and while it is dark; how far the photograph is shifted against that is found
 //! from the slopes of the prediction (Lucas and Kanade, *An iterative image
 //! registration technique*, 1981). Edges between lit and dark cells lie everywhere,
-//! so that hundreds of them vote. A step in the shifts is a bump.
+//! so that hundreds of them vote. A step in the shifts is a bump. White has none of these
+//! edges, only the outline and the paint: it is predicted from stripes and their inverses.
 
 use super::cell_map::{NO_CELL, Registration};
 use crate::format::sequence::Sequence;
 use crate::photographs::sampled::{SIDE, Sampled};
 use iltm_picture::statistics::median;
+use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
+
+/// How many times the standard error of white's shift is noise.
+const NOISE: f64 = 4.0;
 
 /// Photographs that must lie on each side of a bump.
 const LEAST_SIDE: usize = 3;
@@ -23,6 +28,9 @@ pub(crate) struct Moved {
     pub(crate) cell: f64,
     /// The largest step in the shifts; `None` of too few.
     pub(crate) bump: Option<Bump>,
+    /// The photograph of white that lies farthest beside the stripes, and its shift in pixels of
+    /// the file; `None` where nothing tells.
+    pub(crate) white: Option<(usize, [f64; 2])>,
 }
 
 /// Measures the shift of every photograph; `None` if too few pixels have a cell.
@@ -34,16 +42,9 @@ pub(crate) fn find(
     let cells: Vec<u32> = (sampled.pixels.iter())
         .map(|&pixel| registration.seen_cell[pixel as usize])
         .collect();
-    let seen = registration
-        .seen_cell
-        .iter()
-        .filter(|c| **c != NO_CELL)
-        .count();
-    let found = registration.centre.iter().flatten().count();
-    if found == 0 || cells.iter().filter(|c| **c != NO_CELL).count() < SIDE * SIDE {
+    if cells.iter().filter(|c| **c != NO_CELL).count() < SIDE * SIDE {
         return None;
     }
-    // White has no edge between lit and dark.
     let shown: Vec<(usize, &[bool])> = (sequence.views[1..].iter())
         .flat_map(|view| view.shots.iter().map(|&shot| (shot, view.lit.as_slice())))
         .collect();
@@ -60,8 +61,9 @@ pub(crate) fn find(
     even_pairs(sequence, &mut shifts);
     Some(Moved {
         bump: bump(&shifts),
+        white: white(sequence, sampled, binning),
         shifts,
-        cell: binning * (seen as f64 / found as f64).sqrt(),
+        cell: binning * registration.cell_side(),
     })
 }
 
@@ -80,6 +82,61 @@ fn even_pairs(sequence: &Sequence, shifts: &mut [(usize, [f64; 2])]) {
             (shifts[a].1, shifts[b].1) = (mean, mean);
         }
     }
+}
+
+/// The photograph of white that lies farthest beside the sum of stripes and their inverses, and
+/// its shift in pixels of the file.
+fn white(sequence: &Sequence, sampled: &Sampled, binning: f64) -> Option<(usize, [f64; 2])> {
+    let pairs = sequence.code_pairs();
+    let both = pairs.iter().flat_map(|&(a, b)| [a, b]);
+    let stripes: Vec<usize> = both.map(|view| sequence.views[view].shots[0]).collect();
+    if stripes.is_empty() {
+        return None;
+    }
+    let sum = sampled.mean(&stripes);
+    let whites = &sequence.views[0].shots;
+    let shifts = whites.iter().filter_map(|&shot| {
+        let shift = shift_of_sum(&sampled.shots[shot], &sum)?;
+        Some((shot, shift.map(|pixels| binning * pixels)))
+    });
+    shifts.max_by(|(_, a), (_, b)| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])))
+}
+
+/// How far a photograph is shifted right and down against another of the same light, in pixels,
+/// beyond what noise makes of it; `None` where the picture has no edges. Where light does not
+/// add up, the photograph is another curve of the sum: a parabola stands for it.
+fn shift_of_sum(photo: &[f32], sum: &[f32]) -> Option<[f64; 2]> {
+    let most = f64::from(sum.iter().copied().fold(0.0, f32::max));
+    let mut normal = SMatrix::<f64, 5, 5>::zeros();
+    let mut right = SVector::<f64, 5>::zeros();
+    let (mut square_sum, mut count) = (0.0, 0.0);
+    for square in 0..sum.len() / (SIDE * SIDE) {
+        for inner in 0..(SIDE - 2) * (SIDE - 2) {
+            let (row, col) = (1 + inner / (SIDE - 2), 1 + inner % (SIDE - 2));
+            let at = square * SIDE * SIDE + row * SIDE + col;
+            let value = |at: usize| f64::from(sum[at]) / most;
+            let light = value(at);
+            let across = 0.5 * (value(at + 1) - value(at - 1));
+            let down = 0.5 * (value(at + SIDE) - value(at - SIDE));
+            let unknowns = SVector::from([light, across, down, light * light, 1.0]);
+            let seen = f64::from(photo[at]) / most;
+            normal += unknowns * unknowns.transpose();
+            right += unknowns * seen;
+            square_sum += seen * seen;
+            count += 1.0;
+        }
+    }
+    let inverse = normal.try_inverse()?;
+    let found = inverse * right;
+    let variance = (square_sum - found.dot(&right)).max(0.0) / f64::max(count - 5.0, 1.0);
+    // Of the sum where it is half as bright as it gets: there lies the outline.
+    let gain = found[0] + found[3];
+    let shift = |axis: usize| {
+        let own = NOISE * (variance * inverse[(axis, axis)]).sqrt();
+        let size = (found[axis].abs() - own).max(0.0) / gain;
+        -size.copysign(found[axis])
+    };
+    (gain > 0.0).then(|| [shift(1), shift(2)])
 }
 
 /// Mean light of every sampled pixel while its cell is dark and while it is lit.
