@@ -51,6 +51,8 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(test)]
+mod display_tests;
 pub mod features;
 pub mod frame_buffers;
 pub mod governor;

@@ -174,6 +174,25 @@ fn a_restarted_device_leaves_the_display_what_it_shows() {
 }
 
 #[test]
+fn an_output_that_changes_while_it_is_shown_is_not_whole() {
+    let memory = words();
+    let (_source, receiver) = pair(&memory);
+    let presenter = Presenter::new(NativeWords(&memory), receiver.layout());
+    let mut display = Display::new(NativeWords(&memory), receiver.layout());
+    let buffer = presenter.free().expect("both are");
+    presenter.begin(buffer, 7);
+    presenter.publish(buffer, 7);
+    let shown = display.advance().expect("published");
+    for field in [descriptor::START, descriptor::END, descriptor::LENGTH] {
+        assert!(display.is_whole(&shown));
+        let word = &memory[descriptor::output(buffer) + field];
+        let before = word.fetch_add(1, Ordering::SeqCst);
+        assert!(!display.is_whole(&shown), "field {field}");
+        word.store(before, Ordering::SeqCst);
+    }
+}
+
+#[test]
 fn the_display_shows_outputs_in_order_and_keeps_the_last() {
     let memory = words();
     let (_source, receiver) = pair(&memory);

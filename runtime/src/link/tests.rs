@@ -137,6 +137,14 @@ fn every_kind_of_bad_frame_says_what_it_is() {
         with_crc(&[0; 3 + MAX_PAYLOAD + 1]),
         [Err(LinkFrameError::TooLong)]
     );
+    // Cut short, but too long already.
+    let mut block = vec![u8::MAX];
+    block.resize(255, 1);
+    let long = [&block.repeat(MAX_FRAME / 254 + 1)[..], &[5, 1, DELIMITER]].concat();
+    assert_eq!(
+        decoded(&mut Decoder::new(), &long),
+        [Err(LinkFrameError::TooLong)]
+    );
     assert_eq!(
         decoded(&mut Decoder::new(), &[5, 1, DELIMITER]),
         [Err(LinkFrameError::Cobs)]

@@ -243,3 +243,37 @@ fn a_table_that_lists_a_stage_that_is_not_built_is_rejected_with_the_stages_numb
         assert!(why.to_string().contains(&stage.to_string()));
     }
 }
+
+/// Keys live longer than firmware: what they sign must never change.
+#[test]
+fn what_is_signed_is_laid_out_as_the_protocol_says() {
+    let deed = Deed::Begin {
+        length: 0x0102_0304,
+        digest: crate::link::Digest([0xAB; 16]),
+    };
+    let expected = [
+        &b"iltm right 1"[..],
+        &[1, 0, 0, 0],
+        &DEVICE.to_le_bytes(),
+        &[9, 0, 0, 0],
+        &[4, 3, 2, 1],
+        &[0xAB; 16],
+    ];
+    assert_eq!(deed.message(DEVICE, 9)[..], expected.concat());
+    let confirm = Deed::Confirm { table: 7 }.message(DEVICE, 9);
+    let rollback = Deed::Rollback { table: 7 }.message(DEVICE, 9);
+    assert_eq!((confirm[12], rollback[12]), (2, 3));
+    let certificate = Certificate {
+        key: [0xCD; 32],
+        device: DEVICE,
+        version: 6,
+        signature: [0xEF; SIGNATURE],
+    };
+    let fields = [&[0xCD; 32][..], &DEVICE.to_le_bytes(), &[6, 0, 0, 0]].concat();
+    let expected = [&b"iltm technician1"[..], &fields].concat();
+    assert_eq!(certificate.message()[..], expected);
+    assert_eq!(
+        certificate.emit()[..],
+        [&fields[..], &[0xEF; SIGNATURE]].concat()
+    );
+}

@@ -1,11 +1,14 @@
 //! Serial link: host and device at the two ends of one line, good and bad.
 
 use iltm::device::port::BAUD;
+use iltm::device::transcript::Transcribed;
 use iltm::device::{Client, DeviceError, Incoming, Patience, Port};
-use iltm_runtime::link::{Channel, Decoder, Event, Request, SlotState};
-use iltm_tests::fake_device::{FakeDevice, FakeLine, FakePort};
+use iltm_runtime::link::{Channel, Decoder, Event, PROTOCOL_VERSION, Request, SlotState};
+use iltm_tests::fake_device::{FakeDevice, FakeLine, FakePort, FakeTables};
 use iltm_tests::fuzz;
 use iltm_tests::line_faults::{FaultRates, Faults, LossyLine, LossyProxy};
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Time on a line in memory costs nothing.
@@ -164,6 +167,70 @@ fn a_device_of_another_version_is_recognised() {
     };
     let error = Client::greet(device.line(BAUD), PATIENT).expect_err("another version");
     assert!(matches!(error, DeviceError::Protocol { device: 99 }));
+}
+
+#[test]
+fn whose_version_is_behind_is_said() {
+    let step = |device| DeviceError::Protocol { device }.next_step();
+    let (older, newer) = (PROTOCOL_VERSION - 1, PROTOCOL_VERSION + 1);
+    assert!(step(older).contains("firmware up to date"), "{older}");
+    assert!(step(newer).contains("host tools"), "{newer}");
+}
+
+#[test]
+fn another_device_at_the_same_port_is_not_taken_for_the_one_before() {
+    let exchange = |other: fn(&mut FakeDevice)| {
+        let line = FakeDevice::default().line(BAUD);
+        let mut client = Client::greet(line, PATIENT).expect("it is there");
+        client.line().far_end_mut().restart();
+        client.greet_again().expect("the same device");
+        client.line().far_end_mut().restart();
+        other(&mut client.line().far_end_mut().device);
+        let error = client.greet_again().expect_err("another device");
+        assert!(matches!(error, DeviceError::Exchanged), "{error:?}");
+    };
+    exchange(|device| device.number += 1);
+    exchange(|device| device.status.board = "another".parse().expect("short"));
+}
+
+/// Where a transcript goes.
+#[derive(Clone, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("nobody panics").write(bytes)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_transcript_says_when_what_was_said_and_no_whole_key() {
+    let tables = FakeTables::default();
+    let line = FakeDevice {
+        tables: Some(tables),
+        ..FakeDevice::default()
+    };
+    let shared = Shared::default();
+    let mut line = Transcribed::new(line.line(9_600));
+    line.write_to(Box::new(shared.clone()));
+    let mut client = Client::greet(line, PATIENT).expect("it is there");
+    client.provision([0xAB; 32], 9, true).expect("it has none");
+    client.status().expect("an answer");
+    client.line().remark("the end");
+    let bytes = shared.0.lock().expect("nobody panics").clone();
+    let text = String::from_utf8(bytes).expect("text");
+    let times: Vec<f64> = (text.lines())
+        .map(|line| line[..10].trim().parse().expect("seconds"))
+        .collect();
+    assert!(times.is_sorted(), "{text}");
+    // A hello, a key, a status and what answers them: more than 100 bytes at 960 a second.
+    assert!(*times.last().expect("lines") > 0.1, "{text}");
+    assert!(text.contains(&"ab".repeat(4)), "{text}");
+    assert!(!text.contains(&"ab".repeat(32)), "{text}");
+    assert!(text.ends_with("- the end\n"), "{text}");
 }
 
 #[test]

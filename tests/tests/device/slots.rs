@@ -45,6 +45,24 @@ fn with_first() -> (Device, Vec<u8>, Vec<u8>) {
     (device, first, second)
 }
 
+#[test]
+fn sectors_are_compared_as_many_as_fit_an_answer_and_one_at_a_time_in_a_hurry() {
+    let mut device = Device::new(SLOT, 1);
+    let mut sectors = |now_ms: u64, length: u32, first: u32| {
+        device.now_ms = now_ms;
+        match device.ask(Request::Sectors { length, first }) {
+            Response::Sectors(sectors) => (sectors.first, sectors.crcs.len()),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(sectors(1_000, 3 * 256, 0), (0, 3));
+    assert_eq!(sectors(2_000, 2 * 256 + 1, 1), (1, 2));
+    assert_eq!(sectors(3_000, 256, 1), (1, 0));
+    assert_eq!(sectors(4_000, 256, 7), (7, 0));
+    assert_eq!(sectors(5_000, 3 * 256, 0), (0, 3));
+    assert_eq!(sectors(5_001, 3 * 256, 0), (0, 1));
+}
+
 fn roll_back(device: &mut Device) -> Result<(), Refusal> {
     device.carry_out(&[], &Step::Rollback)
 }

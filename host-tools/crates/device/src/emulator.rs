@@ -320,4 +320,18 @@ mod tests {
         let error = error.expect_err("there is none").to_string();
         assert!(error.starts_with("none.elf: "), "{error}");
     }
+
+    #[test]
+    fn a_program_of_another_processor_and_a_text_are_no_firmware() {
+        let memory = BoardMemory::temporary().expect("a temporary file");
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let other = [&b"\x7FELF"[..], &[0; 16]].concat();
+        let text = [&[b' '; 20 - ARM.len()][..], &ARM].concat();
+        for (name, bytes) in [("other.elf", other), ("text.elf", text)] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).expect("writable");
+            let error = Emulator::start(Board::An500, &path, &memory).expect_err(name);
+            assert!(matches!(error, EmulatorError::NoFirmware { .. }), "{error}");
+        }
+    }
 }

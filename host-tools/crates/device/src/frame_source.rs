@@ -192,6 +192,17 @@ mod tests {
     }
 
     #[test]
+    fn the_test_scene_moves_from_its_first_frame_on() {
+        let size = FrameSize::new(16, 8).expect("small");
+        let scene = TestScene::new(size, 25.0);
+        let mut frames = FrameFeed::scene(size, 3, 25.0);
+        for number in 0..3 {
+            let got = frames.next_frame().expect("a frame");
+            assert_eq!(got, samples(&scene.frame(number), 3), "frame {number}");
+        }
+    }
+
+    #[test]
     fn grey_and_colour_become_each_other() {
         let size = FrameSize::new(1, 1).expect("a pixel");
         let grey = Picture::new(size, Samples::Sixteen(vec![0xABCD])).expect("grey");

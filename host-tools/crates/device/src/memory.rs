@@ -221,6 +221,26 @@ mod tests {
     }
 
     #[test]
+    fn a_table_is_put_alone_into_the_first_slot() {
+        let memory = BoardMemory::temporary().expect("a temporary file");
+        memory.write(&psram::SLOT_B, b"another").expect("room");
+        memory.write(&psram::RECORDS[0], b"record").expect("room");
+        memory.put_table(b"table").expect("room");
+        let read = |range: &Range<usize>| {
+            let mut bytes = [0; 8];
+            memory.read(range, &mut bytes).expect("there");
+            bytes
+        };
+        assert_eq!(read(&psram::SLOT_A), *b"table\xFF\xFF\xFF");
+        assert_eq!(read(&psram::SLOT_B), [0xFF; 8]);
+        assert_eq!(read(&psram::RECORDS[0]), [0xFF; 8]);
+        let long = vec![0; psram::SLOT_A.len() + 1];
+        let error = memory.put_table(&long).expect_err("too long");
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        assert_eq!(read(&psram::SLOT_A)[..5], *b"table");
+    }
+
+    #[test]
     fn what_does_not_fit_its_range_is_not_written() {
         let memory = BoardMemory::temporary().expect("a temporary file");
         let error = memory.write(&(4..6), b"abc").expect_err("too long");

@@ -151,6 +151,24 @@ mod tests {
     use std::process::{Command, Stdio};
 
     #[test]
+    fn only_a_line_that_is_late_says_nothing() {
+        for kind in [
+            ErrorKind::TimedOut,
+            ErrorKind::Interrupted,
+            ErrorKind::WouldBlock,
+        ] {
+            assert!(is_nothing(&kind.into()), "{kind}");
+        }
+        for kind in [
+            ErrorKind::BrokenPipe,
+            ErrorKind::UnexpectedEof,
+            ErrorKind::Other,
+        ] {
+            assert!(!is_nothing(&kind.into()), "{kind}");
+        }
+    }
+
+    #[test]
     fn the_program_that_has_a_file_open_is_named() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("port");
