@@ -99,6 +99,7 @@ pages! {
     the_results, "docs/results/README.md", |_| ();
     the_hard_cases, "docs/hard-cases.md", |_| ();
     the_page_of_gates, "docs/gates.md", |_| ();
+    the_page_of_testing, "docs/testing.md", |_| ();
     the_page_of_fuzzing, "docs/fuzzing.md", |_| ();
     the_page_of_porting, "docs/porting.md", |_| ();
 }
