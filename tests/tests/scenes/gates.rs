@@ -38,7 +38,7 @@ fn faults_that_look_like_others_are_found() {
         (52, CaptureFault::Gamma),
         (59, CaptureFault::Gamma),
         (62, CaptureFault::Vivid),
-        (78, CaptureFault::AutoExposure),
+        (112, CaptureFault::AutoExposure),
         (103, CaptureFault::Skipped),
         (159, CaptureFault::Swapped),
     ] {

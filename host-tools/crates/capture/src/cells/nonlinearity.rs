@@ -79,6 +79,8 @@ impl Nonlinearity {
 /// What single pixels say of the camera's curve.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum CurveOfPixels {
+    /// Too little to tell one from another.
+    Unsaid,
     /// Nothing against the declared one.
     Declared,
     /// Another one adds up better.
@@ -91,9 +93,12 @@ pub(crate) enum CurveOfPixels {
 impl CurveOfPixels {
     /// By what was recovered from pixels.
     pub(crate) fn of(fit: Option<&CameraFit>) -> Self {
-        let Some(fit) = fit.filter(|fit| fit.contradicts()) else {
-            return Self::Declared;
+        let Some(fit) = fit.filter(|fit| fit.tells()) else {
+            return Self::Unsaid;
         };
+        if !fit.contradicts() {
+            return Self::Declared;
+        }
         let plain = matches!(fit.best, DeviceResponse::Known(_));
         if plain && fit.declared_misfit > PLAINLY * fit.best_misfit {
             // Of the light that was read.
