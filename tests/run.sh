@@ -71,6 +71,7 @@ say "firmware"
 say "formatting"
 cargo fmt --all --check
 cargo fmt --manifest-path "$firmware/Cargo.toml" --check
+cargo fmt --manifest-path tests/mutations/Cargo.toml --check
 
 say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings

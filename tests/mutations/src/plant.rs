@@ -69,7 +69,7 @@ impl Mutant {
     }
 }
 
-/// Defects of an area, evenly spaced among those that can be planted.
+/// Defects of an area, evenly spaced among those of the kinds that can be planted.
 pub fn choose(root: &Path, area: &'static Area, count: usize) -> Vec<Mutant> {
     let mut mutants = Command::new("cargo");
     mutants.args(["mutants", "--list", "--json", "--workspace"]);
@@ -181,9 +181,8 @@ impl<'m> Planting<'m> {
             line: start.line,
             column: start.column + 1,
         };
-        let found =
-            |mutant: &&&Mutant| mutant.listed.genre == genre && mutant.listed.span.start == place;
-        self.mutants.iter().copied().find(|mutant| found(&mutant))
+        let mut mutants = self.mutants.iter().copied();
+        mutants.find(|mutant| mutant.listed.genre == genre && mutant.listed.span.start == place)
     }
 
     fn body(&mut self, block: &mut Block) {

@@ -69,15 +69,9 @@ fn binary(message: &Value) -> Option<((String, String), (PathBuf, PathBuf))> {
     Some(((package, target), (executable, folder)))
 }
 
-/// What became of a defect.
-enum Outcome {
-    Noticed(&'static str),
-    Survived,
-}
-
 /// Runs the tests of every defect and prints what became of it.
 pub fn all(mutants: &[Mutant], binaries: &Binaries) {
-    let without = Mutex::new(BTreeMap::new());
+    let mut without = BTreeMap::new();
     let mut wanted: Vec<Tests> = Vec::new();
     for tests in mutants.iter().flat_map(|mutant| mutant.area.tests) {
         if !wanted.contains(tests) {
@@ -91,9 +85,8 @@ pub fn all(mutants: &[Mutant], binaries: &Binaries) {
         let took = begin.elapsed();
         eprintln!("{tests:?}: {took:.1?}");
         let key = (tests.package, tests.target, tests.arguments);
-        without.lock().expect("nobody panics").insert(key, took);
+        without.insert(key, took);
     }
-    let without = without.into_inner().expect("nobody panics");
     let next = AtomicUsize::new(0);
     let lines = Mutex::new(BTreeMap::new());
     let threads = thread::available_parallelism().map_or(1, usize::from);
@@ -106,12 +99,7 @@ pub fn all(mutants: &[Mutant], binaries: &Binaries) {
                         let limit = PATIENCE * threads as u32 * (usual + Duration::from_secs(2));
                         !passes(tests, binaries, mutant.number, limit)
                     });
-                    let outcome =
-                        caught.map_or(Outcome::Survived, |it| Outcome::Noticed(it.target));
-                    let word = match outcome {
-                        Outcome::Noticed(by) => by,
-                        Outcome::Survived => "**nobody**",
-                    };
+                    let word = caught.map_or("**nobody**", |tests| tests.target);
                     let line = format!("| {} | {} | {word} |", mutant.area.name, mutant.words());
                     eprintln!("{line}");
                     let mut lines = lines.lock().expect("nobody panics");

@@ -74,10 +74,7 @@ pub fn named_by(kind: CaptureFault) -> (&'static [GateName], &'static [&'static 
         CaptureFault::Gamma => (&[G::Superposition, G::Response], &["[camera] response"]),
         CaptureFault::AutoExposure => (&[G::Superposition], &["Set exposure"]),
         CaptureFault::Tripod => (&[G::Movement], &["take the capture again"]),
-        CaptureFault::Swapped => (
-            &[G::Order],
-            &["Exchange the two files", "put them in their places"],
-        ),
+        CaptureFault::Swapped => (&[G::Order], &["Exchange the two files"]),
         CaptureFault::Dropped => (&[G::Complete], &["Take the missing photographs"]),
         CaptureFault::Skipped => (
             &[G::Order],

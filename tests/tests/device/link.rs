@@ -209,13 +209,12 @@ impl Write for Shared {
 
 #[test]
 fn a_transcript_says_when_what_was_said_and_no_whole_key() {
-    let tables = FakeTables::default();
-    let line = FakeDevice {
-        tables: Some(tables),
+    let device = FakeDevice {
+        tables: Some(FakeTables::default()),
         ..FakeDevice::default()
     };
     let shared = Shared::default();
-    let mut line = Transcribed::new(line.line(9_600));
+    let mut line = Transcribed::new(device.line(9_600));
     line.write_to(Box::new(shared.clone()));
     let mut client = Client::greet(line, PATIENT).expect("it is there");
     client.provision([0xAB; 32], 9, true).expect("it has none");

@@ -40,7 +40,7 @@ fn faults_that_look_like_others_are_found() {
         (62, CaptureFault::Vivid),
         (112, CaptureFault::AutoExposure),
         (103, CaptureFault::Skipped),
-        (159, CaptureFault::Swapped),
+        (19, CaptureFault::Swapped),
     ] {
         let is_that = |fault: &&StudiedFault| fault.kind == kind;
         let study = Study {

@@ -53,8 +53,8 @@ const TELLING: f64 = 4.0;
 /// A misfit must be this many times another for the difference to be believed.
 const CLEARLY: f64 = 2.0;
 
-/// Difference of misfits that is believed whatever they are: in 500 good sessions it is half of that
-/// at most.
+/// Difference of misfits that is believed whatever they are; good sessions of the gates' study stay
+/// below.
 const PLAIN: f64 = 0.008;
 
 impl CameraFit {

@@ -284,6 +284,13 @@ impl Assigned {
             }
         });
         let mut wrong: Vec<Wrong> = wrong.collect();
+        // Two that fit each other's patterns are exchanged, though a third pattern may fit as well.
+        if let [a, b] = wrong.as_mut_slice()
+            && nearer(a.shot, b.shot)
+            && nearer(b.shot, a.shot)
+        {
+            (a.shows, b.shows) = (Some(b.shot), Some(a.shot));
+        }
         // One in ten may be disturbed; if more fit no pattern, the picture moved.
         let strange = wrong.iter().filter(|wrong| wrong.shows.is_none()).count();
         if strange > (shots / 10).max(2) {
