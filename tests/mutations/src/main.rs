@@ -22,9 +22,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-/// Defects of an area, evenly spaced among all that there are.
-const IN_AN_AREA: usize = 36;
-
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let chosen: Vec<&Area> = AREAS
@@ -41,7 +38,7 @@ fn main() {
     let mut refused = BTreeSet::new();
     let mutants: Vec<Mutant> = chosen
         .iter()
-        .flat_map(|area| plant::choose(&root, area, IN_AN_AREA))
+        .flat_map(|area| plant::choose(&root, area))
         .collect();
     let (tests, planted) = loop {
         copied(&plain, &copy, "find . -type f -print0");

@@ -70,7 +70,7 @@ impl Mutant {
 }
 
 /// Defects of an area, evenly spaced among those of the kinds that can be planted.
-pub fn choose(root: &Path, area: &'static Area, count: usize) -> Vec<Mutant> {
+pub fn choose(root: &Path, area: &'static Area) -> Vec<Mutant> {
     let mut mutants = Command::new("cargo");
     mutants.args(["mutants", "--list", "--json", "--workspace"]);
     for file in area.files {
@@ -96,7 +96,7 @@ pub fn choose(root: &Path, area: &'static Area, count: usize) -> Vec<Mutant> {
         .iter()
         .position(|other| other.name == area.name);
     let first = 1_000 * (index.expect("one of them") as u32 + 1);
-    let count = count.min(all.len());
+    let count = area.defects.min(all.len());
     (0..count)
         .map(|at| Mutant {
             number: first + at as u32,

@@ -15,4 +15,4 @@ mod study;
 
 pub use fault::{StudiedFault, named_by};
 pub use session::{StudiedSession, failing};
-pub use study::{Study, StudyResult};
+pub use study::{FaultCount, Study, StudyResult};

@@ -1,6 +1,6 @@
 //! Many sessions at once, each on a thread of its own, and what became of them.
 
-use super::fault::StudiedFault;
+use super::fault::{StudiedFault, named_by};
 use super::session::{StudiedSession, failing};
 use iltm::capture::{Gate, Verdict};
 use std::fmt::Write;
@@ -136,9 +136,14 @@ impl Study {
                     .iter()
                     .filter(|g| g.verdict >= Verdict::Warn)
                     .collect();
-                let words = words(&session, &made.to_string(), &not_passed).unwrap_or_else(|| {
-                    format!("{:06} {made} silent | {}\n", session.seed, session.words)
-                });
+                // Where nothing is said, what those said that ought to have spoken.
+                let silent = || {
+                    let ought = |gate: &&Gate| named_by(fault.kind).0.contains(&gate.name);
+                    let ought: Vec<&Gate> = gates.iter().filter(ought).collect();
+                    words(&session, &format!("{made} silent"), &ought)
+                };
+                let words = words(&session, &made.to_string(), &not_passed).or_else(silent);
+                let words = words.unwrap_or_default();
                 said += &words;
                 entry.missed.push(words);
             }

@@ -6,7 +6,7 @@ use iltm::scene::fill_capture::UnfilledCapture;
 use iltm::scene::{CaptureFault, Forced, VirtualCamera};
 use iltm::session::{self, Layout, OrderOptions, order};
 use iltm_runtime::FrameSize;
-use iltm_tests::gates::{StudiedFault, Study};
+use iltm_tests::gates::{FaultCount, StudiedFault, Study};
 use iltm_tests::simulated::{scene, simulation};
 use std::path::Path;
 
@@ -37,26 +37,38 @@ fn faults_that_look_like_others_are_found() {
         (14, CaptureFault::Gamma),
         (52, CaptureFault::Gamma),
         (59, CaptureFault::Gamma),
+        (10_005, CaptureFault::Gamma),
+        (10_035, CaptureFault::Gamma),
         (62, CaptureFault::Vivid),
         (112, CaptureFault::AutoExposure),
         (103, CaptureFault::Skipped),
         (19, CaptureFault::Swapped),
     ] {
-        let is_that = |fault: &&StudiedFault| fault.kind == kind;
-        let study = Study {
-            first: seed,
-            good: 1,
-            faulty: 1,
-            faults: StudiedFault::ALL.iter().filter(is_that).copied().collect(),
-            threads: 1,
-        };
-        let result = study.run(&|_| {});
-        assert!(result.refused.is_empty(), "{:#?}", result.refused);
-        let [count] = &result.faults[..] else {
-            unreachable!("one fault");
-        };
+        let count = studied(seed, kind);
         assert_eq!((count.all, count.found), (1, 1), "{count:#?}");
     }
+}
+
+/// A scene in which light hardly bounces: patterns add up whatever the camera's curve.
+#[test]
+fn a_curve_that_pixels_hardly_tell_is_left_open() {
+    let count = studied(10_023, CaptureFault::Gamma);
+    assert_eq!((count.found, count.left_open), (0, 1), "{count:#?}");
+}
+
+/// One session of the study, good and with one fault.
+fn studied(seed: u64, kind: CaptureFault) -> FaultCount {
+    let is_that = |fault: &&StudiedFault| fault.kind == kind;
+    let study = Study {
+        first: seed,
+        good: 1,
+        faulty: 1,
+        faults: StudiedFault::ALL.iter().filter(is_that).copied().collect(),
+        threads: 1,
+    };
+    let mut result = study.run(&|_| {});
+    assert!(result.refused.is_empty(), "{:#?}", result.refused);
+    result.faults.remove(0)
 }
 
 fn gates(folder: &Path, bernoulli: Option<usize>) -> Vec<Gate> {

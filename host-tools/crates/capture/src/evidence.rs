@@ -4,7 +4,7 @@
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
-use crate::devices::{ColourMixingMatrix, Devices, MeasuredDevices};
+use crate::devices::{CameraFit, ColourMixingMatrix, Devices, MeasuredDevices};
 use crate::format::error::CaptureError;
 use crate::format::picture_file::FileFormat;
 use crate::format::sequence::Sequence;
@@ -114,6 +114,12 @@ impl CaptureEvidence {
         let registration = &registered.registration;
         let pixels = CellPixels::choose(registration, &linear.saturated);
         let photographs = &mut linear.photographs;
+        let contradicted = devices
+            .devices
+            .camera_fit
+            .as_ref()
+            .filter(|fit| fit.contradicts());
+        let power = contradicted.map(CameraFit::power);
         let measure = || {
             CellEvidence::measure(
                 sequence,
@@ -121,6 +127,7 @@ impl CaptureEvidence {
                 registration,
                 &pixels,
                 &sampled,
+                power,
                 progress,
             )
         };

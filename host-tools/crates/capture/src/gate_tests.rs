@@ -101,9 +101,36 @@ fn assert_named(folder: &TempDir, name: GateName, word: &str) {
     assert!(failed[0].1.contains(word), "{failed:?}");
 }
 
+/// The gate of a name.
+fn gate(folder: &TempDir, name: GateName) -> Gate {
+    let mut gates = gates(folder).into_iter();
+    gates.find(|gate| gate.name == name).unwrap()
+}
+
 fn verdict(folder: &TempDir, name: GateName) -> Verdict {
-    let gates = gates(folder);
-    gates.iter().find(|gate| gate.name == name).unwrap().verdict
+    gate(folder, name).verdict
+}
+
+/// What a gate's page shows of each photograph: index and number, the limit, and the first
+/// photograph of a change.
+fn shown_of_photographs(gate: &Gate) -> (Vec<(u32, f64)>, Option<f64>, Option<u32>) {
+    match &gate.evidence {
+        Evidence::Photographs {
+            values,
+            limit,
+            from,
+            ..
+        } => (values.clone(), *limit, *from),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// What a gate's page shows of each cell.
+fn shown_of_cells(gate: &Gate) -> Vec<f64> {
+    match &gate.evidence {
+        Evidence::Cells { values, .. } => values.clone(),
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]
@@ -143,12 +170,18 @@ fn a_slow_drift_is_measured_and_divided_out() {
         }
     });
     assert_eq!(failed(&folder), []);
-    let drift = gates(&folder)
-        .into_iter()
-        .find(|gate| gate.name == GateName::Drift)
-        .unwrap();
+    let drift = gate(&folder, GateName::Drift);
     assert!((drift.number - 6.0).abs() < 0.5, "{drift:?}");
     assert!(drift.what.contains("corrected"));
+    let (values, limit, _) = shown_of_photographs(&drift);
+    let last = f64::from(values[values.len() - 1].0);
+    for (index, value) in &values {
+        // White, the first photograph, is what all are compared with.
+        let shown = -6.0 * f64::from(*index) / last;
+        assert!((value - shown).abs() < 0.4, "{index}: {value}, not {shown}");
+    }
+    let limit = limit.unwrap();
+    assert!((limit - (30.0 - 6.0)).abs() < 0.4, "{limit}");
     let drifted = read(folder.path(), &CaptureOptions::default(), &Silent).unwrap();
     let (a, b) = (
         &truth.channels[0].observations,
@@ -164,10 +197,7 @@ fn a_slow_drift_is_measured_and_divided_out() {
 fn a_steady_session_is_left_as_it_is() {
     let scene = scene();
     let folder = with(&scene, |_| {});
-    let drift = gates(&folder)
-        .into_iter()
-        .find(|gate| gate.name == GateName::Drift)
-        .unwrap();
+    let drift = gate(&folder, GateName::Drift);
     assert!(
         drift.number < 0.5 && drift.what.contains("steady"),
         "{drift:?}"
@@ -237,6 +267,20 @@ fn a_bumped_tripod_is_named_with_the_photographs_around_it() {
             what.contains("037.png") && what.contains("038.png"),
             "{what}"
         );
+        let movement = gate(&folder, GateName::Movement);
+        let (values, limit, from) = shown_of_photographs(&movement);
+        assert_eq!((limit, from), (Some(movement.limit), Some(38)));
+        for (index, value) in values {
+            if index < 38 {
+                assert!(value < 0.4 * right, "{index}: {value}");
+            } else {
+                // A shift of several pixels looks smaller than it is.
+                assert!(
+                    (0.4 * right..1.1 * right).contains(&value),
+                    "{index}: {value}"
+                );
+            }
+        }
     }
 }
 
@@ -319,14 +363,28 @@ fn clipped_white_is_named_also_below_full_scale() {
 
 #[test]
 fn flicker_is_named_as_jumps_and_as_bands() {
+    let mut gains = Vec::new();
     let folder = with(&scene(), |shown| {
         let mut dice = Dice::new(4);
         for shown in shown {
             let gain = 1.0 + 0.04 * (std::f64::consts::TAU * dice.uniform()).sin();
             shown.light.iter_mut().for_each(|light| *light *= gain);
+            gains.push(gain);
         }
     });
     assert_named(&folder, GateName::Flicker, "jumps");
+    let flicker = gate(&folder, GateName::Flicker);
+    // Half of all sines are above .707.
+    let spread = 100.0 * 1.4826 * 0.707 * 0.04;
+    assert!((flicker.number / spread - 1.0).abs() < 0.25, "{flicker:?}");
+    let (values, limit, _) = shown_of_photographs(&flicker);
+    assert_eq!(limit, Some(1.5));
+    // Slow changes are taken off, so that neighbours are compared; white is judged apart.
+    for two in values[1..].windows(2) {
+        let jump = 100.0 * (gains[two[1].0 as usize] - gains[two[0].0 as usize]);
+        let shown = two[1].1 - two[0].1;
+        assert!((shown - jump).abs() < 1.2, "{two:?}: {shown}, not {jump}");
+    }
     let folder = with(&scene(), |shown| {
         let mut dice = Dice::new(4);
         for shown in shown {
@@ -339,6 +397,60 @@ fn flicker_is_named_as_jumps_and_as_bands() {
         }
     });
     assert_named(&folder, GateName::Flicker, "bands");
+    let flicker = gate(&folder, GateName::Flicker);
+    assert!(
+        (flicker.number - 4.0 / 2.0_f64.sqrt()).abs() < 0.5,
+        "{flicker:?}"
+    );
+    let Evidence::Curve { points, .. } = &flicker.evidence else {
+        panic!("{flicker:?}");
+    };
+    let highest = points.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+    assert!(
+        (highest.0 - 2.3).abs() < 0.3 && (highest.1 - 4.0).abs() < 0.7,
+        "{highest:?}"
+    );
+}
+
+#[test]
+fn noise_is_shown_for_each_cell_as_it_is() {
+    let scene = TestCapture {
+        noise: 0.02,
+        ..scene()
+    };
+    let folder = with(&scene, |_| {});
+    let noise = shown_of_cells(&gate(&folder, GateName::Noise));
+    let pixels = shown_of_cells(&gate(&folder, GateName::Coverage));
+    for (cell, (noise, pixels)) in noise.iter().zip(&pixels).enumerate() {
+        let white = scene.direct + 107.0 * scene.bounced;
+        let wanted = 100.0 * (1.0 / pixels).sqrt() * scene.noise / white;
+        assert!(
+            (noise / wanted - 1.0).abs() < 0.25,
+            "{cell}: {noise}, not {wanted}"
+        );
+    }
+}
+
+#[test]
+fn cells_that_the_camera_does_not_see_are_counted_by_where_they_lie() {
+    let folder = with(&scene(), |shown| {
+        for shown in shown {
+            let width = shown.width as usize;
+            for (at, light) in shown.light.iter_mut().enumerate() {
+                if at % width < 38 && at / width < 30 {
+                    *light = 0.02;
+                }
+            }
+        }
+    });
+    let coverage = gate(&folder, GateName::Coverage);
+    // 9 x 12 cells of 8.3 pixels beside a margin of 4.4: three rows of four.
+    assert!(coverage.what.contains("12 top left"), "{coverage:?}");
+    assert!((coverage.number - 100.0 * 12.0 / 108.0).abs() < 1e-9);
+    let hidden = |cell: usize| cell / 12 < 3 && cell % 12 < 4;
+    for (cell, pixels) in shown_of_cells(&coverage).iter().enumerate() {
+        assert_eq!(pixels.is_nan(), hidden(cell), "{cell}: {pixels}");
+    }
 }
 
 #[test]

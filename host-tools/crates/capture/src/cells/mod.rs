@@ -33,6 +33,7 @@ use drift::{Drift, Steadiness};
 use iltm_picture::progress::Progress;
 use mains_banding::MainsBanding;
 use measurements::ChannelMeasurements;
+use nalgebra::DMatrix;
 use noise::NoiseSource;
 use nonlinearity::Nonlinearity;
 use superposition::Sums;
@@ -43,14 +44,27 @@ pub(crate) struct CellEvidence {
     pub(crate) noise: NoiseSource,
     pub(crate) steadiness: Steadiness,
     pub(crate) banding: Option<MainsBanding>,
+    /// Both once more where single pixels contradict the declared response: a curve looks like
+    /// flicker.
+    pub(crate) straightened: Option<Straightened>,
     /// How well light adds up; `None` without inverses.
     pub(crate) sums: Option<Sums>,
     /// Why light does not add up, where it does not.
     pub(crate) nonlinearity: Option<Nonlinearity>,
 }
 
+/// How the session went by the light that single pixels tell.
+pub(crate) struct Straightened {
+    /// Light as read, raised to this power, is that light; small changes of it are as many times
+    /// as large.
+    pub(crate) power: f64,
+    pub(crate) steadiness: Steadiness,
+    pub(crate) banding: Option<MainsBanding>,
+}
+
 impl CellEvidence {
-    /// Measures all cells in all photographs.
+    /// Measures all cells in all photographs. With `power`, light would add up if it were raised
+    /// to this.
     ///
     /// # Errors
     /// A photograph's own error.
@@ -60,31 +74,42 @@ impl CellEvidence {
         registration: &Registration,
         pixels: &CellPixels,
         sampled: &Sampled,
+        power: Option<f64>,
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
         progress.begin("measuring cells", sequence.shots.len() as u64);
         let light = measure::observe(sequence, photographs, pixels, progress)?;
         progress.end();
-        let steadiness = drift::assess(sequence, &pixels.live, &light.channels);
+        let live = &pixels.live;
+        let bands = |steadiness: &Steadiness, light: &[DMatrix<f64>]| {
+            mains_banding::find(sequence, registration, live, &steadiness.models, light)
+        };
+        let steadiness = drift::assess(sequence, live, &light.channels);
+        let straighten = |power: f64| {
+            let raised = |light: &DMatrix<f64>| light.map(|light| light.max(0.0).powf(power));
+            let light: Vec<DMatrix<f64>> = light.channels.iter().map(raised).collect();
+            let steadiness = drift::assess(sequence, live, &light);
+            let banding = bands(&steadiness, &light);
+            Straightened {
+                power,
+                steadiness,
+                banding,
+            }
+        };
         let observed = measure::average(sequence, &light, pixels, &steadiness.drift);
         // Before one white there is nothing to follow the light by: what bends it would be
         // taken for drift, and the sums for sound.
         let single = sequence.white().shots.len() == 1;
         let plain = single.then(|| measure::average(sequence, &light, pixels, &Drift::default()));
         let summed = &plain.as_ref().unwrap_or(&observed).channels;
-        let sums = Sums::new(sequence, summed, &pixels.live);
+        let sums = Sums::new(sequence, summed, live);
         let off = sums.as_ref().is_some_and(Sums::off);
-        let find = || nonlinearity::find(sequence, &pixels.live, &light.channels, sampled);
+        let find = || nonlinearity::find(sequence, live, &light.channels, sampled);
         Ok(Self {
             nonlinearity: off.then(find),
             sums,
-            banding: mains_banding::find(
-                sequence,
-                registration,
-                &pixels.live,
-                &steadiness.models,
-                &light.channels,
-            ),
+            banding: bands(&steadiness, &light.channels),
+            straightened: power.map(straighten),
             steadiness,
             channels: observed.channels,
             noise: observed.noise,

@@ -23,6 +23,10 @@ const LEAST_AMBIENT: f64 = 0.005;
 /// What one cause may leave of what another one leaves to be preferred.
 const CLEARLY: f64 = 0.5;
 
+/// What brightness that follows the picture may leave of what a curve leaves to be believed though
+/// its factors scatter: in a deep scene wide stripes light far more of it than narrow ones.
+const FAR_BETTER: f64 = 0.25;
+
 /// Misfit of the declared response, of the best one's, from which the best one is it whatever
 /// else may explain a part.
 const PLAINLY: f64 = 5.0;
@@ -101,9 +105,7 @@ impl CurveOfPixels {
         }
         let plain = matches!(fit.best, DeviceResponse::Known(_));
         if plain && fit.declared_misfit > PLAINLY * fit.best_misfit {
-            // Of the light that was read.
-            let half = |response: &DeviceResponse| response.light(0.5).ln();
-            Self::Plain(half(&fit.best) / half(&fit.declared))
+            Self::Plain(fit.power())
         } else {
             Self::Other
         }
@@ -152,7 +154,8 @@ pub(crate) fn find(
     let (factors, followed) = pairs.best_factors();
     let middle = median(factors.clone()).unwrap_or(1.0);
     let off = median(factors.iter().map(|f| (f - middle).abs()).collect()).unwrap_or(0.0);
-    let follows = followed < EXPLAINED * before && (middle - 1.0).abs() > STEADY * off;
+    let steady = (middle - 1.0).abs() > STEADY * off;
+    let follows = followed < EXPLAINED * before && (steady || followed < FAR_BETTER * curved);
     let bent = curved < EXPLAINED * before;
     // Where the scene is even a curve that brightens explains as much as a factor does; but it
     // leaves nothing brighter than white.

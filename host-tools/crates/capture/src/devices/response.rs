@@ -41,7 +41,13 @@ pub struct CameraFit {
     /// Misfit of the worse of a linear camera and one with a gamma of 2.2: where
     /// it is small, the photographs do not tell responses apart.
     pub contrast: f64,
+    /// Misfit that a curve of [`NOTICED`] times the best one's gamma, or of as much less, adds
+    /// to the best one's: where it is small, such a camera would pass.
+    pub sharpness: f64,
 }
+
+/// What a camera's gamma is off for `iltm check` to name it, as a factor.
+const NOTICED: f64 = 1.3;
 
 /// Misfit below which photographs add up: what rounding to 8 bits leaves.
 const GOOD: f64 = 0.005;
@@ -84,8 +90,14 @@ impl CameraFit {
                 (best, best_misfit) = (curve, misfit);
             }
         }
+        let powered = |power: f64| {
+            let light = |value: f64| best.light(value).powf(power);
+            balances.misfit(&Lookup::new(light)) - best_misfit
+        };
+        let sharpness = powered(NOTICED).min(powered(1.0 / NOTICED));
         Some(Self {
             source,
+            sharpness,
             declared_misfit: balances.misfit_of(declared),
             declared: declared.clone(),
             best,
@@ -118,6 +130,18 @@ impl CameraFit {
                 || self.declared_misfit > self.best_misfit + PLAIN)
     }
 
+    /// Whether a gamma off by [`NOTICED`] would be noticed: it must stand out as much as a
+    /// difference that is believed.
+    pub(crate) fn would_notice(&self) -> bool {
+        self.tells() && self.sharpness > PLAIN
+    }
+
+    /// The power that turns light as read into light by the best response, at half the range.
+    pub(crate) fn power(&self) -> f64 {
+        let half = |response: &DeviceResponse| response.light(0.5).ln();
+        half(&self.best) / half(&self.declared)
+    }
+
     /// The finding in a sentence.
     #[must_use]
     pub fn words(&self) -> String {
@@ -127,6 +151,13 @@ impl CameraFit {
             return format!(
                 "the photographs do not tell the camera's response; as read ({}) they add up \
                  within {declared}",
+                self.declared
+            );
+        }
+        if !self.contradicts() && !self.would_notice() {
+            return format!(
+                "the photographs hardly tell the camera's response: as read ({}) they add up \
+                 within {declared}, and with a gamma {NOTICED} times that nearly as well",
                 self.declared
             );
         }

@@ -1,6 +1,7 @@
 //! Gate `flicker`: brightness does not jump from photograph to photograph, nor from
 //! row to row within one.
 
+use crate::cells::CellEvidence;
 use crate::cells::drift::Steadiness;
 use crate::cells::mains_banding::MainsBanding;
 use crate::format::sequence::Sequence;
@@ -13,12 +14,15 @@ const WARN: f64 = 0.006;
 /// Scatter of the brightness that spoils a table by as much.
 const MOST: f64 = 0.015;
 
-/// Judges the fast changes.
-pub(super) fn judge(
-    sequence: &Sequence,
-    steadiness: &Steadiness,
-    bands: Option<&MainsBanding>,
-) -> Gate {
+/// Judges the fast changes, by the light as read or by the light that single pixels tell,
+/// whichever changes less: brightness that jumps does so under any curve.
+pub(super) fn judge(sequence: &Sequence, cells: &CellEvidence) -> Gate {
+    let read = (&cells.steadiness, cells.banding.as_ref());
+    let number = |(steadiness, bands)| scatter(steadiness).max(striped(bands));
+    let (steadiness, bands) = (cells.straightened.as_ref())
+        .map(|other| (other.power, (&other.steadiness, other.banding.as_ref())))
+        .filter(|(power, other)| number(*other) < power * number(read))
+        .map_or(read, |(_, other)| other);
     let name = GateName::Flicker;
     let compared = !steadiness.models.is_empty();
     if !compared && bands.is_none() {
@@ -27,16 +31,8 @@ pub(super) fn judge(
             "there are too few photographs to compare with each other",
         );
     }
-    let offs: Vec<f64> = (steadiness.gains.iter().zip(&steadiness.slow))
-        .map(|(gain, slow)| gain / slow - 1.0)
-        .collect();
-    let scatter = if compared {
-        scatter(&offs, &steadiness.errors)
-    } else {
-        0.0
-    };
-    // The root mean square of a sine is its amplitude over the root of 2.
-    let striped = bands.map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt());
+    let offs = offs(steadiness);
+    let (scatter, striped) = (scatter(steadiness), striped(bands));
     let number = scatter.max(striped);
     let verdict = Verdict::of(number, WARN, MOST);
     let what = match (verdict, bands) {
@@ -91,11 +87,26 @@ pub(super) fn judge(
     }
 }
 
+/// Brightness off the slow curve, of each photograph.
+fn offs(steadiness: &Steadiness) -> Vec<f64> {
+    let both = steadiness.gains.iter().zip(&steadiness.slow);
+    both.map(|(gain, slow)| gain / slow - 1.0).collect()
+}
+
 /// Standard deviation of what is off the slow curve, robust, without what the gains
-/// themselves are uncertain by.
-fn scatter(offs: &[f64], errors: &[f64]) -> f64 {
+/// themselves are uncertain by; 0 where photographs could not be compared.
+fn scatter(steadiness: &Steadiness) -> f64 {
+    if steadiness.models.is_empty() {
+        return 0.0;
+    }
     let middle = |values: Vec<f64>| median(values).unwrap_or(0.0);
-    let spread = 1.4826 * middle(offs.iter().map(|off| off.abs()).collect());
-    let own = middle(errors.to_vec());
+    let off = offs(steadiness).iter().map(|off| off.abs()).collect();
+    let spread = 1.4826 * middle(off);
+    let own = middle(steadiness.errors.clone());
     (spread * spread - own * own).max(0.0).sqrt()
+}
+
+/// Root mean square of the bands: a sine's is its amplitude over the root of 2.
+fn striped(bands: Option<&MainsBanding>) -> f64 {
+    bands.map_or(0.0, |bands| bands.amplitude / 2.0_f64.sqrt())
 }

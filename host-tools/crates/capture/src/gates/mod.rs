@@ -54,7 +54,7 @@ pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
         gates.extend([
             movement::judge(sequence, found.moved.as_ref()),
             drift::judge(sequence, steadiness),
-            flicker::judge(sequence, steadiness, cells.banding.as_ref()),
+            flicker::judge(sequence, cells),
             superposition::judge(sequence, sums, cause, steadiness.excess),
             noise::judge(sequence.grid, &cells.channels, &pixels.live, &counts),
             response::judge(&found.devices, cause),
@@ -98,5 +98,63 @@ pub(crate) fn settle(gates: &mut [Gate], cause: Option<Nonlinearity>) {
             let why = format!("cannot be judged before `{because}` passes");
             *gate = Gate::not_judged(gate.name, why);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gate::Verdict;
+
+    fn failing(name: GateName, number: f64) -> Gate {
+        let gate = Gate::of_share(name, Verdict::Fail, (0.0, 0.0), "Do it again.");
+        Gate { number, ..gate }
+    }
+
+    /// Names of the gates that still fail once they are settled.
+    fn left(mut gates: Vec<Gate>, cause: Option<Nonlinearity>) -> Vec<GateName> {
+        settle(&mut gates, cause);
+        let failing = gates.iter().filter(|gate| gate.fails());
+        failing.map(|gate| gate.name).collect()
+    }
+
+    #[test]
+    fn copies_follow_from_shifted_patterns_where_these_are_more_than_twice_as_many() {
+        let both = |order| {
+            vec![
+                failing(GateName::Order, order),
+                failing(GateName::Complete, 1.0),
+            ]
+        };
+        assert_eq!(left(both(3.0), None), [GateName::Order]);
+        assert_eq!(left(both(2.0), None), [GateName::Complete, GateName::Order]);
+    }
+
+    #[test]
+    fn what_follows_from_another_gate_waits_for_it() {
+        use GateName as G;
+        let all = |names: &[GateName]| names.iter().map(|name| failing(*name, 1.0)).collect();
+        let known = Some(Nonlinearity::Exposure);
+        assert_eq!(
+            left(all(&[G::Movement, G::Flicker, G::Noise]), None),
+            [G::Movement]
+        );
+        assert_eq!(
+            left(all(&[G::Flicker, G::Superposition]), known),
+            [G::Superposition]
+        );
+        assert_eq!(
+            left(all(&[G::Flicker, G::Superposition]), None),
+            [G::Flicker]
+        );
+        assert_eq!(
+            left(all(&[G::Response, G::Superposition]), None),
+            [G::Superposition]
+        );
+        assert_eq!(
+            left(all(&[G::Order, G::Saturation]), None),
+            [G::Saturation, G::Order]
+        );
+        assert_eq!(left(all(&[G::Coverage, G::Order]), None), [G::Order]);
     }
 }

@@ -42,7 +42,7 @@ fn beside(sequence: &Sequence, moved: &Moved) -> Option<Gate> {
     let (warn, limit) = (2.0 * warn, 2.0 * limit);
     let photo = &sequence.shots[shot];
     let what = format!(
-        "camera, projector or scene moved by {size:.2} pixels or more (a cell is {:.0} wide) between \
+        "camera, projector or scene moved by at least {size:.2} pixels (a cell is {:.0} wide) between \
          white, {}, and the patterns",
         moved.cell,
         photo.photo.display()
@@ -91,7 +91,7 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
             bump.size
         ),
         _ => format!(
-            "camera, projector or scene moved by {:.2} pixels (a cell is {:.0} wide) between {} \
+            "camera, projector or scene moved by at least {:.2} pixels (a cell is {:.0} wide) between {} \
              and {}",
             bump.size,
             moved.cell,

@@ -101,7 +101,7 @@ pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
         return gate(verdict, steps, MOST_STEPS, "steps", what, next_step);
     }
     match &devices.camera_fit {
-        Some(fit) if !fit.tells() => Gate::not_judged(name, fit.words()),
+        Some(fit) if !fit.would_notice() => Gate::not_judged(name, fit.words()),
         Some(fit) => {
             let number = 100.0 * beyond(fit);
             gate(Verdict::Pass, number, 100.0 * MOST, "%", fit.words(), "")

@@ -17,8 +17,9 @@ use rayon::prelude::*;
 /// How many times the standard error of white's shift is noise.
 const NOISE: f64 = 4.0;
 
-/// Photographs that must lie on each side of a bump.
-const LEAST_SIDE: usize = 3;
+/// Photographs that must lie on each side of a bump: the widest stripes of a deep scene and their
+/// inverse, tilted by far light, are none.
+const LEAST_SIDE: usize = 5;
 
 /// What the photographs show of movement.
 pub(crate) struct Moved {
