@@ -149,6 +149,10 @@ fn good_captures_pass_at_every_noise() {
             "{gates:?}"
         );
         assert_eq!(gates.len(), GateName::ALL.len());
+        let passes = gates.iter().filter(|gate| gate.verdict == Verdict::Pass);
+        for gate in passes {
+            assert!(gate.number <= gate.limit, "{gate:?}");
+        }
     }
 }
 
@@ -282,6 +286,53 @@ fn a_bumped_tripod_is_named_with_the_photographs_around_it() {
             }
         }
     }
+}
+
+#[test]
+fn a_bump_between_white_and_the_patterns_is_named() {
+    let folder = with(&scene(), |shown| shown[0].light = shown[0].shifted(3.0));
+    let movement = gate(&folder, GateName::Movement);
+    assert!(movement.fails(), "{movement:?}");
+    let what = &movement.what;
+    assert!(what.contains("between white, photos/000.png"), "{what}");
+    let (values, limit, _) = shown_of_photographs(&movement);
+    assert_eq!(values, [(0, movement.number)]);
+    assert_eq!(limit, Some(movement.limit));
+}
+
+#[test]
+fn photographs_that_changed_places_at_random_are_no_shift_of_all() {
+    let folder = with(&scene(), |shown| {
+        let places = [30, 37, 50];
+        let lights = places.map(|at| shown[at].light.clone());
+        for (k, light) in lights.into_iter().enumerate() {
+            shown[places[(k + 1) % 3]].light = light;
+        }
+    });
+    let order = gate(&folder, GateName::Order);
+    assert_eq!((order.fails(), order.number), (true, 3.0), "{order:?}");
+    assert!(
+        !order.what.contains("moved up") && !order.what.contains("earlier"),
+        "{order:?}"
+    );
+}
+
+#[test]
+fn photographs_after_one_that_was_taken_twice_are_named_as_earlier() {
+    let folder = with(&scene(), |shown| {
+        for at in (31..shown.len()).rev() {
+            shown[at].light = shown[at - 1].light.clone();
+        }
+        let mut dice = Dice::new(9);
+        for light in &mut shown[31].light {
+            *light += 0.003 * dice.normal();
+        }
+    });
+    let order = gate(&folder, GateName::Order);
+    assert!(
+        order.what.contains("from photos/031.png on") && order.what.contains("1 earlier"),
+        "{order:?}"
+    );
 }
 
 #[test]
@@ -492,6 +543,8 @@ fn stripes_alone_are_judged_by_what_they_show() {
     let of = |name| examined.gates.iter().find(|g| g.name == name).unwrap();
     assert_eq!(of(GateName::Superposition).verdict, Verdict::Pass);
     assert_eq!(of(GateName::Coverage).verdict, Verdict::Pass);
+    // One photograph of white says nothing of how the light changed.
+    assert_eq!(of(GateName::Drift).verdict, Verdict::NotJudged);
     let flicker = of(GateName::Flicker);
     assert_eq!(flicker.verdict, Verdict::Pass);
     assert!(flicker.what.contains("too few were taken"), "{flicker:?}");

@@ -79,7 +79,12 @@ impl Mixed {
     }
 
     /// Adds ramps of all channels to the folder.
-    fn with_ramps(mut self) -> Self {
+    fn with_ramps(self) -> Self {
+        self.with_ramps_of(1.0)
+    }
+
+    /// The same of a projector that has only a part of its light for a channel alone.
+    fn with_ramps_of(mut self, alone: f64) -> Self {
         let white = scene().patterns().remove(0).1;
         let mut lines = "index,role,pattern,photo\n".to_owned();
         let levels = (0..=15).map(|k| 17 * k);
@@ -91,7 +96,12 @@ impl Mixed {
             let files = format!("calibration/{index:03}.png,photos/{index:03}.png");
             writeln!(lines, "{index},{role},{files}").unwrap();
             let input = channel.input(level).map(|code| f64::from(code) / 255.0);
-            let lit = [0, 1, 2].map(|p| PROJECTOR[p].light(input[p]));
+            let part = if channel == RampChannel::White {
+                1.0
+            } else {
+                alone
+            };
+            let lit = [0, 1, 2].map(|p| part * PROJECTOR[p].light(input[p]));
             self.photograph(index, &white, lit);
         }
         fs::write(self.folder.path().join(CALIBRATION_FILE), lines).unwrap();
@@ -154,6 +164,24 @@ fn a_camera_that_mixes_colours_compensates_coloured_content_as_well_as_one_that_
         mixed < 1.1 * even && naive > 2.0 * mixed,
         "{mixed} {even} {naive}"
     );
+}
+
+#[test]
+fn a_white_segment_is_named_and_a_projector_without_one_is_not() {
+    for (alone, excess) in [(1.0, None), (0.8, Some("25 % brighter"))] {
+        let capture = Mixed::new(EVEN).with_ramps_of(alone);
+        let examined = examine(capture.folder.path(), &CaptureOptions::default(), &Silent).unwrap();
+        let mut gates = examined.gates.into_iter();
+        let response = gates.find(|gate| gate.name == GateName::Response).unwrap();
+        assert_eq!(response.fails(), excess.is_some(), "{response:?}");
+        if let Some(words) = excess {
+            assert!(response.what.contains(words), "{response:?}");
+            assert!(
+                response.next_step.contains("brilliant colour"),
+                "{response:?}"
+            );
+        }
+    }
 }
 
 #[test]

@@ -56,6 +56,10 @@ const UNLIKE: f64 = 0.35;
 /// wide or light each other much, all patterns look a little unlike themselves.
 const STRANGE: f64 = 3.0;
 
+/// How much farther than from the nearest pattern a photograph may be from another one that fits
+/// as well.
+const AS_WELL: f64 = 0.1;
+
 /// What a photograph shows instead of its own pattern.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Wrong {
@@ -284,10 +288,17 @@ impl Assigned {
             }
         });
         let mut wrong: Vec<Wrong> = wrong.collect();
-        // Two that fit each other's patterns are exchanged, though a third pattern may fit as well.
+        // Two that fit each other's patterns are exchanged, though a third pattern may fit as well;
+        // it must not fit much better.
+        let fits = |a: &Wrong, b: &Wrong| {
+            let least = a
+                .shows
+                .map_or(0.0, |best| distance(a.shot, &patterns[best]));
+            nearer(a.shot, b.shot) && distance(a.shot, &patterns[b.shot]) < least + AS_WELL
+        };
         if let [a, b] = wrong.as_mut_slice()
-            && nearer(a.shot, b.shot)
-            && nearer(b.shot, a.shot)
+            && fits(a, b)
+            && fits(b, a)
         {
             (a.shows, b.shows) = (Some(b.shot), Some(a.shot));
         }
