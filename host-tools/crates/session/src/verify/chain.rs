@@ -264,3 +264,64 @@ pub(super) fn find(
     }
     Ok(best.1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAIN: [f64; 2] = [1.0; 2];
+
+    /// A plane that rises by 10 from row to row and by 1 from column to column.
+    fn rising(grid: Grid) -> Vec<f64> {
+        let value = |cell: usize| (10 * (cell / grid.cols()) + cell % grid.cols()) as f64;
+        (0..grid.cells()).map(value).collect()
+    }
+
+    #[test]
+    fn a_shift_takes_each_value_from_as_far_and_black_from_beyond() {
+        let grid = Grid::new(3, 4).unwrap();
+        let shifted = |shift: [f64; 2]| {
+            let warp = Warp {
+                scale: PLAIN,
+                shift,
+            };
+            warp.sampled(grid, &rising(grid), false)
+        };
+        let right = [
+            1.0, 2.0, 3.0, 0.0, 11.0, 12.0, 13.0, 0.0, 21.0, 22.0, 23.0, 0.0,
+        ];
+        assert_eq!(shifted([1.0, 0.0]), right);
+        let down = [
+            10.0, 11.0, 12.0, 13.0, 20.0, 21.0, 22.0, 23.0, 0.0, 0.0, 0.0, 0.0,
+        ];
+        assert_eq!(shifted([0.0, 1.0]), down);
+        // A quarter of the way to the next column and half of that to the next row.
+        assert_eq!(shifted([0.25, 0.5])[5], 11.0 + 0.25 + 5.0);
+    }
+
+    #[test]
+    fn a_scale_is_about_the_middle_and_back_undoes_it() {
+        let grid = Grid::new(5, 7).unwrap();
+        let warp = Warp {
+            scale: [0.5, 0.5],
+            shift: [0.0; 2],
+        };
+        let smaller = warp.sampled(grid, &rising(grid), false);
+        for (cell, value) in smaller.iter().enumerate() {
+            let (row, col) = ((cell / 7) as f64, (cell % 7) as f64);
+            let wanted = 10.0 * (2.0 + 0.5 * (row - 2.0)) + 3.0 + 0.5 * (col - 3.0);
+            assert!(
+                (value - wanted).abs() < 1e-12,
+                "{cell}: {value}, not {wanted}"
+            );
+        }
+        let moved = Warp {
+            scale: [0.9, 1.1],
+            shift: [0.3, -0.2],
+        };
+        let there = moved.sampled(grid, &rising(grid), false);
+        let back = moved.sampled(grid, &there, true);
+        // The middle has neighbours on all sides.
+        assert!((back[17] - 23.0).abs() < 1e-9, "{}", back[17]);
+    }
+}
