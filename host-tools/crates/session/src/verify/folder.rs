@@ -252,3 +252,27 @@ pub(super) fn plain(wanted: &Picture, curves: &ProjectorCurves) -> Picture {
         curves.code(channel, f64::from(light.planes()[channel][pixel]))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::test_scene::{inverse, scene};
+    use iltm_compile::{CompileOptions, compile};
+    use iltm_runtime::Grid;
+
+    fn range(inverse: &iltm_solve::InverseTransport) -> [f64; 2] {
+        let compiled = compile(inverse, None, &CompileOptions::default()).unwrap();
+        levels(&Table::check(&compiled.image).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn patterns_have_the_range_that_the_table_can_show() {
+        // Cells that hardly light each other show any pattern; those that light each other
+        // much cannot show dark ones beside bright ones.
+        let grid = Grid::new(5, 8).unwrap();
+        let flat = range(&inverse(grid, 1, |_, _| 6.0, |_, _| 0.0));
+        let deep = range(&scene(1));
+        assert!((flat[0] / flat[1] - 0.2 / 1.0).abs() < 1e-9, "{flat:?}");
+        assert!(deep[0] / deep[1] > 0.25, "{deep:?}");
+    }
+}

@@ -144,3 +144,41 @@ fn codes(grid: Grid, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Picture 
         code(shape[channel][cell])
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn natural_images_are_of_all_brightness_and_each_colour_has_a_share_of_its_own() {
+        let grid = Grid::new(12, 16).unwrap();
+        let drawn = drawn(grid, 3);
+        let natural = &drawn[..NATURAL];
+        let planes: Vec<&Vec<f64>> = natural.iter().flat_map(|(_, planes)| planes).collect();
+        assert_eq!(planes.len(), 9);
+        for plane in &planes {
+            assert!(
+                plane
+                    .iter()
+                    .all(|light| (-1e-9..=1.0 + 1e-9).contains(light))
+            );
+        }
+        // What is not common to an image's channels is no other channel's share.
+        let own = |image: usize, channel: usize| -> Vec<f64> {
+            let grey = super::drawn(grid, 1);
+            let common = grey[image].1[0].iter().zip(&natural[image].1[channel]);
+            common
+                .map(|(common, mixed)| (mixed - 0.65 * common) / 0.35)
+                .collect()
+        };
+        let shares: Vec<Vec<f64>> = (0..9).map(|k| own(k / 3, k % 3)).collect();
+        for (k, share) in shares.iter().enumerate() {
+            for other in &shares[..k] {
+                let apart = share.iter().zip(other).map(|(a, b)| (a - b).abs());
+                assert!(apart.fold(0.0, f64::max) > 0.1);
+            }
+        }
+        let titles: Vec<&str> = drawn[NATURAL..].iter().map(|d| d.0.as_str()).collect();
+        assert_eq!(titles, ["Even grey", "Checkerboard", "Colour bars"]);
+    }
+}

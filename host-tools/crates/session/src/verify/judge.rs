@@ -638,3 +638,84 @@ fn worst(table: &Table<'_>, images: &[ImageVerdict]) -> Vec<WorstCell> {
     worst.truncate(WORST);
     worst
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(found: f64, wanted: f64) -> bool {
+        (found - wanted).abs() < 1e-12
+    }
+
+    #[test]
+    fn the_error_at_a_given_scale_is_over_live_cells_of_all_channels() {
+        let lit = LiveCells::new(&[true, false, true]);
+        let wanted = vec![vec![0.5, 9.0, 0.5], vec![0.5, 9.0, 0.5]];
+        let seen = vec![vec![1.2, 0.0, 1.0], vec![1.0, 0.0, 0.8]];
+        // At half the light two of four are off by .1, of a norm of 1.
+        let error = at_scale(&seen, &wanted, 0.5, &lit);
+        assert!(close(error, 0.02_f64.sqrt()), "{error}");
+        let dark = vec![vec![0.0; 3]];
+        assert!(close(at_scale(&dark, &dark, 1.0, &lit), 1.0));
+    }
+
+    #[test]
+    fn noise_or_viewpoint_beyond_its_share_of_the_promise_cannot_tell() {
+        let unsure = |noise: f64, viewpoint: f64| {
+            let bound = Bound {
+                limit: 0.02,
+                given: false,
+                predicted: Some(0.01),
+                range: None,
+                noise: Some(noise),
+                viewpoint,
+                promise: 0.01,
+                added: noise.hypot(viewpoint),
+                expected: None,
+                doubt: 0.02,
+            };
+            (bound.unsure(), bound.worst())
+        };
+        assert_eq!(unsure(0.014, 0.024), (None, Cause::Viewpoint));
+        assert_eq!(unsure(0.016, 0.0), (Some(Cause::Noise), Cause::Noise));
+        let viewpoint = Cause::Viewpoint;
+        assert_eq!(unsure(0.0, 0.026), (Some(viewpoint), viewpoint));
+    }
+
+    fn verdict(cells: [Vec<Option<f64>>; 2]) -> ImageVerdict {
+        ImageVerdict {
+            image: 0,
+            error: [0.0; 2],
+            modelled: None,
+            at_table_white: 0.0,
+            white: 1.0,
+            cells,
+        }
+    }
+
+    #[test]
+    fn a_cells_error_over_all_images_is_their_root_mean_square() {
+        let one = verdict([vec![None, Some(0.5)], vec![Some(0.3), Some(0.0)]]);
+        let other = verdict([vec![Some(1.0), Some(0.5)], vec![Some(0.4), Some(0.0)]]);
+        let images = [one, other];
+        let after = over_images(&images, 1);
+        assert!(close(after[0].unwrap(), 0.125_f64.sqrt()), "{after:?}");
+        assert_eq!(after[1], Some(0.0));
+        assert_eq!(over_images(&images, 0), [None, Some(0.5)]);
+        assert!(over_images(&[], 0).is_empty());
+    }
+
+    #[test]
+    fn what_neighbours_share_is_the_mean_product_of_pairs_beside_and_below() {
+        // 2 x 3 cells; the end of a row is no neighbour of the next one's begin.
+        let cells = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0].map(Some);
+        let beside = 1.0 * 2.0 + 2.0 * 3.0 + 4.0 * 5.0 + 5.0 * 6.0;
+        let below = 1.0 * 4.0 + 2.0 * 5.0 + 3.0 * 6.0;
+        assert!(close(
+            shared_by_neighbours(&cells, 3),
+            (beside + below) / 7.0
+        ));
+        let apart = [Some(1.0), Some(-1.0), None];
+        assert!(close(shared_by_neighbours(&apart, 3), 0.0));
+    }
+}

@@ -98,4 +98,12 @@ mod tests {
             assert_eq!(VerifyRole::from_name(&role.to_string()), Some(role));
         }
     }
+
+    #[test]
+    fn an_unknown_role_is_told_which_ones_there_are() {
+        let text = VerifyRole::unknown("flat");
+        for word in ["\"flat\"", "plain-K", "wanted-K", "bernoulli"] {
+            assert!(text.contains(word), "{text}");
+        }
+    }
 }
