@@ -326,3 +326,23 @@ fn significant(cells: &[f64]) -> bool {
     let variance = cells.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (count - 1.0);
     mean > OTHER && mean > SURE * (variance / count).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enough_cells_that_agree_are_significant_and_few_or_scattered_ones_are_not() {
+        assert!(significant(&[1.0; LEAST_CELLS]));
+        assert!(significant(&[0.9; 8]));
+        assert!(!significant(&[1.0; LEAST_CELLS - 1]));
+        assert!(!significant(&[0.2; 40]));
+        // Two thirds say one thing, a third the other: .33 with a standard error of .2.
+        let scattered: Vec<f64> = (0..24)
+            .map(|k| if k % 3 == 0 { -1.0 } else { 1.0 })
+            .collect();
+        assert!(!significant(&scattered));
+        // The same share of two hundred times as many is sure.
+        assert!(significant(&scattered.repeat(200)));
+    }
+}

@@ -321,4 +321,22 @@ mod tests {
         assert!(photo.planes[0][0] >= Photo::SATURATED);
         assert!((photo.planes[0][1] - 0.215_861 / 2.0).abs() < 1e-6);
     }
+
+    #[test]
+    fn floats_of_openexr_are_light_and_those_of_other_files_follow_the_response() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f.png");
+        GrayImage::new(1, 1).save(&path).unwrap();
+        let format = PhotoFormat::of_first(source(&path), &Response::Srgb.into()).unwrap();
+        let tiff = FileFormat::Tiff;
+        assert_eq!(format.float(FileFormat::OpenExr, 0.5), 0.5);
+        assert!((format.float(tiff, 0.5) - 0.214_041).abs() < 1e-6);
+        assert_eq!(format.float(tiff, -0.25), -0.25);
+        // Full scale is saturated in both, and so is what a gamma darkens to less than white.
+        let saturated = [
+            format.float(FileFormat::OpenExr, 1.0),
+            format.float(tiff, 0.985),
+        ];
+        assert_eq!(saturated, [SATURATED_SAMPLE; 2]);
+    }
 }

@@ -78,3 +78,39 @@ fn squares(width: usize, height: usize, most: usize) -> Vec<u32> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_are_whole_and_lie_evenly_over_the_photograph() {
+        let (width, height) = (5 * SIDE + 3, 4 * SIDE + 7);
+        for most in [100, 5] {
+            let pixels = squares(width, height, most);
+            assert_eq!(pixels.len(), most.min(20) * SIDE * SIDE);
+            let mut rows = Vec::new();
+            for square in pixels.chunks(SIDE * SIDE) {
+                let (left, top) = (square[0] as usize % width, square[0] as usize / width);
+                assert!(left + SIDE <= width && top + SIDE <= height);
+                rows.push(top / SIDE);
+                for (at, pixel) in square.iter().enumerate() {
+                    let wanted = (top + at / SIDE) * width + left + at % SIDE;
+                    assert_eq!(*pixel as usize, wanted);
+                }
+            }
+            rows.dedup();
+            assert_eq!(rows, [0, 1, 2, 3]);
+        }
+    }
+
+    #[test]
+    fn the_mean_of_photographs_is_taken_pixel_by_pixel() {
+        let sampled = Sampled {
+            pixels: vec![7, 9],
+            shots: vec![vec![1.0, 2.0], vec![9.0, 9.0], vec![3.0, 6.0]],
+        };
+        assert_eq!(sampled.mean(&[0, 2]), [2.0, 4.0]);
+        assert_eq!(sampled.mean(&[]), [0.0, 0.0]);
+    }
+}
