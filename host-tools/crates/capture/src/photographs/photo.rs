@@ -329,14 +329,15 @@ mod tests {
         GrayImage::new(1, 1).save(&path).unwrap();
         let format = PhotoFormat::of_first(source(&path), &Response::Srgb.into()).unwrap();
         let tiff = FileFormat::Tiff;
-        assert_eq!(format.float(FileFormat::OpenExr, 0.5), 0.5);
-        assert!((format.float(tiff, 0.5) - 0.214_041).abs() < 1e-6);
-        assert_eq!(format.float(tiff, -0.25), -0.25);
+        let near = |found: f32, wanted: f32| (found - wanted).abs() < 1e-6;
+        assert!(near(format.float(FileFormat::OpenExr, 0.5), 0.5));
+        assert!(near(format.float(tiff, 0.5), 0.214_041));
+        assert!(near(format.float(tiff, -0.25), -0.25));
         // Full scale is saturated in both, and so is what a gamma darkens to less than white.
         let saturated = [
             format.float(FileFormat::OpenExr, 1.0),
             format.float(tiff, 0.985),
         ];
-        assert_eq!(saturated, [SATURATED_SAMPLE; 2]);
+        assert!(saturated.iter().all(|light| light.is_infinite()));
     }
 }

@@ -296,7 +296,8 @@ mod tests {
         ];
         assert_eq!(shifted([0.0, 1.0]), down);
         // A quarter of the way to the next column and half of that to the next row.
-        assert_eq!(shifted([0.25, 0.5])[5], 11.0 + 0.25 + 5.0);
+        let between = shifted([0.25, 0.5])[5];
+        assert!((between - (11.0 + 0.25 + 5.0)).abs() < 1e-12, "{between}");
     }
 
     #[test]
