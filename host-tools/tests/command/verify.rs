@@ -32,11 +32,20 @@ pub(crate) fn copy() -> User {
     user
 }
 
+/// How far the brightness of white that photographs show is off the one that the table says.
+fn brightness_off(verdict: &serde_json::Value, user: &User) -> f64 {
+    let table = user.json("inspect t.iltm");
+    let said = table["brightness"]["mean"].as_f64().unwrap();
+    verdict["brightness"].as_f64().unwrap() / said - 1.0
+}
+
 #[test]
 fn a_good_table_passes_and_a_bound_below_the_noise_tells_nothing_with_the_same_figures() {
     let user = photographed();
     let figures = user.json("verify t.iltm v --report r");
     assert_eq!(figures["outcome"], "passed");
+    let off = brightness_off(&figures, user);
+    assert!(off.abs() < 0.05, "{off}: {figures}");
     let error = |half: &str| figures["mean_error"][half].as_f64().unwrap();
     assert!(error("after") < 0.1 * error("before"), "{figures}");
     for file in [
@@ -108,6 +117,8 @@ fn a_chain_that_compensates_once_passes_and_every_other_is_named() {
         let verdict = run.json();
         if exit == 0 {
             assert_eq!(verdict["outcome"], "passed", "{verdict}");
+            let off = brightness_off(&verdict, &user);
+            assert!(off.abs() < 0.05, "{off}: {verdict}");
         } else {
             assert_eq!(verdict["cause"], "chain", "{chain}: {verdict}");
             contains(verdict["error"]["next_step"].as_str().unwrap(), &[said]);

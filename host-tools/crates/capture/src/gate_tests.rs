@@ -298,6 +298,10 @@ fn a_bump_between_white_and_the_patterns_is_named() {
     let (values, limit, _) = shown_of_photographs(&movement);
     assert_eq!(values, [(0, movement.number)]);
     assert_eq!(limit, Some(movement.limit));
+    // Half the limit is worth a remark.
+    let folder = with(&scene(), |shown| shown[0].light = shown[0].shifted(0.9));
+    let movement = gate(&folder, GateName::Movement);
+    assert_eq!(movement.verdict, Verdict::Warn, "{movement:?}");
 }
 
 #[test]

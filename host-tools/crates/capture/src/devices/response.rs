@@ -41,7 +41,7 @@ pub struct CameraFit {
     /// Misfit of the worse of a linear camera and one with a gamma of 2.2: where
     /// it is small, the photographs do not tell responses apart.
     pub contrast: f64,
-    /// Misfit that a curve of [`NOTICED`] times the best one's gamma, or of as much less, adds
+    /// Misfit that a curve of 1.3 times the best one's gamma, or of as much less, adds
     /// to the best one's: where it is small, such a camera would pass.
     pub sharpness: f64,
 }
