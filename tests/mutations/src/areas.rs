@@ -95,7 +95,6 @@ pub const AREAS: &[Area] = &[
         tests: &[
             tests("iltm-capture", "iltm_capture", &[]),
             tests("iltm-capture", "calibration", &[]),
-            tests("iltm-tests", "scenes", &["gates"]),
         ],
     },
     Area {
@@ -105,7 +104,6 @@ pub const AREAS: &[Area] = &[
         tests: &[
             tests("iltm-session", "iltm_session", &["verify"]),
             tests("iltm", "command", &["verify"]),
-            tests("iltm-tests", "scenes", &["verify"]),
         ],
     },
     Area {

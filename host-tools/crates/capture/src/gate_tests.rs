@@ -322,6 +322,29 @@ fn photographs_that_changed_places_at_random_are_no_shift_of_all() {
 }
 
 #[test]
+fn a_photograph_of_the_next_pattern_and_one_of_a_later_one_are_not_exchanged() {
+    let folder = with(&scene(), |shown| {
+        let mut dice = Dice::new(9);
+        for (at, other) in [(30, 37), (37, 50)] {
+            shown[at].light = shown[other].light.clone();
+            for light in &mut shown[at].light {
+                *light += 0.003 * dice.normal();
+            }
+        }
+    });
+    let order = gate(&folder, GateName::Order);
+    assert_eq!((order.fails(), order.number), (true, 2.0), "{order:?}");
+    let words = [
+        "030.png shows that of photos/037.png",
+        "037.png shows that of photos/050.png",
+    ];
+    assert!(
+        words.iter().all(|words| order.what.contains(words)),
+        "{order:?}"
+    );
+}
+
+#[test]
 fn photographs_after_one_that_was_taken_twice_are_named_as_earlier() {
     let folder = with(&scene(), |shown| {
         for at in (31..shown.len()).rev() {
@@ -474,7 +497,15 @@ fn noise_is_shown_for_each_cell_as_it_is() {
         ..scene()
     };
     let folder = with(&scene, |_| {});
-    let noise = shown_of_cells(&gate(&folder, GateName::Noise));
+    let judged = gate(&folder, GateName::Noise);
+    let noise = shown_of_cells(&judged);
+    // All cells are about as bright.
+    let squares: f64 = noise.iter().map(|noise| noise * noise).sum();
+    let number = (squares / noise.len() as f64).sqrt();
+    assert!(
+        (judged.number / number - 1.0).abs() < 0.05,
+        "{number}: {judged:?}"
+    );
     let pixels = shown_of_cells(&gate(&folder, GateName::Coverage));
     for (cell, (noise, pixels)) in noise.iter().zip(&pixels).enumerate() {
         let white = scene.direct + 107.0 * scene.bounced;

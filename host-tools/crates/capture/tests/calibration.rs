@@ -174,6 +174,13 @@ fn a_white_segment_is_named_and_a_projector_without_one_is_not() {
         let mut gates = examined.gates.into_iter();
         let response = gates.find(|gate| gate.name == GateName::Response).unwrap();
         assert_eq!(response.fails(), excess.is_some(), "{response:?}");
+        let Evidence::Curve { points, .. } = &response.evidence else {
+            panic!("{response:?}");
+        };
+        // The ramp of white alone.
+        let levels: Vec<f64> = points.iter().map(|point| point.0).collect();
+        let shown: Vec<f64> = (0..=15).map(|k| 17.0 * f64::from(k)).collect();
+        assert_eq!(levels, shown);
         if let Some(words) = excess {
             assert!(response.what.contains(words), "{response:?}");
             assert!(
