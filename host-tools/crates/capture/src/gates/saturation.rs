@@ -56,3 +56,35 @@ pub(super) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gat
         ..Gate::of_share(GateName::Saturation, verdict, (number, limit), next_step)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(count: usize, lost: usize) -> Gate {
+        let clipped = Clipped {
+            lit: 1_000,
+            count,
+            ceiling: None,
+        };
+        let why = Why::Saturated {
+            saturated: 9,
+            pixels: 10,
+        };
+        let left_out: Vec<LeftOut> = (0..lost).map(|cell| LeftOut { cell, why }).collect();
+        judge(&clipped, &left_out, 200 - lost)
+    }
+
+    #[test]
+    fn pixels_or_cells_are_said_whichever_is_closer_to_its_limit() {
+        let said = |gate: &Gate| (gate.verdict, gate.number.round(), gate.limit.round());
+        assert_eq!(said(&judged(50, 2)), (Verdict::Warn, 5.0, 10.0));
+        assert_eq!(said(&judged(50, 8)), (Verdict::Warn, 4.0, 5.0));
+        assert_eq!(said(&judged(50, 12)), (Verdict::Fail, 6.0, 5.0));
+        assert_eq!(said(&judged(110, 0)), (Verdict::Fail, 11.0, 10.0));
+        assert_eq!(said(&judged(5, 0)), (Verdict::Pass, 1.0, 10.0));
+        // Photographs of other patterns lose cells where nothing is clipped.
+        assert_eq!(said(&judged(0, 40)), (Verdict::Pass, 0.0, 10.0));
+        assert!(judged(50, 8).what.contains("8 of 200 cells are lost"));
+    }
+}

@@ -104,3 +104,32 @@ fn cuts_off(
     };
     excess(true) > excess(false) + CUT_OFF
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The ceiling of a plane whose values are these, each so many times; the last ones are
+    /// saturated.
+    fn ceiling(values: &[(f32, usize)], saturated: usize) -> Option<f32> {
+        let plane: Vec<f32> = (values.iter())
+            .flat_map(|&(value, count)| vec![value; count])
+            .collect();
+        let lit: Vec<usize> = (0..plane.len()).collect();
+        let from = plane.len() - saturated;
+        let known: Vec<bool> = lit.iter().map(|at| *at >= from).collect();
+        ceiling_of(&plane, &lit, &known)
+    }
+
+    #[test]
+    fn a_ceiling_is_a_highest_value_that_is_far_more_frequent_than_those_below() {
+        let below: Vec<(f32, usize)> = (0..20).map(|k| (0.02 * k as f32, 10)).collect();
+        let with = |top: &[(f32, usize)]| [&below, top].concat();
+        assert_eq!(ceiling(&with(&[(0.5, 60)]), 0), Some(0.5));
+        assert_eq!(ceiling(&with(&[(0.5, 49)]), 0), None);
+        // What is saturated anyway is not looked at.
+        assert_eq!(ceiling(&with(&[(0.5, 60), (0.98, 300)]), 300), Some(0.5));
+        // Too few values below say nothing.
+        assert_eq!(ceiling(&[&below[..7], &[(0.5, 60)]].concat(), 0), None);
+    }
+}

@@ -98,4 +98,13 @@ mod tests {
         assert!((scatter / best - 1.0).abs() < 0.04, "{}", scatter / best);
         assert!((mean - light).abs() < 4.0 * (best / count).sqrt());
     }
+
+    #[test]
+    fn rounding_is_uniform_over_a_step_of_the_file() {
+        // 16 bits at most are told apart.
+        for (bits, step) in [(8, 1.0 / 255.0), (12, 1.0 / 4095.0), (32, 1.0 / 65_535.0)] {
+            let wanted: f64 = step * step / 12.0;
+            assert!((rounding(bits) / wanted - 1.0).abs() < 1e-12, "{bits}");
+        }
+    }
 }

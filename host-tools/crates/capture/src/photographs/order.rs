@@ -332,6 +332,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn shifts_of_one_and_two_are_tried_from_every_eighth_of_a_session() {
+        let tried: Vec<(usize, isize)> = Shift::all(80).map(|s| (s.from, s.by)).collect();
+        let wanted = [1, -1, 2, -2].map(|by| (0..8).map(move |eighth| (10 * eighth, by)));
+        assert_eq!(tried, wanted.into_iter().flatten().collect::<Vec<_>>());
+    }
+
+    #[test]
     fn enough_cells_that_agree_are_significant_and_few_or_scattered_ones_are_not() {
         assert!(significant(&[1.0; LEAST_CELLS]));
         assert!(significant(&[0.9; 8]));

@@ -93,10 +93,8 @@ pub(crate) fn register(
     let gray = &gray_code::decode(sequence, linear, progress)?;
     progress.end();
     let photographs = &mut linear.photographs;
-    progress.begin(
-        "registering camera pixels",
-        sequence.bernoulli().len() as u64,
-    );
+    // Nobody knows how many rounds over the photographs it will take.
+    progress.begin("registering camera pixels", 0);
     let camera = (photographs.format.width, photographs.format.height);
     let mut candidates: Vec<Candidate> = (0..)
         .zip(&gray.cell)
