@@ -345,6 +345,35 @@ fn a_photograph_of_the_next_pattern_and_one_of_a_later_one_are_not_exchanged() {
 }
 
 #[test]
+fn a_photograph_that_shows_no_pattern_is_named_and_white_that_is_a_little_dark_is_not() {
+    // As many cells as ever, every other one of a checkerboard.
+    let scene = scene();
+    let (rows, cols) = (scene.rows, scene.cols);
+    let lit = (0..rows * cols).map(|cell| (cell / cols + cell % cols) % 2 == 0);
+    let board = Pattern {
+        rows,
+        cols,
+        lit: lit.collect(),
+    };
+    let folder = with(&scene, |shown| {
+        shown[40].light = scene.light(&board);
+        for light in &mut shown[0].light {
+            *light *= 0.95;
+        }
+    });
+    let order = gate(&folder, GateName::Order);
+    assert_eq!((order.fails(), order.number), (true, 1.0), "{order:?}");
+    assert!(order.what.contains("040.png shows none"), "{order:?}");
+    let (values, limit, _) = shown_of_photographs(&order);
+    // Half of the cells are not as they should be.
+    let (own, limit) = (values[40].1, limit.unwrap());
+    assert!(
+        (own - 0.5).abs() < 0.15 && (limit - 0.35).abs() < 1e-9,
+        "{own} {limit}"
+    );
+}
+
+#[test]
 fn photographs_after_one_that_was_taken_twice_are_named_as_earlier() {
     let folder = with(&scene(), |shown| {
         for at in (31..shown.len()).rev() {
