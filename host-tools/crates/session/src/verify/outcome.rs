@@ -258,3 +258,46 @@ fn changed(bound: &Bound, drift: &Drift) -> Cause {
         Some(_) => Cause::ProjectorResponse,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::WhiteChange;
+
+    #[test]
+    fn what_changed_is_the_scene_then_a_colour_then_the_response() {
+        let bound = Bound {
+            limit: 0.02,
+            given: false,
+            predicted: None,
+            range: None,
+            noise: None,
+            viewpoint: 0.0,
+            promise: 0.01,
+            added: 0.0,
+            expected: None,
+            doubt: 0.02,
+        };
+        let cause = |shape: f64, level: [f64; 3]| {
+            let white = WhiteChange {
+                level: level.to_vec(),
+                shape,
+                alone: 0.005,
+                cells: Vec::new(),
+            };
+            let drift = Drift {
+                white: Some(white),
+                session: 0.0,
+            };
+            changed(&bound, &drift)
+        };
+        assert_eq!(cause(0.05, [1.0, 1.0, 0.9]), Cause::Scene);
+        assert_eq!(cause(0.02, [1.0, 1.0, 0.9]), Cause::Colour);
+        assert_eq!(cause(0.02, [1.0, 1.0, 0.98]), Cause::ProjectorResponse);
+        let unknown = Drift {
+            white: None,
+            session: 0.0,
+        };
+        assert_eq!(changed(&bound, &unknown), Cause::Unknown);
+    }
+}
