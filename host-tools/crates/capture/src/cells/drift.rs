@@ -74,6 +74,19 @@ pub(crate) struct Steadiness {
     pub(crate) excess: Option<f64>,
 }
 
+impl Steadiness {
+    /// The same with the changes from photograph to photograph so many times as large.
+    pub(crate) fn scaled(mut self, times: f64) -> Self {
+        for gain in self.gains.iter_mut().chain(&mut self.slow) {
+            *gain = 1.0 + times * (*gain - 1.0);
+        }
+        for error in &mut self.errors {
+            *error *= times;
+        }
+        self
+    }
+}
+
 /// Finds out how the light in all cells (`N x shots` a channel) changed.
 pub(crate) fn assess(sequence: &Sequence, live: &[bool], channels: &[DMatrix<f64>]) -> Steadiness {
     let darks: Vec<Vec<f64>> = channels.iter().map(|l| dark_curve(sequence, l)).collect();

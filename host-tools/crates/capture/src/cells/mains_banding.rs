@@ -33,6 +33,17 @@ pub(crate) struct MainsBanding {
     pub(crate) tried: Vec<(f64, f64)>,
 }
 
+impl MainsBanding {
+    /// The same with amplitudes so many times as large.
+    pub(crate) fn scaled(mut self, times: f64) -> Self {
+        self.amplitude *= times;
+        for (_, amplitude) in &mut self.tried {
+            *amplitude *= times;
+        }
+        self
+    }
+}
+
 /// Finds the bands of a capture, by the models of its channels or, without any, by the pairs of
 /// the Gray code in `light` (`N x shots` a channel); `None` if there are too few of these.
 pub(crate) fn find(

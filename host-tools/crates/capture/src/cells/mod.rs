@@ -44,22 +44,13 @@ pub(crate) struct CellEvidence {
     pub(crate) noise: NoiseSource,
     pub(crate) steadiness: Steadiness,
     pub(crate) banding: Option<MainsBanding>,
-    /// Both once more where single pixels contradict the declared response: a curve looks like
-    /// flicker.
-    pub(crate) straightened: Option<Straightened>,
+    /// Both once more by the light that single pixels tell, where they contradict the declared
+    /// response: a curve looks like flicker. Changes are those of the light as read.
+    pub(crate) straightened: Option<(Steadiness, Option<MainsBanding>)>,
     /// How well light adds up; `None` without inverses.
     pub(crate) sums: Option<Sums>,
     /// Why light does not add up, where it does not.
     pub(crate) nonlinearity: Option<Nonlinearity>,
-}
-
-/// How the session went by the light that single pixels tell.
-pub(crate) struct Straightened {
-    /// Light as read, raised to this power, is that light; small changes of it are as many times
-    /// as large.
-    pub(crate) power: f64,
-    pub(crate) steadiness: Steadiness,
-    pub(crate) banding: Option<MainsBanding>,
 }
 
 impl CellEvidence {
@@ -90,11 +81,9 @@ impl CellEvidence {
             let light: Vec<DMatrix<f64>> = light.channels.iter().map(raised).collect();
             let steadiness = drift::assess(sequence, live, &light);
             let banding = bands(&steadiness, &light);
-            Straightened {
-                power,
-                steadiness,
-                banding,
-            }
+            // A power makes small changes as many times as large.
+            let banding = banding.map(|bands| bands.scaled(1.0 / power));
+            (steadiness.scaled(1.0 / power), banding)
         };
         let observed = measure::average(sequence, &light, pixels, &steadiness.drift);
         // Before one white there is nothing to follow the light by: what bends it would be

@@ -157,7 +157,7 @@ impl CameraFit {
         if !self.contradicts() && !self.would_notice() {
             return format!(
                 "the photographs hardly tell the camera's response: as read ({}) they add up \
-                 within {declared}, and with a gamma {NOTICED} times that nearly as well",
+                 within {declared}, and with a gamma off by a factor of {NOTICED} nearly as well",
                 self.declared
             );
         }

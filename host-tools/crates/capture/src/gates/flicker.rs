@@ -20,9 +20,9 @@ pub(super) fn judge(sequence: &Sequence, cells: &CellEvidence) -> Gate {
     let read = (&cells.steadiness, cells.banding.as_ref());
     let number = |(steadiness, bands)| scatter(steadiness).max(striped(bands));
     let (steadiness, bands) = (cells.straightened.as_ref())
-        .map(|other| (other.power, (&other.steadiness, other.banding.as_ref())))
-        .filter(|(power, other)| number(*other) < power * number(read))
-        .map_or(read, |(_, other)| other);
+        .map(|(steadiness, bands)| (steadiness, bands.as_ref()))
+        .filter(|other| number(*other) < number(read))
+        .unwrap_or(read);
     let name = GateName::Flicker;
     let compared = !steadiness.models.is_empty();
     if !compared && bands.is_none() {
