@@ -385,13 +385,31 @@ fn bound(
 ) -> Bound {
     let own = table.inverse_error().to_num::<f64>();
     let predicted = tier_costs(table).last().map(|step| step.total);
-    let predicted = predicted.filter(|_| own > 0.0);
-    let noise = noise(readings, lit);
-    let count = images.len().max(1) as f64;
-    let mean = |of: &dyn Fn(usize) -> f64| (0..images.len()).map(of).sum::<f64>() / count;
-    let noise_of = |image: usize| noise.as_ref().map_or(0.0, |noise| noise[image]);
-    let range_of = |image: usize| images[image].modelled.map_or(0.0, |modelled| modelled[1]);
-    let modelled = images.iter().all(|image| image.modelled.is_some());
+    let range = |image: &ImageVerdict| image.modelled.map(|modelled| modelled[1]);
+    let ranges: Vec<Option<f64>> = images.iter().map(range).collect();
+    bound_of(
+        predicted.filter(|_| own > 0.0),
+        (before, given),
+        &ranges,
+        noise(readings, lit).as_deref(),
+        viewpoint,
+    )
+}
+
+/// The same from what the table predicts of itself, and from what range and noise make in each
+/// image.
+fn bound_of(
+    predicted: Option<f64>,
+    (before, given): (f64, Option<f64>),
+    ranges: &[Option<f64>],
+    noise: Option<&[f64]>,
+    viewpoint: f64,
+) -> Bound {
+    let count = ranges.len().max(1) as f64;
+    let mean = |of: &dyn Fn(usize) -> f64| (0..ranges.len()).map(of).sum::<f64>() / count;
+    let noise_of = |image: usize| noise.map_or(0.0, |noise| noise[image]);
+    let range_of = |image: usize| ranges[image].unwrap_or(0.0);
+    let modelled = ranges.iter().all(Option::is_some);
     let unpredicted = given.unwrap_or(UNPREDICTED * before) / MARGIN;
     let promise_of = |image: usize| match (given, predicted) {
         (None, Some(predicted)) => predicted.hypot(range_of(image)),
@@ -405,7 +423,7 @@ fn bound(
         promise.hypot(noise).hypot(viewpoint)
     });
     let expected = predicted.filter(|_| given.is_none()).map(|_| expected);
-    let limit = expected.map_or(MARGIN * unpredicted, |expected| MARGIN * expected);
+    let limit = MARGIN * expected.unwrap_or(unpredicted);
     let explained = mean(&|image| promise_of(image).hypot(added_of(image)));
     Bound {
         limit,
@@ -680,6 +698,44 @@ mod tests {
         assert_eq!(unsure(0.016, 0.0), (Some(Cause::Noise), Cause::Noise));
         let viewpoint = Cause::Viewpoint;
         assert_eq!(unsure(0.0, 0.026), (Some(viewpoint), viewpoint));
+    }
+
+    #[test]
+    fn a_limit_counts_noise_and_viewpoint_up_to_their_share_of_each_images_promise() {
+        // Promises of .05 and .03: the table's own .03, and what range leaves.
+        let ranges = [Some(0.04), Some(0.0)];
+        let bound = bound_of(Some(0.03), (0.5, None), &ranges, Some(&[0.0; 2]), 0.0);
+        assert!(close(bound.promise, 0.04) && close(bound.range.unwrap(), 0.02));
+        assert!(close(bound.limit, 0.06) && close(bound.doubt, 0.06));
+        // Noise beyond 1.5 promises, and a viewpoint beyond 2.5, raise the doubt only.
+        let one = |noise, viewpoint| {
+            bound_of(
+                Some(0.03),
+                (0.5, None),
+                &[Some(0.04)],
+                Some(&[noise]),
+                viewpoint,
+            )
+        };
+        let noisy = one(1.0, 0.0);
+        assert!(close(noisy.limit, 1.5 * 0.05_f64.hypot(0.075)));
+        assert!(close(noisy.doubt, 1.5 * 0.05_f64.hypot(1.0)));
+        assert!(close(one(0.0, 1.0).limit, 1.5 * 0.05_f64.hypot(0.125)));
+        // A bound that is asked for, or half of the error before, is the limit as it is.
+        for (predicted, given, limit) in [
+            (Some(0.03), Some(0.02), 0.02),
+            (None, None, 0.25),
+            (None, Some(0.1), 0.1),
+        ] {
+            let bound = bound_of(predicted, (0.5, given), &ranges, None, 0.0);
+            assert!(close(bound.limit, limit), "{bound:?}");
+            assert!(close(bound.promise, limit / 1.5), "{bound:?}");
+            assert_eq!((bound.expected, bound.noise), (None, None));
+        }
+        assert_eq!(
+            bound_of(Some(0.03), (0.5, None), &[None], None, 0.0).range,
+            None
+        );
     }
 
     fn verdict(cells: [Vec<Option<f64>>; 2]) -> ImageVerdict {

@@ -180,15 +180,20 @@ fn expectation(verdict: &TableVerdict) -> Vec<(&'static str, String)> {
     lines
 }
 
+/// What is said first of a table that makes it no better.
+const fn harm([before, after]: [f64; 2]) -> &'static str {
+    if after >= before {
+        "With the table the error is no smaller than without. "
+    } else {
+        ""
+    }
+}
+
 /// Why it passed or not, a sentence or two.
 #[must_use]
 pub fn reason(verdict: &TableVerdict) -> String {
     let [before, after] = verdict.error;
-    let harm = if after >= before {
-        "With the table the error is larger than without. "
-    } else {
-        ""
-    };
+    let harm = harm(verdict.error);
     let bound = &verdict.bound;
     let level = verdict.drift.white.iter().flat_map(|white| &white.level);
     let level: Vec<f64> = level.copied().collect();
@@ -357,4 +362,16 @@ fn drift(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
             p .quiet { "During this session white changed by " (session) "." }
         }
     } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::harm;
+
+    #[test]
+    fn only_a_table_that_makes_it_no_better_is_said_to_do_harm() {
+        assert_eq!(harm([0.2, 0.1]), "");
+        assert!(harm([0.2, 0.2]).contains("no smaller"));
+        assert!(harm([0.1, 0.2]).contains("no smaller"));
+    }
 }
