@@ -125,3 +125,38 @@ fn evidence(devices: &Devices) -> Evidence {
         points,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::devices::Ramp;
+    use crate::{Fall, Settings};
+
+    #[test]
+    fn a_camera_is_suspected_only_where_white_is_darker_and_nothing_falls() {
+        let ramp = |fall: bool, white_excess: f64| Ramp {
+            points: Vec::new(),
+            response: None,
+            fall: fall.then_some(Fall {
+                channel: RampChannel::White,
+                level: 200,
+                share: 0.2,
+            }),
+            white_excess: Some(white_excess),
+            mixing: None,
+        };
+        let suspected = |ramp: Ramp| {
+            let devices = Devices {
+                ramp: Some(ramp),
+                ..Devices::declared(&Settings::default())
+            };
+            let gate = judge(&devices, None);
+            assert_eq!(gate.verdict, Verdict::Fail, "{}", gate.what);
+            gate.next_step.contains("makes white darker")
+        };
+        assert!(suspected(ramp(false, -0.2)));
+        assert!(!suspected(ramp(false, 0.2)));
+        assert!(!suspected(ramp(true, -0.2)));
+        assert!(!suspected(ramp(true, 0.2)));
+    }
+}

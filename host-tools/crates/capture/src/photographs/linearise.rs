@@ -154,3 +154,29 @@ impl<'a> LinearPhotographs<'a> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::sequence::{CaptureOptions, Selection};
+    use crate::test_capture::TestCapture;
+    use crate::{Manifest, Settings};
+
+    #[test]
+    fn a_pixel_that_was_saturated_once_stays_so() {
+        let folder = tempfile::tempdir().unwrap();
+        TestCapture::default().write(folder.path());
+        let shots = Manifest::read(folder.path()).unwrap().shots;
+        let options = CaptureOptions::default();
+        let mut chosen = Selection::new(folder.path(), &shots, &options).unwrap();
+        chosen.find_photographs(folder.path()).unwrap();
+        let sequence = Sequence::read(folder.path(), chosen).unwrap();
+        let reading = Settings::default().camera.reading();
+        let read = LinearPhotographs::read(folder.path(), &sequence, &reading, &Silent);
+        let mut linear = read.unwrap();
+        assert!(!linear.saturated[3]);
+        linear.saturated[3] = true;
+        linear.average_white_black(&sequence, &Silent).unwrap();
+        assert!(linear.saturated[3] && !linear.saturated[4]);
+    }
+}

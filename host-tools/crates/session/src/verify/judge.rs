@@ -660,6 +660,10 @@ fn worst(table: &Table<'_>, images: &[ImageVerdict]) -> Vec<WorstCell> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verify::test_scene::scene;
+    use iltm_capture::{CellReadings, Registration};
+    use iltm_compile::{CompileOptions, compile};
+    use iltm_runtime::Grid;
 
     fn close(found: f64, wanted: f64) -> bool {
         (found - wanted).abs() < 1e-12
@@ -736,6 +740,71 @@ mod tests {
             bound_of(Some(0.03), (0.5, None), &[None], None, 0.0).range,
             None
         );
+    }
+
+    /// White as photographs of 2 x 2 cells in two channels show it.
+    fn readings(white: Vec<CellPlanes>) -> Readings {
+        let registration = Registration {
+            camera: (0, 0),
+            binning: 1,
+            cell_of_pixel: Vec::new(),
+            seen_cell: Vec::new(),
+            centre: vec![None; 4],
+        };
+        Readings {
+            shown: Vec::new(),
+            revisited: CellReadings {
+                grid: Grid::new(2, 2).unwrap(),
+                channels: 2,
+                live: vec![true; 4],
+                left_out: Vec::new(),
+                registration,
+                gates: Vec::new(),
+                cause: None,
+                white,
+                black: Vec::new(),
+                pictures: Vec::new(),
+                views: Vec::new(),
+                step: 1,
+            },
+            live: vec![true; 4],
+            wanted: false,
+            flood: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn white_changes_by_a_level_for_each_channel_and_a_shape_over_the_cells() {
+        // The means of both photographs: .9 of what is expected, in one cell .99; .8 in the other
+        // channel.
+        let one = vec![vec![0.8, 0.8, 0.8, 0.89], vec![0.8; 4]];
+        let other = vec![vec![1.0, 1.0, 1.0, 1.09], vec![0.8; 4]];
+        let lit = LiveCells::new(&[true; 4]);
+        let flood = vec![vec![0.5; 4]; 2];
+        let change = white_change(&readings(vec![one, other]), &flood, 2.0, 2, &lit);
+        assert!(close(change.level[0], 0.9) && close(change.level[1], 0.8));
+        let near = |found: f64, wanted: f64| (found - wanted).abs() < 1e-6;
+        assert!(near(change.shape, (0.01_f64 / 8.0).sqrt()));
+        // The mean over the channels.
+        let cells: Vec<f64> = change.cells.iter().flatten().copied().collect();
+        assert!(cells[..3].iter().all(|off| near(*off, 0.0)), "{cells:?}");
+        assert!(near(cells[3], 0.05), "{cells:?}");
+    }
+
+    #[test]
+    fn brightness_is_wanted_white_of_the_middle_image_over_the_projector_s_own() {
+        let options = CompileOptions::default();
+        let compiled = compile(&scene(1), None, &options).unwrap();
+        let table = Table::check(&compiled.image).unwrap();
+        let image = |white: f64| ImageVerdict {
+            white,
+            ..verdict([Vec::new(), Vec::new()])
+        };
+        let images = [image(0.2), image(0.4), image(0.3)];
+        let readings = readings(vec![vec![vec![0.5, 0.7, 0.6, 0.6]; 2]]);
+        let lit = LiveCells::new(&[true; 4]);
+        let found = brightness(&readings, &images, &mut Expected::new(&table), &lit);
+        assert!(close(found, 0.3 / 0.6), "{found}");
     }
 
     fn verdict(cells: [Vec<Option<f64>>; 2]) -> ImageVerdict {

@@ -211,3 +211,28 @@ fn blocks(cells: &Picture) -> Picture {
     let size = cells.size();
     cells.enlarged(MAP_SIDE.div_ceil(size.width().max(size.height())))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use iltm_picture::Samples;
+
+    #[test]
+    fn a_map_shows_every_cell_in_its_place() {
+        let grid = Grid::new(2, 3).unwrap();
+        let scale = ColourScale::linear(Palette::Magma, 1.0);
+        let cells = [Some(0.0), Some(0.5), None, Some(1.0), None, Some(0.25)];
+        let picture = map(grid, &scale, &cells);
+        let (width, height) = (picture.size().width(), picture.size().height());
+        let Samples::Eight(samples) = picture.samples() else {
+            panic!("8 bits");
+        };
+        for (cell, value) in cells.into_iter().enumerate() {
+            let (row, col) = (cell / 3, cell % 3);
+            let (x, y) = ((2 * col + 1) * width / 6, (2 * row + 1) * height / 4);
+            let at = 3 * (y * width + x);
+            let wanted = value.map_or(UNKNOWN, |value| scale.colour(value));
+            assert_eq!(samples[at..at + 3], wanted, "{cell}");
+        }
+    }
+}
