@@ -50,6 +50,11 @@ pub struct Mutant {
 }
 
 impl Mutant {
+    /// Whether it lies in a line that is written like `order.rs:265`.
+    pub fn lies_at(&self, line: &str) -> bool {
+        format!("{}:{}", self.listed.file, self.listed.span.start.line).ends_with(line)
+    }
+
     /// In words.
     pub fn words(&self) -> String {
         let Listed {

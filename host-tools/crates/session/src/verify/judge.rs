@@ -785,6 +785,13 @@ mod tests {
         assert!(close(change.level[0], 0.9) && close(change.level[1], 0.8));
         let near = |found: f64, wanted: f64| (found - wanted).abs() < 1e-6;
         assert!(near(change.shape, (0.01_f64 / 8.0).sqrt()));
+        // A cell alone shares nothing with its neighbours; all of a row do.
+        assert!(near(change.alone, change.shape));
+        let row = vec![vec![0.9, 0.9, 0.99, 0.99], vec![0.9, 0.9, 0.99, 0.99]];
+        let change = white_change(&readings(vec![row]), &flood, 2.0, 2, &lit);
+        assert!(change.alone < 0.9 * change.shape, "{change:?}");
+        let one = vec![vec![0.9, 0.9, 0.9, 0.99], vec![0.8; 4]];
+        let change = white_change(&readings(vec![one]), &flood, 2.0, 2, &lit);
         // The mean over the channels.
         let cells: Vec<f64> = change.cells.iter().flatten().copied().collect();
         assert!(cells[..3].iter().all(|off| near(*off, 0.0)), "{cells:?}");
@@ -800,7 +807,7 @@ mod tests {
             white,
             ..verdict([Vec::new(), Vec::new()])
         };
-        let images = [image(0.2), image(0.4), image(0.3)];
+        let images = [0.2, 0.4, 0.3, 0.1, 0.5].map(image);
         let readings = readings(vec![vec![vec![0.5, 0.7, 0.6, 0.6]; 2]]);
         let lit = LiveCells::new(&[true; 4]);
         let found = brightness(&readings, &images, &mut Expected::new(&table), &lit);
