@@ -185,7 +185,7 @@ fn photograph(
             response: scene.projector.response,
         };
         let codes = slides.codes(&session.indices())?;
-        session = session.showing(codes);
+        session = session.showing(camera.grid(), codes);
     }
     let taken = match (arguments.shot, &arguments.output) {
         (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),

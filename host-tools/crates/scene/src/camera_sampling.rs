@@ -8,7 +8,7 @@ use super::description::{Gloss, Panel};
 use super::facets::Facets;
 use super::form_factor::from_point;
 use super::near_field::NearField;
-use super::patches::Patches;
+use super::patches::{Patch, Patches};
 use super::projector_light::ProjectorLight;
 use super::sparse::{SparseRows, merge};
 use nalgebra::Vector3;
@@ -62,26 +62,15 @@ impl CameraSampling {
         near: Option<&NearField>,
         options: SamplingOptions,
     ) -> Self {
-        let eye = PixelSampler {
+        let pixels = PixelSampler {
             facets,
-            patches,
+            patches: Some(patches),
             light,
             near,
             options,
         };
-        let (width, height) = facets.scene().camera.size;
-        let pixels: Vec<PixelSamples> = (0..width * height)
-            .into_par_iter()
-            .map(|pixel| eye.pixel(pixel % width, pixel / width))
-            .collect();
-        let rows = |of: fn(&PixelSamples) -> &Vec<Contribution>| {
-            (0..options.channels)
-                .map(|channel| {
-                    let entry = |(index, share): &Contribution| (*index, share[channel]);
-                    SparseRows::from_rows(pixels.iter().map(|p| of(p).iter().map(entry).collect()))
-                })
-                .collect()
-        };
+        let pixels = pixels.all();
+        let rows = |of| rows(&pixels, options.channels, of);
         Self {
             direct: rows(|pixel| &pixel.direct),
             indirect: rows(|pixel| &pixel.indirect),
@@ -93,6 +82,36 @@ impl CameraSampling {
             open: pixels.iter().map(|pixel| pixel.open as f32).collect(),
         }
     }
+}
+
+/// Light straight from the projector alone, pixels x what `light` tells apart, one entry a
+/// channel.
+pub(crate) fn direct(
+    facets: &Facets<'_>,
+    light: &ProjectorLight<'_>,
+    options: SamplingOptions,
+) -> Vec<SparseRows> {
+    let pixels = PixelSampler {
+        facets,
+        patches: None,
+        light,
+        near: None,
+        options,
+    };
+    rows(&pixels.all(), options.channels, |pixel| &pixel.direct)
+}
+
+/// Some of what pixels see, one entry a channel.
+fn rows(
+    pixels: &[PixelSamples],
+    channels: usize,
+    of: fn(&PixelSamples) -> &Vec<Contribution>,
+) -> Vec<SparseRows> {
+    let of_channel = |channel: usize| {
+        let entry = |(index, share): &Contribution| (*index, share[channel]);
+        SparseRows::from_rows(pixels.iter().map(|p| of(p).iter().map(entry).collect()))
+    };
+    (0..channels).map(of_channel).collect()
 }
 
 /// One pixel's view of a cell or a patch: which, and how much of it by channel.
@@ -123,7 +142,8 @@ struct PatchView {
 
 struct PixelSampler<'e> {
     facets: &'e Facets<'e>,
-    patches: &'e Patches,
+    /// Those that light bounces from; `None` if only the projector's own light is wanted.
+    patches: Option<&'e Patches>,
     light: &'e ProjectorLight<'e>,
     near: Option<&'e NearField>,
     options: SamplingOptions,
@@ -142,6 +162,15 @@ struct SurfacePoint<'e> {
 }
 
 impl<'e> PixelSampler<'e> {
+    /// Every pixel, row by row.
+    fn all(&self) -> Vec<PixelSamples> {
+        let (width, height) = self.facets.scene().camera.size;
+        (0..width * height)
+            .into_par_iter()
+            .map(|pixel| self.pixel(pixel % width, pixel / width))
+            .collect()
+    }
+
     fn pixel(&self, col: u32, row: u32) -> PixelSamples {
         let camera = &self.facets.scene().camera;
         let (width, height) = camera.size;
@@ -224,7 +253,8 @@ impl<'e> PixelSampler<'e> {
         let view = &self.facets.scene().projector.view;
         let described = self.facets.described(point.facet);
         let albedo = point.panel.albedo.at(described.texture_place(&point.world));
-        if let Some(patch) = self.patches.at(view, point.facet, point.back, &point.world) {
+        let at = |patches: &Patches| patches.at(view, point.facet, point.back, &point.world);
+        if let Some(patch) = self.patches.and_then(at) {
             pixel
                 .indirect
                 .push((patch as u32, albedo.map(|a| part * a)));
@@ -287,23 +317,29 @@ impl<'e> PixelSampler<'e> {
     /// Adds what varies over the patches that the pixel sees: bounced light beside a
     /// fold, and what lobes send of it.
     fn vary(&self, pixel: &mut PixelSamples) {
+        let patches = self.patches.map_or(&[][..], Patches::all);
         for place in &pixel.places {
             if let Some(near) = self.near {
-                let patches = self.patches.all();
                 near.at(patches, place.patch, &place.world, |other, more| {
                     let share = place.share.map(|share| share * more);
                     pixel.detail.push((other, share));
                 });
             }
             if let Some((gloss, part)) = place.gloss {
-                self.shine(place, gloss, part, &mut pixel.lobes);
+                self.shine(patches, place, gloss, part, &mut pixel.lobes);
             }
         }
     }
 
     /// What a lobe sends to the viewer of the light that leaves patches.
-    fn shine(&self, place: &PatchView, gloss: Gloss, part: f64, seen: &mut Vec<Contribution>) {
-        let patches = self.patches.all();
+    fn shine(
+        &self,
+        patches: &[Patch],
+        place: &PatchView,
+        gloss: Gloss,
+        part: f64,
+        seen: &mut Vec<Contribution>,
+    ) {
         let normal = patches[place.patch].polygon.normal();
         for (index, other) in patches.iter().enumerate() {
             if other.facet == patches[place.patch].facet {

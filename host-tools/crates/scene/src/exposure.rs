@@ -2,6 +2,7 @@
 //! see of it.
 
 use super::effects::Effect;
+use super::pixel_sampling::PixelSampling;
 use super::radiosity::{FormFactorMatrix, StopRule, radiosity};
 use super::simulation::{Simulation, SimulationError};
 use nalgebra::DMatrix;
@@ -96,7 +97,11 @@ impl Simulation<'_> {
     }
 
     /// What each of the camera's channels gets of the projector's, its black included.
-    fn seen_by_channels(&self, projected: &[DMatrix<f64>], lamp: &[f64]) -> Vec<DMatrix<f64>> {
+    pub(crate) fn seen_by_channels(
+        &self,
+        projected: &[DMatrix<f64>],
+        lamp: &[f64],
+    ) -> Vec<DMatrix<f64>> {
         let black = if self.decisions.on(Effect::Black) {
             self.scene.projector.black
         } else {
@@ -181,21 +186,48 @@ impl Simulation<'_> {
     /// by row, before exposure and noise.
     #[must_use]
     pub fn photograph(&self, exposed: &Exposed, pattern: usize) -> Vec<Vec<f32>> {
+        self.seen(exposed, pattern, &|channel, pixel| {
+            let shown = of_channel(&exposed.shown, channel).column(pattern);
+            self.sight.direct[channel].times(pixel, |cell| shown[cell])
+        })
+    }
+
+    /// The same of a frame that is finer than the cells, whose means the pattern was. `shown` is
+    /// what each of the camera's channels gets of every pixel of the frame, one entry where it is
+    /// the same for all.
+    pub(crate) fn photograph_of_pixels(
+        &self,
+        exposed: &Exposed,
+        pattern: usize,
+        pixels: &PixelSampling,
+        shown: &[DMatrix<f64>],
+    ) -> Vec<Vec<f32>> {
+        self.seen(exposed, pattern, &|channel, pixel| {
+            let shown = of_channel(shown, channel);
+            pixels.direct[channel].times(pixel, |at| shown[at])
+        })
+    }
+
+    /// What the camera's pixels see, with light straight from the projector by channel and pixel.
+    fn seen(
+        &self,
+        exposed: &Exposed,
+        pattern: usize,
+        direct: &(dyn Fn(usize, usize) -> f64 + Sync),
+    ) -> Vec<Vec<f32>> {
         (0..self.channels)
             .map(|channel| {
-                let shown = of_channel(&exposed.shown, channel);
-                let shown = shown.column(pattern);
                 let indirect = exposed.indirect[channel].column(pattern);
                 let leaving = exposed.leaving[channel].column(pattern);
                 let ambient = exposed.ambient[channel];
                 let pixel = |pixel| {
-                    let direct = self.sight.direct[channel].times(pixel, |cell| shown[cell]);
                     let bounced = self.sight.indirect[channel].times(pixel, |at| indirect[at]);
                     let detail = self.sight.detail[channel]
                         // Where a surface is in view, light from elsewhere is not.
                         .times(pixel, |at| leaving[at] - ambient);
                     let lobes = self.sight.lobes.times(pixel, |at| leaving[at]);
                     let elsewhere = ambient * f64::from(self.sight.open[pixel]);
+                    let direct = direct(channel, pixel);
                     (direct + bounced + detail + lobes + elsewhere).max(0.0) as f32
                 };
                 let (width, height) = self.scene.camera.size;

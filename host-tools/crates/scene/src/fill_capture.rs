@@ -3,9 +3,9 @@
 
 use super::simulation::SimulationError;
 use super::virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};
-use iltm_capture::{CaptureError, find_photo, listed};
+use iltm_capture::{CaptureError, SETTINGS_FILE, Settings, find_photo, listed};
 use iltm_picture::{Samples, png, progress::Progress, whole_file};
-use iltm_runtime::{FrameSize, Grid};
+use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
@@ -80,8 +80,8 @@ pub struct UnfilledCapture {
 }
 
 impl UnfilledCapture {
-    /// Reads the manifests of a folder and their patterns, each of one pixel a cell
-    /// of `grid`.
+    /// Reads the manifests of a folder and their patterns, each of one pixel a cell of `grid` or
+    /// a slide of the projector's own pixels.
     ///
     /// # Errors
     /// [`FillCaptureError`] with the manifest's line or the pattern.
@@ -91,9 +91,15 @@ impl UnfilledCapture {
         shots.sort_by_key(|shot| shot.index);
         // Exposures are relative to the longest, which white is exposed for.
         let longest = shots.iter().filter_map(|s| s.exposure).fold(0.0, f64::max);
+        let settings = folder.join(SETTINGS_FILE).is_file();
+        let projector = settings.then(|| Settings::read(folder)).transpose()?;
+        let projector = projector.and_then(|settings| settings.projector.pixels());
         let frames = shots.iter().map(|shot| {
+            let path = folder.join(&shot.pattern);
+            let (size, codes) = frame(&path, grid, projector)?;
             Ok(ProjectedFrame {
-                codes: codes(&folder.join(&shot.pattern), grid)?,
+                size,
+                codes,
                 exposure: shot.exposure.map_or(1.0, |exposure| exposure / longest),
             })
         });
@@ -129,8 +135,9 @@ impl UnfilledCapture {
     /// The same with other input codes of every cell for each photograph, in the order of the
     /// indices; what has none stays.
     #[must_use]
-    pub fn showing(mut self, codes: Vec<Vec<[u8; 3]>>) -> Self {
+    pub fn showing(mut self, grid: Grid, codes: Vec<Vec<[u8; 3]>>) -> Self {
         for (frame, codes) in self.frames.iter_mut().zip(codes) {
+            frame.size = FrameSize::of_grid(grid);
             frame.codes = codes;
         }
         self
@@ -199,8 +206,12 @@ fn write(photograph: &Photograph, path: &Path) -> Result<(), FillCaptureError> {
     })
 }
 
-/// Input codes of every cell in a picture of one pixel a cell.
-fn codes(path: &Path, grid: Grid) -> Result<Vec<[u8; 3]>, FillCaptureError> {
+/// Size and input codes of a picture of one pixel a cell, or of what a border leaves of a slide.
+fn frame(
+    path: &Path,
+    grid: Grid,
+    projector: Option<ProjectorPixels>,
+) -> Result<(FrameSize, Vec<[u8; 3]>), FillCaptureError> {
     let refuse = |reason: String| FillCaptureError::Pattern {
         path: path.to_owned(),
         reason,
@@ -210,12 +221,22 @@ fn codes(path: &Path, grid: Grid) -> Result<Vec<[u8; 3]>, FillCaptureError> {
         source,
     })?;
     let picture = png::read(BufReader::new(file)).map_err(|error| refuse(error.to_string()))?;
-    let size = picture.size();
-    if size != FrameSize::of_grid(grid) {
+    let (found, cells) = (picture.size(), FrameSize::of_grid(grid));
+    let slide = projector.filter(|projector| projector.size() == found);
+    let (size, border) = match slide {
+        _ if found == cells => (cells, 0),
+        Some(projector) => (projector.inner(), usize::from(projector.border())),
+        None => {
+            return Err(refuse(format!(
+                "{} x {} cells (rows x columns), but the scene's projector has {grid}",
+                found.height(),
+                found.width()
+            )));
+        }
+    };
+    if size.width() < cells.width() || size.height() < cells.height() {
         return Err(refuse(format!(
-            "{} x {} cells (rows x columns), but the scene's projector has {grid}",
-            size.height(),
-            size.width()
+            "a border of {border} pixels leaves fewer pixels than {grid} cells"
         )));
     }
     let codes: Vec<u8> = match picture.samples() {
@@ -225,7 +246,12 @@ fn codes(path: &Path, grid: Grid) -> Result<Vec<[u8; 3]>, FillCaptureError> {
             codes.iter().map(eight).collect()
         }
     };
-    let pixels = codes.chunks_exact(picture.channels());
+    let channels = picture.channels();
     let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % pixel.len()]);
-    Ok(pixels.map(colour).collect())
+    let lines = codes.chunks_exact(found.width() * channels).skip(border);
+    let codes = lines.take(size.height()).flat_map(|line| {
+        let pixels = line.chunks_exact(channels).skip(border);
+        pixels.take(size.width()).map(colour)
+    });
+    Ok((size, codes.collect()))
 }

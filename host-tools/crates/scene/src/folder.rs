@@ -55,7 +55,8 @@ pub fn write(
         folder.file(numbered("patterns", index as u32), picture)?;
     }
     progress.begin("taking photographs", patterns.len() as u64);
-    let frames: Vec<ProjectedFrame> = patterns.iter().map(|(_, pattern)| pattern.into()).collect();
+    let frame = |(_, pattern): &(Role, Pattern)| ProjectedFrame::of_pattern(camera.grid(), pattern);
+    let frames: Vec<ProjectedFrame> = patterns.iter().map(frame).collect();
     let all: Vec<usize> = (0..frames.len()).collect();
     let taken = AtomicUsize::new(0);
     let bounces = camera.take(&frames, &all, |place, photograph| {

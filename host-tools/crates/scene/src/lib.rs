@@ -13,6 +13,7 @@
 //! simulation         all of it, ready for patterns            interreflection
 //! exposure           light under patterns, what pixels see of it
 //! sensor             exposure, noise, bits, response
+//! pixel_sampling   what it sees of frames finer than the cells
 //! virtual_camera     one photograph after another, drift      injected_fault
 //! folder             the photographs as a capture
 //! fill_capture       the photographs that a folder of patterns calls for
@@ -43,6 +44,7 @@ mod interreflection;
 mod near_field;
 mod patches;
 mod pinhole;
+mod pixel_sampling;
 mod projector_light;
 pub mod radiosity;
 mod sensor;

@@ -6,6 +6,7 @@ use super::facets::Facets;
 use super::patches::{Patch, samples};
 use super::pinhole::FramePlace;
 use super::sparse::{SparseRows, merge};
+use iltm_runtime::FrameSize;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -34,12 +35,32 @@ pub(crate) struct Beam {
 pub(crate) struct ProjectorLight<'f> {
     facets: &'f Facets<'f>,
     beam: Beam,
+    /// Cells across and down, or the pixels of a finer frame.
+    frame: FrameSize,
 }
 
 impl<'f> ProjectorLight<'f> {
     /// The light of the scene's projector, as much of it as `beam` says.
     pub(crate) fn new(facets: &'f Facets<'f>, beam: Beam) -> Self {
-        Self { facets, beam }
+        Self {
+            facets,
+            beam,
+            frame: FrameSize::of_grid(facets.scene().projector.grid),
+        }
+    }
+
+    /// The same light of a frame whose pixels are told apart instead of the cells. Their blur is
+    /// left to whoever makes the frame.
+    pub(crate) fn of_pixels(self, frame: FrameSize) -> Self {
+        let beam = Beam {
+            blur: false,
+            ..self.beam
+        };
+        Self {
+            beam,
+            frame,
+            ..self
+        }
     }
 
     fn projector(&self) -> &'f Projector {
@@ -80,23 +101,23 @@ impl<'f> ProjectorLight<'f> {
 
     /// Calls `each` with every cell that lights a place of the frame and its share.
     pub(crate) fn cells(&self, place: FramePlace, mut each: impl FnMut(u32, f64)) {
-        let grid = self.projector().grid;
-        let sizes = (grid.cols() as f64, grid.rows() as f64);
+        let (cols, rows) = (self.frame.width(), self.frame.height());
+        let sizes = (cols as f64, rows as f64);
         let (x, y) = (place.across * sizes.0, place.down * sizes.1);
         if !self.beam.blur {
             let inside = x >= 0.0 && y >= 0.0 && x < sizes.0 && y < sizes.1;
             if inside {
-                each((y as usize * grid.cols() + x as usize) as u32, 1.0);
+                each((y as usize * cols + x as usize) as u32, 1.0);
             }
             return;
         }
         let sigma = self.projector().blur;
-        for row in reached(y, sigma, grid.rows()) {
+        for row in reached(y, sigma, rows) {
             let down = share(y, sigma, row);
-            for col in reached(x, sigma, grid.cols()) {
+            for col in reached(x, sigma, cols) {
                 let weight = down * share(x, sigma, col);
                 if weight > 0.0 {
-                    each((row * grid.cols() + col) as u32, weight);
+                    each((row * cols + col) as u32, weight);
                 }
             }
         }
@@ -173,14 +194,14 @@ impl<'f> ProjectorLight<'f> {
 }
 
 /// Rows or columns that light a place.
-fn reached(place: f64, sigma: f64, count: usize) -> std::ops::Range<usize> {
+pub(crate) fn reached(place: f64, sigma: f64, count: usize) -> std::ops::Range<usize> {
     let low = (place - BLUR_REACH * sigma).floor().max(0.0) as usize;
     let high = (place + BLUR_REACH * sigma).ceil().max(0.0) as usize;
     low.min(count)..high.min(count)
 }
 
 /// Share of a row's or column's light at a place: a box convolved with a Gaussian.
-fn share(place: f64, sigma: f64, index: usize) -> f64 {
+pub(crate) fn share(place: f64, sigma: f64, index: usize) -> f64 {
     let from = (index as f64 - place) / (sigma * std::f64::consts::SQRT_2);
     let to = (index as f64 + 1.0 - place) / (sigma * std::f64::consts::SQRT_2);
     0.5 * (libm::erf(to) - libm::erf(from))

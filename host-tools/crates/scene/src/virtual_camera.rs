@@ -3,11 +3,12 @@
 
 use super::description::Scene;
 use super::injected_fault::{CaptureFault, InjectedFault, InjectedFaults};
+use super::pixel_sampling::PixelSampling;
 use super::sensor::Sensor;
 use super::simulation::{Simulation, SimulationError};
 use iltm_capture::Pattern;
 use iltm_picture::Response;
-use iltm_runtime::Grid;
+use iltm_runtime::{FrameSize, Grid};
 use nalgebra::DMatrix;
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use rayon::prelude::*;
@@ -19,19 +20,31 @@ const TOGETHER: usize = 64;
 /// What the projector is given for one photograph.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ProjectedFrame {
-    /// Input codes of every cell, red, green and blue, 0 to 255, length `N`.
+    /// One pixel a cell, or a finer frame without its border.
+    pub size: FrameSize,
+    /// Input codes of every pixel, red, green and blue, 0 to 255, row by row.
     pub codes: Vec<[u8; 3]>,
     /// Exposure relative to that of the other photographs.
     pub exposure: f64,
 }
 
-impl From<&Pattern> for ProjectedFrame {
-    fn from(pattern: &Pattern) -> Self {
+impl ProjectedFrame {
+    /// Lit cells white, the others black.
+    pub(super) fn of_pattern(grid: Grid, pattern: &Pattern) -> Self {
         let code = |lit: &bool| [255 * u8::from(*lit); 3];
         Self {
+            size: FrameSize::of_grid(grid),
             codes: pattern.lit.iter().map(code).collect(),
             exposure: 1.0,
         }
+    }
+
+    /// The cell that the centre of a pixel lies in.
+    fn cell(&self, grid: Grid, pixel: usize) -> usize {
+        let (x, y) = (pixel % self.size.width(), pixel / self.size.width());
+        let part = |at: usize, of: usize, cells: usize| (2 * at + 1) * cells / (2 * of);
+        let row = part(y, self.size.height(), grid.rows());
+        row * grid.cols() + part(x, self.size.width(), grid.cols())
     }
 }
 
@@ -156,7 +169,7 @@ impl<'s> VirtualCamera<'s> {
     /// [`SimulationError`], or the first error of `keep`.
     ///
     /// # Panics
-    /// If a place is beyond the frames, or a frame has not one code a cell.
+    /// If a place is beyond the frames, or a frame has not one code a pixel.
     pub fn take<E>(
         &self,
         frames: &[ProjectedFrame],
@@ -171,6 +184,13 @@ impl<'s> VirtualCamera<'s> {
             count: frames.len(),
         };
         let mut bounces = self.bounces;
+        let cells = FrameSize::of_grid(self.grid());
+        let mut finer: Vec<PixelSampling> = Vec::new();
+        for size in places.iter().map(|place| frames[*place].size) {
+            if size != cells && finer.iter().all(|known| known.size != size) {
+                finer.push(PixelSampling::new(self.simulation, size));
+            }
+        }
         for places in places.chunks(TOGETHER) {
             let shown: Vec<(usize, &ProjectedFrame)> = places
                 .iter()
@@ -186,7 +206,15 @@ impl<'s> VirtualCamera<'s> {
                 .par_iter()
                 .enumerate()
                 .map(|(column, (place, frame))| {
-                    let mut light = self.simulation.photograph(&exposed, column);
+                    let pixels = finer.iter().find(|pixels| pixels.size == frame.size);
+                    let mut light = match pixels {
+                        Some(pixels) => {
+                            let shown = self.shown(frame, &faults, lamp[column], pixels);
+                            let of = self.simulation;
+                            of.photograph_of_pixels(&exposed, column, pixels, &shown)
+                        }
+                        None => self.simulation.photograph(&exposed, column),
+                    };
                     faults.disturb(&mut light, self.scene.camera.size.0 as usize, *place);
                     let exposure = frame.exposure * faults.exposure(mean(&light), self.white);
                     keep(*place, Some(self.photograph(&light, exposure, *place)))
@@ -203,18 +231,27 @@ impl<'s> VirtualCamera<'s> {
         faults: &InjectedFaults<'_>,
         shown: &[(usize, &ProjectedFrame)],
     ) -> (Vec<DMatrix<f64>>, Vec<f64>) {
-        let response = self.scene.projector.response;
-        let light: Vec<f64> = (0..=255_u8)
-            .map(|code| response.light(f64::from(code) / 255.0))
-            .collect();
-        let cells = self.simulation.grid().cells();
-        let mut channels = vec![DMatrix::zeros(cells, shown.len()); 3];
+        let light = self.light_of_codes();
+        let grid = self.grid();
+        let cells = FrameSize::of_grid(grid);
+        let mut channels = vec![DMatrix::zeros(grid.cells(), shown.len()); 3];
         for (column, (_, frame)) in shown.iter().enumerate() {
-            assert_eq!(frame.codes.len(), cells, "a code for every cell");
-            for (cell, codes) in frame.codes.iter().enumerate() {
+            assert_eq!(frame.codes.len(), frame.size.pixels(), "a code a pixel");
+            let mut pixels = vec![0.0_f64; grid.cells()];
+            for (pixel, codes) in frame.codes.iter().enumerate() {
+                let cell = frame.cell(grid, pixel);
+                pixels[cell] += 1.0;
                 let projected = faults.projected(codes.map(|code| light[usize::from(code)]));
                 for (channel, light) in channels.iter_mut().zip(projected) {
-                    channel[(cell, column)] = light;
+                    channel[(cell, column)] += light;
+                }
+            }
+            if frame.size != cells {
+                for channel in &mut channels {
+                    let light = channel.column_mut(column);
+                    for (light, pixels) in light.into_iter().zip(&pixels) {
+                        *light /= pixels.max(1.0);
+                    }
                 }
             }
         }
@@ -232,6 +269,36 @@ impl<'s> VirtualCamera<'s> {
             channels.truncate(1);
         }
         (channels, lamp)
+    }
+
+    /// Light, 0 to 1, that the projector makes of each input code.
+    fn light_of_codes(&self) -> Vec<f64> {
+        let response = self.scene.projector.response;
+        let light = |code| response.light(f64::from(code) / 255.0);
+        (0..=255_u8).map(light).collect()
+    }
+
+    /// What each of the camera's channels gets of every pixel of a fine frame.
+    fn shown(
+        &self,
+        frame: &ProjectedFrame,
+        faults: &InjectedFaults<'_>,
+        lamp: f64,
+        pixels: &PixelSampling,
+    ) -> Vec<DMatrix<f64>> {
+        let light = self.light_of_codes();
+        let projected = |codes: &[u8; 3]| faults.projected(codes.map(|c| light[usize::from(c)]));
+        let grey = frame.codes.iter().all(|[r, g, b]| r == g && g == b);
+        let of_channel = |channel: usize| {
+            let light = frame.codes.iter().map(|codes| projected(codes)[channel]);
+            DMatrix::from_iterator(frame.codes.len(), 1, light)
+        };
+        let all: Vec<_> = (0..if grey { 1 } else { 3 }).map(of_channel).collect();
+        let mut shown = self.simulation.seen_by_channels(&all, &[lamp]);
+        for light in &mut shown {
+            pixels.blur(light);
+        }
+        shown
     }
 
     fn photograph(&self, light: &[Vec<f32>], exposure: f64, place: usize) -> Photograph {
