@@ -229,7 +229,7 @@ impl VerdictRig {
 }
 
 /// Turns the photographs of a folder into JPEG files.
-fn as_jpeg(photos: &Path, quality: u8) {
+pub fn as_jpeg(photos: &Path, quality: u8) {
     let files: Vec<PathBuf> = (fs::read_dir(photos).expect("photographs"))
         .map(|entry| entry.expect("a file").path())
         .collect();

@@ -3,7 +3,7 @@
 use super::failure::Kind;
 use super::named::Named;
 use super::simulate_chain::Chain;
-use crate::capture::{CameraSettings, GateName, MIN_BERNOULLI};
+use crate::capture::{CameraSettings, GateName, MIN_BERNOULLI, MapFormat};
 #[cfg(unix)]
 use crate::device::emulator::Board;
 use crate::scene::{CaptureFault, Effect, InjectedFault};
@@ -204,6 +204,10 @@ pub(super) struct Check {
     /// Look only at the first M Bernoulli photographs beside all others
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
+    /// File to write, .npy or .exr, with the place of the projector's picture that every camera
+    /// pixel sees
+    #[arg(long, value_name = "FILE", value_parser = map_file)]
+    pub(super) map: Option<(PathBuf, MapFormat)>,
 }
 
 #[derive(Debug, Args)]
@@ -239,6 +243,10 @@ pub(super) struct Patterns {
     /// Leave out the pictures that measure projector and camera: ramp and blur probe
     #[arg(long, conflicts_with = "ramp")]
     pub(super) no_calibration: bool,
+    /// Leave out the stripes finer than the cells, by which every camera pixel finds its place in
+    /// the projector's picture
+    #[arg(long)]
+    pub(super) no_dense: bool,
     /// Show white and black again after this many other pictures
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..))]
     pub(super) repeat_every: u16,
@@ -759,6 +767,13 @@ fn frame_size(text: &str) -> Result<FrameSize, String> {
     sides
         .and_then(|(width, height)| FrameSize::new(side(width)?, side(height)?))
         .ok_or_else(|| "a size is written like 320x240".to_owned())
+}
+
+fn map_file(text: &str) -> Result<(PathBuf, MapFormat), String> {
+    let path = PathBuf::from(text);
+    let format = MapFormat::of(&path);
+    let format = format.ok_or_else(|| "a map is a .npy or an .exr file".to_owned())?;
+    Ok((path, format))
 }
 
 #[cfg(unix)]

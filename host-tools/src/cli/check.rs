@@ -2,10 +2,10 @@
 
 use super::args::Check;
 use super::failure::{Failure, Kind};
-use super::output::{Output, write_files};
+use super::output::{Output, write_file, write_files};
 use super::progress::progress;
-use super::summary::gates;
-use crate::capture::{self, CaptureOptions, Examined, Gate, Verdict};
+use super::summary::{gates, map_fault};
+use crate::capture::{self, CaptureOptions, Examined, Gate, MapSource, ProjectorMap, Verdict};
 use crate::report;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -33,15 +33,35 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         Ok::<_, Failure>(folder.join(PAGE_FILE))
     });
     let page = page.transpose()?;
+    let map = map(arguments, &examined)?;
+    let fault = match examined.measurements.as_ref().map(|m| &m.map) {
+        Some(Some(Err(fault))) => Some(map_fault(fault)),
+        _ => None,
+    };
     let data = json!({
         "capture": arguments.capture.display().to_string(),
         "pass": failed.is_empty(),
         "not_judged": not_judged(&examined.gates),
         "gates": gates(&examined.gates),
         "cells": cells(&examined),
+        "map_fault": fault,
+        "map": map.as_ref().map(|map| json!({
+            "source": map.source.name(),
+            "projector": [map.projector.0, map.projector.1],
+            "camera": [map.camera.0, map.camera.1],
+            "binning": map.binning,
+            "known": map.known(),
+            "uncertainty": map.usual_uncertainty(),
+        })),
         "page": page.as_ref().map(|page| page.display().to_string()),
     });
     let mut text = text(&examined.gates);
+    if let Some(fault) = &fault {
+        let _ = writeln!(text, "warn stripes       {fault}");
+    }
+    if let (Some(map), Some((path, _))) = (&map, &arguments.map) {
+        let _ = writeln!(text, "{}: {}", path.display(), words(map));
+    }
     if let Some(page) = &page {
         let _ = writeln!(text, "{}: what each gate saw", page.display());
     }
@@ -53,6 +73,48 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     output.findings(&text);
     let failure = refusal(&arguments.capture.display().to_string(), &failed);
     Err(failure.with_result(data))
+}
+
+/// Writes the projector map where one is asked for.
+fn map(arguments: &Check, examined: &Examined) -> Result<Option<ProjectorMap>, Failure> {
+    let Some((path, format)) = &arguments.map else {
+        return Ok(None);
+    };
+    let capture = arguments.capture.display();
+    // Without cells, the gates say why.
+    let Some(measurements) = &examined.measurements else {
+        return Ok(None);
+    };
+    let map = match &measurements.map {
+        Some(Ok(map)) => map.clone(),
+        Some(Err(error)) => {
+            let message = format!("{capture}: {error}");
+            return Err(Failure::new(Kind::Photographs, message, error.next_step()));
+        }
+        None => ProjectorMap::of_cells(measurements),
+    };
+    let bytes = map.file(*format).map_err(|error| {
+        let message = format!("{}: {error}", path.display());
+        Failure::new(Kind::Write, message, "Write it as .npy.")
+    })?;
+    write_file(path, &bytes)?;
+    Ok(Some(map))
+}
+
+/// What a map is, for people.
+fn words(map: &ProjectorMap) -> String {
+    let (width, height) = map.projector;
+    let from = match map.source {
+        MapSource::Waves => "from fine stripes".to_owned(),
+        MapSource::Code => "from the Gray code".to_owned(),
+        MapSource::Cells => "from the cells alone, since there are no finer stripes".to_owned(),
+    };
+    format!(
+        "{} of {} camera pixels see a place of {width} x {height}, known to {:.2} pixels, {from}",
+        map.known(),
+        map.position.len(),
+        map.usual_uncertainty().unwrap_or(f32::NAN),
+    )
 }
 
 /// The capture's name for people.

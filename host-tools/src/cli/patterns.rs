@@ -23,9 +23,10 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
             arguments.ramp
         },
         probe: !arguments.no_calibration,
+        stripes: !arguments.no_dense,
         repeat_every: arguments.repeat_every.into(),
     };
-    let slides = session::order(grid, &options);
+    let slides = session::order(&layout, &options);
     let bars = progress(output);
     let made = session::write(&slides, &layout, &arguments.camera, out, bars.as_ref())?;
     let data = json!({
@@ -36,15 +37,17 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
         "border": layout.border(),
         "slides": made.slides,
         "calibration": made.calibration,
+        "stripes": made.stripes,
         "seed": arguments.seed,
     });
     let text = format!(
-        "capture     {}: {} slides of {}, {} of them to measure projector and camera\n\
+        "capture     {}: {} slides of {}, {} of them to measure projector and camera, {} fine stripes\n\
          next        read {}, then `iltm capture {} --display N --camera CMD`\n",
         out.display(),
         made.slides,
         layout.projector(),
         made.calibration,
+        made.stripes,
         out.join("README.md").display(),
         out.display(),
     );

@@ -2,8 +2,10 @@
 
 use super::words::lines;
 use crate::build_table::BuiltTable;
-use crate::capture::CameraFit;
-use crate::capture::{Devices, Diagnostics, FileFormat, Gate, LeftOut, Measurements, Verdict, Why};
+use crate::capture::{
+    CameraFit, Devices, Diagnostics, FileFormat, Gate, LeftOut, MapError, Measurements, Verdict,
+    Why,
+};
 use crate::solve::{Compensation, Flux, InverseTransport, Method, WhyLeftOut};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -169,7 +171,18 @@ pub(super) fn remarks(built: &BuiltTable) -> String {
     if let Some(why) = no_operator(built) {
         let _ = writeln!(text, "note        {why}");
     }
+    if let Some(Err(fault)) = &built.measurements.map {
+        let _ = writeln!(text, "note        {}", map_fault(fault));
+    }
     text
+}
+
+/// Why fine stripes serve nothing, and what to do about it.
+pub(super) fn map_fault(fault: &MapError) -> String {
+    format!(
+        "{fault}; gains follow the cells alone. {}",
+        fault.next_step()
+    )
 }
 
 /// Details of a table that was built, for people who ask.

@@ -31,9 +31,10 @@ fn a_folder_of_patterns_says_how_many_slides_it_has() {
     let made = user.run("patterns -o c --rows 3 --cols 4 --json");
     assert_eq!(made.said, "");
     assert_eq!(made.json()["slides"], slides(&user));
-    // White, black, 9 + 3 * 8 levels, two probes, 2 * (2 + 2) stripes and 150 by chance;
-    // white and black return after every 16 of all but the first two, and last.
-    let others = 33 + 2 + 8 + 150_usize;
+    // White, black, 9 + 3 * 8 levels, two probes, 2 * (2 + 2) stripes, 2 * (7 + 7) finer ones that
+    // halve 480 and 360 pixels until 4 are left, 2 * 4 waves and 150 by chance; white and black
+    // return after every 16 of all but the first two, and last.
+    let others = 33 + 2 + 8 + 28 + 8 + 150_usize;
     assert_eq!(slides(&user), 2 + others + 2 * others.div_ceil(16));
     let again = user.run("patterns -o c --rows 3 --cols 4");
     insta::assert_snapshot!(again.with_code());

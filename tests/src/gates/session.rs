@@ -9,7 +9,7 @@ use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::UnfilledCapture;
 use iltm::scene::{CaptureFault, Forced, InjectedFault, Simulation, VirtualCamera};
 use iltm::session::{self, Layout, OrderOptions, order};
-use iltm_runtime::FrameSize;
+use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -63,6 +63,8 @@ impl StudiedSession {
             } else {
                 5 + 4 * dice.u16(..3)
             },
+            // The gates look at the capture itself.
+            stripes: false,
             probe: dice.bool(),
             repeat_every: dice.usize(8..=24),
         };
@@ -119,13 +121,12 @@ impl StudiedSession {
         folder: &Path,
     ) {
         let grid = simulation.grid();
-        let size = FrameSize::new(2 * grid.cols() as u16, 2 * grid.rows() as u16);
-        let layout = Layout::new(grid, size.expect("a size"), 0).expect("a layout");
+        let layout = layout(grid);
         let settings = CameraSettings {
             response: self.scene.camera.response.into(),
             ..CameraSettings::default()
         };
-        let slides = order(grid, &self.order);
+        let slides = order(&layout, &self.order);
         session::write(&slides, &layout, &settings, folder, &Silent).expect("written");
         let camera = VirtualCamera::new(&self.scene, simulation, self.seed).expect("light");
         let faults: Vec<InjectedFault> = fault.into_iter().collect();
@@ -160,10 +161,8 @@ impl StudiedSession {
     /// A place among the photographs of the scene: exchanging two that measure a device is no
     /// matter of `order`.
     fn scene_place(&self, dice: &mut Rng, good: &Examined) -> f64 {
-        let slides = order(
-            good.measurements.as_ref().expect("a good session").grid,
-            &self.order,
-        );
+        let grid = good.measurements.as_ref().expect("a good session").grid;
+        let slides = order(&layout(grid), &self.order);
         let of_scene = |slide: &session::Slide| matches!(slide.purpose, session::Purpose::Scene(_));
         let places: Vec<usize> = (4..slides.len() - 2)
             .filter(|&at| of_scene(&slides[at]) && of_scene(&slides[at + 1]))
@@ -172,6 +171,12 @@ impl StudiedSession {
         // In its middle, so that no rounding moves it.
         (place as f64 + 0.5) / slides.len() as f64
     }
+}
+
+/// Two pixels of the projector along each side of a cell.
+fn layout(grid: Grid) -> Layout {
+    let size = FrameSize::new(2 * grid.cols() as u16, 2 * grid.rows() as u16);
+    Layout::new(grid, size.expect("a size"), 0).expect("a layout")
 }
 
 /// Exponent of the camera's response.

@@ -93,7 +93,7 @@ fn few_patterns_accuse_no_photograph_and_a_curved_camera_no_projector() {
     };
     let size = FrameSize::new(32, 24).unwrap();
     let layout = Layout::new(simulation.grid(), size, 0).unwrap();
-    let slides = order(simulation.grid(), &options);
+    let slides = order(&layout, &options);
     let camera = capture::CameraSettings {
         response: scene.camera.response.into(),
         ..capture::CameraSettings::default()

@@ -47,7 +47,7 @@ fn photographed(
     };
     let size = FrameSize::new(PROJECTOR.0, PROJECTOR.1).unwrap();
     let layout = Layout::new(grid, size, 0).unwrap();
-    let slides = order(grid, &options);
+    let slides = order(&layout, &options);
     session::write(&slides, &layout, &camera(scene), folder, &Silent).unwrap();
     let camera = VirtualCamera::new(scene, simulation, 5).unwrap();
     let camera = camera.with_faults(faults);

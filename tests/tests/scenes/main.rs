@@ -3,6 +3,7 @@
 
 mod closed_loop_simulated;
 mod demo;
+mod dense_map;
 mod gates;
 mod hard_cases;
 mod installation;

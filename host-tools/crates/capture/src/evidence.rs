@@ -16,6 +16,7 @@ use crate::photographs::order::{self, Order};
 use crate::photographs::sampled::Sampled;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::registration::movement::{self, Moved};
+use crate::registration::projector_map::{self, MapError, ProjectorMap};
 use crate::registration::{self, Registered};
 use iltm_picture::Declared;
 use iltm_picture::progress::Progress;
@@ -37,6 +38,8 @@ pub(crate) struct CaptureEvidence {
     pub(crate) moved: Option<Moved>,
     /// `None` if no cell was found.
     pub(crate) cells: Option<CellEvidence>,
+    /// The projector map of stripes finer than the cells, if there are any.
+    pub(crate) map: Option<Result<ProjectorMap, MapError>>,
     /// The photograph of white, as it is drawn.
     pub(crate) white: WhitePhotograph,
     /// The flood photograph with black subtracted, one plane a channel.
@@ -133,6 +136,8 @@ impl CaptureEvidence {
         };
         let found = pixels.live.contains(&true);
         let cells = found.then(measure).transpose()?;
+        let projector = &settings.projector;
+        let map = projector_map::find(folder, sequence, projector, linear, registration, progress)?;
         let format = &linear.photographs.format;
         let files = (format.file, format.bits);
         let white = WhitePhotograph::new(linear, registration);
@@ -148,6 +153,7 @@ impl CaptureEvidence {
             cells,
             registered,
             pixels,
+            map,
             white,
             flood,
         })
@@ -187,6 +193,7 @@ impl CaptureEvidence {
             live: self.pixels.live,
             registration: self.registered.registration,
             flood: self.flood,
+            map: self.map,
             devices: self.devices,
             settings: settings.clone(),
             diagnostics,

@@ -67,10 +67,13 @@ pub use format::sequence::{CaptureOptions, MIN_BERNOULLI};
 pub use format::settings::{
     CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings,
 };
+pub use format::stripe_role::{STRIPES_FILE, StripeManifest, StripeRole, StripeShot, WAVE};
 pub use gate::{Evidence, Gate, GateName, Verdict};
 pub use linear_photograph::LinearPhotograph;
 pub use photographs::photo_stats::PhotoStats;
 pub use registration::cell_map::{NO_CELL, Registration};
+pub use registration::map_file::MapFormat;
+pub use registration::projector_map::{MapError, MapSource, ProjectorMap};
 pub use registration::{MIN_REGRESSION, PixelCount, RegistrationMethod};
 pub use remeasure::{CellPlanes, CellReadings, remeasure};
 

@@ -19,8 +19,9 @@ const LEAST_FLOOD: f64 = 0.2;
 
 /// The fine gain map from a flood photograph `b`: `g(x) = (1 + (U K A b)(x)) / b(x)`.
 ///
-/// Where the inverse is exact, `1 + K b = g b` at the cells; taking `U (g b)` for
-/// the numerator makes the map agree with the solved gains where it is not quite.
+/// Where the inverse is exact, `1 + K b = g b` at the cells, `b` being what was observed of them;
+/// taking `U (g b)` for the numerator makes the map agree with the solved gains where it is not
+/// quite.
 /// `None` if the flood map is not of the inverse's grid, or no finer than it.
 #[must_use]
 pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineGains> {
@@ -33,8 +34,9 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
     let size = FrameSize::new(flood.cols as u16, flood.rows as u16)?;
     let rows = Axis::new(grid.rows(), flood.rows)?;
     let cols = Axis::new(grid.cols(), flood.cols)?;
-    let channels = flood.channels.iter().zip(&inverse.channels);
-    let channels = channels.map(|(flood_light, channel)| {
+    let channels = flood.channels.iter().zip(&flood.observed);
+    let channels = channels.zip(&inverse.channels);
+    let channels = channels.map(|((flood_light, observed), channel)| {
         let cell_of = |index: usize| {
             let (row, col) = (index / flood.cols / factor, index % flood.cols / factor);
             row * grid.cols() + col
@@ -44,7 +46,7 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
             cell_light[cell_of(index)] += f64::from(*light) / (factor * factor) as f64;
         }
         let numerator: Vec<f64> = (0..grid.cells())
-            .map(|cell| channel.gain[cell] * cell_light[cell])
+            .map(|cell| channel.gain[cell] * observed[cell])
             .collect();
         let interpolate = |index: usize| {
             let (y, x) = (

@@ -3,7 +3,7 @@
 use super::{Layout, PatternsError, Purpose, Slide};
 use iltm_capture::{
     CALIBRATION_FILE, CalibrationManifest, CameraSettings, MANIFEST_FILE, Manifest, SETTINGS_FILE,
-    numbered,
+    STRIPES_FILE, StripeManifest, numbered,
 };
 use iltm_picture::{WholeFolder, progress::Progress};
 use rayon::prelude::*;
@@ -28,6 +28,8 @@ pub struct Made {
     pub slides: usize,
     /// Those of them that measure projector and camera.
     pub calibration: usize,
+    /// Those of them that are stripes finer than the cells.
+    pub stripes: usize,
 }
 
 /// File of the slide with this index, relative to the capture folder.
@@ -56,18 +58,23 @@ pub fn write(
     slides.par_iter().enumerate().try_for_each(|(at, slide)| {
         let index = at as u32;
         let pattern = match slide.purpose {
-            Purpose::Scene(_) => "patterns",
-            Purpose::Calibration(_) => "calibration",
+            Purpose::Scene(_) => Some("patterns"),
+            Purpose::Calibration(_) => Some("calibration"),
+            // The slide says it all.
+            Purpose::Stripes(_) => None,
         };
-        folder.picture(numbered(pattern, index), &slide.cells)?;
-        folder.picture(slide_name(index), &layout.slide(&slide.cells)?)?;
+        if let Some(pattern) = pattern {
+            folder.picture(numbered(pattern, index), &slide.picture)?;
+        }
+        folder.picture(slide_name(index), &layout.slide(&slide.picture)?)?;
         progress.advance(1);
         Ok::<(), PatternsError>(())
     })?;
-    let (scene, calibration) = lists(slides);
+    let (scene, calibration, stripes) = lists(slides);
     let made = Made {
         slides: slides.len(),
         calibration: calibration.shots.len(),
+        stripes: stripes.shots.len(),
     };
     folder.file(MANIFEST_FILE, scene.to_csv())?;
     folder.file(SETTINGS_FILE, filled(SETTINGS, layout, camera, made))?;
@@ -75,25 +82,33 @@ pub fn write(
     if made.calibration > 0 {
         folder.file(CALIBRATION_FILE, calibration.to_csv())?;
     }
+    if made.stripes > 0 {
+        folder.file(STRIPES_FILE, stripes.to_csv())?;
+    }
     folder.finish()?;
     progress.end();
     Ok(made)
 }
 
 /// The lists of a folder with these slides.
-fn lists(slides: &[Slide]) -> (Manifest, CalibrationManifest) {
+fn lists(slides: &[Slide]) -> (Manifest, CalibrationManifest, StripeManifest) {
     let slides = || (0..).zip(slides.iter().map(|slide| slide.purpose));
     let scene = slides().filter_map(|(index, purpose)| match purpose {
         Purpose::Scene(role) => Some((index, role)),
-        Purpose::Calibration(_) => None,
+        Purpose::Calibration(_) | Purpose::Stripes(_) => None,
     });
     let calibration = slides().filter_map(|(index, purpose)| match purpose {
         Purpose::Calibration(role) => Some((index, role)),
-        Purpose::Scene(_) => None,
+        Purpose::Scene(_) | Purpose::Stripes(_) => None,
+    });
+    let stripes = slides().filter_map(|(index, purpose)| match purpose {
+        Purpose::Stripes(role) => Some((index, role)),
+        Purpose::Scene(_) | Purpose::Calibration(_) => None,
     });
     (
         Manifest::numbered("patterns", scene),
         CalibrationManifest::numbered("calibration", calibration),
+        StripeManifest::numbered(SLIDES_FOLDER, stripes),
     )
 }
 
@@ -150,7 +165,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("c");
         let layout = layout();
-        let slides = order(layout.grid(), options);
+        let slides = order(&layout, options);
         let made = write(&slides, &layout, &camera(), &out, &Silent).unwrap();
         (folder, out, made)
     }
@@ -224,7 +239,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("mine"), "kept").unwrap();
         let layout = layout();
-        let slides = order(layout.grid(), &OrderOptions::default());
+        let slides = order(&layout, &OrderOptions::default());
         let error = write(&slides, &layout, &camera(), folder.path(), &Silent).unwrap_err();
         let taken = matches!(error, PatternsError::Folder(FolderError::Taken { .. }));
         assert!(taken, "{error}");

@@ -140,13 +140,14 @@ impl Layout {
         inner.planes().iter().map(plane).collect()
     }
 
-    /// The projector's picture of a picture of one pixel a cell, 8 bits, grey or
-    /// RGB.
+    /// The projector's picture of a picture of one pixel a cell, or of one of
+    /// [`inner`](Self::inner), 8 bits, grey or RGB.
     ///
     /// # Errors
     /// [`PatternsError::NotCells`] if that is of another size or depth.
     pub fn slide(&self, cells: &Picture) -> Result<Picture, PatternsError> {
-        self.enlarged(cells).ok_or_else(|| PatternsError::NotCells {
+        let slide = self.enlarged(cells).or_else(|| self.framed(cells));
+        slide.ok_or_else(|| PatternsError::NotCells {
             found: cells.size(),
             grid: self.grid,
         })

@@ -1,8 +1,9 @@
 //! Order of showing: which pictures, and one after the other.
 
+use super::Layout;
 use super::calibration_pictures::{even, probes, ramp_roles};
-use iltm_capture::{CalibrationRole, Role, pattern_set};
-use iltm_picture::{Picture, Samples};
+use iltm_capture::{CalibrationRole, CodeAxis, Role, StripeRole, pattern_set};
+use iltm_picture::{Picture, Response, Samples};
 use iltm_runtime::{FrameSize, Grid};
 
 /// What a picture is shown for: which list it stands in.
@@ -12,6 +13,8 @@ pub enum Purpose {
     Scene(Role),
     /// To measure projector and camera: `calibration.csv`.
     Calibration(CalibrationRole),
+    /// To see the projector's pixels: `stripes.csv`.
+    Stripes(StripeRole),
 }
 
 /// One picture to show.
@@ -19,8 +22,9 @@ pub enum Purpose {
 pub struct Slide {
     /// What for.
     pub purpose: Purpose,
-    /// One pixel a cell, 8 bits, grey or RGB.
-    pub cells: Picture,
+    /// One pixel a cell, 8 bits, grey or RGB; of fine stripes, one a pixel of the projector
+    /// inside its border.
+    pub picture: Picture,
 }
 
 /// What to show.
@@ -33,6 +37,8 @@ pub struct OrderOptions {
     /// Levels of the response ramp, in white and in each channel, 2 to 256; 0 for
     /// none.
     pub ramp: u16,
+    /// Whether stripes finer than the cells are shown.
+    pub stripes: bool,
     /// Whether blur is probed.
     pub probe: bool,
     /// White and black are shown again after so many others, at least 1.
@@ -45,29 +51,41 @@ impl Default for OrderOptions {
             bernoulli: 150,
             seed: 1,
             ramp: 9,
+            stripes: true,
             probe: true,
             repeat_every: 16,
         }
     }
 }
 
-/// White and black, the ramps and probes, then the patterns of [`pattern_set`]; white and
-/// black again every [`OrderOptions::repeat_every`] pictures and at the very end,
+/// White and black, the ramps and probes, then the patterns of [`pattern_set`], fine stripes
+/// after the Gray code; white and black again every [`OrderOptions::repeat_every`] pictures and at the very end,
 /// which shows whether lamp, camera or scene changed meanwhile.
 ///
 /// Bernoulli patterns come last, so that a session that had to stop early still has
 /// all that a solve needs, but fewer of them.
 #[must_use]
-pub fn order(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
+pub fn order(layout: &Layout, options: &OrderOptions) -> Vec<Slide> {
+    let grid = layout.grid();
     let mut flood = Vec::new();
     let mut others = calibration(grid, options);
+    let mut stripes = if options.stripes {
+        fine_stripes(layout)
+    } else {
+        Vec::new()
+    };
     for (role, pattern) in pattern_set(grid, options.bernoulli, options.seed) {
         let list = match role {
             Role::White | Role::Black => &mut flood,
-            _ => &mut others,
+            Role::Bernoulli => {
+                others.append(&mut stripes);
+                &mut others
+            }
+            Role::Column { .. } | Role::Row { .. } => &mut others,
         };
         list.extend(slide(Purpose::Scene(role), binary(grid, &pattern.lit)));
     }
+    others.append(&mut stripes);
     let mut slides = flood.clone();
     let mut since = 0;
     for slide in others {
@@ -80,6 +98,33 @@ pub fn order(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
     }
     slides.extend(flood);
     slides
+}
+
+/// Stripes finer than the cells, of both axes, as a projector that follows sRGB shows them.
+fn fine_stripes(layout: &Layout) -> Vec<Slide> {
+    let (grid, inner) = (layout.grid(), layout.inner());
+    let sides = [
+        (CodeAxis::Column, grid.cols(), inner.width()),
+        (CodeAxis::Row, grid.rows(), inner.height()),
+    ];
+    let of_axis = |(axis, cells, pixels): (CodeAxis, usize, usize)| {
+        let (roles, bits) = StripeRole::of_axis(axis, cells, pixels);
+        roles.into_iter().filter_map(move |role| {
+            let code = |at: usize| {
+                let value = Response::Srgb.value(role.light(at, pixels, cells, bits));
+                (255.0 * value).round() as u8
+            };
+            let codes: Vec<u8> = (0..pixels).map(code).collect();
+            let at = |pixel: usize| match axis {
+                CodeAxis::Column => codes[pixel % inner.width()],
+                CodeAxis::Row => codes[pixel / inner.width()],
+            };
+            let samples = (0..inner.pixels()).map(at).collect();
+            let picture = Picture::new(inner, Samples::Eight(samples));
+            slide(Purpose::Stripes(role), picture)
+        })
+    };
+    sides.into_iter().flat_map(of_axis).collect()
 }
 
 /// Ramps and probes.
@@ -103,8 +148,8 @@ fn calibration(grid: Grid, options: &OrderOptions) -> Vec<Slide> {
     ramps.chain(probing.into_iter().filter_map(probe)).collect()
 }
 
-fn slide(purpose: Purpose, cells: Option<Picture>) -> Option<Slide> {
-    cells.map(|cells| Slide { purpose, cells })
+fn slide(purpose: Purpose, picture: Option<Picture>) -> Option<Slide> {
+    picture.map(|picture| Slide { purpose, picture })
 }
 
 /// Lit cells as 255, others as 0; `None` unless there is one of each.
@@ -117,8 +162,13 @@ fn binary(grid: Grid, lit: &[bool]) -> Option<Picture> {
 mod tests {
     use super::*;
 
+    fn layout(rows: u16, cols: u16) -> Layout {
+        let projector = FrameSize::new(16 * cols, 9 * rows).unwrap();
+        Layout::new(Grid::new(rows, cols).unwrap(), projector, 0).unwrap()
+    }
+
     fn purposes(options: &OrderOptions) -> Vec<Purpose> {
-        let slides = order(Grid::new(3, 5).unwrap(), options);
+        let slides = order(&layout(3, 5), options);
         slides.iter().map(|slide| slide.purpose).collect()
     }
 
@@ -156,13 +206,15 @@ mod tests {
             ..OrderOptions::default()
         };
         let once = |purpose: &Purpose| match purpose {
-            Purpose::Scene(Role::White | Role::Black) | Purpose::Calibration(_) => None,
+            Purpose::Scene(Role::White | Role::Black)
+            | Purpose::Calibration(_)
+            | Purpose::Stripes(_) => None,
             Purpose::Scene(role) => Some(*role),
         };
-        let slides = order(grid, &options);
+        let slides = order(&layout(3, 5), &options);
         let slides: Vec<(Role, &Picture)> = slides
             .iter()
-            .filter_map(|slide| Some((once(&slide.purpose)?, &slide.cells)))
+            .filter_map(|slide| Some((once(&slide.purpose)?, &slide.picture)))
             .collect();
         let simulated = pattern_set(grid, 40, 9);
         assert_eq!(slides.len(), simulated.len() - 2);

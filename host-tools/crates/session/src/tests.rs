@@ -29,7 +29,7 @@ impl Rig {
         let grid = Grid::new(3, 4).unwrap();
         let layout = Layout::new(grid, FrameSize::new(24, 18).unwrap(), 0).unwrap();
         let slides = order(
-            grid,
+            &layout,
             &OrderOptions {
                 bernoulli: 3,
                 ramp: 0,

@@ -78,7 +78,7 @@ impl Registration {
     }
 
     /// Cells right and down from the centre of `cell` to a pixel, each -1 to 1.
-    fn offset(&self, grid: Grid, cell: usize, pixel: usize) -> [f64; 2] {
+    pub(crate) fn offset(&self, grid: Grid, cell: usize, pixel: usize) -> [f64; 2] {
         let Some(centre) = self.centre[cell] else {
             return [0.0; 2];
         };

@@ -1,13 +1,15 @@
 //! Fine flood: the flood photograph in projector coordinates, finer than the cells.
 //!
 //! Video has more pixels than the grid has cells, so its gain map needs more
-//! than one flood value a cell. The map from cells to the camera goes through
+//! than one flood value a cell. With fine stripes, the projector map says which
+//! pixels see a sample. Without, the map from cells to the camera goes through
 //! the cells' mean positions, linear between them: it may bend at every cell, as
 //! it does where the surface has a crease, and it does not reach across an edge
 //! where the surface ends.
 
 use super::measurements::Measurements;
-use crate::registration::cell_map::{NO_CELL, Registration};
+use crate::registration::cell_map::Registration;
+use crate::registration::projector_map::ProjectorMap;
 use iltm_picture::statistics::median;
 use iltm_runtime::Grid;
 
@@ -30,9 +32,12 @@ pub struct FineFlood {
     /// Fine samples along a cell's side, 1 to 8.
     pub factor: usize,
     /// Flood light with black subtracted in camera units, one plane a channel,
-    /// row by row, length `rows * cols`. The mean over a live cell's samples is
-    /// that cell's flood observation; a cell that is not live has zeros.
+    /// row by row, length `rows * cols`; zeros in cells that are not live.
+    /// Without a projector map, the mean over a cell's samples is its observation.
     pub channels: Vec<Vec<f32>>,
+    /// The flood observation of each cell that a solve works with, one plane a
+    /// channel, length `N`.
+    pub observed: Vec<Vec<f64>>,
 }
 
 impl FineFlood {
@@ -51,26 +56,137 @@ impl FineFlood {
         let grid = measurements.grid;
         let (rows, cols) = (grid.rows() * factor, grid.cols() * factor);
         let mut channels = vec![vec![0.0; rows * cols]; measurements.channels.len()];
-        let surface = Surface::new(grid, &measurements.registration);
+        let surface = Surface::new(measurements);
+        let mapped = match &measurements.map {
+            Some(Ok(map)) => Some(MappedFlood::new(measurements, map, factor)),
+            _ => None,
+        };
         for cell in (0..grid.cells()).filter(|&cell| measurements.live[cell]) {
-            let samples = surface.samples(cell, factor, &measurements.flood);
+            let seen = mapped.as_ref().map(|mapped| mapped.samples(cell));
+            let known = |seen: &Vec<Vec<Option<f32>>>| seen.iter().flatten().any(Option::is_some);
+            let by_map = seen.as_ref().is_some_and(known);
+            let samples = match seen {
+                Some(seen) if by_map => seen,
+                _ => surface.samples(cell, factor, &measurements.flood),
+            };
             for (channel, samples) in samples.into_iter().enumerate() {
                 let observations = &measurements.channels[channel].observations;
                 let flood = observations[(cell, Measurements::WHITE)];
-                for (at, sample) in scaled(&samples, flood).into_iter().enumerate() {
+                let samples = if by_map {
+                    filled(&samples, factor)
+                } else {
+                    scaled(&samples, flood)
+                };
+                for (at, sample) in samples.into_iter().enumerate() {
                     let row = cell / grid.cols() * factor + at / factor;
                     let col = cell % grid.cols() * factor + at % factor;
                     channels[channel][row * cols + col] = sample;
                 }
             }
         }
+        let observed = measurements.channels.iter().map(|channel| {
+            let flood = channel.observations.column(Measurements::WHITE);
+            flood.iter().copied().collect()
+        });
         Self {
             rows,
             cols,
             factor,
             channels,
+            observed: observed.collect(),
         }
     }
+}
+
+/// The flood photograph gathered by the projector map.
+struct MappedFlood {
+    grid: Grid,
+    factor: usize,
+    /// Light times area, one plane a channel, and area, row by row over all samples.
+    light: Vec<Vec<f32>>,
+    area: Vec<f32>,
+}
+
+impl MappedFlood {
+    fn new(measurements: &Measurements, map: &ProjectorMap, factor: usize) -> Self {
+        let grid = measurements.grid;
+        let (rows, cols) = (grid.rows() * factor, grid.cols() * factor);
+        let mut light = vec![vec![0.0; rows * cols]; measurements.flood.len()];
+        let mut area = vec![0.0; rows * cols];
+        // Side of a camera's pixel in samples: as wide as it is, it adds to what it covers.
+        let side = (factor as f64 / measurements.registration.cell_side()) as f32;
+        for (pixel, place) in map.position.iter().enumerate() {
+            let [across, down] = map.in_cells(*place, grid).map(|at| at * factor as f32);
+            if across.is_nan() || down.is_nan() || !measurements.is_inside(pixel) {
+                continue;
+            }
+            for (row, tall) in covered(down, side, rows) {
+                for (col, wide) in covered(across, side, cols) {
+                    let (at, share) = (row * cols + col, tall * wide);
+                    area[at] += share;
+                    for (light, flood) in light.iter_mut().zip(&measurements.flood) {
+                        light[at] += share * flood[pixel];
+                    }
+                }
+            }
+        }
+        Self {
+            grid,
+            factor,
+            light,
+            area,
+        }
+    }
+
+    /// Samples of each plane in one cell, row by row; `None` where no pixel sees one.
+    fn samples(&self, cell: usize) -> Vec<Vec<Option<f32>>> {
+        let (cols, factor) = (self.grid.cols() * self.factor, self.factor);
+        let first = cell / self.grid.cols() * factor * cols + cell % self.grid.cols() * factor;
+        let value = |plane: &Vec<f32>, sample: usize| {
+            let at = first + sample / factor * cols + sample % factor;
+            (self.area[at] >= LEAST_COVER).then(|| plane[at] / self.area[at])
+        };
+        let plane = |plane| {
+            (0..factor * factor)
+                .map(|sample| value(plane, sample))
+                .collect()
+        };
+        self.light.iter().map(plane).collect()
+    }
+}
+
+/// Samples along a side of `count` that an interval of `side` around `middle` covers, and how much
+/// of each.
+fn covered(middle: f32, side: f32, count: usize) -> impl Iterator<Item = (usize, f32)> {
+    let (from, to) = (middle - side / 2.0, middle + side / 2.0);
+    let last = (to.ceil().max(0.0) as usize).min(count);
+    (from.max(0.0) as usize..last).filter_map(move |at| {
+        let share = to.min(at as f32 + 1.0) - from.max(at as f32);
+        (share > 0.0).then_some((at, share))
+    })
+}
+
+/// Fills unknown samples of a cell with the nearest known ones' mean.
+fn filled(samples: &[Option<f32>], factor: usize) -> Vec<f32> {
+    let value = |at: usize| {
+        let (row, col) = (at / factor, at % factor);
+        let near = (0..factor).find_map(|reach| {
+            let (mut sum, mut count) = (0.0, 0.0_f32);
+            for (other, sample) in samples.iter().enumerate() {
+                let (down, across) = (
+                    (other / factor).abs_diff(row),
+                    (other % factor).abs_diff(col),
+                );
+                if let (true, Some(sample)) = (down.max(across) == reach, sample) {
+                    sum += sample;
+                    count += 1.0;
+                }
+            }
+            (count > 0.0).then(|| sum / count)
+        });
+        near.unwrap_or(0.0)
+    };
+    (0..samples.len()).map(value).collect()
 }
 
 /// Subdivision that leaves [`PIXELS_A_SAMPLE`] in a live cell of median size.
@@ -110,23 +226,12 @@ struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    fn new(grid: Grid, registration: &'a Registration) -> Self {
-        let (width, height) = registration.camera;
-        let lit = |x: usize, y: usize| registration.seen_cell[y * width + x] != NO_CELL;
-        let inner = |at: usize| {
-            let (x, y) = (at % width, at / width);
-            (1..width - 1).contains(&x)
-                && (1..height - 1).contains(&y)
-                && lit(x, y)
-                && lit(x - 1, y)
-                && lit(x + 1, y)
-                && lit(x, y - 1)
-                && lit(x, y + 1)
-        };
+    fn new(measurements: &'a Measurements) -> Self {
+        let pixels = 0..measurements.registration.seen_cell.len();
         Self {
-            grid,
-            registration,
-            inner: (0..width * height).map(inner).collect(),
+            grid: measurements.grid,
+            registration: &measurements.registration,
+            inner: pixels.map(|pixel| measurements.is_inside(pixel)).collect(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::error::CaptureError;
 use super::role::Role;
+use super::stripe_role::STRIPES_FILE;
 use std::collections::HashMap;
 use std::fmt;
 use std::fs::File;
@@ -370,7 +371,7 @@ pub const VERIFY_FILE: &str = "verify.csv";
 
 /// Lists that a folder may hold: a capture's, and those of a folder made to verify a
 /// table.
-const LISTS: [&str; 3] = [MANIFEST_FILE, CALIBRATION_FILE, VERIFY_FILE];
+const LISTS: [&str; 4] = [MANIFEST_FILE, CALIBRATION_FILE, STRIPES_FILE, VERIFY_FILE];
 
 /// A role by its name alone: whoever photographs need not know more.
 #[derive(Clone, PartialEq, Eq, Debug)]

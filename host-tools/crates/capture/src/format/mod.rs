@@ -3,6 +3,7 @@
 //! | file | holds | module |
 //! |---|---|---|
 //! | `capture.csv`, `calibration.csv` | which picture each photograph shows | `manifest`, `role`, `calibration_role` |
+//! | `stripes.csv` | the same of stripes finer than the cells | `stripe_role` |
 //! | `capture.toml` | what photographs cannot say about themselves | `settings` |
 //! | `patterns/*.png` | which cells are lit | `pattern`, `pattern_set`, `code` |
 //! | `photos/*` | PNG, TIFF, JPEG, `OpenEXR` or netpbm | `photo_files`, `picture_file` |
@@ -26,3 +27,4 @@ pub(crate) mod reference;
 pub(crate) mod role;
 pub(crate) mod sequence;
 pub(crate) mod settings;
+pub(crate) mod stripe_role;

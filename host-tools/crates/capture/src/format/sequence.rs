@@ -89,6 +89,10 @@ pub(crate) struct Sequence {
     pub(crate) codes: [Code; 2],
     /// Columns and rows of the patterns that each cell stands for, as a power of 2.
     pub(crate) coarser: u8,
+    /// Photographs of the stripes that are finer than the cells for that reason.
+    pub(crate) finer: Vec<Bracket>,
+    /// Columns and rows of the patterns, and their codes.
+    pub(crate) shown: [(usize, Code); 2],
     /// Where the Gray code ends and the Bernoulli patterns begin in `views`.
     bernoulli_from: usize,
 }
@@ -189,6 +193,8 @@ impl Sequence {
         };
         let fits = |steps: &u8| blocks(*steps) <= Grid::MAX_CELLS;
         let coarser = (fewest..Role::MAX_BITS).find(fits).unwrap_or(fewest);
+        let shown = std::array::from_fn(|k| (sides[k].1, codes[k]));
+        let mut finer = Vec::new();
         if coarser > 0 {
             let firsts = [0, 1].map(|k| codes[k].firsts(coarser, sides[k].1));
             codes = codes.map(|code| code.coarser(coarser));
@@ -198,6 +204,8 @@ impl Sequence {
                 .collect();
             let encoded = |shot: &Shot| encoded_by(shot.role, codes);
             let kept: Vec<bool> = shots.iter().map(encoded).collect();
+            let left = brackets.iter().zip(&kept).filter(|(_, kept)| !**kept);
+            finer = left.map(|(bracket, _)| bracket.clone()).collect();
             keep(&mut brackets, &kept);
             keep(&mut shots, &kept);
             keep(&mut patterns, &kept);
@@ -213,6 +221,8 @@ impl Sequence {
             views,
             codes,
             coarser,
+            finer,
+            shown,
             bernoulli_from,
         })
     }

@@ -9,8 +9,11 @@
 
 pub(crate) mod cell_map;
 pub(crate) mod gray_code;
+mod local_planes;
+pub(crate) mod map_file;
 mod mixed_pixels;
 pub(crate) mod movement;
+pub(crate) mod projector_map;
 mod regression;
 
 use crate::format::error::CaptureError;

@@ -1,0 +1,701 @@
+//! Projector map: which place of the projector's picture each camera pixel sees, from stripes.
+//!
+//! | photographs | a position is known to |
+//! |---|---|
+//! | waves of `stripes.csv` (phase shifting, four steps) | a fraction of a pixel |
+//! | Gray code finer than the cells | the finest stripe that the camera tells apart |
+//! | neither | about a part of a cell: linear between the cells' centres |
+//!
+//! The cell of each pixel is known. The bits beyond it halve the cell until less than half a wave
+//! is left, and the phase of the waves says where within the wave. The steps' second harmonic,
+//! which no wave has, says how large the noise is.
+
+use super::cell_map::{NO_CELL, Registration};
+use super::local_planes;
+use crate::cells::measurements::Measurements;
+use crate::format::bracket::{self, Bracket};
+use crate::format::error::CaptureError;
+use crate::format::manifest::Shot;
+use crate::format::photo_files::find_photo;
+use crate::format::picture_file::{Opened, Source};
+use crate::format::role::{CodeAxis, Role};
+use crate::format::sequence::Sequence;
+use crate::format::settings::ProjectorSettings;
+use crate::format::stripe_role::{
+    STRIPES_FILE, StripeManifest, StripeRole, StripeShot, WAVE, coarse_bits,
+};
+use crate::photographs::linearise::LinearPhotographs;
+use crate::photographs::{Photographs, channel_sum};
+use iltm_picture::progress::Progress;
+use iltm_picture::statistics::median;
+use iltm_runtime::Grid;
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+use std::path::Path;
+
+/// Contrast of stripes, of white's light, from which they are believed: what only bounces to a
+/// pixel has none.
+const LEAST_CONTRAST: f32 = 0.1;
+
+/// Uncertainty, projector pixels, up to which the position in a wave is one.
+const MOST_UNCERTAIN: f32 = 0.5;
+
+/// Projector pixels that a place is off where a camera sees each of them with about one of its
+/// own: steps of light as wide as a pixel are no wave.
+const BEATING: f32 = 0.06;
+
+/// Pixels on each side over which the noise is averaged.
+const NOISE_REACH: usize = 2;
+
+/// How far waves may be off the middle of the half that the code says, in halves: beside a border
+/// the neighbour's code is as good.
+const MOST_APART: f32 = 0.25;
+
+/// Share of the pixels that see waves in which code and waves may contradict each other.
+const MOST_WRONG: f64 = 0.2;
+
+/// What a map was made from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum MapSource {
+    /// Waves, a few projector pixels long.
+    Waves,
+    /// Gray code finer than the cells.
+    Code,
+    /// The cells alone.
+    Cells,
+}
+
+impl MapSource {
+    /// Its name for programs.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Waves => "waves",
+            Self::Code => "code",
+            Self::Cells => "cells",
+        }
+    }
+}
+
+/// Which place of the projector's picture each camera pixel sees.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ProjectorMap {
+    /// What it was made from.
+    pub source: MapSource,
+    /// Width and height of the projector's picture in pixels; of the patterns, where the
+    /// projector's is not known.
+    pub projector: (usize, usize),
+    /// Pixels of it on every side that are no cell's.
+    pub border: usize,
+    /// Width and height of the registered photographs in pixels.
+    pub camera: (usize, usize),
+    /// Side of the square of file pixels that one registered pixel averages.
+    pub binning: usize,
+    /// `[x, y]` in pixels of the projector's picture, the centre of the first being `[0, 0]`; NaN
+    /// where nothing is known. Row by row, length `width * height`.
+    pub position: Vec<[f32; 2]>,
+    /// Standard error of a position in pixels, of both directions together; NaN where nothing is
+    /// known. Same length. Of waves it is what noise and neighbouring pixels tell; elsewhere it is
+    /// that of any place within the finest stripe that was told apart, or within the cell.
+    pub uncertainty: Vec<f32>,
+}
+
+/// Why fine stripes gave no map.
+#[derive(Clone, PartialEq, Debug, thiserror::Error)]
+pub enum MapError {
+    /// Photographs are missing; the first and how many.
+    #[error("photographs of fine stripes are missing: {first}, {count} in all")]
+    Missing {
+        /// The first of them.
+        first: String,
+        /// How many.
+        count: usize,
+    },
+    /// Lines of the list are missing.
+    #[error("{STRIPES_FILE} has no {role}")]
+    NotListed {
+        /// What is missing.
+        role: String,
+    },
+    /// The slides are smaller than the border, or than the cells.
+    #[error("the slides of fine stripes have {0} x {1} pixels, which leaves none for some cells")]
+    Slides(usize, usize),
+    /// Code and waves say different places.
+    #[error(
+        "the fine stripes contradict each other in {percent:.0} % of the pixels: photographs are \
+         out of order, or something moved between them"
+    )]
+    Contradiction {
+        /// Share of the pixels, %.
+        percent: f64,
+    },
+}
+
+impl MapError {
+    /// What to do about it.
+    #[must_use]
+    pub const fn next_step(&self) -> &'static str {
+        match self {
+            Self::Missing { .. } => {
+                "Take them with `iltm capture`, which goes on where it stopped."
+            }
+            Self::NotListed { .. } | Self::Slides(..) => {
+                "Make the capture folder again with `iltm patterns`."
+            }
+            Self::Contradiction { .. } => {
+                "Take the photographs of stripes.csv again, with a longer wait before each."
+            }
+        }
+    }
+}
+
+impl ProjectorMap {
+    /// The map that the cells alone give, linear between their centres.
+    #[must_use]
+    pub fn of_cells(measurements: &Measurements) -> Self {
+        let registration = &measurements.registration;
+        let grid = measurements.grid;
+        let projector = measurements.settings.projector.pixels();
+        let (whole, inner, border) = projector.map_or(
+            ((grid.cols(), grid.rows()), (grid.cols(), grid.rows()), 0),
+            |pixels| {
+                let (whole, inner) = (pixels.size(), pixels.inner());
+                (
+                    (whole.width(), whole.height()),
+                    (inner.width(), inner.height()),
+                    pixels.border(),
+                )
+            },
+        );
+        let sides = [
+            inner.0 as f64 / grid.cols() as f64,
+            inner.1 as f64 / grid.rows() as f64,
+        ];
+        let shift = f64::from(border) - 0.5;
+        let uncertainty = within(sides[0] as f32).hypot(within(sides[1] as f32));
+        let known = |pixel: usize| {
+            let cell = registration.seen_cell[pixel];
+            if cell == NO_CELL {
+                return ([f32::NAN; 2], f32::NAN);
+            }
+            let cell = cell as usize;
+            let from_centre = registration.offset(grid, cell, pixel);
+            let number = [cell % grid.cols(), cell / grid.cols()];
+            let place = [0, 1].map(|axis: usize| {
+                let cells = number[axis] as f64 + 0.5 + from_centre[axis].clamp(-0.5, 0.5);
+                (cells * sides[axis] + shift) as f32
+            });
+            (place, uncertainty)
+        };
+        let known = (0..registration.seen_cell.len()).into_par_iter().map(known);
+        let (position, uncertainty) = known.unzip();
+        Self {
+            source: MapSource::Cells,
+            projector: whole,
+            border: usize::from(border),
+            camera: registration.camera,
+            binning: registration.binning,
+            position,
+            uncertainty,
+        }
+    }
+
+    /// A position in cells of a grid over the picture, from the left and upper edge of the first.
+    pub(crate) fn in_cells(&self, [x, y]: [f32; 2], grid: Grid) -> [f32; 2] {
+        let side = |of: usize, cells: usize| (of - 2 * self.border) as f32 / cells as f32;
+        let first = self.border as f32 - 0.5;
+        [
+            (x - first) / side(self.projector.0, grid.cols()),
+            (y - first) / side(self.projector.1, grid.rows()),
+        ]
+    }
+
+    /// Pixels whose position is known.
+    #[must_use]
+    pub fn known(&self) -> usize {
+        let known = self.uncertainty.iter().filter(|known| !known.is_nan());
+        known.count()
+    }
+
+    /// Median of the known uncertainties; `None` if nothing is known.
+    #[must_use]
+    pub fn usual_uncertainty(&self) -> Option<f32> {
+        let known = self.uncertainty.iter().filter(|known| !known.is_nan());
+        median(known.map(|known| f64::from(*known)).collect()).map(|median| median as f32)
+    }
+}
+
+/// Standard deviation of a place of which only the stripe is known, in one direction.
+fn within(side: f32) -> f32 {
+    side / 12.0_f32.sqrt()
+}
+
+/// What the photographs of one axis show.
+struct AxisLight {
+    /// Pattern minus inverse of each bit beyond the cells'.
+    bits: Vec<Vec<f32>>,
+    /// Waves, if there are any.
+    waves: Option<WaveLight>,
+}
+
+/// What the photographs of the waves of one axis show.
+struct WaveLight {
+    /// First step minus third, and second minus fourth.
+    wave: [Vec<f32>; 2],
+    /// First minus second plus third minus fourth: nothing but noise.
+    rest: Vec<f32>,
+}
+
+/// Places along one axis.
+struct Axis<'a> {
+    /// Which of the two.
+    along: CodeAxis,
+    /// Number of the first cell in its code.
+    offset: usize,
+    /// Side of what the bits of `light` leave of a cell, pixels.
+    side: f32,
+    /// Where number 0 would begin, pixels before the first.
+    before: f32,
+    light: &'a AxisLight,
+    /// Standard deviation of the light of a pixel in one photograph, around each pixel.
+    noise: Vec<f32>,
+}
+
+/// A place along an axis.
+struct Place {
+    at: f32,
+    uncertainty: f32,
+    /// Whether code and waves agree; `None` where the camera sees no wave.
+    agrees: Option<bool>,
+}
+
+/// Fine stripes: what was shown and how it was photographed.
+struct Fine {
+    roles: Vec<StripeRole>,
+    light: Vec<Vec<f32>>,
+}
+
+/// Decodes stripes that are finer than the cells; `None` if there are none.
+///
+/// # Errors
+/// A manifest's or a photograph's own error; [`CaptureError::Unlike`] if they are not of the
+/// capture's kind.
+pub(crate) fn find(
+    folder: &Path,
+    sequence: &Sequence,
+    settings: &ProjectorSettings,
+    linear: &LinearPhotographs<'_>,
+    registration: &Registration,
+    progress: &dyn Progress,
+) -> Result<Option<Result<ProjectorMap, MapError>>, CaptureError> {
+    match StripeManifest::read_if_there(folder)? {
+        Some(manifest) => {
+            let found = listed(folder, sequence, settings, manifest, linear, progress)?;
+            Ok(Some(
+                found.and_then(|found| found.map(registration, linear)),
+            ))
+        }
+        None if sequence.finer.is_empty() => Ok(None),
+        None => {
+            let found = left_out(folder, sequence, linear, progress)?;
+            Ok(Some(
+                found.and_then(|found| found.map(registration, linear)),
+            ))
+        }
+    }
+}
+
+/// All that a map is made from.
+struct Decoding {
+    /// Width and height of the projector's picture.
+    projector: (usize, usize),
+    border: usize,
+    /// Columns of cells.
+    cols: usize,
+    /// Side of what the bits leave of a cell, where number 0 would begin, and the number of the
+    /// first cell, by axis.
+    scale: [(f32, f32, usize); 2],
+    light: [AxisLight; 2],
+}
+
+/// Stripes of `stripes.csv`.
+fn listed(
+    folder: &Path,
+    sequence: &Sequence,
+    settings: &ProjectorSettings,
+    manifest: StripeManifest,
+    linear: &LinearPhotographs<'_>,
+    progress: &dyn Progress,
+) -> Result<Result<Decoding, MapError>, CaptureError> {
+    let all = manifest.shots.len();
+    let (mut shots, mut missing) = (Vec::new(), None);
+    for mut shot in manifest.shots {
+        match find_photo(folder, &shot.photo)? {
+            Some(found) => {
+                shot.photo = found;
+                shots.push(shot);
+            }
+            None => missing = missing.or_else(|| Some(shot.photo.display().to_string())),
+        }
+    }
+    if let Some(first) = missing {
+        let count = all - shots.len();
+        return Ok(Err(MapError::Missing { first, count }));
+    }
+    let Some(slide) = shots.first() else {
+        let (axis, bit) = (CodeAxis::Column, coarse_bits(sequence.grid.cols()));
+        let inverse = false;
+        return Ok(Err(not_listed(StripeRole::Code { axis, bit, inverse })));
+    };
+    let picture = Opened::open(Source {
+        path: &folder.join(&slide.pattern),
+        what: "pattern",
+        line: slide.line,
+    })?;
+    let (width, height) = picture.size();
+    let (width, height) = (width as usize, height as usize);
+    let border = usize::from(settings.border);
+    let inner = [width, height].map(|side| side.saturating_sub(2 * border));
+    let cells = [sequence.grid.cols(), sequence.grid.rows()];
+    if (0..2).any(|axis| inner[axis] < cells[axis]) {
+        return Ok(Err(MapError::Slides(width, height)));
+    }
+    let as_shot = |shot: &StripeShot| Shot {
+        index: shot.index,
+        role: Role::White,
+        pattern: shot.pattern.clone(),
+        photo: shot.photo.clone(),
+        exposure: shot.exposure,
+        line: shot.line,
+    };
+    let files: Vec<Shot> = shots.iter().map(as_shot).collect();
+    let own = bracket::longest(&files, &folder.join(STRIPES_FILE))?;
+    let brackets = Bracket::of_each(&files, sequence.longest.or(own));
+    let fine = Fine {
+        roles: shots.iter().map(|shot| shot.role).collect(),
+        light: light(folder, brackets, linear, progress)?,
+    };
+    let along = |axis: CodeAxis, at: usize| fine.axis(axis, cells[at], inner[at], linear);
+    let light = along(CodeAxis::Column, 0).and_then(|x| Ok([x, along(CodeAxis::Row, 1)?]));
+    Ok(light.map(|light| {
+        let scale = [0, 1].map(|at: usize| {
+            let parts = cells[at] << light[at].bits.len();
+            (inner[at] as f32 / parts as f32, 0.0, 0)
+        });
+        Decoding {
+            projector: (width, height),
+            border,
+            cols: cells[0],
+            scale,
+            light,
+        }
+    }))
+}
+
+/// Stripes of `capture.csv` that were left out because no table has so many cells.
+fn left_out(
+    folder: &Path,
+    sequence: &Sequence,
+    linear: &LinearPhotographs<'_>,
+    progress: &dyn Progress,
+) -> Result<Result<Decoding, MapError>, CaptureError> {
+    let stripe = |bracket: &Bracket| {
+        let (axis, bit, inverse) = bracket.shots.first()?.role.as_stripe()?;
+        Some(StripeRole::Code { axis, bit, inverse })
+    };
+    let roles: Vec<Option<StripeRole>> = sequence.finer.iter().map(stripe).collect();
+    let brackets = sequence.finer.iter().zip(&roles);
+    let brackets = brackets.filter(|(_, role)| role.is_some());
+    let brackets = brackets.map(|(bracket, _)| bracket.clone()).collect();
+    let fine = Fine {
+        light: light(folder, brackets, linear, progress)?,
+        roles: roles.into_iter().flatten().collect(),
+    };
+    let axes = [CodeAxis::Column, CodeAxis::Row];
+    let light = [0, 1].map(|at: usize| AxisLight {
+        bits: fine.bits(axes[at], sequence.codes[at].bits, linear),
+        waves: None,
+    });
+    let scale = [0, 1].map(|at: usize| {
+        let missing = usize::from(sequence.coarser).saturating_sub(light[at].bits.len());
+        let offset = sequence.shown[at].1.offset;
+        let side = (1_usize << missing) as f32;
+        (side, offset as f32, sequence.codes[at].offset)
+    });
+    Ok(Ok(Decoding {
+        projector: (sequence.shown[0].0, sequence.shown[1].0),
+        border: 0,
+        cols: sequence.grid.cols(),
+        scale,
+        light,
+    }))
+}
+
+fn not_listed(role: StripeRole) -> MapError {
+    let role = role.to_string();
+    MapError::NotListed { role }
+}
+
+/// Light of each photograph, channels added.
+fn light(
+    folder: &Path,
+    brackets: Vec<Bracket>,
+    linear: &LinearPhotographs<'_>,
+    progress: &dyn Progress,
+) -> Result<Vec<Vec<f32>>, CaptureError> {
+    if brackets.is_empty() {
+        return Ok(Vec::new());
+    }
+    let count = brackets.len();
+    let reading = &linear.photographs.format.reading;
+    let mut photographs = Photographs::of_brackets(folder, brackets, reading)?;
+    linear.photographs.format.check_like(&photographs.format)?;
+    progress.begin("reading fine stripes", count as u64);
+    let mut light = vec![Vec::new(); count];
+    let all: Vec<usize> = (0..count).collect();
+    photographs.for_batches(&all, progress, |photos| {
+        for (at, photo) in photos {
+            light[*at] = channel_sum(&photo.planes);
+        }
+    })?;
+    progress.end();
+    Ok(light)
+}
+
+fn minus(a: &[f32], b: &[f32], times: f32) -> Vec<f32> {
+    let pairs = a.iter().zip(b);
+    pairs.map(|(a, b)| times * (a - b)).collect()
+}
+
+impl Fine {
+    fn of(&self, role: StripeRole) -> Option<&[f32]> {
+        let at = self.roles.iter().position(|known| *known == role)?;
+        Some(&self.light[at])
+    }
+
+    /// Pattern minus inverse of the bits of an axis from `first` on, as far as they were
+    /// photographed. What has no inverse is seen against the middle of white and black.
+    fn bits(&self, axis: CodeAxis, first: u8, linear: &LinearPhotographs<'_>) -> Vec<Vec<f32>> {
+        let difference = |bit: u8| {
+            let of = |inverse| self.of(StripeRole::Code { axis, bit, inverse });
+            let middle = || {
+                let (white, black) = (channel_sum(&linear.flood), channel_sum(&linear.black));
+                let sum = white.iter().zip(&black).map(|(w, b)| 0.5 * (w + b));
+                sum.collect::<Vec<f32>>()
+            };
+            match (of(false), of(true)) {
+                (Some(pattern), Some(inverse)) => Some(minus(pattern, inverse, 1.0)),
+                (Some(pattern), None) => Some(minus(pattern, &middle(), 2.0)),
+                (None, Some(inverse)) => Some(minus(&middle(), inverse, 2.0)),
+                (None, None) => None,
+            }
+        };
+        (first..Role::MAX_BITS).map_while(difference).collect()
+    }
+
+    /// Bits and waves of an axis with so many cells over so many pixels.
+    fn axis(
+        &self,
+        axis: CodeAxis,
+        cells: usize,
+        pixels: usize,
+        linear: &LinearPhotographs<'_>,
+    ) -> Result<AxisLight, MapError> {
+        let first = coarse_bits(cells);
+        let bits = self.bits(axis, first, linear);
+        let step = |step: u8| StripeRole::Wave { axis, step };
+        let steps = [0, 1, 2, 3].map(|at| self.of(step(at)));
+        let waves = match steps {
+            [None, None, None, None] => None,
+            [Some(first), Some(second), Some(third), Some(fourth)] => {
+                let wave = [minus(first, third, 1.0), minus(second, fourth, 1.0)];
+                let others = minus(third, fourth, 1.0);
+                let pairs = minus(first, second, 1.0).into_iter().zip(others);
+                let rest = pairs.map(|(a, b)| a + b).collect();
+                Some(WaveLight { wave, rest })
+            }
+            _ => {
+                let missing = (0..4).find(|at| steps[usize::from(*at)].is_none());
+                return Err(not_listed(step(missing.unwrap_or(0))));
+            }
+        };
+        // Waves alone do not tell which wave it is, and nothing at all tells nothing.
+        let needed = StripeRole::of_axis(axis, cells, pixels).1 - first;
+        let given = bits.len() as u8;
+        if given < needed && (waves.is_some() || given == 0) {
+            let bit = first + given;
+            let inverse = false;
+            return Err(not_listed(StripeRole::Code { axis, bit, inverse }));
+        }
+        Ok(AxisLight { bits, waves })
+    }
+}
+
+impl Decoding {
+    /// Puts both axes together.
+    fn map(
+        &self,
+        registration: &Registration,
+        linear: &LinearPhotographs<'_>,
+    ) -> Result<ProjectorMap, MapError> {
+        let flood = linear.flood_light().pixels;
+        let camera = registration.camera;
+        let axes = [CodeAxis::Column, CodeAxis::Row];
+        let axes = [0, 1].map(|at: usize| {
+            let (light, (side, before, offset)) = (&self.light[at], self.scale[at]);
+            let waves = light.waves.as_ref();
+            Axis {
+                along: axes[at],
+                offset,
+                side,
+                before,
+                light,
+                noise: waves.map_or_else(Vec::new, |waves| waves.noise(camera)),
+            }
+        });
+        let found = |pixel: usize| {
+            let cell = registration.seen_cell[pixel];
+            if cell == NO_CELL {
+                return None;
+            }
+            let place = |axis: &Axis<'_>| {
+                let cell = match axis.along {
+                    CodeAxis::Column => cell as usize % self.cols,
+                    CodeAxis::Row => cell as usize / self.cols,
+                };
+                axis.place(cell, pixel, flood[pixel])
+            };
+            Some([place(&axes[0]), place(&axes[1])])
+        };
+        let found: Vec<Option<[Place; 2]>> = (0..registration.seen_cell.len())
+            .into_par_iter()
+            .map(found)
+            .collect();
+        let in_waves = |place: &[Place; 2]| place.iter().all(|axis| axis.agrees.is_some());
+        let contradicts = |place: &[Place; 2]| place.iter().any(|at| at.agrees == Some(false));
+        let seen = || found.iter().flatten();
+        let waves = seen().filter(|place| in_waves(place)).count();
+        let wrong = seen().filter(|place| contradicts(place)).count();
+        let wrong = wrong as f64 / waves.max(1) as f64;
+        if wrong > MOST_WRONG {
+            let percent = 100.0 * wrong;
+            return Err(MapError::Contradiction { percent });
+        }
+        let source = if 2 * waves > seen().count() {
+            MapSource::Waves
+        } else {
+            MapSource::Code
+        };
+        let known = |place: &Option<[Place; 2]>| {
+            let place = place.as_ref().filter(|place| !contradicts(place))?;
+            let own = place[0].uncertainty.hypot(place[1].uncertainty);
+            Some((own, in_waves(place)))
+        };
+        let known: Vec<Option<(f32, bool)>> = found.iter().map(known).collect();
+        let shift = self.border as f32 - 0.5;
+        let at =
+            |place: &Option<[Place; 2]>| place.as_ref().map(|[x, y]| [x.at + shift, y.at + shift]);
+        let places = found.iter().zip(&known);
+        let mut position: Vec<_> = places
+            .map(|(place, known)| at(place).filter(|_| known.is_some()))
+            .collect();
+        let left = local_planes::settle(&mut position, camera);
+        let uncertainty = known
+            .iter()
+            .zip(left)
+            .map(|(known, left)| match (*known, left) {
+                (None, _) => f32::NAN,
+                (Some((own, true)), Some(left)) => left.max(own).hypot(BEATING),
+                // Anywhere within a pixel of the projector.
+                (Some((own, true)), None) => own.hypot(within(1.0)).hypot(within(1.0)),
+                (Some((own, false)), left) => left.unwrap_or(0.0).max(own),
+            });
+        let uncertainty = uncertainty.collect();
+        let position = position.into_iter();
+        let position = position
+            .map(|place| place.unwrap_or([f32::NAN; 2]))
+            .collect();
+        Ok(ProjectorMap {
+            source,
+            projector: self.projector,
+            border: self.border,
+            camera,
+            binning: registration.binning,
+            position,
+            uncertainty,
+        })
+    }
+}
+
+impl Axis<'_> {
+    /// Middle and side of the stripe that the first `bits` bits say, pixels.
+    fn stripe(&self, cell: usize, pixel: usize, bits: usize) -> (f32, f32) {
+        let mut number = cell + self.offset;
+        for bit in &self.light.bits[..bits] {
+            let lit = usize::from(bit[pixel] > 0.0);
+            number = number << 1 | ((number & 1) ^ lit);
+        }
+        let side = self.side * (1_u32 << (self.light.bits.len() - bits)) as f32;
+        ((number as f32 + 0.5) * side - self.before, side)
+    }
+
+    /// The place that a pixel with this light under white sees.
+    fn place(&self, cell: usize, pixel: usize, flood: f32) -> Place {
+        let waves = self.light.waves.as_ref();
+        let in_wave = waves.and_then(|waves| self.in_wave(waves, cell, pixel, flood));
+        in_wave.unwrap_or_else(|| self.in_stripe(cell, pixel, flood))
+    }
+
+    /// The same by the code alone.
+    fn in_stripe(&self, cell: usize, pixel: usize, flood: f32) -> Place {
+        // A border between two stripes may have any bit; after the last one that has contrast, the
+        // camera sees none.
+        let seen = |bit: &Vec<f32>| bit[pixel].abs() >= LEAST_CONTRAST * flood;
+        let told = self.light.bits.iter().rposition(seen);
+        let (at, side) = self.stripe(cell, pixel, told.map_or(0, |last| last + 1));
+        Place {
+            at,
+            uncertainty: within(side),
+            agrees: None,
+        }
+    }
+
+    /// The same by waves; `None` where the camera sees none.
+    fn in_wave(&self, waves: &WaveLight, cell: usize, pixel: usize, flood: f32) -> Option<Place> {
+        let [re, im] = [0, 1].map(|part: usize| waves.wave[part][pixel]);
+        let size = re.hypot(im);
+        // Opposite steps differ by all the light that comes straight from the projector.
+        if size < LEAST_CONTRAST * flood {
+            return None;
+        }
+        let (middle, side) = self.stripe(cell, pixel, self.light.bits.len());
+        let wave = WAVE as f32;
+        let uncertainty = wave / TAU * 2.0_f32.sqrt() * self.noise[pixel] / size;
+        let phase = im.atan2(re) / TAU * wave;
+        let at = phase + wave * ((middle - phase) / wave).round();
+        (uncertainty < MOST_UNCERTAIN).then_some(Place {
+            at,
+            uncertainty,
+            agrees: Some((at - middle).abs() <= (0.5 + MOST_APART) * side),
+        })
+    }
+}
+
+impl WaveLight {
+    /// Standard deviation of the light of a pixel in one photograph, around each pixel.
+    fn noise(&self, (width, height): (usize, usize)) -> Vec<f32> {
+        let around =
+            |at: usize, of: usize| at.saturating_sub(NOISE_REACH)..(at + NOISE_REACH + 1).min(of);
+        let at = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            let rows = around(y, height);
+            let all = rows.flat_map(|y| self.rest[y * width..][around(x, width)].iter());
+            let (sum, count) = all.fold((0.0_f32, 0.0_f32), |(sum, count), rest| {
+                (sum + rest * rest, count + 1.0)
+            });
+            // Four photographs are in it.
+            0.5 * (sum / count).sqrt()
+        };
+        (0..width * height).into_par_iter().map(at).collect()
+    }
+}

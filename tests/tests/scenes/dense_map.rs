@@ -1,0 +1,197 @@
+//! Projector map of fine stripes against geometry: lines of sight to the M-shaped panels, and
+//! from there to the projector, worked out here from the numbers of the scene's description.
+
+use iltm::capture::{self, CameraSettings, CaptureOptions, MapSource, ProjectorMap};
+use iltm::progress::Silent;
+use iltm::scene::fill_capture::UnfilledCapture;
+use iltm::scene::{Forced, VirtualCamera};
+use iltm::session::{self, Layout, OrderOptions, order};
+use iltm_runtime::FrameSize;
+use iltm_tests::simulated::{scene, simulation};
+use iltm_tests::verdicts::as_jpeg;
+use nalgebra::Vector3;
+
+/// Pixels of the projector, and those that stay black on each side.
+const PROJECTOR: (u16, u16) = (174, 110);
+const BORDER: u16 = 3;
+
+/// Pixels from a crease or an edge that are beside it.
+const BESIDE: isize = 2;
+
+/// The folds of the M, x and z.
+const FOLDS: [(f64, f64); 5] = [
+    (-2.0, 0.0),
+    (-1.0, -1.0),
+    (0.0, 0.0),
+    (1.0, -1.0),
+    (2.0, 0.0),
+];
+
+/// A pinhole: where it is, and its axes to the right, downwards and forwards, the first two as
+/// long as half its picture at distance 1.
+struct View {
+    position: Vector3<f64>,
+    right: Vector3<f64>,
+    down: Vector3<f64>,
+    forward: Vector3<f64>,
+}
+
+impl View {
+    fn new(position: [f64; 3], field_of_view: f64, aspect: f64) -> Self {
+        let position = Vector3::from(position);
+        let forward = (Vector3::new(0.0, 0.0, -0.5) - position).normalize();
+        let half = (0.5 * field_of_view.to_radians()).tan();
+        let right = forward.cross(&Vector3::y()).normalize();
+        Self {
+            down: forward.cross(&right) * (half / aspect),
+            right: right * half,
+            position,
+            forward,
+        }
+    }
+
+    /// Where it sees a point, 0 to 1 from the left and from the top.
+    fn sees(&self, point: &Vector3<f64>) -> [f64; 2] {
+        let way = point - self.position;
+        let depth = way.dot(&self.forward);
+        [self.right, self.down]
+            .map(|axis| 0.5 + 0.5 * way.dot(&axis) / (depth * axis.norm_squared()))
+    }
+
+    /// The panel that it sees at a place of its picture, and the point of it.
+    fn panel(&self, [across, down]: [f64; 2]) -> Option<(usize, Vector3<f64>)> {
+        let way = self.forward + (2.0 * across - 1.0) * self.right + (2.0 * down - 1.0) * self.down;
+        let hit = |panel: usize| {
+            let ((x, z), (end, _)) = (FOLDS[panel], FOLDS[panel + 1]);
+            let slope = FOLDS[panel + 1].1 - z;
+            // z = z0 + slope (x - x0)
+            let level = |at: &Vector3<f64>| at.z - slope * at.x;
+            let along = (z - slope * x - level(&self.position)) / level(&way);
+            let point = self.position + along * way;
+            let inside = (x..end).contains(&point.x) && point.y.abs() <= 1.25;
+            inside.then_some((panel, point, along))
+        };
+        let nearest = (0..4).filter_map(hit).min_by(|a, b| a.2.total_cmp(&b.2));
+        nearest.map(|(panel, point, _)| (panel, point))
+    }
+}
+
+/// How far a map is off: the root mean square of each direction on flat parts, and what 95 % of
+/// the pixels beside creases and edges keep; and the shares of the pixels that are lit and known.
+struct Off {
+    flat: [f64; 2],
+    beside: f64,
+    known: f64,
+    /// Of flat parts, both directions together.
+    stated: f64,
+}
+
+fn off(map: &ProjectorMap) -> Off {
+    let (width, height) = map.camera;
+    let camera = View::new([0.6, 0.3, 9.0], 27.0, width as f64 / height as f64);
+    let projector = View::new([-0.4, 0.0, 9.0], 23.0, 21.0 / 13.0);
+    let place = |x: usize, y: usize| {
+        [
+            (x as f64 + 0.5) / width as f64,
+            (y as f64 + 0.5) / height as f64,
+        ]
+    };
+    let seen: Vec<Option<(usize, Vector3<f64>)>> = (0..width * height)
+        .map(|pixel| camera.panel(place(pixel % width, pixel / width)))
+        .collect();
+    let panel = |x: isize, y: isize| {
+        let at = usize::try_from(x).ok()?;
+        let row = usize::try_from(y)
+            .ok()
+            .filter(|row| at < width && *row < height)?;
+        seen[row * width + at].map(|seen| seen.0)
+    };
+    let inner = [PROJECTOR.0, PROJECTOR.1].map(|side| f64::from(side - 2 * BORDER));
+    let (mut squares, mut flat, mut stated) = ([0.0; 2], 0.0, 0.0);
+    let (mut beside, mut lit, mut known) = (Vec::new(), 0.0, 0.0);
+    for (pixel, seen) in seen.iter().enumerate() {
+        let Some((own, point)) = seen else { continue };
+        let at = projector.sees(point);
+        let truth = [0, 1].map(|axis| at[axis] * inner[axis] + f64::from(BORDER) - 0.5);
+        let border = (0..2).any(|axis| !(0.01..0.99).contains(&at[axis]));
+        lit += f64::from(u8::from(!border));
+        let found = map.position[pixel];
+        if border || found[0].is_nan() {
+            continue;
+        }
+        known += 1.0;
+        let apart = [0, 1].map(|axis| f64::from(found[axis]) - truth[axis]);
+        let (x, y) = ((pixel % width) as isize, (pixel / width) as isize);
+        let all = -BESIDE..=BESIDE;
+        let same = |dx: isize, dy: isize| panel(x + dx, y + dy) == Some(*own);
+        if all.clone().all(|dy| all.clone().all(|dx| same(dx, dy))) {
+            flat += 1.0;
+            for (square, apart) in squares.iter_mut().zip(apart) {
+                *square += apart * apart;
+            }
+            stated += f64::from(map.uncertainty[pixel]).powi(2);
+        } else {
+            beside.push(apart[0].hypot(apart[1]));
+        }
+    }
+    beside.sort_by(f64::total_cmp);
+    Off {
+        flat: squares.map(|square| (square / flat).sqrt()),
+        beside: beside[beside.len() * 95 / 100],
+        known: known / lit,
+        stated: (stated / flat).sqrt(),
+    }
+}
+
+#[test]
+fn every_pixel_finds_its_place_across_creases_with_twelve_bits_and_with_jpeg() {
+    for (camera, jpeg) in [(1, false), (1, true), (2, false), (2, true)] {
+        let (width, height) = (192 * camera, 132 * camera);
+        let curve = if jpeg { "srgb" } else { "linear" };
+        let scene = scene(
+            "m-panels",
+            &[
+                ("width = 192", &format!("width = {width}")),
+                ("height = 132", &format!("height = {height}")),
+                ("bits = 12", &format!("bits = 12\nresponse = \"{curve}\"")),
+            ],
+        );
+        let simulation = simulation(&scene, Forced::default());
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("session");
+        let options = OrderOptions {
+            bernoulli: 10,
+            ramp: 0,
+            probe: false,
+            ..OrderOptions::default()
+        };
+        let size = FrameSize::new(PROJECTOR.0, PROJECTOR.1).unwrap();
+        let layout = Layout::new(simulation.grid(), size, BORDER).unwrap();
+        let settings = CameraSettings {
+            response: scene.camera.response.into(),
+            ..CameraSettings::default()
+        };
+        let slides = order(&layout, &options);
+        session::write(&slides, &layout, &settings, &folder, &Silent).unwrap();
+        let unfilled = UnfilledCapture::read(&folder, simulation.grid()).unwrap();
+        let taken = VirtualCamera::new(&scene, &simulation, 1).unwrap();
+        unfilled.take_missing(&taken, &Silent).unwrap();
+        if jpeg {
+            as_jpeg(&folder.join("photos"), 90);
+        }
+        let measured = capture::read(&folder, &CaptureOptions::default(), &Silent).unwrap();
+        let map = measured.map.unwrap().unwrap();
+        assert_eq!(map.source, MapSource::Waves);
+        let off = off(&map);
+        let words = format!(
+            "camera of {width}, jpeg {jpeg}: flat {:.3} {:.3}, beside {:.3}, stated {:.3}, known {:.4}",
+            off.flat[0], off.flat[1], off.beside, off.stated, off.known
+        );
+        println!("{words}");
+        assert!(off.flat[0] < 0.15 && off.flat[1] < 0.15, "{words}");
+        assert!(off.beside < 0.5 && off.known > 0.99, "{words}");
+        // What a map says of itself is neither less nor many times what it is.
+        let true_one = off.flat[0].hypot(off.flat[1]);
+        assert!((1.0..3.0).contains(&(off.stated / true_one)), "{words}");
+    }
+}
