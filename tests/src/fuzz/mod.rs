@@ -20,10 +20,11 @@ use crate::fake_device::FakeDevice;
 use crate::wedge_table;
 use iltm::capture::{
     self, CalibrationRole, CaptureOptions, LinearPhotograph, ListedRole, ManifestOf, Role,
-    Settings, parse_reference,
+    Settings, StripeRole, parse_reference,
 };
 use iltm::progress::Silent;
 use iltm::scene::description::{Scene, parse_mesh};
+use iltm::verify::VerifyRole;
 use iltm::video::{Compensator, OperatorMemory};
 use iltm_runtime::FrameSize;
 use iltm_runtime::Grid;
@@ -98,14 +99,16 @@ pub fn frames(bytes: &[u8]) {
     }
 }
 
-/// A `capture.csv` or `calibration.csv`.
+/// A `capture.csv`, `stripes.csv`, `calibration.csv` or `verify.csv`.
 ///
 /// # Panics
 /// If a manifest that was read is written and read again as another. Only the
 /// lines may differ: they are written in the order of the index.
 pub fn manifest(bytes: &[u8]) {
     manifest_of::<Role>(bytes);
+    manifest_of::<StripeRole>(bytes);
     manifest_of::<CalibrationRole>(bytes);
+    manifest_of::<VerifyRole>(bytes);
 }
 
 fn manifest_of<R: ListedRole + PartialEq + Debug>(bytes: &[u8]) {

@@ -4,8 +4,11 @@
 //! between them: it may bend at every cell, as it does where the surface has a
 //! crease, and it does not reach across an edge where the surface ends.
 
+use super::measurements::Measurements;
 use crate::registration::cell_map::{NO_CELL, Registration, cell_beside};
+use crate::registration::projector_map::{MapSource, ProjectorMap, within};
 use iltm_runtime::Grid;
+use rayon::prelude::*;
 
 /// Ratio of a cell's distances to its two neighbours from which the farther one
 /// is on another surface.
@@ -78,7 +81,7 @@ impl Registration {
     }
 
     /// Cells right and down from the centre of `cell` to a pixel, each -1 to 1.
-    pub(crate) fn offset(&self, grid: Grid, cell: usize, pixel: usize) -> [f64; 2] {
+    fn offset(&self, grid: Grid, cell: usize, pixel: usize) -> [f64; 2] {
         let Some(centre) = self.centre[cell] else {
             return [0.0; 2];
         };
@@ -106,6 +109,58 @@ impl Registration {
             }
         }
         best.0.map(|offset| offset.clamp(-1.0, 1.0))
+    }
+}
+
+impl ProjectorMap {
+    /// The map that the cells alone give, linear between their centres.
+    #[must_use]
+    pub fn of_cells(measurements: &Measurements) -> Self {
+        let registration = &measurements.registration;
+        let grid = measurements.grid;
+        let projector = measurements.settings.projector.pixels();
+        let (whole, inner, border) = projector.map_or(
+            ((grid.cols(), grid.rows()), (grid.cols(), grid.rows()), 0),
+            |pixels| {
+                let (whole, inner) = (pixels.size(), pixels.inner());
+                (
+                    (whole.width(), whole.height()),
+                    (inner.width(), inner.height()),
+                    pixels.border(),
+                )
+            },
+        );
+        let sides = [
+            inner.0 as f64 / grid.cols() as f64,
+            inner.1 as f64 / grid.rows() as f64,
+        ];
+        let shift = f64::from(border) - 0.5;
+        let uncertainty = within(sides[0] as f32).hypot(within(sides[1] as f32));
+        let known = |pixel: usize| {
+            let cell = registration.seen_cell[pixel];
+            if cell == NO_CELL {
+                return ([f32::NAN; 2], f32::NAN);
+            }
+            let cell = cell as usize;
+            let from_centre = registration.offset(grid, cell, pixel);
+            let number = [cell % grid.cols(), cell / grid.cols()];
+            let place = [0, 1].map(|axis: usize| {
+                let cells = number[axis] as f64 + 0.5 + from_centre[axis].clamp(-0.5, 0.5);
+                (cells * sides[axis] + shift) as f32
+            });
+            (place, uncertainty)
+        };
+        let known = (0..registration.seen_cell.len()).into_par_iter().map(known);
+        let (position, uncertainty) = known.unzip();
+        Self {
+            source: MapSource::Cells,
+            projector: whole,
+            border: usize::from(border),
+            camera: registration.camera,
+            binning: registration.binning,
+            position,
+            uncertainty,
+        }
     }
 }
 

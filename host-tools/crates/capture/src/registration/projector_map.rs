@@ -12,7 +12,6 @@
 
 use super::cell_map::{NO_CELL, Registration};
 use super::local_planes;
-use crate::cells::measurements::Measurements;
 use crate::format::bracket::{self, Bracket};
 use crate::format::error::CaptureError;
 use crate::format::manifest::Shot;
@@ -150,56 +149,6 @@ impl MapError {
 }
 
 impl ProjectorMap {
-    /// The map that the cells alone give, linear between their centres.
-    #[must_use]
-    pub fn of_cells(measurements: &Measurements) -> Self {
-        let registration = &measurements.registration;
-        let grid = measurements.grid;
-        let projector = measurements.settings.projector.pixels();
-        let (whole, inner, border) = projector.map_or(
-            ((grid.cols(), grid.rows()), (grid.cols(), grid.rows()), 0),
-            |pixels| {
-                let (whole, inner) = (pixels.size(), pixels.inner());
-                (
-                    (whole.width(), whole.height()),
-                    (inner.width(), inner.height()),
-                    pixels.border(),
-                )
-            },
-        );
-        let sides = [
-            inner.0 as f64 / grid.cols() as f64,
-            inner.1 as f64 / grid.rows() as f64,
-        ];
-        let shift = f64::from(border) - 0.5;
-        let uncertainty = within(sides[0] as f32).hypot(within(sides[1] as f32));
-        let known = |pixel: usize| {
-            let cell = registration.seen_cell[pixel];
-            if cell == NO_CELL {
-                return ([f32::NAN; 2], f32::NAN);
-            }
-            let cell = cell as usize;
-            let from_centre = registration.offset(grid, cell, pixel);
-            let number = [cell % grid.cols(), cell / grid.cols()];
-            let place = [0, 1].map(|axis: usize| {
-                let cells = number[axis] as f64 + 0.5 + from_centre[axis].clamp(-0.5, 0.5);
-                (cells * sides[axis] + shift) as f32
-            });
-            (place, uncertainty)
-        };
-        let known = (0..registration.seen_cell.len()).into_par_iter().map(known);
-        let (position, uncertainty) = known.unzip();
-        Self {
-            source: MapSource::Cells,
-            projector: whole,
-            border: usize::from(border),
-            camera: registration.camera,
-            binning: registration.binning,
-            position,
-            uncertainty,
-        }
-    }
-
     /// A position in cells of a grid over the picture, from the left and upper edge of the first.
     pub(crate) fn in_cells(&self, [x, y]: [f32; 2], grid: Grid) -> [f32; 2] {
         let side = |of: usize, cells: usize| (of - 2 * self.border) as f32 / cells as f32;
@@ -226,7 +175,7 @@ impl ProjectorMap {
 }
 
 /// Standard deviation of a place of which only the stripe is known, in one direction.
-fn within(side: f32) -> f32 {
+pub(crate) fn within(side: f32) -> f32 {
     side / 12.0_f32.sqrt()
 }
 
