@@ -314,3 +314,40 @@ impl<'a> Surface<'a> {
         (cell / cols).abs_diff(other / cols) <= 1 && (cell % cols).abs_diff(other % cols) <= 1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_adds_to_each_sample_by_as_much_as_it_covers() {
+        let shares = |middle: f32| -> Vec<(usize, f32)> {
+            let covered = covered(middle, 0.5, 4);
+            covered
+                .map(|(at, share)| (at, (100.0 * share).round() / 100.0))
+                .collect()
+        };
+        assert_eq!(shares(1.25), [(1, 0.5)]);
+        assert_eq!(shares(2.0), [(1, 0.25), (2, 0.25)]);
+        assert_eq!(shares(-0.1), [(0, 0.15)]);
+        assert_eq!(shares(4.1), [(3, 0.15)]);
+        assert_eq!((shares(-3.0), shares(9.0)), (vec![], vec![]));
+    }
+
+    #[test]
+    fn an_unknown_sample_has_the_mean_of_the_nearest_known_ones() {
+        let samples = [
+            Some(1.0),
+            None,
+            Some(3.0),
+            None,
+            None,
+            None,
+            None,
+            None,
+            None,
+        ];
+        let filled: Vec<f32> = filled(&samples, 3);
+        assert_eq!(filled, [1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 2.0, 2.0, 2.0]);
+    }
+}
