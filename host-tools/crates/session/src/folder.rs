@@ -191,11 +191,18 @@ mod tests {
         let (_folder, out, made) = made(&OrderOptions::default());
         let scene = Manifest::read(&out).unwrap().shots;
         let calibration = CalibrationManifest::read(&out).unwrap().shots;
-        assert_eq!(scene.len() + calibration.len(), made.slides);
+        let stripes = StripeManifest::read_if_there(&out).unwrap().unwrap().shots;
+        let all = scene.len() + calibration.len() + stripes.len();
+        assert_eq!(all, made.slides);
         assert_eq!(calibration.len(), made.calibration);
+        assert_eq!(stripes.len(), made.stripes);
         let files = scene.iter().map(|shot| (shot.index, &shot.pattern));
         let files = files.chain(calibration.iter().map(|shot| (shot.index, &shot.pattern)));
-        let mut indices = Vec::new();
+        // Fine stripes are slides themselves.
+        for shot in &stripes {
+            assert_eq!(shot.pattern, slide_name(shot.index));
+        }
+        let mut indices: Vec<u32> = stripes.iter().map(|shot| shot.index).collect();
         for (index, pattern) in files {
             indices.push(index);
             let size = |path: &Path| png::read(fs::File::open(path).unwrap()).unwrap().size();

@@ -184,12 +184,14 @@ mod tests {
                 ..OrderOptions::default()
             };
             let purposes = purposes(&options);
+            // Two halvings and a wave of four steps along each side.
+            let stripes = 2 * (2 * 2 + 4);
             assert_eq!(purposes[..2], [WHITE, BLACK]);
             assert_eq!(purposes[purposes.len() - 2..], [WHITE, BLACK]);
             let between = purposes.split(|purpose| [WHITE, BLACK].contains(purpose));
             assert_eq!(
                 between.map(<[_]>::len).max(),
-                Some(repeat_every.min(33 + 1 + 10 + 20))
+                Some(repeat_every.min(33 + 1 + 10 + stripes + 20))
             );
             // And never twice in a row.
             let pairs = purposes.windows(2);
