@@ -26,6 +26,12 @@ impl ProjectorPixels {
         Some(Self { size, border })
     }
 
+    /// A projector of `size` without a border.
+    #[must_use]
+    pub const fn whole(size: FrameSize) -> Self {
+        Self { size, border: 0 }
+    }
+
     /// The projector's own width and height.
     #[must_use]
     pub const fn size(self) -> FrameSize {

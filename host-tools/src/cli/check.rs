@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         "map_fault": fault,
         "map": map.as_ref().map(|map| json!({
             "source": map.source.name(),
-            "projector": [map.projector.0, map.projector.1],
+            "projector": [map.projector.size().width(), map.projector.size().height()],
             "camera": [map.camera.0, map.camera.1],
             "binning": map.binning,
             "known": map.known(),
@@ -103,14 +103,14 @@ fn map(arguments: &Check, examined: &Examined) -> Result<Option<ProjectorMap>, F
 
 /// What a map is, for people.
 fn words(map: &ProjectorMap) -> String {
-    let (width, height) = map.projector;
+    let projector = map.projector.size();
     let from = match map.source {
         MapSource::Waves => "from fine stripes".to_owned(),
         MapSource::Code => "from the Gray code".to_owned(),
         MapSource::Cells => "from the cells alone, since there are no finer stripes".to_owned(),
     };
     format!(
-        "{} of {} camera pixels see a place of {width} x {height}, known to {:.2} pixels, {from}",
+        "{} of {} camera pixels see a place of {projector}, known to {:.2} pixels, {from}",
         map.known(),
         map.position.len(),
         map.usual_uncertainty().unwrap_or(f32::NAN),

@@ -5,10 +5,16 @@ use iltm::capture::pattern_set;
 use iltm::progress::Silent;
 use iltm::scene::ablation::ablate;
 use iltm::scene::description::Scene;
-use iltm::scene::{Effect, Forced, SimulationOptions, VirtualCamera, folder};
+use iltm::scene::{
+    Effect, Forced, Photograph, ProjectedFrame, SimulationError, SimulationOptions, VirtualCamera,
+    folder,
+};
+use iltm_runtime::FrameSize;
 use iltm_tests::simulated::{learned, scene, simulation};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::Mutex;
 use strum::IntoEnumIterator;
 
 /// Panels in random places whose light, blur, colour and so on are drawn over several
@@ -185,4 +191,46 @@ fn effects_that_are_asked_for_are_simulated_and_said_to_be() {
         assert!(!decision.on && decision.forced, "{decision:?}");
     }
     assert_eq!(simulation.work().exchanged, 0);
+}
+
+/// Frames finer than the cells go another way than cells do; where each cell is even, both are one
+/// picture, through a blur of .4 cells and with vignetting.
+#[test]
+fn a_slide_of_even_cells_is_photographed_as_the_cells_are() {
+    for name in ["dome", "installation"] {
+        let scene = scene(name, &[]);
+        let still = [Effect::Noise, Effect::Quantisation, Effect::Drift];
+        let forced = still.into_iter().fold(Forced::default(), |forced, effect| {
+            forced.with(effect, false)
+        });
+        let simulation = simulation(&scene, forced);
+        let grid = simulation.grid();
+        let code = |cell: usize| [[255, 40, 0], [90, 255, 255], [0, 0, 0]][cell % 3];
+        let frame = |side: usize| {
+            let (width, height) = (side * grid.cols(), side * grid.rows());
+            let cell = |at: usize| at / width / side * grid.cols() + at % width / side;
+            ProjectedFrame {
+                size: FrameSize::new(width as u16, height as u16).unwrap(),
+                codes: (0..width * height).map(|at| code(cell(at))).collect(),
+                exposure: 1.0,
+            }
+        };
+        let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
+        let taken = Mutex::new(BTreeMap::new());
+        let keep = |place, photograph: Option<Photograph>| {
+            taken.lock().unwrap().insert(place, photograph.unwrap());
+            Ok::<(), SimulationError>(())
+        };
+        let frames = [frame(1), frame(24)];
+        camera.take(&frames, &[0, 1], keep).unwrap();
+        let taken = taken.into_inner().unwrap();
+        let values = |place: usize| {
+            let planes = taken[&place].values.iter().flatten();
+            planes.map(|value| f64::from(*value))
+        };
+        let off = values(0).zip(values(1)).map(|(a, b)| (a - b).powi(2));
+        let off = (off.sum::<f64>() / values(0).map(|v| v * v).sum::<f64>()).sqrt();
+        println!("{name}: {off:.5}");
+        assert!(off < 0.005, "{name}: {off}");
+    }
 }

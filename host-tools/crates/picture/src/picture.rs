@@ -121,6 +121,33 @@ impl Picture {
         }
     }
 
+    /// What is left of it without `border` pixels on every side; `None` if nothing is.
+    #[must_use]
+    pub fn without_border(&self, border: u16) -> Option<Self> {
+        let border = usize::from(border);
+        let left = |side: usize| u16::try_from(side.checked_sub(2 * border)?).ok();
+        let size = FrameSize::new(left(self.size.width())?, left(self.size.height())?)?;
+        let (line, channels) = (self.size.width() * self.channels, self.channels);
+        let lines = border..border + size.height();
+        let parts = lines.map(|y| {
+            let begin = y * line + border * channels;
+            begin..begin + size.width() * channels
+        });
+        let samples = match &self.samples {
+            Samples::Eight(codes) => {
+                Samples::Eight(parts.flat_map(|part| codes[part].iter().copied()).collect())
+            }
+            Samples::Sixteen(codes) => {
+                Samples::Sixteen(parts.flat_map(|part| codes[part].iter().copied()).collect())
+            }
+        };
+        Some(Self {
+            size,
+            channels,
+            samples,
+        })
+    }
+
     /// Its size.
     #[must_use]
     pub const fn size(&self) -> FrameSize {

@@ -3,9 +3,9 @@
 
 use super::simulation::SimulationError;
 use super::virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};
-use iltm_capture::{CaptureError, SETTINGS_FILE, Settings, find_photo, listed};
+use iltm_capture::{CaptureError, Settings, find_photo, listed};
 use iltm_picture::{Samples, png, progress::Progress, whole_file};
-use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels};
+use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, resample::area::AreaAverage};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
@@ -91,9 +91,7 @@ impl UnfilledCapture {
         shots.sort_by_key(|shot| shot.index);
         // Exposures are relative to the longest, which white is exposed for.
         let longest = shots.iter().filter_map(|s| s.exposure).fold(0.0, f64::max);
-        let settings = folder.join(SETTINGS_FILE).is_file();
-        let projector = settings.then(|| Settings::read(folder)).transpose()?;
-        let projector = projector.and_then(|settings| settings.projector.pixels());
+        let projector = Settings::read(folder)?.projector.pixels();
         let frames = shots.iter().map(|shot| {
             let path = folder.join(&shot.pattern);
             let (size, codes) = frame(&path, grid, projector)?;
@@ -223,9 +221,12 @@ fn frame(
     let picture = png::read(BufReader::new(file)).map_err(|error| refuse(error.to_string()))?;
     let (found, cells) = (picture.size(), FrameSize::of_grid(grid));
     let slide = projector.filter(|projector| projector.size() == found);
-    let (size, border) = match slide {
-        _ if found == cells => (cells, 0),
-        Some(projector) => (projector.inner(), usize::from(projector.border())),
+    let picture = match slide {
+        _ if found == cells => picture,
+        Some(projector) => picture
+            .without_border(projector.border())
+            .filter(|inner| AreaAverage::new(grid, inner.size()).is_some())
+            .ok_or_else(|| refuse(format!("its border leaves fewer pixels than {grid} cells")))?,
         None => {
             return Err(refuse(format!(
                 "{} x {} cells (rows x columns), but the scene's projector has {grid}",
@@ -234,11 +235,6 @@ fn frame(
             )));
         }
     };
-    if size.width() < cells.width() || size.height() < cells.height() {
-        return Err(refuse(format!(
-            "a border of {border} pixels leaves fewer pixels than {grid} cells"
-        )));
-    }
     let codes: Vec<u8> = match picture.samples() {
         Samples::Eight(codes) => codes.clone(),
         Samples::Sixteen(codes) => {
@@ -246,12 +242,7 @@ fn frame(
             codes.iter().map(eight).collect()
         }
     };
-    let channels = picture.channels();
+    let pixels = codes.chunks_exact(picture.channels());
     let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % pixel.len()]);
-    let lines = codes.chunks_exact(found.width() * channels).skip(border);
-    let codes = lines.take(size.height()).flat_map(|line| {
-        let pixels = line.chunks_exact(channels).skip(border);
-        pixels.take(size.width()).map(colour)
-    });
-    Ok((size, codes.collect()))
+    Ok((picture.size(), pixels.map(colour).collect()))
 }

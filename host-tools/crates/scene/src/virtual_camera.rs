@@ -8,7 +8,7 @@ use super::sensor::Sensor;
 use super::simulation::{Simulation, SimulationError};
 use iltm_capture::Pattern;
 use iltm_picture::Response;
-use iltm_runtime::{FrameSize, Grid};
+use iltm_runtime::{FrameSize, Grid, resample::area::AreaAverage};
 use nalgebra::DMatrix;
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use rayon::prelude::*;
@@ -37,14 +37,6 @@ impl ProjectedFrame {
             codes: pattern.lit.iter().map(code).collect(),
             exposure: 1.0,
         }
-    }
-
-    /// The cell that the centre of a pixel lies in.
-    fn cell(&self, grid: Grid, pixel: usize) -> usize {
-        let (x, y) = (pixel % self.size.width(), pixel / self.size.width());
-        let part = |at: usize, of: usize, cells: usize| (2 * at + 1) * cells / (2 * of);
-        let row = part(y, self.size.height(), grid.rows());
-        row * grid.cols() + part(x, self.size.width(), grid.cols())
     }
 }
 
@@ -169,7 +161,8 @@ impl<'s> VirtualCamera<'s> {
     /// [`SimulationError`], or the first error of `keep`.
     ///
     /// # Panics
-    /// If a place is beyond the frames, or a frame has not one code a pixel.
+    /// If a place is beyond the frames, or a frame has not one code a pixel or fewer pixels than
+    /// cells.
     pub fn take<E>(
         &self,
         frames: &[ProjectedFrame],
@@ -186,7 +179,8 @@ impl<'s> VirtualCamera<'s> {
         let mut bounces = self.bounces;
         let cells = FrameSize::of_grid(self.grid());
         let mut finer: Vec<PixelSampling> = Vec::new();
-        for size in places.iter().map(|place| frames[*place].size) {
+        let shown = places.iter().filter_map(|place| faults.shown_at(*place));
+        for size in shown.map(|shown| frames[shown].size) {
             if size != cells && finer.iter().all(|known| known.size != size) {
                 finer.push(PixelSampling::new(self.simulation, size));
             }
@@ -233,25 +227,25 @@ impl<'s> VirtualCamera<'s> {
     ) -> (Vec<DMatrix<f64>>, Vec<f64>) {
         let light = self.light_of_codes();
         let grid = self.grid();
-        let cells = FrameSize::of_grid(grid);
         let mut channels = vec![DMatrix::zeros(grid.cells(), shown.len()); 3];
         for (column, (_, frame)) in shown.iter().enumerate() {
             assert_eq!(frame.codes.len(), frame.size.pixels(), "a code a pixel");
+            let owners = AreaAverage::new(grid, frame.size).expect("a pixel a cell or more");
+            let width = frame.size.width();
             let mut pixels = vec![0.0_f64; grid.cells()];
             for (pixel, codes) in frame.codes.iter().enumerate() {
-                let cell = frame.cell(grid, pixel);
+                let Some(cell) = owners.owner(pixel % width, pixel / width) else {
+                    continue;
+                };
                 pixels[cell] += 1.0;
                 let projected = faults.projected(codes.map(|code| light[usize::from(code)]));
                 for (channel, light) in channels.iter_mut().zip(projected) {
                     channel[(cell, column)] += light;
                 }
             }
-            if frame.size != cells {
-                for channel in &mut channels {
-                    let light = channel.column_mut(column);
-                    for (light, pixels) in light.into_iter().zip(&pixels) {
-                        *light /= pixels.max(1.0);
-                    }
+            for channel in &mut channels {
+                for (light, pixels) in channel.column_mut(column).iter_mut().zip(&pixels) {
+                    *light /= pixels.max(1.0);
                 }
             }
         }

@@ -100,21 +100,9 @@ impl Layout {
     /// size or depth.
     #[must_use]
     pub fn unframed(&self, picture: &Picture) -> Option<Picture> {
-        let Samples::Eight(samples) = picture.samples() else {
-            return None;
-        };
-        if picture.size() != self.projector {
-            return None;
-        }
-        let channels = picture.channels();
-        let border = usize::from(self.border);
-        let line = self.projector.width() * channels;
-        let lines = samples.chunks_exact(line).skip(border);
-        let inner = lines.take(self.inner.height()).flat_map(|line| {
-            let inner = line.chunks_exact(channels).skip(border);
-            inner.take(self.inner.width()).flatten().copied()
-        });
-        Picture::new(self.inner, Samples::Eight(inner.collect()))
+        let slide =
+            matches!(picture.samples(), Samples::Eight(_)) && picture.size() == self.projector;
+        slide.then(|| picture.without_border(self.border)).flatten()
     }
 
     /// Mean light of every cell in a picture of the projector's size, `N` entries for each of

@@ -59,8 +59,8 @@ impl Default for OrderOptions {
 }
 
 /// White and black, the ramps and probes, then the patterns of [`pattern_set`], fine stripes
-/// after the Gray code; white and black again every [`OrderOptions::repeat_every`] pictures and at the very end,
-/// which shows whether lamp, camera or scene changed meanwhile.
+/// after the Gray code; white and black again every [`OrderOptions::repeat_every`] pictures and
+/// at the very end, which shows whether lamp, camera or scene changed meanwhile.
 ///
 /// Bernoulli patterns come last, so that a session that had to stop early still has
 /// all that a solve needs, but fewer of them.

@@ -7,7 +7,8 @@
 use super::measurements::Measurements;
 use crate::registration::cell_map::{NO_CELL, Registration, cell_beside};
 use crate::registration::projector_map::{MapSource, ProjectorMap, within};
-use iltm_runtime::Grid;
+use iltm_runtime::placement::ProjectorPixels;
+use iltm_runtime::{FrameSize, Grid};
 use rayon::prelude::*;
 
 /// Ratio of a cell's distances to its two neighbours from which the farther one
@@ -118,23 +119,15 @@ impl ProjectorMap {
     pub fn of_cells(measurements: &Measurements) -> Self {
         let registration = &measurements.registration;
         let grid = measurements.grid;
-        let projector = measurements.settings.projector.pixels();
-        let (whole, inner, border) = projector.map_or(
-            ((grid.cols(), grid.rows()), (grid.cols(), grid.rows()), 0),
-            |pixels| {
-                let (whole, inner) = (pixels.size(), pixels.inner());
-                (
-                    (whole.width(), whole.height()),
-                    (inner.width(), inner.height()),
-                    pixels.border(),
-                )
-            },
-        );
+        let stated = measurements.settings.projector.pixels();
+        let cells = ProjectorPixels::whole(FrameSize::of_grid(grid));
+        let projector = stated.unwrap_or(cells);
+        let inner = projector.inner();
         let sides = [
-            inner.0 as f64 / grid.cols() as f64,
-            inner.1 as f64 / grid.rows() as f64,
+            inner.width() as f64 / grid.cols() as f64,
+            inner.height() as f64 / grid.rows() as f64,
         ];
-        let shift = f64::from(border) - 0.5;
+        let shift = f64::from(projector.border()) - 0.5;
         let uncertainty = within(sides[0] as f32).hypot(within(sides[1] as f32));
         let known = |pixel: usize| {
             let cell = registration.seen_cell[pixel];
@@ -154,8 +147,7 @@ impl ProjectorMap {
         let (position, uncertainty) = known.unzip();
         Self {
             source: MapSource::Cells,
-            projector: whole,
-            border: usize::from(border),
+            projector,
             camera: registration.camera,
             binning: registration.binning,
             position,

@@ -2,15 +2,13 @@
 
 use super::RampPoint;
 use super::samples::used_pixels;
-use crate::format::bracket::{self, Bracket};
+use crate::format::bracket::Bracket;
 use crate::format::calibration_role::{CalibrationManifest, CalibrationRole, CalibrationShot};
 use crate::format::error::CaptureError;
-use crate::format::manifest::{CALIBRATION_FILE, MANIFEST_FILE, Shot};
+use crate::format::manifest::{CALIBRATION_FILE, MANIFEST_FILE};
 use crate::format::photo_files::find_photo;
 use crate::format::picture_file::{Opened, Samples, Source};
-use crate::format::role::Role;
 use crate::format::sequence::{Sequence, another_grid};
-use crate::photographs::Photographs;
 use crate::photographs::linearise::LinearPhotographs;
 use iltm_picture::progress::{Progress, Silent};
 use iltm_runtime::Grid;
@@ -66,12 +64,9 @@ impl CalibrationPhotos {
         }
         let used = used_pixels(linear);
         let whites = whites(sequence, linear, &used)?;
-        let files: Vec<Shot> = shots.iter().map(as_shot).collect();
-        let own = bracket::longest(&files, &folder.join(CALIBRATION_FILE))?;
-        let brackets = Bracket::of_each(&files, sequence.longest.or(own));
-        let reading = &linear.photographs.format.reading;
-        let mut photographs = Photographs::of_brackets(folder, brackets, reading)?;
-        linear.photographs.format.check_like(&photographs.format)?;
+        let list = folder.join(CALIBRATION_FILE);
+        let brackets = Bracket::of_list(&shots, &list, sequence.longest)?;
+        let mut photographs = linear.others(folder, brackets)?;
         progress.begin("reading the calibration", shots.len() as u64);
         let black = mean_of(&linear.black, &used);
         let all: Vec<usize> = (0..shots.len()).collect();
@@ -122,18 +117,6 @@ fn whites(
         }
     })?;
     Ok(whites)
-}
-
-/// A calibration photograph as one of the capture, which light all cells.
-fn as_shot(shot: &CalibrationShot) -> Shot {
-    Shot {
-        index: shot.index,
-        role: Role::White,
-        pattern: shot.pattern.clone(),
-        photo: shot.photo.clone(),
-        exposure: shot.exposure,
-        line: shot.line,
-    }
 }
 
 /// Mean of each plane over the used pixels.

@@ -4,8 +4,9 @@
 //! scale at the longest exposure of the capture, so that of a short one may be above 1.
 
 use super::error::CaptureError;
-use super::manifest::{LINE, Shot};
+use super::manifest::{LINE, Shot, ShotOf};
 use super::pattern::Pattern;
+use super::role::Role;
 use std::path::Path;
 
 /// Photographs that become one.
@@ -25,6 +26,23 @@ impl Bracket {
             .iter()
             .map(|shot| Self::new(vec![shot.clone()], longest));
         each.collect()
+    }
+
+    /// A bracket for each shot of another list. `longest` is the exposure that the capture's light
+    /// is relative to; without one, it is the longest of the list.
+    ///
+    /// # Errors
+    /// As [`longest`].
+    pub(crate) fn of_list<R>(
+        shots: &[ShotOf<R>],
+        list: &Path,
+        longest: Option<f64>,
+    ) -> Result<Vec<Self>, CaptureError> {
+        // What was shown does not matter to how it is read.
+        let shots = shots.iter().map(|shot| shot.with_role(Role::White));
+        let shots: Vec<Shot> = shots.collect();
+        let own = self::longest(&shots, list)?;
+        Ok(Self::of_each(&shots, longest.or(own)))
     }
 
     fn new(shots: Vec<Shot>, longest: Option<f64>) -> Self {

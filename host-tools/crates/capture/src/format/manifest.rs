@@ -75,6 +75,20 @@ pub struct ShotOf<R> {
     pub line: u64,
 }
 
+impl<R> ShotOf<R> {
+    /// The same as a line of `capture.csv`: with another role.
+    pub(crate) fn with_role(&self, role: Role) -> Shot {
+        Shot {
+            index: self.index,
+            role,
+            pattern: self.pattern.clone(),
+            photo: self.photo.clone(),
+            exposure: self.exposure,
+            line: self.line,
+        }
+    }
+}
+
 /// One line of `capture.csv`.
 pub type Shot = ShotOf<Role>;
 

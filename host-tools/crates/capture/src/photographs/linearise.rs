@@ -2,6 +2,7 @@
 //! black, which all others are seen against.
 
 use super::{Photographs, channel_sum};
+use crate::format::bracket::Bracket;
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
 use crate::format::settings::Reading;
@@ -136,6 +137,29 @@ impl<'a> LinearPhotographs<'a> {
     ) -> Result<(), CaptureError> {
         self.photographs.unmix(inverse);
         self.average_white_black(sequence, progress)
+    }
+
+    /// Opens photographs of another list of the folder, which are read as these are.
+    ///
+    /// # Errors
+    /// A photograph's own error; [`CaptureError::Unlike`] if they are not of the capture's kind.
+    pub(crate) fn others<'f>(
+        &self,
+        folder: &'f Path,
+        brackets: Vec<Bracket>,
+    ) -> Result<Photographs<'f>, CaptureError> {
+        let reading = &self.photographs.format.reading;
+        let mut others = Photographs::of_brackets(folder, brackets, reading)?;
+        self.photographs.format.check_like(&others.format)?;
+        others.unmixing.clone_from(&self.photographs.unmixing);
+        Ok(others)
+    }
+
+    /// The middle of white and black in every pixel, summed over the channels.
+    pub(crate) fn middle(&self) -> Vec<f32> {
+        let (white, black) = (channel_sum(&self.flood), channel_sum(&self.black));
+        let middle = white.iter().zip(&black).map(|(w, b)| 0.5 * (w + b));
+        middle.collect()
     }
 
     /// What the projector adds to every pixel under white.

@@ -46,16 +46,14 @@ pub(crate) fn decode(
     progress: &dyn Progress,
 ) -> Result<GrayLabels, CaptureError> {
     let flood = linear.flood_light();
-    let photographs = &mut linear.photographs;
     if flood.bright < LEAST_LIGHT {
         return Err(CaptureError::NoLight {
-            path: photographs.path(sequence.white().shots[0]),
+            path: linear.photographs.path(sequence.white().shots[0]),
         });
     }
     let lit = flood.lit();
-    let (white, black) = (channel_sum(&linear.flood), channel_sum(&linear.black));
-    let middle = white.iter().zip(&black).map(|(w, b)| 0.5 * (w + b));
-    let middle: Vec<f32> = middle.collect();
+    let middle = linear.middle();
+    let photographs = &mut linear.photographs;
     let mut margin = vec![f32::INFINITY; middle.len()];
     let mut codes = [vec![0_u32; middle.len()], vec![0_u32; middle.len()]];
     for (axis, code) in [CodeAxis::Column, CodeAxis::Row]
@@ -109,14 +107,25 @@ fn bit_difference(
         let (planes, _) = photographs.mean(&view.shots, progress)?;
         Ok(Some(channel_sum(&planes)))
     };
-    let subtract = |a: &[f32], b: &[f32], times: f32| -> Vec<f32> {
-        a.iter().zip(b).map(|(a, b)| times * (a - b)).collect()
+    let (pattern, inverse) = (photo(false)?, photo(true)?);
+    let found = difference(pattern.as_deref(), inverse.as_deref(), middle);
+    // `Sequence` has checked that each bit was photographed.
+    Ok(found.unwrap_or_else(|| vec![0.0; middle.len()]))
+}
+
+/// Pattern minus inverse in every pixel; where one of the two is missing, twice the other against
+/// the middle of white and black. `None` without both.
+pub(super) fn difference(
+    pattern: Option<&[f32]>,
+    inverse: Option<&[f32]>,
+    middle: &[f32],
+) -> Option<Vec<f32>> {
+    let (more, less, times) = match (pattern, inverse) {
+        (Some(pattern), Some(inverse)) => (pattern, inverse, 1.0),
+        (Some(pattern), None) => (pattern, middle, 2.0),
+        (None, Some(inverse)) => (middle, inverse, 2.0),
+        (None, None) => return None,
     };
-    Ok(match (photo(false)?, photo(true)?) {
-        (Some(pattern), Some(inverse)) => subtract(&pattern, &inverse, 1.0),
-        (Some(pattern), None) => subtract(&pattern, middle, 2.0),
-        (None, Some(inverse)) => subtract(middle, &inverse, 2.0),
-        // `Sequence` has checked that each bit was photographed.
-        (None, None) => vec![0.0; middle.len()],
-    })
+    let pairs = more.iter().zip(less);
+    Some(pairs.map(|(more, less)| times * (more - less)).collect())
 }

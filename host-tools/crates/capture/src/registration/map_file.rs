@@ -67,14 +67,15 @@ impl ProjectorMap {
 mod tests {
     use super::*;
     use crate::registration::projector_map::MapSource;
+    use iltm_runtime::FrameSize;
+    use iltm_runtime::placement::ProjectorPixels;
     use image::ImageFormat;
 
     #[test]
     fn both_files_hold_positions_row_by_row_and_nan_where_nothing_is_known() {
         let map = ProjectorMap {
             source: MapSource::Code,
-            projector: (40, 30),
-            border: 0,
+            projector: ProjectorPixels::whole(FrameSize::new(40, 30).unwrap()),
             camera: (2, 1),
             binning: 1,
             position: vec![[3.5, 7.25], [f32::NAN; 2]],

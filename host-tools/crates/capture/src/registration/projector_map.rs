@@ -11,26 +11,25 @@
 //! which no wave has, says how large the noise is.
 
 use super::cell_map::{NO_CELL, Registration};
-use super::local_planes;
-use crate::format::bracket::{self, Bracket};
+use super::{gray_code, local_planes};
+use crate::format::bracket::Bracket;
 use crate::format::error::CaptureError;
-use crate::format::manifest::Shot;
 use crate::format::photo_files::find_photo;
 use crate::format::picture_file::{Opened, Source};
 use crate::format::role::{CodeAxis, Role};
 use crate::format::sequence::Sequence;
 use crate::format::settings::ProjectorSettings;
-use crate::format::stripe_role::{
-    STRIPES_FILE, StripeManifest, StripeRole, StripeShot, WAVE, coarse_bits,
-};
+use crate::format::stripe_role::{STRIPES_FILE, StripeManifest, StripeRole, WAVE, coarse_bits};
+use crate::photographs::channel_sum;
 use crate::photographs::linearise::LinearPhotographs;
-use crate::photographs::{Photographs, channel_sum};
 use iltm_picture::progress::Progress;
 use iltm_picture::statistics::median;
-use iltm_runtime::Grid;
+use iltm_runtime::placement::ProjectorPixels;
+use iltm_runtime::{FrameSize, Grid};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 use std::path::Path;
+use strum::IntoStaticStr;
 
 /// Contrast of stripes, of white's light, from which they are believed: what only bounces to a
 /// pixel has none.
@@ -54,7 +53,8 @@ const MOST_APART: f32 = 0.25;
 const MOST_WRONG: f64 = 0.2;
 
 /// What a map was made from.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum MapSource {
     /// Waves, a few projector pixels long.
     Waves,
@@ -67,12 +67,8 @@ pub enum MapSource {
 impl MapSource {
     /// Its name for programs.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Waves => "waves",
-            Self::Code => "code",
-            Self::Cells => "cells",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
@@ -81,11 +77,8 @@ impl MapSource {
 pub struct ProjectorMap {
     /// What it was made from.
     pub source: MapSource,
-    /// Width and height of the projector's picture in pixels; of the patterns, where the
-    /// projector's is not known.
-    pub projector: (usize, usize),
-    /// Pixels of it on every side that are no cell's.
-    pub border: usize,
+    /// The pixels of the projector's picture; of the patterns, where the projector's are not known.
+    pub projector: ProjectorPixels,
     /// Width and height of the registered photographs in pixels.
     pub camera: (usize, usize),
     /// Side of the square of file pixels that one registered pixel averages.
@@ -118,7 +111,7 @@ pub enum MapError {
     },
     /// The slides are smaller than the border, or than the cells.
     #[error("the slides of fine stripes have {0} x {1} pixels, which leaves none for some cells")]
-    Slides(usize, usize),
+    Slides(u32, u32),
     /// Code and waves say different places.
     #[error(
         "the fine stripes contradict each other in {percent:.0} % of the pixels: photographs are \
@@ -151,11 +144,11 @@ impl MapError {
 impl ProjectorMap {
     /// A position in cells of a grid over the picture, from the left and upper edge of the first.
     pub(crate) fn in_cells(&self, [x, y]: [f32; 2], grid: Grid) -> [f32; 2] {
-        let side = |of: usize, cells: usize| (of - 2 * self.border) as f32 / cells as f32;
-        let first = self.border as f32 - 0.5;
+        let inner = self.projector.inner();
+        let first = f32::from(self.projector.border()) - 0.5;
         [
-            (x - first) / side(self.projector.0, grid.cols()),
-            (y - first) / side(self.projector.1, grid.rows()),
+            (x - first) * grid.cols() as f32 / inner.width() as f32,
+            (y - first) * grid.rows() as f32 / inner.height() as f32,
         ]
     }
 
@@ -256,9 +249,7 @@ pub(crate) fn find(
 
 /// All that a map is made from.
 struct Decoding {
-    /// Width and height of the projector's picture.
-    projector: (usize, usize),
-    border: usize,
+    projector: ProjectorPixels,
     /// Columns of cells.
     cols: usize,
     /// Side of what the bits leave of a cell, where number 0 would begin, and the number of the
@@ -302,24 +293,18 @@ fn listed(
         line: slide.line,
     })?;
     let (width, height) = picture.size();
-    let (width, height) = (width as usize, height as usize);
-    let border = usize::from(settings.border);
-    let inner = [width, height].map(|side| side.saturating_sub(2 * border));
+    let side = |side: u32| u16::try_from(side).unwrap_or(0);
+    let size = FrameSize::new(side(width), side(height));
+    let projector = size.and_then(|size| ProjectorPixels::new(size, settings.border));
     let cells = [sequence.grid.cols(), sequence.grid.rows()];
-    if (0..2).any(|axis| inner[axis] < cells[axis]) {
+    let inner = projector.map(ProjectorPixels::inner);
+    let inner = inner.map_or([0; 2], |inner| [inner.width(), inner.height()]);
+    let enough = (0..2).all(|axis| inner[axis] >= cells[axis]);
+    let Some(projector) = projector.filter(|_| enough) else {
         return Ok(Err(MapError::Slides(width, height)));
-    }
-    let as_shot = |shot: &StripeShot| Shot {
-        index: shot.index,
-        role: Role::White,
-        pattern: shot.pattern.clone(),
-        photo: shot.photo.clone(),
-        exposure: shot.exposure,
-        line: shot.line,
     };
-    let files: Vec<Shot> = shots.iter().map(as_shot).collect();
-    let own = bracket::longest(&files, &folder.join(STRIPES_FILE))?;
-    let brackets = Bracket::of_each(&files, sequence.longest.or(own));
+    let list = folder.join(STRIPES_FILE);
+    let brackets = Bracket::of_list(&shots, &list, sequence.longest)?;
     let fine = Fine {
         roles: shots.iter().map(|shot| shot.role).collect(),
         light: light(folder, brackets, linear, progress)?,
@@ -332,8 +317,7 @@ fn listed(
             (inner[at] as f32 / parts as f32, 0.0, 0)
         });
         Decoding {
-            projector: (width, height),
-            border,
+            projector,
             cols: cells[0],
             scale,
             light,
@@ -371,9 +355,13 @@ fn left_out(
         let side = (1_usize << missing) as f32;
         (side, offset as f32, sequence.codes[at].offset)
     });
+    let [width, height] = [0, 1].map(|at: usize| sequence.shown[at].0);
+    let size = FrameSize::new(width as u16, height as u16);
+    let Some(size) = size else {
+        return Ok(Err(MapError::Slides(width as u32, height as u32)));
+    };
     Ok(Ok(Decoding {
-        projector: (sequence.shown[0].0, sequence.shown[1].0),
-        border: 0,
+        projector: ProjectorPixels::whole(size),
         cols: sequence.grid.cols(),
         scale,
         light,
@@ -396,9 +384,7 @@ fn light(
         return Ok(Vec::new());
     }
     let count = brackets.len();
-    let reading = &linear.photographs.format.reading;
-    let mut photographs = Photographs::of_brackets(folder, brackets, reading)?;
-    linear.photographs.format.check_like(&photographs.format)?;
+    let mut photographs = linear.others(folder, brackets)?;
     progress.begin("reading fine stripes", count as u64);
     let mut light = vec![Vec::new(); count];
     let all: Vec<usize> = (0..count).collect();
@@ -411,9 +397,8 @@ fn light(
     Ok(light)
 }
 
-fn minus(a: &[f32], b: &[f32], times: f32) -> Vec<f32> {
-    let pairs = a.iter().zip(b);
-    pairs.map(|(a, b)| times * (a - b)).collect()
+fn minus(a: &[f32], b: &[f32]) -> Vec<f32> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 impl Fine {
@@ -423,21 +408,12 @@ impl Fine {
     }
 
     /// Pattern minus inverse of the bits of an axis from `first` on, as far as they were
-    /// photographed. What has no inverse is seen against the middle of white and black.
+    /// photographed.
     fn bits(&self, axis: CodeAxis, first: u8, linear: &LinearPhotographs<'_>) -> Vec<Vec<f32>> {
+        let middle = linear.middle();
         let difference = |bit: u8| {
             let of = |inverse| self.of(StripeRole::Code { axis, bit, inverse });
-            let middle = || {
-                let (white, black) = (channel_sum(&linear.flood), channel_sum(&linear.black));
-                let sum = white.iter().zip(&black).map(|(w, b)| 0.5 * (w + b));
-                sum.collect::<Vec<f32>>()
-            };
-            match (of(false), of(true)) {
-                (Some(pattern), Some(inverse)) => Some(minus(pattern, inverse, 1.0)),
-                (Some(pattern), None) => Some(minus(pattern, &middle(), 2.0)),
-                (None, Some(inverse)) => Some(minus(&middle(), inverse, 2.0)),
-                (None, None) => None,
-            }
+            gray_code::difference(of(false), of(true), &middle)
         };
         (first..Role::MAX_BITS).map_while(difference).collect()
     }
@@ -457,9 +433,9 @@ impl Fine {
         let waves = match steps {
             [None, None, None, None] => None,
             [Some(first), Some(second), Some(third), Some(fourth)] => {
-                let wave = [minus(first, third, 1.0), minus(second, fourth, 1.0)];
-                let others = minus(third, fourth, 1.0);
-                let pairs = minus(first, second, 1.0).into_iter().zip(others);
+                let wave = [minus(first, third), minus(second, fourth)];
+                let others = minus(third, fourth);
+                let pairs = minus(first, second).into_iter().zip(others);
                 let rest = pairs.map(|(a, b)| a + b).collect();
                 Some(WaveLight { wave, rest })
             }
@@ -541,7 +517,7 @@ impl Decoding {
             Some((own, in_waves(place)))
         };
         let known: Vec<Option<(f32, bool)>> = found.iter().map(known).collect();
-        let shift = self.border as f32 - 0.5;
+        let shift = f32::from(self.projector.border()) - 0.5;
         let at =
             |place: &Option<[Place; 2]>| place.as_ref().map(|[x, y]| [x.at + shift, y.at + shift]);
         let places = found.iter().zip(&known);
@@ -567,7 +543,6 @@ impl Decoding {
         Ok(ProjectorMap {
             source,
             projector: self.projector,
-            border: self.border,
             camera,
             binning: registration.binning,
             position,
