@@ -12,6 +12,7 @@ use iltm_runtime::link::{
     SlotState, Stack, Status, TableName, Version,
 };
 use iltm_runtime::store::{Slot, Updater};
+use iltm_runtime::units::ClippedSamples;
 use std::fmt;
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -163,8 +164,12 @@ impl Default for FakeDevice {
                 broken: 3,
             },
             clipping: Clipping {
-                last: 120,
-                total: 4_500,
+                last: ClippedSamples {
+                    black: 120,
+                    white: 60,
+                },
+                black: 4_500,
+                white: 900,
                 samples: 12_000,
             },
             frame_time: FrameTime {

@@ -14,6 +14,7 @@ use iltm::{
 };
 use iltm_runtime::frame_buffers::{Format, Layout, psram};
 use iltm_runtime::image::Table;
+use iltm_runtime::units::ClippedSamples;
 use iltm_runtime::{FrameSize, Grid};
 use std::collections::HashMap;
 use std::io::{self, ErrorKind, Read, Write};
@@ -311,8 +312,13 @@ pub fn wait_for_frame(playback: &mut Playback<'_>, end: Instant) -> Vec<u8> {
     }
 }
 
-/// What the host makes of a frame.
-pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Vec<u8>, u64) {
+/// What the host makes of a frame, and the samples that it clips.
+pub fn on_host(
+    table: &Table<'_>,
+    tier: u8,
+    format: Format,
+    frame: &[u8],
+) -> (Vec<u8>, ClippedSamples) {
     let settings = CompensateOptions {
         tier: Some(tier),
         encoding: format.encoding(),
@@ -323,8 +329,13 @@ pub fn on_host(table: &Table<'_>, tier: u8, format: Format, frame: &[u8]) -> (Ve
     let samples = Samples::Eight(frame.to_vec());
     let picture = Picture::new(format.size(), samples).expect("a whole frame");
     let (picture, summary) = compensator.frame(picture).expect("it fits the table");
+    let count = |samples: u64| u32::try_from(samples).expect("a frame's");
+    let clipped = ClippedSamples {
+        black: count(summary.clipped - summary.clipped_white),
+        white: count(summary.clipped_white),
+    };
     match picture.samples() {
-        Samples::Eight(samples) => (samples.clone(), summary.clipped),
+        Samples::Eight(samples) => (samples.clone(), clipped),
         Samples::Sixteen(_) => unreachable!("the samples were bytes"),
     }
 }
@@ -336,7 +347,7 @@ pub fn clipped_on_host(
     format: Format,
     frame: &[u8],
     shown: &[u8],
-) -> Option<u64> {
+) -> Option<ClippedSamples> {
     (0..=table.top_tier()).find_map(|tier| {
         let (made, clipped) = on_host(table, tier, format, frame);
         (made == shown).then_some(clipped)

@@ -5,6 +5,7 @@ use super::failure::{Failure, Kind, cannot_read};
 use super::output::{Output, read_file};
 use super::progress::progress;
 use super::tables::check;
+use super::words::advice_for_white;
 use crate::compile::Provenance;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
 use crate::video::watch::FileWatch;
@@ -149,9 +150,6 @@ fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Percent of the samples cut off at white from which people are told what to do.
-const WORTH_ADVICE: f64 = 0.1;
-
 /// What was done, for programs and for people.
 fn totals(summary: &FrameTotals, seconds: f64) -> (Value, String) {
     let share = |count: u64| 100.0 * count as f64 / summary.samples.max(1) as f64;
@@ -177,9 +175,8 @@ fn totals(summary: &FrameTotals, seconds: f64) -> (Value, String) {
          {black:.2} % darker than its black\n",
         summary.size
     );
-    if white > WORTH_ADVICE {
-        text += "         too bright: `iltm solve --content FILE` makes a table that is dark \
-                 enough for it\n";
+    if let Some(advice) = advice_for_white(white) {
+        let _ = writeln!(text, "         {advice}");
     }
     if summary.cut_short {
         text += "         the program that takes the frames ended before the last one: the rest is lost\n";

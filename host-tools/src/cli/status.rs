@@ -5,11 +5,12 @@ use super::connect::connect;
 use super::failure::Failure;
 use super::output::Output;
 use super::words::{
-    called, clipped_share, duration, identity, milliseconds, mode, number, serial, slot_lines,
-    slot_states, slots_data, status_data, table_in_use, table_name, trust, watchdog,
+    advice_for_white, called, clipped_percent, duration, identity, milliseconds, mode, number,
+    serial, slot_lines, slot_states, slots_data, status_data, table_in_use, table_name, trust,
+    watchdog,
 };
 use crate::device::DeviceError;
-use iltm_runtime::link::{Hello, Slots, Status};
+use iltm_runtime::link::{Clipping, Hello, Slots, Status};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -70,6 +71,9 @@ fn text(port: &str, status: &Status, device: &Hello, slots: Option<&Slots>) -> S
     line("frames", frames(status));
     line("frame time", frame_time(status));
     line("clipped", clipped(status));
+    if let Some(advice) = advice_for_white(clipped_percent(status)[1]) {
+        line("", advice.to_owned());
+    }
     line(
         "stack",
         format!("{} of {} bytes used", status.stack.used, status.stack.size),
@@ -101,9 +105,14 @@ fn frame_time(status: &Status) -> String {
 }
 
 fn clipped(status: &Status) -> String {
+    let [black, white] = clipped_percent(status);
+    let Clipping {
+        black: all_black,
+        white: all_white,
+        ..
+    } = status.clipping;
     format!(
-        "{:.2} % of the last frame's samples, {} samples in all",
-        100.0 * clipped_share(status),
-        status.clipping.total
+        "{black:.2} % of the last frame at black, {white:.2} % at white; \
+         {all_black} and {all_white} samples in all"
     )
 }

@@ -2,8 +2,8 @@
 
 use iltm_runtime::image::Label;
 use iltm_runtime::link::{
-    FrameKind, Hello, Mode, PassThrough, SlotInfo, SlotState, Slots, Status, TableAbout, TableName,
-    TableReason,
+    Clipping, FrameKind, Hello, Mode, PassThrough, SlotInfo, SlotState, Slots, Status, TableAbout,
+    TableName, TableReason,
 };
 use serde_json::{Value, json};
 use std::fmt::{self, Write};
@@ -133,7 +133,8 @@ pub(super) fn status_data(status: &Status) -> Value {
         },
         "clipped": {
             "last": status.clipping.last,
-            "total": status.clipping.total,
+            "black": status.clipping.black,
+            "white": status.clipping.white,
             "samples": status.clipping.samples,
         },
         "frame_time_us": {
@@ -204,9 +205,19 @@ pub(super) fn milliseconds(us: u32) -> String {
     format!("{:.1} ms", f64::from(us) / 1000.0)
 }
 
-/// Share of the last frame's samples that were clipped.
-pub(super) fn clipped_share(status: &Status) -> f64 {
-    f64::from(status.clipping.last) / f64::from(status.clipping.samples.max(1))
+/// Percent of the samples clipped at white from which people are told what to do.
+const WORTH_ADVICE: f64 = 0.1;
+
+/// What to do if this many percent of the samples are clipped at white.
+pub(super) fn advice_for_white(percent: f64) -> Option<&'static str> {
+    let advice = "too bright: `iltm solve --content FILE` makes a table that is dark enough for it";
+    (percent > WORTH_ADVICE).then_some(advice)
+}
+
+/// Shares of the last frame's samples that were clipped at black and at white, in percent.
+pub(super) fn clipped_percent(status: &Status) -> [f64; 2] {
+    let Clipping { last, samples, .. } = status.clipping;
+    [last.black, last.white].map(|count| 100.0 * f64::from(count) / f64::from(samples.max(1)))
 }
 
 pub(super) fn serial(status: &Status) -> String {

@@ -83,7 +83,7 @@ fn noise_around_an_answer_does_not_hide_it() {
 #[test]
 fn a_device_of_another_version_says_which_side_to_change() {
     let port = FakePort::new(FakeDevice {
-        protocol: 2,
+        protocol: 3,
         ..FakeDevice::default()
     });
     insta::assert_snapshot!(said("status", port.path()));
@@ -167,7 +167,10 @@ fn monitor_prints_a_line_for_everything_that_happens() {
     watching.until("compensating, tier 3 of 5");
     // From the second status on there is a rate: the device counts 60 a second.
     let status = watching.until("compensating, tier 3 of 5");
-    contains(&status, &["9.0 of 16.7 ms, 1.00 % clipped, 1 late"]);
+    contains(
+        &status,
+        &["9.0 of 16.7 ms, clipped 1.00 % at black and 0.50 % at white, 1 late"],
+    );
     watching.port.order(Order::Event(CHANGED));
     let changed = watching.until("tier 3 to 2");
     assert_eq!(

@@ -488,7 +488,7 @@ fn a_report_has_what_support_needs_and_no_keys() {
         files.push((name, text));
     }
     for (name, words) in [
-        ("versions.json", "\"protocol\": 1"),
+        ("versions.json", "\"protocol\": 2"),
         ("status.json", "compensating"),
         ("slots.json", "trial"),
         ("config.toml", "exclude"),

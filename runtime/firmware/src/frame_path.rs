@@ -6,6 +6,7 @@ use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells};
 use iltm_runtime::placement::PixelArea;
+use iltm_runtime::units::ClippedSamples;
 use iltm_runtime::{FrameSize, features};
 
 /// What is done to the frames of a format.
@@ -70,13 +71,13 @@ impl FramePath {
         wanted: &[u8],
         input: &mut [u8],
         memory: &mut Memory,
-    ) -> Result<u32, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         match (*self, table) {
             (Self::PassThrough(_), _) | (_, None) => {
                 for (input, wanted) in input.iter_mut().zip(wanted) {
                     *input = *wanted;
                 }
-                Ok(0)
+                Ok(ClippedSamples::default())
             }
             (Self::Grid(encoding), Some(table)) => {
                 let mut workspace = memory.workspace();

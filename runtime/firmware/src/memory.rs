@@ -6,7 +6,7 @@ use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{
     FrameError, FrameJob, FullMemory, RowBuffers, Workspace, compensate_pixels, prepare_pixels,
 };
-use iltm_runtime::units::{Halfword, InputCoefficient};
+use iltm_runtime::units::{ClippedSamples, Halfword, InputCoefficient};
 use iltm_runtime::{FrameSize, Grid};
 use static_cell::ConstStaticCell;
 
@@ -169,7 +169,7 @@ impl Memory {
         job: &FrameJob<'_, '_>,
         wanted: &[u8],
         input: &mut [u8],
-    ) -> Result<u32, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         let [first, _] = &self.pixels;
         let at = usize::from(!first.is_ready(job.table, job.area.size));
         let (channels, cells) = (job.table.channels().into(), job.table.grid().cells());

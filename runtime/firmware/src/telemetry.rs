@@ -8,6 +8,7 @@ use iltm_runtime::link::{
     Clipping, Fault, FrameCounts, FrameKind, FrameTime, Mode, Name, PassThrough, SerialCounts,
     SlotState, Stack, Status, Version,
 };
+use iltm_runtime::units::ClippedSamples;
 
 /// Everything that a status says, kept up to date by the frame loop.
 pub struct Telemetry {
@@ -82,7 +83,7 @@ impl Telemetry {
     }
 
     /// A frame was worked on in this many ticks.
-    pub fn frame(&mut self, ticks: u32, tier: u8, clipped: u32) {
+    pub fn frame(&mut self, ticks: u32, tier: u8, clipped: ClippedSamples) {
         let microseconds = ticks / self.ticks_per_microsecond;
         self.mean = if self.status.frames.shown == 0 {
             ticks.saturating_mul(MEAN_OVER)
@@ -97,7 +98,8 @@ impl Telemetry {
         time.worst_us = time.worst_us.max(microseconds);
         let clipping = &mut self.status.clipping;
         clipping.last = clipped;
-        clipping.total = clipping.total.saturating_add(u64::from(clipped));
+        clipping.black = clipping.black.saturating_add(clipped.black.into());
+        clipping.white = clipping.white.saturating_add(clipped.white.into());
     }
 
     /// What became of the frames that were to come in.

@@ -82,7 +82,7 @@ pub(crate) mod lines {
 pub(crate) mod pixels {
     use crate::kernel::{Block, Plane};
     use crate::response::CODES;
-    use crate::units::{Halfword, InputCoefficient};
+    use crate::units::{ClippedSamples, Halfword, InputCoefficient};
 
     /// Merges a block of the pixels of one channel: the sum of each node to `sums`, its
     /// details to `details`. `light` is by code. `false`, and nothing done, if that has to
@@ -112,7 +112,7 @@ pub(crate) mod pixels {
         _gains: &[[Halfword; C]],
         _corrections: &[i32],
         _input: &mut [[u8; C]],
-    ) -> Option<u32> {
+    ) -> Option<ClippedSamples> {
         None
     }
 

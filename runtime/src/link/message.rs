@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the messages here. [`Request::Hello`] and [`Response::Hello`] stay
 /// as they are in every version, so that any two can find out that they differ.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// What a host asks. Every request may be repeated without harm.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]

@@ -5,6 +5,7 @@
 use super::message::Version;
 use crate::frame_buffers::{AttachError, Broken};
 use crate::trust::Rejected;
+use crate::units::ClippedSamples;
 use core::fmt;
 use heapless::String;
 use serde::{Deserialize, Serialize};
@@ -158,9 +159,11 @@ pub struct FrameCounts {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct Clipping {
     /// In the last frame.
-    pub last: u32,
-    /// In all frames.
-    pub total: u64,
+    pub last: ClippedSamples,
+    /// At black, in all frames.
+    pub black: u64,
+    /// At white, in all frames.
+    pub white: u64,
     /// Samples of a frame, clipped or not.
     pub samples: u32,
 }

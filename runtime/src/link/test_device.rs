@@ -1,6 +1,7 @@
 //! Test device with every field at its longest.
 
 use super::*;
+use crate::units::ClippedSamples;
 
 /// Says what takes most bytes.
 pub(super) struct FullDevice;
@@ -102,8 +103,12 @@ impl Device for FullDevice {
                 broken: MOST,
             },
             clipping: Clipping {
-                last: MOST,
-                total: u64::MAX,
+                last: ClippedSamples {
+                    black: MOST,
+                    white: MOST,
+                },
+                black: u64::MAX,
+                white: u64::MAX,
                 samples: MOST,
             },
             frame_time: FrameTime {

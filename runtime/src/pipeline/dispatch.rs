@@ -10,6 +10,7 @@ use crate::FrameSize;
 use crate::features::Stage;
 use crate::image::Table;
 use crate::placement::PixelArea;
+use crate::units::ClippedSamples;
 
 /// Compensates a frame of one pixel a cell at a tier; returns how many samples were
 /// clipped.
@@ -23,7 +24,7 @@ pub fn compensate_cells(
     wanted: &[u8],
     input: &mut [u8],
     workspace: &mut Workspace<'_>,
-) -> Result<u32, FrameError> {
+) -> Result<ClippedSamples, FrameError> {
     match table.channels() {
         1 => cells::<1>(table, tier, encoding, wanted, input, workspace),
         _ => cells::<3>(table, tier, encoding, wanted, input, workspace),
@@ -37,7 +38,7 @@ fn cells<const C: usize>(
     wanted: &[u8],
     input: &mut [u8],
     workspace: &mut Workspace<'_>,
-) -> Result<u32, FrameError> {
+) -> Result<ClippedSamples, FrameError> {
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     GridPipeline::<C>::new(table)?.compensate(tier, encoding, wanted, input, workspace)
 }
@@ -88,7 +89,7 @@ pub fn compensate_pixels(
     input: &mut [u8],
     memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
-) -> Result<u32, FrameError> {
+) -> Result<ClippedSamples, FrameError> {
     match job.table.channels() {
         1 => pixels::<1>(job, wanted, input, memory, workspace),
         _ => pixels::<3>(job, wanted, input, memory, workspace),
@@ -101,7 +102,7 @@ fn pixels<const C: usize>(
     input: &mut [u8],
     memory: &mut FullMemory<'_>,
     workspace: &mut Workspace<'_>,
-) -> Result<u32, FrameError> {
+) -> Result<ClippedSamples, FrameError> {
     let pipeline = FullPipeline::<C>::within(job.table, job.size, job.area)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     pipeline.compensate(job.tier, job.encoding, wanted, input, memory, workspace)

@@ -12,7 +12,7 @@
 )]
 
 use super::FrameError;
-use super::stages::{ClippedInRow, Workspace, correct, drive_row, subtract_ambient};
+use super::stages::{Workspace, correct, drive_row, subtract_ambient};
 use crate::FrameSize;
 use crate::features::Stage;
 use crate::haar::ShortSlice;
@@ -20,7 +20,7 @@ use crate::image::{FineGain, Table};
 use crate::placement::PixelArea;
 use crate::resample::area::AreaAverage;
 use crate::resample::interpolation::{Axis, blend, blend_rows};
-use crate::units::{Drive, Light};
+use crate::units::{ClippedSamples, Drive, Light};
 
 /// Fraction bits that gains have beyond their own while they are interpolated.
 const GAIN_GUARD_BITS: u32 = 12;
@@ -315,7 +315,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         corrections: &[i32],
         row: &mut RowBuffers<'_>,
         drives: &mut [Drive],
-    ) -> ClippedInRow {
+    ) -> ClippedSamples {
         self.correct_row(y, corrections, row);
         let fraction = u32::from(self.table.gain_fraction());
         drive_row(light, gain, fraction, row.spread, drives)

@@ -12,7 +12,7 @@ use super::sample::{Encoding, Sample};
 use super::stages::Workspace;
 use crate::haar::ShortSlice;
 use crate::kernel::Plane;
-use crate::units::Halfword;
+use crate::units::{ClippedSamples, Halfword};
 use core::array::from_fn;
 
 /// Memory for frames of `W x H` pixels of `C` channels over `N` cells.
@@ -113,7 +113,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         input: &mut [[S; C]],
         memory: &mut FullMemory<'_>,
         workspace: &mut Workspace<'_>,
-    ) -> Result<u32, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         self.check_tier(tier)?;
         self.check_pixels("input", input.len())?;
         if self.operates(tier) {
@@ -162,7 +162,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         memory: &mut FullMemory<'_>,
-    ) -> Result<u32, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         self.check(memory)?;
         self.check_pixels("wanted", wanted.len())?;
         self.check_pixels("input", input.len())?;
@@ -173,7 +173,7 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         }
         let fraction = u32::from(self.table().gain_fraction());
         let curves: [_; C] = from_fn(|channel| S::curves(self.table(), encoding, channel));
-        let mut clipped = 0;
+        let mut clipped = ClippedSamples::default();
         if self.frame() != self.whole() {
             // What no cell covers stays black.
             input.as_flattened_mut().fill(S::default());

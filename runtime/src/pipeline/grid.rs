@@ -3,10 +3,11 @@
 use super::FrameError;
 use super::pixels::Pixels;
 use super::sample::{Encoding, Sample};
-use super::stages::{Workspace, drive, is_too_bright};
+use super::stages::Workspace;
 use crate::haar::ShortSlice;
 use crate::image::Table;
 use crate::kernel::Plane;
+use crate::units::ClippedSamples;
 
 /// Compensates frames of the grid's own size, `C` channels side by side.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +44,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         workspace: &mut Workspace<'_>,
-    ) -> Result<u32, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         let top = self.table.top_tier();
         if tier > top {
             return Err(FrameError::NoSuchTier { tier, top });
@@ -97,7 +98,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
         wanted: &[[S; C]],
         input: &mut [[S; C]],
         workspace: &mut Workspace<'_>,
-    ) -> Result<u32, FrameError> {
+    ) -> Result<ClippedSamples, FrameError> {
         self.check("wanted", wanted.len())?;
         self.check("input", input.len())?;
         workspace.check(self.table)?;
@@ -109,7 +110,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
         }
         let gains = self.table.gains().as_chunks::<C>().0;
         let fraction = u32::from(self.table.gain_fraction());
-        let mut clipped = 0;
+        let mut clipped = ClippedSamples::default();
         for channel in 0..C {
             if operates {
                 workspace.synthesise(self.table, channel)?;
@@ -119,38 +120,6 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
             clipped += S::finish(&pixels, fraction, gains, corrections, input);
         }
         Ok(clipped)
-    }
-
-    /// How many samples of the frame that [`compensate`](Self::compensate) has just made at
-    /// this tier were clipped at white; all others of those clipped were at black.
-    ///
-    /// # Errors
-    /// [`FrameError::Short`] if a slice is too short.
-    pub fn too_bright<S: Sample>(
-        &self,
-        tier: u8,
-        encoding: Encoding,
-        wanted: &[[S; C]],
-        workspace: &mut Workspace<'_>,
-    ) -> Result<u32, FrameError> {
-        self.check("wanted", wanted.len())?;
-        workspace.check(self.table)?;
-        let fraction = u32::from(self.table.gain_fraction());
-        let mut count = 0;
-        for channel in 0..C {
-            if self.operates(tier) {
-                workspace.synthesise(self.table, channel)?;
-            }
-            let pixels = self.pixels(encoding, wanted, channel);
-            let gains = self.table.gains().iter().skip(channel).step_by(C);
-            let cells = gains.zip(workspace.cells.iter());
-            for (index, (gain, correction)) in cells.enumerate() {
-                let gain = u16::from_le_bytes(*gain);
-                let wanted = drive(pixels.light(index), gain, fraction, *correction);
-                count += u32::from(is_too_bright(wanted));
-            }
-        }
-        Ok(count)
     }
 
     /// Whether frames of `tier` go through the operator.

@@ -6,7 +6,7 @@ use super::stages::{clip, drive};
 use crate::image::Table;
 use crate::kernel::{Block, pixels};
 use crate::response::{CODES, INDEX_SHIFT, ResponseCurve, code_at, linear_code, linear_code_8};
-use crate::units::{Halfword, InputCoefficient, Light};
+use crate::units::{ClippedSamples, Halfword, InputCoefficient, Light};
 use core::fmt;
 
 /// What the codes of a frame mean.
@@ -31,9 +31,8 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
     /// Light of a code.
     fn light(self, curves: Self::Curves<'_>) -> Light;
 
-    /// Code of a drive in units of [`Drive`](crate::units::Drive) that may lie outside 0 to 1; says
-    /// whether it did.
-    fn code(wanted: i32, curves: Self::Curves<'_>) -> (Self, bool);
+    /// Code of a drive in units of [`Drive`](crate::units::Drive) that may lie outside 0 to 1.
+    fn code(wanted: i32, curves: Self::Curves<'_>) -> Self;
 
     /// [`CellSource::merge`](crate::haar::CellSource::merge) of pixels.
     #[inline]
@@ -61,7 +60,7 @@ pub trait Sample: Copy + Default + fmt::Debug + 'static {
         gains: &[[Halfword; C]],
         corrections: &[i32],
         input: &mut [[Self; C]],
-    ) -> u32 {
+    ) -> ClippedSamples {
         finish_plainly(wanted, gain_fraction, gains, corrections, input)
     }
 }
@@ -85,18 +84,17 @@ fn finish_plainly<S: Sample, const C: usize>(
     gains: &[[Halfword; C]],
     corrections: &[i32],
     input: &mut [[S; C]],
-) -> u32 {
-    let mut clipped = 0;
+) -> ClippedSamples {
+    let mut clipped = ClippedSamples::default();
     let pixels = input.iter_mut().zip(gains).zip(corrections);
     for (index, ((pixel, gain), correction)) in pixels.enumerate() {
         let gain = gain.get(wanted.plane.channel).copied().unwrap_or_default();
         let light = wanted.light(index);
         let wanted_drive = drive(light, u16::from_le_bytes(gain), gain_fraction, *correction);
-        let (code, was_clipped) = S::code(wanted_drive, wanted.curves);
         if let Some(sample) = pixel.get_mut(wanted.plane.channel) {
-            *sample = code;
+            *sample = S::code(wanted_drive, wanted.curves);
         }
-        clipped += u32::from(was_clipped);
+        clipped.count(wanted_drive);
     }
     clipped
 }
@@ -133,18 +131,16 @@ impl Sample for u8 {
     }
 
     #[inline]
-    fn code(wanted: i32, curves: Curves<'_>) -> (Self, bool) {
+    fn code(wanted: i32, curves: Curves<'_>) -> Self {
         let Some(codes) = curves.codes else {
-            let (drive, clipped) = clip(wanted);
-            return (linear_code_8(drive), clipped);
+            return linear_code_8(clip(wanted));
         };
         // Negative drives become the largest indices.
         let index = (wanted.cast_unsigned() >> INDEX_SHIFT) as usize;
         if let Some(code) = codes.get(index) {
-            return (*code, false);
+            return *code;
         }
-        let (drive, clipped) = clip(wanted);
-        (code_at(codes, drive), clipped)
+        code_at(codes, clip(wanted))
     }
 
     #[inline]
@@ -177,7 +173,7 @@ impl Sample for u8 {
         gains: &[[Halfword; C]],
         corrections: &[i32],
         input: &mut [[Self; C]],
-    ) -> u32 {
+    ) -> ClippedSamples {
         let Curves { light, codes } = wanted.curves;
         let plane = &wanted.plane;
         let done = pixels::finish(
@@ -226,13 +222,11 @@ impl Sample for u16 {
     }
 
     #[inline]
-    fn code(wanted: i32, curves: WideCurves<'_>) -> (Self, bool) {
-        let (drive, clipped) = clip(wanted);
-        let code = match curves.encoding {
-            Encoding::Display => curves.response.fine_code(drive),
-            Encoding::Linear => linear_code(drive),
-        };
-        (code, clipped)
+    fn code(wanted: i32, curves: WideCurves<'_>) -> Self {
+        match curves.encoding {
+            Encoding::Display => curves.response.fine_code(clip(wanted)),
+            Encoding::Linear => linear_code(clip(wanted)),
+        }
     }
 }
 
@@ -272,15 +266,18 @@ mod tests {
                 light: &LINEAR_LIGHT,
                 codes,
             };
-            for (wanted, expected) in [
-                (i32::MIN, (0, true)),
-                (-1, (0, true)),
-                (0, (0, false)),
-                (32_768, (255, false)),
-                (32_769, (255, true)),
-                (i32::MAX, (255, true)),
+            for (wanted, code, black, white) in [
+                (i32::MIN, 0, 1, 0),
+                (-1, 0, 1, 0),
+                (0, 0, 0, 0),
+                (32_768, 255, 0, 0),
+                (32_769, 255, 0, 1),
+                (i32::MAX, 255, 0, 1),
             ] {
-                assert_eq!(u8::code(wanted, curves), expected, "{wanted}");
+                assert_eq!(u8::code(wanted, curves), code, "{wanted}");
+                let mut clipped = ClippedSamples::default();
+                clipped.count(wanted);
+                assert_eq!(clipped, ClippedSamples { black, white }, "{wanted}");
             }
         }
     }

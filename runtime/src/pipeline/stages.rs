@@ -11,7 +11,7 @@
 
 use crate::haar::{CellSource, Cells, ShortSlice, analyse, synthesise};
 use crate::image::Table;
-use crate::units::{CORRECTION_GUARD_BITS, Drive, InputCoefficient, Light};
+use crate::units::{CORRECTION_GUARD_BITS, ClippedSamples, Drive, InputCoefficient, Light};
 
 /// Takes the ambient light away; light below it becomes none, since no projector
 /// input can reach it.
@@ -41,21 +41,11 @@ pub fn drive(light: Light, gain: u16, gain_fraction: u32, correction: i32) -> i3
     direct.wrapping_sub(correction >> CORRECTION_GUARD_BITS)
 }
 
-/// A drive between 0 and 1; says whether it was outside.
+/// A drive between 0 and 1.
 #[inline]
 #[must_use]
-pub(super) fn clip(wanted: i32) -> (Drive, bool) {
-    let reached = wanted.clamp(0, i32::from(Drive::ONE.to_bits()));
-    (Drive::from_bits(reached as u16), wanted != reached)
-}
-
-/// Samples that were clipped, by the end at which they were.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct ClippedInRow {
-    /// Drives below 0: more light arrives from elsewhere than is wanted.
-    pub black: u32,
-    /// Drives above 1.
-    pub white: u32,
+pub(super) fn clip(wanted: i32) -> Drive {
+    Drive::from_bits(wanted.clamp(0, i32::from(Drive::ONE.to_bits())) as u16)
 }
 
 /// A row of [`drive`]s between 0 and 1; returns how many were clipped.
@@ -66,22 +56,15 @@ pub fn drive_row(
     gain_fraction: u32,
     corrections: &[i32],
     drives: &mut [Drive],
-) -> ClippedInRow {
+) -> ClippedSamples {
     let inputs = light.iter().zip(gain).zip(corrections);
-    let mut clipped = ClippedInRow::default();
+    let mut clipped = ClippedSamples::default();
     for (slot, ((light, gain), correction)) in drives.iter_mut().zip(inputs) {
         let wanted = drive(*light, *gain, gain_fraction, *correction);
-        *slot = clip(wanted).0;
-        clipped.black += u32::from(wanted < 0);
-        clipped.white += u32::from(is_too_bright(wanted));
+        *slot = clip(wanted);
+        clipped.count(wanted);
     }
     clipped
-}
-
-/// Whether a drive is above 1.
-#[inline(always)]
-pub(super) fn is_too_bright(wanted: i32) -> bool {
-    wanted > i32::from(Drive::ONE.to_bits())
 }
 
 /// Memory for the operator on a grid of `N` cells. Channels lie one after the

@@ -30,6 +30,7 @@ use iltm_runtime::haar::{Basis, Function};
 use iltm_runtime::image::Table;
 use iltm_runtime::operator::Segment;
 use iltm_runtime::pipeline::{Encoding, GridPipeline, Sample};
+use iltm_runtime::units::ClippedSamples;
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
 
@@ -202,7 +203,10 @@ impl fmt::Display for Worst {
 
 /// Drives of a frame of `C` channels, all of the same light, as the runtime makes them
 /// with 16-bit codes, and the clipped samples.
-pub fn runtime_drives<const C: usize>(table: &Table<'_>, light: &[f64]) -> (Vec<[f64; C]>, u32) {
+pub fn runtime_drives<const C: usize>(
+    table: &Table<'_>,
+    light: &[f64],
+) -> (Vec<[f64; C]>, ClippedSamples) {
     let (codes, clipped) = frame::<u16, C>(table, light, |light| (light * 65_535.0) as u16);
     let drives = codes
         .iter()
@@ -214,7 +218,7 @@ fn frame<S: Sample, const C: usize>(
     table: &Table<'_>,
     light: &[f64],
     code: impl Fn(f64) -> S,
-) -> (Vec<[S; C]>, u32) {
+) -> (Vec<[S; C]>, ClippedSamples) {
     let wanted: Vec<[S; C]> = light.iter().map(|light| [code(*light); C]).collect();
     let mut input = vec![[S::default(); C]; light.len()];
     let pipeline = GridPipeline::<C>::new(table).expect("the caller knows its channels");

@@ -13,6 +13,7 @@ use iltm_runtime::link::{Event, Fault, FaultyFrame, Mode, PassThrough, SlotState
 use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::trust::Rejected;
+use iltm_runtime::units::ClippedSamples;
 use iltm_tests::firmware::{
     CountedBoard, Effects, PATIENCE, client, clipped_on_host, counted, elf, finding, flash_bytes,
     memory_with, on_host, order, play, random_frame, random_table, start, through, word,
@@ -115,13 +116,14 @@ fn a_status_says_what_the_device_has_done() {
     let mut client = client(&emulator);
     assert_eq!(client.device().board, "mps2-an500");
     let mut playback = Playback::new(&memory, small_format()).expect("it fits");
-    let mut clipped = 0;
+    let (mut clipped, mut last) = (ClippedSamples::default(), ClippedSamples::default());
     for seed in 0..60 {
         let wanted = random_frame(small_format(), seed);
         let input = through(&mut playback, &wanted);
         // The governor has climbed one tier or another: one of them fits.
         let of_frame = clipped_on_host(&table, small_format(), &wanted, &input);
-        clipped += of_frame.expect("the frame is one that the table gives");
+        last = of_frame.expect("the frame is one that the table gives");
+        clipped += last;
     }
     let status = client.status().expect("the device answers");
     println!("{status:?}");
@@ -130,7 +132,10 @@ fn a_status_says_what_the_device_has_done() {
     assert_eq!(status.slots, [SlotState::Active, SlotState::Empty]);
     assert_eq!((status.frames.received, status.frames.shown), (60, 60));
     assert_eq!((status.frames.dropped, status.frames.broken), (0, 0));
-    assert_eq!(status.clipping.total, clipped);
+    assert!(clipped.black > 0 && clipped.white > 0, "{clipped:?}");
+    assert_eq!(status.clipping.last, last);
+    assert_eq!(status.clipping.black, u64::from(clipped.black));
+    assert_eq!(status.clipping.white, u64::from(clipped.white));
     assert_eq!(status.clipping.samples, 6 * 8 * 3);
     assert_eq!(status.top_tier, table.top_tier());
     assert_eq!(status.last_fault, None);

@@ -244,7 +244,12 @@ fn the_fuzz_target_says_what_it_thinks_it_says() {
         }
     }
     let expected = [
-        (7, Ok(Request::Hello { protocol: 1 })),
+        (
+            7,
+            Ok(Request::Hello {
+                protocol: PROTOCOL_VERSION,
+            }),
+        ),
         (8, Ok(Request::Subscribe { period_ms: 500 })),
     ];
     let requests = requests.iter();

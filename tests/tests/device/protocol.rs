@@ -5,8 +5,9 @@ use ed25519_dalek::{Signer, SigningKey};
 use iltm_runtime::image::Label;
 use iltm_runtime::link::{
     Channel, Device as _, Digest, EndedTrial, Event, Fault, FaultyFrame, FrameKind, InUse,
-    LinkFrame, MAX_ENCODED, MAX_PAYLOAD, MAX_SECTORS, Receiving, Refusal, Request, Response,
-    Sectors, SlotInfo, SlotState, Slots, TableAbout, TableName, TableReason, TierReason,
+    LinkFrame, MAX_ENCODED, MAX_PAYLOAD, MAX_SECTORS, PROTOCOL_VERSION, Receiving, Refusal,
+    Request, Response, Sectors, SlotInfo, SlotState, Slots, TableAbout, TableName, TableReason,
+    TierReason,
 };
 use iltm_runtime::store::MAX_CHUNK;
 use iltm_runtime::trust::{Deed, Rejected};
@@ -72,7 +73,13 @@ fn conversation(examples: &mut Examples) {
     let mut device = FakeDevice::default();
     let identity = device.identity();
     device.uptime_ms = 10_000;
-    examples.request("hello-request", 1, &Request::Hello { protocol: 1 });
+    examples.request(
+        "hello-request",
+        1,
+        &Request::Hello {
+            protocol: PROTOCOL_VERSION,
+        },
+    );
     examples.response("hello-response", 1, &Response::Hello(identity));
     examples.request("status-request", 2, &Request::Status);
     examples.response("status-response", 2, &Response::Status(device.status()));
@@ -318,10 +325,7 @@ fn the_specification_states_the_limits() {
             "Silence that ends a subscription, ms",
             iltm_runtime::link::LAPSE_MS.into(),
         ),
-        (
-            "Version of the protocol",
-            iltm_runtime::link::PROTOCOL_VERSION.into(),
-        ),
+        ("Version of the protocol", PROTOCOL_VERSION.into()),
         ("Most bytes of a chunk", MAX_CHUNK),
         ("Most sectors in one response", MAX_SECTORS),
     ] {

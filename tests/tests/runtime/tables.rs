@@ -8,6 +8,7 @@ use iltm::video::OperatorMemory;
 use iltm_runtime::haar::{self, Function};
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{Encoding, GridPipeline};
+use iltm_runtime::units::ClippedSamples;
 use iltm_tests::{grid, wedge, wedge_table};
 use nalgebra::{DMatrix, DVector};
 
@@ -22,7 +23,7 @@ fn compensate<const C: usize>(
     let cells = table.grid().cells();
     let pipeline = GridPipeline::<C>::new(table).expect("the test knows its channels");
     let mut drives = vec![DMatrix::zeros(cells, wanted.ncols()); C];
-    let mut clipped = 0;
+    let mut clipped = ClippedSamples::default();
     for (index, image) in wanted.column_iter().enumerate() {
         let code = |light: &f64| [(light * 65_535.0).round() as u16; C];
         let codes: Vec<[u16; C]> = image.iter().map(code).collect();
@@ -39,7 +40,7 @@ fn compensate<const C: usize>(
         }
     }
     let samples = (cells * wanted.ncols() * C) as f64;
-    (drives, f64::from(clipped) / samples)
+    (drives, f64::from(clipped.total()) / samples)
 }
 
 fn every_tier_keeps_its_promise<const C: usize>(rows: u16, cols: u16) {

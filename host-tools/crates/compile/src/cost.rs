@@ -128,7 +128,7 @@ impl Shape {
         let channels = f64::from(self.channels);
         let sample = if self.channels == 1 { 12.59 } else { 12.28 };
         let sample = sample + if self.ambient { 2.04 } else { 0.0 };
-        let rows = 208.0 * self.size.height() as f64;
+        let rows = 220.0 * self.size.height() as f64;
         channels * (552.0 + rows + sample * self.size.pixels() as f64)
     }
 

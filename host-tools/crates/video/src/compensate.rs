@@ -11,11 +11,11 @@
 //! its size changes.
 
 use super::bands::{Bands, Interleaved};
-use super::engine::{ClippedSamples, Engine, EngineJob};
+use super::engine::{Engine, EngineJob};
 use super::live::Live;
 use super::{Fit, Input, PlacedFrames, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
-use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding};
+use iltm_runtime::{FrameSize, image::Table, pipeline::Encoding, units::ClippedSamples};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::io::{Read, Write};
 use std::path::Path;
@@ -233,8 +233,8 @@ impl<'t, 'a> Compensator<'t, 'a> {
             size,
             frames: 1,
             samples: job.samples() as u64,
-            clipped: clipped.black + clipped.white,
-            clipped_white: clipped.white,
+            clipped: clipped.total().into(),
+            clipped_white: clipped.white.into(),
             cut_short: false,
         })
     }

@@ -59,7 +59,7 @@ impl<S: Code> Curves<S> {
                 let curves = S::curves(table, encoding, channel);
                 let mut codes = vec![S::default(); VALUES];
                 for (code, bits) in codes.iter_mut().zip(0..=Drive::ONE.to_bits()) {
-                    (*code, _) = S::code(bits.into(), curves);
+                    *code = S::code(bits.into(), curves);
                 }
                 codes
             })

@@ -5,7 +5,6 @@
 //! [`Governor`] may choose another tier, as on the device. A newer table that cannot be
 //! used changes nothing.
 
-use super::engine::ClippedSamples;
 use super::planar::{Planar, PlaneLayout};
 use super::stream::{self, FrameQueue};
 use super::y4m::{Header, Reader};
@@ -14,6 +13,7 @@ use iltm_picture::progress::Progress;
 use iltm_runtime::{
     governor::{Governor, Reason, TierChange},
     image::{ImageError, Table, unseal},
+    units::ClippedSamples,
 };
 use std::io::{Read, Write};
 use std::time::{Duration, Instant};
@@ -273,8 +273,8 @@ impl LiveSummary {
     fn add(&mut self, tier: u8, took: Duration, samples: usize, clipped: ClippedSamples) {
         self.frames.frames += 1;
         self.frames.samples += samples as u64;
-        self.frames.clipped += clipped.black + clipped.white;
-        self.frames.clipped_white += clipped.white;
+        self.frames.clipped += u64::from(clipped.total());
+        self.frames.clipped_white += u64::from(clipped.white);
         self.slowest = self.slowest.max(took);
         let tier = usize::from(tier);
         self.tiers.resize(self.tiers.len().max(tier + 1), 0);

@@ -35,9 +35,11 @@ impl Show for Plain {
             MonitorEvent::Device(Event::Status(status)) => {
                 self.rates.add(status);
                 let time = status.frame_time;
+                let [black, white] = words::clipped_percent(status);
                 line(&format!(
                     "{} {}{}, tier {} of {}, {}, \
-                     {:.1} of {:.1} ms, {:.2} % clipped, {} late, {} dropped, {} broken",
+                     {:.1} of {:.1} ms, clipped {:.2} % at black and {:.2} % at white, \
+                     {} late, {} dropped, {} broken",
                     words::duration(status.uptime_ms),
                     status.mode,
                     match self.trial_s {
@@ -49,7 +51,8 @@ impl Show for Plain {
                     self.rates.words(),
                     f64::from(time.mean_us) / 1000.0,
                     f64::from(time.budget_us) / 1000.0,
-                    100.0 * words::clipped_share(status),
+                    black,
+                    white,
                     status.frames.late,
                     status.frames.dropped,
                     status.frames.broken,

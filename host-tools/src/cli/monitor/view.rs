@@ -210,7 +210,7 @@ impl View {
         let frames = &status.frames;
         let time = &status.frame_time;
         let share = |us: u32| f64::from(us) / f64::from(time.budget_us.max(1));
-        let clipped = words::clipped_share(status);
+        let [black, white] = words::clipped_percent(status);
         let stack = f64::from(status.stack.used) / f64::from(status.stack.size.max(1));
         let line = |name: &str, value: String| format!("{name:<11}{value}");
         vec![
@@ -248,9 +248,8 @@ impl View {
             line(
                 "clipped",
                 format!(
-                    "{} {:>6.2} % of samples",
-                    gauge(clipped, None),
-                    100.0 * clipped
+                    "{} {black:>6.2} % at black, {white:.2} % at white",
+                    gauge((black + white) / 100.0, None)
                 ),
             ),
             line(

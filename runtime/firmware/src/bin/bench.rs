@@ -20,6 +20,7 @@ use iltm_runtime::frame_buffers::ControlWords;
 use iltm_runtime::image::{Table, content, unseal};
 use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 use iltm_runtime::store::Slot;
+use iltm_runtime::units::ClippedSamples;
 use static_cell::ConstStaticCell;
 
 /// Instructions a tick: a nanosecond each, at 25 MHz.
@@ -70,7 +71,7 @@ fn grid<const C: usize>(
     input: &mut [u8],
     memory: &mut Memory,
     clock: &impl Clock,
-) -> Result<([u64; 4], u32), FrameError> {
+) -> Result<([u64; 4], ClippedSamples), FrameError> {
     let pipeline = GridPipeline::<C>::new(table)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     let mut workspace = memory.workspace();
@@ -97,7 +98,7 @@ fn full<const C: usize>(
     input: &mut [u8],
     memory: &mut Memory,
     clock: &impl Clock,
-) -> Result<([u64; 4], u32), FrameError> {
+) -> Result<([u64; 4], ClippedSamples), FrameError> {
     let pipeline = FullPipeline::<C>::new(table, size)?;
     let (wanted, input) = (wanted.as_chunks().0, input.as_chunks_mut().0);
     let (mut frame, mut workspace) = memory.full(0, C, table.grid().cells(), size.width());
@@ -153,7 +154,7 @@ fn main() -> ! {
                     second,
                     third,
                     whole,
-                    clipped
+                    clipped.total()
                 );
             }
             Err(_) => hprintln!("tier {} cannot be counted", tier),

@@ -12,7 +12,7 @@
 use super::levels::span;
 use crate::kernel::{Block, Plane};
 use crate::response::CODES;
-use crate::units::{Drive, Halfword, InputCoefficient};
+use crate::units::{ClippedSamples, Drive, Halfword, InputCoefficient};
 use core::arch::global_asm;
 use core::ptr::without_provenance;
 
@@ -53,6 +53,10 @@ struct Finish {
 
 /// What a drive is multiplied by to be a code in the high word of the product.
 const PROPORTIONAL: usize = 255 << (32 - Drive::FRAC_NBITS);
+
+/// Most pixels that the finishing loop takes, since it counts those clipped in two
+/// halfwords. More, which only a grid can have, go the plain way.
+const MAX_PIXELS: usize = u16::MAX as usize;
 
 /// What the adding loop needs. The assembler below knows the order of the fields.
 #[repr(C)]
@@ -158,9 +162,9 @@ pub(crate) fn finish<const C: usize>(
     gains: &[[Halfword; C]],
     corrections: &[i32],
     input: &mut [[u8; C]],
-) -> Option<u32> {
+) -> Option<ClippedSamples> {
     let (count, channel) = (corrections.len(), wanted.channel);
-    if count == 0 {
+    if count > MAX_PIXELS {
         return None;
     }
     let finish = Finish {
@@ -180,8 +184,8 @@ pub(crate) fn finish<const C: usize>(
     // `light` has an element for every value of a byte, and `codes` for every index
     // that `usat` leaves, below 2^13; the loops for codes in proportion take them for
     // a factor.
-    unsafe {
-        Some(match (C, wanted.ambient.is_some(), codes.is_some()) {
+    let clipped = unsafe {
+        match (C, wanted.ambient.is_some(), codes.is_some()) {
             (1, false, true) => iltm_finish_1_dark(finish),
             (1, true, true) => iltm_finish_1_lit(finish),
             (3, false, true) => iltm_finish_3_dark(finish),
@@ -191,8 +195,12 @@ pub(crate) fn finish<const C: usize>(
             (3, false, false) => iltm_finish_3_dark_linear(finish),
             (3, true, false) => iltm_finish_3_lit_linear(finish),
             _ => return None,
-        })
-    }
+        }
+    };
+    Some(ClippedSamples {
+        black: clipped & 0xffff,
+        white: clipped >> 16,
+    })
 }
 
 /// Light added to columns, as `portable.rs` says.
@@ -378,7 +386,8 @@ global_asm!(
 
 // r0 corrections, r1 wanted, r2 gain, r3 input, r4 light, r5 codes or factor, r6 gain
 // fraction, r7 half, r8 pixels left, r9 drive, r10 gain and index, r11 ambient, r12
-// correction, lr samples clipped.
+// correction or the way back, lr samples clipped at black and, in the high halfword,
+// at white.
 global_asm!(
     r#"
     .macro iltm_drive channels, lit, linear
@@ -411,14 +420,10 @@ global_asm!(
         strb r10, [r3], #\channels
     .endm
 
-    .macro iltm_clip
-        cmp r9, #32768
-        it ne
-        addne lr, #1
-    .endm
-
     .macro iltm_finish name, channels, lit, linear
     .section .text.\name, "ax", %progbits
+    @ In code aligned to halfwords `adr` would be two bytes off.
+    .balign 4
     .global \name
     .type \name, %function
     .thumb_func
@@ -462,20 +467,25 @@ global_asm!(
         mov r0, lr
         pop {{r4-r11, pc}}
     11:
-        iltm_clip
-        b 21b
+        adr.w r12, 21b
+        b 8f
     12:
-        iltm_clip
-        b 22b
+        adr.w r12, 22b
+        b 8f
     13:
-        iltm_clip
-        b 23b
+        adr.w r12, 23b
+        b 8f
     14:
-        iltm_clip
-        b 24b
+        adr.w r12, 24b
+        b 8f
     16:
-        iltm_clip
-        b 26b
+        adr.w r12, 26b
+    8:
+        add lr, lr, r9, lsr #31
+        cmp r9, #32768
+        it gt
+        addgt lr, #0x10000
+        mov pc, r12
     .size \name, . - \name
     .endm
 

@@ -20,7 +20,7 @@ use super::files::{Owner, files, keys, signer};
 use crate::flash_simulator::{NorSimulator, Violations, Wear};
 use crate::slots::{SimDevice, SlotLayout};
 use ed25519_dalek::{Signer, SigningKey};
-use iltm_runtime::link::{Channel, Event, Refusal, Request, Response, Status};
+use iltm_runtime::link::{Channel, Event, PROTOCOL_VERSION, Refusal, Request, Response, Status};
 use iltm_runtime::store::Slot;
 use iltm_runtime::trust::{Certificate, Deed};
 use model::{Model, Record, Sizes};
@@ -149,7 +149,9 @@ impl<const W: usize, const E: usize> Trial<W, E> {
     fn happens(&mut self, op: Op) {
         let fresh = std::mem::take(&mut self.fresh);
         match op {
-            Op::Hello => self.request(&Request::Hello { protocol: 1 }),
+            Op::Hello => self.request(&Request::Hello {
+                protocol: PROTOCOL_VERSION,
+            }),
             Op::Status => self.request(&Request::Status),
             Op::Slots => self.request(&Request::Slots),
             Op::Subscribe { period_ms } => self.request(&Request::Subscribe { period_ms }),
@@ -367,7 +369,9 @@ impl<const W: usize, const E: usize> Trial<W, E> {
     fn odd(&mut self, request: u8, how: u8) {
         self.sequence = self.sequence.wrapping_add(1);
         let requests = [
-            Request::Hello { protocol: 1 },
+            Request::Hello {
+                protocol: PROTOCOL_VERSION,
+            },
             Request::Subscribe { period_ms: 700 },
             Request::Sectors {
                 length: 300,

@@ -2,10 +2,11 @@
 
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::Code;
-use super::{ClippedSamples, EngineJob, OperatorMemory};
+use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, GridPipeline},
+    units::ClippedSamples,
 };
 
 /// Compensates frames of the grid's own size.
@@ -55,21 +56,14 @@ impl<'t, 'a, S: Code, const C: usize> Cells<'t, 'a, S, C> {
                 *wanted = std::array::from_fn(|channel| self.codes[place(cell, channel)]);
             }
             let workspace = &mut operator.workspace();
-            let all = self.pipeline.compensate(
+            let of_group = self.pipeline.compensate(
                 job.tier,
                 job.encoding,
                 &self.wanted,
                 &mut self.input,
                 workspace,
             )?;
-            let white =
-                self.pipeline
-                    .too_bright(job.tier, job.encoding, &self.wanted, workspace)?;
-            clipped = clipped
-                + ClippedSamples {
-                    black: u64::from(all.saturating_sub(white)),
-                    white: u64::from(white),
-                };
+            clipped += of_group;
             for (cell, input) in self.input.iter().enumerate() {
                 for (channel, code) in input.iter().enumerate() {
                     self.codes[place(cell, channel)] = *code;

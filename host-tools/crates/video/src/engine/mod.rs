@@ -24,6 +24,7 @@ use iltm_runtime::{
     image::Table,
     pipeline::{Encoding, FrameError},
     placement::PixelArea,
+    units::ClippedSamples,
 };
 use rayon::ThreadPool;
 use rows::FullFrames;
@@ -33,25 +34,6 @@ pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
     job: EngineJob,
     operator: OperatorMemory,
     path: EnginePath<'t, 'a, P, C>,
-}
-
-/// Samples that the projector would have had to show darker than black or brighter than
-/// white.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub(super) struct ClippedSamples {
-    pub(super) black: u64,
-    pub(super) white: u64,
-}
-
-impl std::ops::Add for ClippedSamples {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self {
-            black: self.black + other.black,
-            white: self.white + other.white,
-        }
-    }
 }
 
 /// What frames there will be and what is to be done to them.

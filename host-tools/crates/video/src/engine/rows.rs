@@ -8,12 +8,12 @@
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
 use super::memory::{BandMemory, Memories, RowMemory};
-use super::{ClippedSamples, EngineJob, OperatorMemory};
+use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{FrameError, FullPipeline},
     placement::PixelArea,
-    units::Light,
+    units::{ClippedSamples, Light},
 };
 use pulp::{Arch, NullaryFnOnce};
 use rayon::ThreadPool;
@@ -141,7 +141,10 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
                     })
                 })
             });
-            clipped.reduce(ClippedSamples::default, std::ops::Add::add)
+            clipped.reduce(ClippedSamples::default, |mut all, of_band| {
+                all += of_band;
+                all
+            })
         })
     }
 }
@@ -251,7 +254,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
                 let (colour, channel) = (line % colours, line % colours % C);
                 let gain = &stages.gains[(y * C + channel) * size.width()..][..size.width()];
                 let (mut row, drives) = memory.row.split();
-                let row_clipped = stages.pipeline.finish_row(
+                let of_row = stages.pipeline.finish_row(
                     y,
                     light,
                     gain,
@@ -259,11 +262,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
                     &mut row,
                     drives,
                 );
-                clipped = clipped
-                    + ClippedSamples {
-                        black: row_clipped.black.into(),
-                        white: row_clipped.white.into(),
-                    };
+                clipped += of_row;
                 stages.curves.encode(channel, drives, codes);
             }
             self.band.pack(strip, &mut memory.conversion, codes);
