@@ -627,6 +627,10 @@ pub(super) struct Verify {
     /// Black pixels on each side; by default as the patterns of the scene had it, or none
     #[arg(long, value_name = "PIXELS", requires = "output")]
     pub(super) border: Option<u16>,
+    /// Photographs of the film of a --wanted folder, with any names and as many as there are,
+    /// in the order of the numbers in them: what each shows is known by the card before it
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    pub(super) photographs: Option<PathBuf>,
     /// Largest error that passes; by default 1.5 times what is to be expected
     #[arg(long, value_name = "ERROR", value_parser = error_bound, conflicts_with = "output")]
     pub(super) bound: Option<f64>,

@@ -373,11 +373,16 @@ impl From<VerifyError> for Failure {
             VerifyError::Capture(error) => return error.into(),
             VerifyError::Slides(_) => Kind::Usage,
             VerifyError::NoManifest { .. } => Kind::Read,
-            VerifyError::Order { .. } | VerifyError::TooFewCells { .. } => Kind::Photographs,
+            VerifyError::Order { .. }
+            | VerifyError::TooFewCells { .. }
+            | VerifyError::Unrecognised { .. }
+            | VerifyError::NoCards { other: None, .. } => Kind::Photographs,
             VerifyError::OtherTable { .. }
+            | VerifyError::NoCards { other: Some(_), .. }
             | VerifyError::NotOfTable { .. }
             | VerifyError::Grid { .. } => Kind::OtherTable,
             VerifyError::Untold { .. } => Kind::Table,
+            VerifyError::Photographed { .. } => Kind::Write,
             VerifyError::Overexposed { .. } => Kind::Inconclusive,
             VerifyError::Missing { .. }
             | VerifyError::Unpaired { .. }

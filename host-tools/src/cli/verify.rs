@@ -11,8 +11,8 @@ use super::words::{number, table_in_use};
 use crate::compile::Provenance;
 use crate::session::Layout;
 use crate::verify::{
-    Cause, Handover, ImageVerdict, Outcome, Readings, Slides, TableVerdict, TestImage,
-    brightness_words, html, judge, pictures, reason, test_images, write,
+    Cause, Handover, ImageVerdict, Outcome, Readings, Recognised, Slides, TableVerdict, TestImage,
+    brightness_words, html, judge, pictures, reason, recognise, test_images, write,
 };
 use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
@@ -66,6 +66,7 @@ fn prepare(
         "folder": out.display().to_string(),
         "wanted": arguments.wanted,
         "pictures": written.pictures,
+        "film": written.film,
         "images": written.images.iter().map(|image| json!({
             "title": image.title,
             "clipped": image.clipped,
@@ -78,9 +79,14 @@ fn prepare(
     } else {
         "each as it is and compensated"
     };
+    let film = match (arguments.wanted, written.film) {
+        (false, _) => "",
+        (true, 0) => "The projection has too few pixels for a film with cards.\n",
+        (true, _) => "film/ has them for a player, each after a card with its number.\n",
+    };
     let text = format!(
         "{}: {} pictures to project and photograph ({} test images, {how};\n\
-         white, black and patterns that find the cells). README.md in it says how. Then:\n\
+         white, black and patterns that find the cells). {film}README.md in it says how. Then:\n\
          iltm verify {} {}\n",
         out.display(),
         written.pictures,
@@ -104,6 +110,9 @@ fn verdict(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
+    let photographs = arguments.photographs.as_deref();
+    let recognised = photographs.map(|from| recognise(folder, from, table, bars));
+    let recognised = recognised.transpose()?;
     let readings = Readings::read(folder, table, bars)?;
     let verdict = judge(folder, table, &readings, arguments.bound)?;
     let images = test_images(table)?;
@@ -119,8 +128,23 @@ fn verdict(
     };
     let page = report(table, &readings, &verdict, (&images, &handover), &out)?;
     bars.end();
-    let data = data(arguments, folder, &verdict, &images, &page);
-    let text = text(&verdict, &images, &page);
+    let mut data = data(arguments, folder, &verdict, &images, &page);
+    data["recognised"] = recognised.map_or(Value::Null, |found| {
+        json!({
+            "photographs": found.photographs,
+            "cards": found.cards,
+            "slides": found.slides,
+        })
+    });
+    let recognised = recognised.map(|found| {
+        let Recognised {
+            photographs,
+            cards,
+            slides,
+        } = found;
+        format!("recognised  {slides} slides, by {cards} cards in {photographs} photographs\n")
+    });
+    let text = recognised.unwrap_or_default() + &text(&verdict, &images, &page);
     if verdict.outcome == Outcome::Passed {
         output.result(&data, &text);
         return Ok(());

@@ -133,6 +133,81 @@ fn a_chain_that_compensates_once_passes_and_every_other_is_named() {
     user.fails(37, "verify u.iltm w");
 }
 
+/// A card of a film as a camera sees it: smaller, on a dark wall.
+fn card_seen(card: &image::GrayImage) -> image::GrayImage {
+    let (width, height) = (card.width() * 4 / 5, card.height() * 4 / 5);
+    let card = image::imageops::resize(card, width, height, image::imageops::Triangle);
+    let mut seen = image::GrayImage::from_pixel(width + 90, height + 70, image::Luma([9]));
+    for (x, y, code) in card.enumerate_pixels() {
+        let dimmed = 9 + code[0] / 2;
+        // As much as a projector's keystone.
+        let shifted = x + 20 + (height - y) / 12;
+        seen.put_pixel(shifted, y + 30, image::Luma([dimmed]));
+    }
+    seen
+}
+
+#[test]
+fn photographs_of_a_film_are_recognised_by_its_cards_whatever_their_names_are() {
+    let user = copy();
+    user.says("verify t.iltm -o w --wanted --projector 640x400 --border 3");
+    user.copy(&user.path("w"), "s");
+    for part in ["patterns", "slides", "photos", "wanted"] {
+        user.copy(&user.path("w").join(part), &format!("s/{part}"));
+    }
+    user.says("simulate SCENES/m-panels.toml --photograph s --seed 9 --chain once --table t.iltm");
+    fs::create_dir(user.path("seen")).unwrap();
+    let slides = user.names("s/photos");
+    let mut number = 97;
+    let mut name = || {
+        number += 1;
+        user.path(&format!("seen/IMG_{number}.png"))
+    };
+    for (at, slide) in slides.iter().enumerate() {
+        let card = user
+            .picture(&format!("w/film/{:03}.png", 2 * at))
+            .into_luma8();
+        card_seen(&card).save(name()).unwrap();
+        for _ in 0..=at % 3 {
+            fs::copy(user.path("s/photos").join(slide), name()).unwrap();
+        }
+    }
+    let verdict = user.json("verify t.iltm w --photographs seen");
+    assert_eq!(verdict["outcome"], "passed", "{verdict}");
+    let found = &verdict["recognised"];
+    assert_eq!(found["slides"], slides.len(), "{verdict}");
+    assert_eq!(found["cards"], slides.len(), "{verdict}");
+    for slide in &slides {
+        let (own, copied) = (format!("s/photos/{slide}"), format!("w/photos/{slide}"));
+        assert!(user.read(&own) == user.read(&copied), "{slide}");
+    }
+    // What is there is not replaced.
+    contains(
+        &user.fails(9, "verify t.iltm w --photographs seen"),
+        &["has photographs already", "Leave --photographs away"],
+    );
+    fs::remove_dir_all(user.path("w/photos")).unwrap();
+    fs::create_dir(user.path("w/photos")).unwrap();
+    // The card of the fourth slide is not there: what follows the third card may be two slides.
+    let card = user
+        .names("seen")
+        .into_iter()
+        .find(|name| name == "IMG_107.png");
+    user.remove(&format!("seen/{}", card.unwrap()));
+    contains(
+        &user.fails(5, "verify t.iltm w --photographs seen"),
+        &[
+            "no card was read of slide 4",
+            "Photograph these slides again",
+        ],
+    );
+    assert!(user.names("w/photos").is_empty());
+    contains(
+        &user.fails(5, "verify t.iltm w --photographs s/photos"),
+        &["none of its 61 pictures shows a card"],
+    );
+}
+
 #[test]
 fn what_is_missing_is_listed_and_what_was_made_with_another_table_fails() {
     let user = copy();

@@ -70,6 +70,7 @@ pub use format::settings::{
 pub use format::stripe_role::{STRIPES_FILE, StripeManifest, StripeRole, StripeShot, WAVE};
 pub use gate::{Evidence, Gate, GateName, Verdict};
 pub use linear_photograph::LinearPhotograph;
+pub use photographs::grey_view::grey_view;
 pub use photographs::photo_stats::PhotoStats;
 pub use registration::cell_map::{NO_CELL, Registration};
 pub use registration::map_file::MapFormat;

@@ -11,6 +11,7 @@ use crate::format::manifest::Shot;
 use crate::format::photo_files::resolve;
 use crate::format::sequence::{CaptureOptions, Selection, Sequence};
 use crate::format::settings::Settings;
+use crate::photographs::grey_view::shrunk;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::registration::cell_map::Registration;
 use crate::{Gate, gates};
@@ -54,17 +55,6 @@ pub struct CellReadings {
 
 /// Most pixels across a photograph for people.
 const VIEW_WIDTH: usize = 400;
-
-/// The means of squares of `step` pixels of a plane; what is left at the end is left out.
-fn shrunk(plane: &[f32], (width, height): (usize, usize), step: usize) -> Vec<f32> {
-    let (across, down) = (width / step, height / step);
-    let mean = |at: usize| {
-        let first = at / across * step * width + at % across * step;
-        let rows = (0..step).map(|row| &plane[first + row * width..][..step]);
-        rows.flatten().sum::<f32>() / (step * step) as f32
-    };
-    (0..across * down).map(mean).collect()
-}
 
 /// Registers the cells by the photographs of `code` (white, black, the Gray code of both
 /// axes and any Bernoulli patterns) and measures them in those of `pictures`. Of the

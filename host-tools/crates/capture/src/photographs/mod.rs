@@ -12,6 +12,7 @@
 //! | brightness of a file, before anything is known of it | `photo_stats` |
 
 pub(crate) mod clipping;
+pub(crate) mod grey_view;
 pub(crate) mod linearise;
 mod merge;
 pub(crate) mod order;

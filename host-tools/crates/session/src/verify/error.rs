@@ -39,6 +39,32 @@ pub enum VerifyError {
         /// All of them, relative to it.
         missing: Vec<PathBuf>,
     },
+    /// The folder has photographs already.
+    #[error("{}: the folder has photographs already", path.display())]
+    Photographed {
+        /// The first of them.
+        path: PathBuf,
+    },
+    /// No photograph of a film shows a card of this table's.
+    #[error("{}: none of its {photographs} pictures shows a card of this table's film{}", folder.display(), of_another(other.as_deref()))]
+    NoCards {
+        /// The folder of photographs.
+        folder: PathBuf,
+        /// Pictures in it.
+        photographs: usize,
+        /// Id of another table whose cards they show.
+        other: Option<String>,
+    },
+    /// It is not clear which photographs show some of the slides.
+    #[error("{}: {}", folder.display(), unrecognised(unseen, unclear))]
+    Unrecognised {
+        /// The folder of photographs.
+        folder: PathBuf,
+        /// Slides whose card no photograph shows.
+        unseen: Vec<u32>,
+        /// Slides whose card is there, but no photograph, or several that differ, after it.
+        unclear: Vec<u32>,
+    },
     /// A test image is not there both plain and compensated.
     #[error("{}: test image {image} has no {what} picture", path.display())]
     Unpaired {
@@ -160,6 +186,24 @@ impl VerifyError {
                 "Take them: `iltm capture {}` goes on where it stopped; or copy them into photos/.",
                 folder.display()
             ),
+            Self::Photographed { .. } => {
+                "Leave --photographs away to judge those, or move them away first.".to_owned()
+            }
+            Self::NoCards { other: Some(_), .. } => {
+                "Verify with the table that the film was made for, or photograph the film in \
+                 film/ of this folder."
+                    .to_owned()
+            }
+            Self::NoCards { other: None, .. } => {
+                "Play film/ of the folder and photograph it sharp and large: each card, then its \
+                 slide."
+                    .to_owned()
+            }
+            Self::Unrecognised { folder, .. } => format!(
+                "Photograph these slides again, each after its card, put the photographs into {} \
+                 under names that come after the others, and run the command again.",
+                folder.display()
+            ),
             Self::Unpaired { .. } | Self::NoImages { .. } | Self::Picture { .. } => {
                 "Make the folder anew with `iltm verify TABLE.iltm -o FOLDER`.".to_owned()
             }
@@ -185,6 +229,26 @@ impl VerifyError {
             }
         }
     }
+}
+
+fn of_another(table: Option<&str>) -> String {
+    let words = |table| format!("; they show cards of table {table}");
+    table.map(words).unwrap_or_default()
+}
+
+fn unrecognised(unseen: &[u32], unclear: &[u32]) -> String {
+    let of = |slides: &[u32], what: &str| {
+        let mut names: Vec<String> = slides.iter().take(NAMED).map(u32::to_string).collect();
+        if slides.len() > NAMED {
+            names.push(format!("{} more", slides.len() - NAMED));
+        }
+        let word = if slides.len() == 1 { "slide" } else { "slides" };
+        (!slides.is_empty()).then(|| format!("{what} {word} {}", names.join(", ")))
+    };
+    let unseen = of(unseen, "no card was read of");
+    let unclear = of(unclear, "no photograph after the card is surely of");
+    let parts: Vec<String> = [unseen, unclear].into_iter().flatten().collect();
+    parts.join("; ")
 }
 
 fn count(missing: usize) -> String {

@@ -1,5 +1,6 @@
 //! Verification folder: writes the pictures that a table is verified with.
 
+use super::card::Card;
 use super::images::{MOST_CLIPPED, RANGES, test_images};
 use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
@@ -23,6 +24,9 @@ const README_WANTED: &str = include_str!("README-wanted.txt");
 pub struct Written {
     /// Pictures to project, each of which is photographed once.
     pub pictures: usize,
+    /// Pictures of the film: all of them, each after its card; none if the projection has too
+    /// few pixels for a card, or the slides are for a projector alone.
+    pub film: usize,
     /// The test images.
     pub images: Vec<TestImage>,
 }
@@ -54,6 +58,9 @@ pub enum Slides {
     /// Each test image as it should look: for a chain that compensates.
     Wanted,
 }
+
+/// Folder of the slides with their cards, for a player.
+const FILM_FOLDER: &str = "film";
 
 /// File that says which table a folder of wanted images is for: nothing else in it does.
 pub(super) const TABLE_FILE: &str = "table.txt";
@@ -103,6 +110,10 @@ pub fn write(
         SETTINGS_FILE,
         toml::to_string(&settings).unwrap_or_default(),
     )?;
+    let film = match kind {
+        Slides::Both => 0,
+        Slides::Wanted => write_film(table, layout, &slides, &folder)?,
+    };
     let readme = match kind {
         Slides::Both => README,
         Slides::Wanted => {
@@ -116,8 +127,40 @@ pub fn write(
     progress.end();
     Ok(Written {
         pictures: slides.len(),
+        film,
         images,
     })
+}
+
+/// Writes the film: every slide after its card, and a last card, after which nothing is a
+/// slide. Says how many pictures it has.
+fn write_film(
+    table: &Table<'_>,
+    layout: &Layout,
+    slides: &[VerifySlide],
+    folder: &WholeFolder,
+) -> Result<usize, VerifyError> {
+    let card = |index: usize| {
+        let (table, slide) = (table.id(), index as u32);
+        Card { table, slide }.picture(layout)
+    };
+    let cards: Option<Vec<Picture>> = (0..=slides.len()).map(card).collect();
+    let Some(cards) = cards else {
+        return Ok(0);
+    };
+    folder.folder(FILM_FOLDER)?;
+    let slides = slides.iter().map(|slide| &slide.full).map(Some);
+    let pairs = cards.iter().zip(slides.chain([None]));
+    let film: Vec<&Picture> = pairs
+        .flat_map(|(card, slide)| [Some(card), slide])
+        .flatten()
+        .collect();
+    let written = film.par_iter().enumerate().map(|(at, picture)| {
+        folder.picture(numbered(FILM_FOLDER, at as u32), picture)?;
+        Ok(())
+    });
+    written.collect::<Result<Vec<()>, VerifyError>>()?;
+    Ok(film.len())
 }
 
 /// Where the wanted light of a test image stands, relative to the folder: sRGB codes.

@@ -7,7 +7,9 @@
 //! ```text
 //! table -> images     wanted light that the table can show
 //!          folder     pictures to project, verify.csv, README.md
-//! photographs -> session   what verify.csv and the pictures say, read back and checked
+//!          card       numbers the slides of a film
+//! photographs -> recognise  which slide each photograph of a film shows
+//!                readings   what verify.csv and the pictures say, read back and checked
 //!                expected  the light that the table expects of any input
 //!                judge     errors before and after, drift, what they are held against
 //!                chain     what a chain did that was to compensate
@@ -15,6 +17,7 @@
 //!                page      all of it for people, with maps of the worst cells
 //! ```
 
+mod card;
 mod chain;
 mod error;
 mod expected;
@@ -26,6 +29,7 @@ mod maps;
 mod outcome;
 mod page;
 mod readings;
+mod recognise;
 mod response;
 #[cfg(test)]
 #[path = "../../../compile/src/test_scene.rs"]
@@ -42,4 +46,5 @@ pub use maps::pictures;
 pub use outcome::{Cause, Outcome, refused};
 pub use page::{Handover, brightness_words, html, reason};
 pub use readings::{Readings, Shown};
+pub use recognise::{Recognised, recognise};
 pub use response::ProjectorCurves;
