@@ -136,13 +136,11 @@ fn verdict(
             "slides": found.slides,
         })
     });
-    let recognised = recognised.map(|found| {
-        let Recognised {
-            photographs,
-            cards,
-            slides,
-        } = found;
-        format!("recognised  {slides} slides, by {cards} cards in {photographs} photographs\n")
+    let recognised = recognised.map(|found: Recognised| {
+        format!(
+            "recognised  {} slides, by {} cards in {} photographs\n",
+            found.slides, found.cards, found.photographs
+        )
     });
     let text = recognised.unwrap_or_default() + &text(&verdict, &images, &page);
     if verdict.outcome == Outcome::Passed {

@@ -184,7 +184,7 @@ fn photographs_of_a_film_are_recognised_by_its_cards_whatever_their_names_are() 
     // What is there is not replaced.
     contains(
         &user.fails(9, "verify t.iltm w --photographs seen"),
-        &["has photographs already", "Leave --photographs away"],
+        &["there are photographs already", "Leave --photographs away"],
     );
     fs::remove_dir_all(user.path("w/photos")).unwrap();
     fs::create_dir(user.path("w/photos")).unwrap();
@@ -197,7 +197,9 @@ fn photographs_of_a_film_are_recognised_by_its_cards_whatever_their_names_are() 
             "Photograph these slides again",
         ],
     );
+    // Nothing was copied, and nothing is left of the attempt.
     assert!(user.names("w/photos").is_empty());
+    assert!(user.names("w").iter().all(|name| !name.starts_with('.')));
     contains(
         &user.fails(5, "verify t.iltm w --photographs s/photos"),
         &["none of its 61 pictures shows a card"],

@@ -171,7 +171,7 @@ pub fn photograph(bytes: &[u8]) {
     }
 }
 
-/// A hello of protocol version 1 with number 7, as it goes on a line.
+/// A hello of protocol version 2 with number 7, as it goes on a line.
 pub const HELLO: [u8; 11] = [
     0x01, 0x02, 0x07, 0x01, 0x06, 0x02, 0x88, 0xAE, 0xFB, 0xB5, 0x00,
 ];

@@ -10,6 +10,7 @@
 //! | squares of pixels from every photograph | `sampled` |
 //! | which pattern each photograph shows | `order` |
 //! | brightness of a file, before anything is known of it | `photo_stats` |
+//! | a file small and grey, before anything is known of it | `grey_view` |
 
 pub(crate) mod clipping;
 pub(crate) mod grey_view;

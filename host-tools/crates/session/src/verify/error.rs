@@ -5,9 +5,9 @@ use crate::PatternsError;
 use iltm_capture::CaptureError;
 use iltm_picture::FolderError;
 use iltm_video::VideoError;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// Photographs that are named before the rest is only counted.
+/// Photographs or slides that are named before the rest is only counted.
 const NAMED: usize = 8;
 
 /// What went wrong.
@@ -32,7 +32,7 @@ pub enum VerifyError {
         path: PathBuf,
     },
     /// Photographs that `verify.csv` names are not there.
-    #[error("{}: {} missing: {}", folder.display(), count(missing.len()), listed(missing))]
+    #[error("{}: {} missing: {}", folder.display(), count(missing.len()), listed(missing, |path| path.display().to_string()))]
     Missing {
         /// The folder.
         folder: PathBuf,
@@ -40,9 +40,9 @@ pub enum VerifyError {
         missing: Vec<PathBuf>,
     },
     /// The folder has photographs already.
-    #[error("{}: the folder has photographs already", path.display())]
+    #[error("{}: there are photographs already", path.display())]
     Photographed {
-        /// The first of them.
+        /// Where photographs go.
         path: PathBuf,
     },
     /// No photograph of a film shows a card of this table's.
@@ -195,8 +195,8 @@ impl VerifyError {
                     .to_owned()
             }
             Self::NoCards { other: None, .. } => {
-                "Play film/ of the folder and photograph it sharp and large: each card, then its \
-                 slide."
+                "Play film/ of a folder made with --wanted and photograph it sharp and large: each \
+                 card, then its slide."
                     .to_owned()
             }
             Self::Unrecognised { folder, .. } => format!(
@@ -238,12 +238,8 @@ fn of_another(table: Option<&str>) -> String {
 
 fn unrecognised(unseen: &[u32], unclear: &[u32]) -> String {
     let of = |slides: &[u32], what: &str| {
-        let mut names: Vec<String> = slides.iter().take(NAMED).map(u32::to_string).collect();
-        if slides.len() > NAMED {
-            names.push(format!("{} more", slides.len() - NAMED));
-        }
         let word = if slides.len() == 1 { "slide" } else { "slides" };
-        (!slides.is_empty()).then(|| format!("{what} {word} {}", names.join(", ")))
+        (!slides.is_empty()).then(|| format!("{what} {word} {}", listed(slides, u32::to_string)))
     };
     let unseen = of(unseen, "no card was read of");
     let unclear = of(unclear, "no photograph after the card is surely of");
@@ -258,11 +254,11 @@ fn count(missing: usize) -> String {
     }
 }
 
-fn listed(missing: &[PathBuf]) -> String {
-    let name = |path: &PathBuf| -> String { Path::new(path).display().to_string() };
-    let mut names: Vec<String> = missing.iter().take(NAMED).map(name).collect();
-    if missing.len() > NAMED {
-        names.push(format!("and {} more", missing.len() - NAMED));
+/// The first of some things, and how many more there are.
+fn listed<T>(things: &[T], name: impl Fn(&T) -> String) -> String {
+    let mut names: Vec<String> = things.iter().take(NAMED).map(name).collect();
+    if things.len() > NAMED {
+        names.push(format!("and {} more", things.len() - NAMED));
     }
     names.join(", ")
 }

@@ -59,6 +59,9 @@ pub enum Slides {
     Wanted,
 }
 
+/// Folder where the photographs go.
+pub(super) const PHOTOS_FOLDER: &str = "photos";
+
 /// Folder of the slides with their cards, for a player.
 const FILM_FOLDER: &str = "film";
 
@@ -85,7 +88,7 @@ pub fn write(
     settings.projector.size = Some([size.width() as u16, size.height() as u16]);
     settings.projector.border = layout.border();
     let folder = WholeFolder::create(out)?;
-    for name in ["patterns", "slides", "photos", "wanted"] {
+    for name in ["patterns", "slides", PHOTOS_FOLDER, "wanted"] {
         folder.folder(name)?;
     }
     let slides = match kind {

@@ -3,9 +3,10 @@
 
 use super::VerifyError;
 use super::card::Card;
+use super::folder::PHOTOS_FOLDER;
 use super::manifest::VerifyManifest;
-use iltm_capture::{CaptureError, FileFormat, find_photo, grey_view};
-use iltm_picture::{FolderError, LightPicture, progress::Progress};
+use iltm_capture::{CaptureError, FileFormat, grey_view};
+use iltm_picture::{FolderError, LightPicture, WholeFolder, progress::Progress};
 use iltm_runtime::image::Table;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -64,13 +65,10 @@ pub fn recognise(
     progress: &dyn Progress,
 ) -> Result<Recognised, VerifyError> {
     let manifest = VerifyManifest::read(folder)?;
-    for shot in &manifest.shots {
-        if let Some(photo) = find_photo(folder, &shot.photo)? {
-            return Err(VerifyError::Photographed {
-                path: folder.join(photo),
-            });
-        }
-    }
+    let copies = WholeFolder::create(&folder.join(PHOTOS_FOLDER)).map_err(|error| match error {
+        FolderError::Taken { path } => VerifyError::Photographed { path },
+        error @ FolderError::Io { .. } => error.into(),
+    })?;
     let photographs = look_at_all(from, progress)?;
     let cards = photographs.iter().filter_map(|seen| seen.card);
     let (own, others): (Vec<Card>, Vec<Card>) = cards.partition(|card| card.table == table.id());
@@ -100,28 +98,19 @@ pub fn recognise(
             unclear,
         });
     }
-    let mut copied = Vec::new();
     for shot in &manifest.shots {
-        let Some(seen) = known.get(&shot.index) else {
+        let (Some(seen), Some(name)) = (known.get(&shot.index), shot.photo.file_name()) else {
             continue;
         };
         let extension = seen.path.extension().unwrap_or_default();
-        let to = folder.join(&shot.photo).with_extension(extension);
-        let done = std::fs::copy(&seen.path, &to);
-        copied.push(to);
-        if let Err(source) = done {
-            // Half of the photographs would be in the way of the next attempt.
-            for path in &copied {
-                let _ = std::fs::remove_file(path);
-            }
-            let path = copied.pop().unwrap_or_default();
-            return Err(FolderError::Io { path, source }.into());
-        }
+        let photograph = std::fs::read(&seen.path).map_err(FolderError::io(&seen.path))?;
+        copies.file(Path::new(name).with_extension(extension), photograph)?;
     }
+    copies.finish()?;
     Ok(Recognised {
         photographs: photographs.len(),
         cards: own.len(),
-        slides: copied.len(),
+        slides: manifest.shots.len(),
     })
 }
 
