@@ -84,7 +84,7 @@ folder=$board$some${more:+-$more}
 flags="-C target-cpu=$cpu --cfg sha2_backend_soft=\"compact\""
 # A panic says where it happened: without these, the image would hold the folders of
 # whoever built it, and its size would depend on how long their names are.
-runtime=$(cd .. && pwd)
+runtime=$(cd .. && pwd -P)
 flags+=" --remap-path-prefix=$runtime=runtime --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry/src="
 options=(--release --locked --target "$target" --no-default-features --features "$features" --bin "$bin")
 if [ $route = debian ]; then

@@ -130,8 +130,9 @@ fn address(line: &str) -> Option<u64> {
     u64::from_str_radix(address, 16).ok()
 }
 
-/// A file of the runtime from `runtime/` on.
+/// A file of the runtime from `runtime/` on, which is where the firmware's build begins.
 fn own(file: &str) -> String {
+    let file = format!("/{file}");
     file.rfind("/runtime/src/")
         .map_or(String::new(), |start| file[start + 1..].to_owned())
 }
