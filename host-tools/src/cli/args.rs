@@ -254,12 +254,14 @@ pub(super) struct Patterns {
 
 /// What `iltm capture --help` ends with.
 const CAMERAS: &str = "\
-Commands are run by the shell. These words are replaced, quoted where the shell
-needs it:
+Commands are run by the shell. Each of these words stands for one word of the
+shell, spaces and all, with and without double quotes around it:
   {photo}     file to write      {stem}   the same without its ending
   {slide}     file that is shown {index}  its number
   {role}      what it is shown for
   {exposure}  the fifth column of capture.csv, if there is one
+A second shell (sh -c, eval, ssh) would read a name in double quotes as part of
+its command: put that command in a script, which gets the name as its argument.
 
 Cameras, each with exposure, white balance and focus set by hand before:
   --camera 'gphoto2 --force-overwrite --capture-image-and-download \\

@@ -57,8 +57,9 @@ impl<'a> CommandScreen<'a> {
 impl Screen for CommandScreen<'_> {
     fn show(&mut self, planned: &Planned) -> Result<(), SessionError> {
         let refuse = |reason: String| SessionError::Display { reason };
-        let command = shell::filled(&self.command, planned, &planned.photo);
-        match shell::run(&command, SHOWING, self.stop) {
+        let command = &self.command;
+        let line = shell::filled(command, planned, &planned.photo);
+        match shell::run(&line, SHOWING, self.stop) {
             Ok(Ran::Ended(status, _)) if status.success() => Ok(()),
             Ok(Ran::Ended(status, words)) => Err(refuse(format!(
                 "`{command}` ended with {status}; it says: {words}"

@@ -28,49 +28,84 @@ pub(super) enum Ran {
     Stopped,
 }
 
+/// A user's command with what it is about.
+#[derive(Debug)]
+pub(super) struct Line {
+    /// What the shell reads.
+    script: String,
+    /// Variables that the shell gets: the values of the words that the script holds.
+    values: Vec<(&'static str, String)>,
+}
+
 /// Puts what a command is about in the place of `{photo}`, `{stem}`, `{slide}`,
-/// `{index}`, `{role}` and `{exposure}`, quoted for the shell where that is needed.
-/// Other words in braces are the shell's. What was put in is not looked at again: a
-/// file name that holds one of these words stays a file name.
-pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> String {
+/// `{index}`, `{role}` and `{exposure}`, each as one word of the shell, within double
+/// quotes too. Other words in braces are the shell's, and so is a brace after a
+/// backslash.
+///
+/// The values stand in variables, not in the text of the command: whatever a file is
+/// called and however the user's command quotes it, this shell never reads a name as a
+/// command. A second shell does that (`sh -c`, `eval`, `ssh`) if the first one puts the
+/// value into its text, as it does within double quotes.
+pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> Line {
     let stem = photo.with_extension("");
     let exposure = planned.exposure.map(|exposure| exposure.to_string());
     let words = [
-        ("{photo}", photo.to_string_lossy().into_owned()),
-        ("{stem}", stem.to_string_lossy().into_owned()),
-        ("{slide}", planned.slide.to_string_lossy().into_owned()),
-        ("{index}", planned.index.to_string()),
-        ("{role}", planned.role.clone()),
-        ("{exposure}", exposure.unwrap_or_default()),
+        ("{photo}", "ILTM_PHOTO", photo.to_string_lossy().into()),
+        ("{stem}", "ILTM_STEM", stem.to_string_lossy().into()),
+        (
+            "{slide}",
+            "ILTM_SLIDE",
+            planned.slide.to_string_lossy().into(),
+        ),
+        ("{index}", "ILTM_INDEX", planned.index.to_string()),
+        ("{role}", "ILTM_ROLE", planned.role.clone()),
+        ("{exposure}", "ILTM_EXPOSURE", exposure.unwrap_or_default()),
     ];
-    let mut text = String::new();
+    let mut script = String::new();
     let mut rest = command;
-    while let Some(brace) = rest.find('{') {
-        let (before, from_brace) = rest.split_at(brace);
-        text.push_str(before);
-        let word = words.iter().find(|(word, _)| from_brace.starts_with(word));
-        let length = word.map_or(1, |(word, _)| word.len());
-        let own = &from_brace[..length];
-        text.push_str(&word.map_or(own.to_owned(), |(_, value)| quoted(value)));
-        rest = &from_brace[length..];
+    let (mut single, mut double) = (false, false);
+    while let Some(next) = rest.chars().next() {
+        let word = words.iter().find(|(word, ..)| rest.starts_with(word));
+        let length = match (word, next) {
+            (Some((word, name, value)), _) => {
+                script.push_str(&placed(name, value, double));
+                rest = &rest[word.len()..];
+                continue;
+            }
+            (None, '\\') if cfg!(unix) && !single => {
+                1 + rest[1..].chars().next().map_or(0, char::len_utf8)
+            }
+            (None, _) => next.len_utf8(),
+        };
+        single ^= next == '\'' && !double;
+        double ^= next == '"' && !single;
+        script.push_str(&rest[..length]);
+        rest = &rest[length..];
     }
-    text + rest
+    let values = words.map(|(_, name, value)| (name, value)).into();
+    Line { script, values }
 }
 
-/// A word for the shell.
+/// A value's place in the text of a command: the variable that holds it.
 #[cfg(unix)]
-fn quoted(word: &str) -> String {
-    iltm_report::solve_page::quoted(Path::new(word))
+fn placed(name: &str, _value: &str, in_quotes: bool) -> String {
+    if in_quotes {
+        format!("${{{name}}}")
+    } else {
+        format!("\"${{{name}}}\"")
+    }
 }
 
-/// A word for the shell. Captures' names have no quotes and no percent signs.
+/// A value's place in the text of a command: the value, for this shell reads a
+/// variable's value as text of the command. Captures' names have no quotes and no
+/// percent signs.
 #[cfg(windows)]
-fn quoted(word: &str) -> String {
+fn placed(_name: &str, value: &str, in_quotes: bool) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+:=@\\".contains(c);
-    if word.chars().all(plain) {
-        word.to_owned()
+    if in_quotes || value.chars().all(plain) {
+        value.to_owned()
     } else {
-        format!("\"{word}\"")
+        format!("\"{value}\"")
     }
 }
 
@@ -79,11 +114,12 @@ fn quoted(word: &str) -> String {
 ///
 /// # Errors
 /// What the system says where there is no shell.
-pub(super) fn run(command: &str, patience: Duration, stop: &dyn Fn() -> bool) -> io::Result<Ran> {
+pub(super) fn run(line: &Line, patience: Duration, stop: &dyn Fn() -> bool) -> io::Result<Ran> {
     // A file cannot fill up as a pipe does that nobody reads, and does not stay open
     // with what the command may leave behind.
     let mut words = tempfile::tempfile()?;
-    let mut child = shell(command)
+    let mut child = shell(&line.script)
+        .envs(line.values.iter().cloned())
         .stdin(Stdio::null())
         .stdout(words.try_clone()?)
         .stderr(words.try_clone()?)
@@ -184,33 +220,62 @@ mod tests {
         }
     }
 
+    fn in_shell(command: &str) -> Line {
+        filled(command, &planned(), Path::new("7.png"))
+    }
+
+    fn says(command: &str, photo: &str) -> String {
+        let ran = run(
+            &filled(command, &planned(), Path::new(photo)),
+            Duration::from_secs(20),
+            &|| false,
+        );
+        match ran.unwrap() {
+            Ran::Ended(_, words) => words,
+            ran => panic!("{ran:?}"),
+        }
+    }
+
     #[test]
     fn words_are_filled_in_for_the_shell_and_its_own_braces_left() {
-        let command =
-            "snap -o {photo} --raw {stem}.raw -n {index} -t {exposure} {role} ${HOME} {x,y}";
-        let text = filled(command, &planned(), Path::new("/it's/007.png"));
+        let command = "printf '<%s>' -o {photo} \"{photo}\" {stem}.raw {index} {exposure} {role} ${HOME:+home} {x,y} '{a}' \\{role}";
         assert_eq!(
-            text,
-            r#"snap -o "/it's/007.png" --raw "/it's/007".raw -n 7 -t 0.25 row-1-inverse ${HOME} {x,y}"#
+            says(command, "/it's a/007.png"),
+            "<-o></it's a/007.png></it's a/007.png></it's a/007.raw><7><0.25><row-1-inverse><home><{x,y}><{a}><{role}>"
         );
     }
 
     #[test]
-    fn a_name_that_holds_words_in_braces_runs_nothing() {
+    fn no_name_is_a_command_however_the_user_quotes_it() {
         let folder = tempfile::tempdir().unwrap();
         let written = folder.path().join("written");
-        let name = format!("{{stem}};touch {};#{{index}}.png", written.display());
-        let hostile = Planned {
-            photo: name.clone().into(),
-            ..planned()
-        };
-        let command = filled("echo {photo} {index}", &hostile, &hostile.photo);
-        let ran = run(&command, Duration::from_secs(20), &|| false).unwrap();
-        let Ran::Ended(status, words) = ran else {
-            panic!("{ran:?}")
-        };
-        assert!(status.success() && !written.exists(), "{command}");
-        assert_eq!(words, format!("{name} 7"));
+        let touch = format!("touch {}", written.display());
+        for name in [
+            format!("$({touch})"),
+            format!("`{touch}`"),
+            format!("a;{touch};#"),
+            format!("a';{touch};'"),
+            format!("a\";{touch};\""),
+            format!("a\n{touch}\n"),
+            format!("{{stem}};{touch};#{{index}}"),
+        ] {
+            for command in [
+                "echo {photo}",
+                "echo \"{photo}\"",
+                "echo '{photo}'",
+                "sh -c 'echo {photo}'",
+                "echo \"$(echo {photo})\" `echo {photo}`",
+                "true # it's {photo}",
+                "cat <<END\n{photo}\nEND",
+                "echo \\{photo} \\\"{photo} \\'{photo}",
+            ] {
+                says(command, &name);
+                assert!(!written.exists(), "{command} with {name}");
+            }
+        }
+        let name = "$(true);{stem} {index} 'x'";
+        assert_eq!(says("echo {photo} {index}", name), format!("{name} 7"));
+        assert_eq!(says("echo \"{photo} {index}\"", name), format!("{name} 7"));
     }
 
     #[test]
@@ -218,7 +283,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let late = folder.path().join("late");
         let command = format!("(sleep 3; touch {}) & sleep 30", late.display());
-        let ran = run(&command, Duration::from_millis(200), &|| false).unwrap();
+        let ran = run(&in_shell(&command), Duration::from_millis(200), &|| false).unwrap();
         assert!(matches!(ran, Ran::TooLong(_)), "{ran:?}");
         thread::sleep(Duration::from_secs(4));
         assert!(!late.exists());
@@ -227,7 +292,7 @@ mod tests {
     #[test]
     fn the_end_of_what_a_command_says_is_kept() {
         let command = "seq 1 5000; echo broken lens >&2; exit 3";
-        let ran = run(command, Duration::from_secs(20), &|| false).unwrap();
+        let ran = run(&in_shell(command), Duration::from_secs(20), &|| false).unwrap();
         let Ran::Ended(status, words) = ran else {
             panic!("{ran:?}")
         };
