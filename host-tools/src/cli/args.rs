@@ -260,8 +260,9 @@ shell, spaces and all, with and without double quotes around it:
   {slide}     file that is shown {index}  its number
   {role}      what it is shown for
   {exposure}  the fifth column of capture.csv, if there is one
-A second shell (sh -c, eval, ssh) would read a name in double quotes as part of
-its command: put that command in a script, which gets the name as its argument.
+A second shell (sh -c, eval, ssh) may read a name with other characters than
+letters, digits and /._-+:=@ as part of its command: put that command in a
+script, which gets the name as its argument.
 
 Cameras, each with exposure, white balance and focus set by hand before:
   --camera 'gphoto2 --force-overwrite --capture-image-and-download \\

@@ -42,10 +42,10 @@ pub(super) struct Line {
 /// quotes too. Other words in braces are the shell's, and so is a brace after a
 /// backslash.
 ///
-/// The values stand in variables, not in the text of the command: whatever a file is
-/// called and however the user's command quotes it, this shell never reads a name as a
-/// command. A second shell does that (`sh -c`, `eval`, `ssh`) if the first one puts the
-/// value into its text, as it does within double quotes.
+/// A value that is not plain stands in a variable, not in the text of the command:
+/// whatever a file is called and however the user's command quotes it, this shell never
+/// reads a name as a command. A second shell does that (`sh -c`, `eval`, `ssh`) if the
+/// first one puts the value into its text, as it does within double quotes.
 pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> Line {
     let stem = photo.with_extension("");
     let exposure = planned.exposure.map(|exposure| exposure.to_string());
@@ -63,49 +63,45 @@ pub(super) fn filled(command: &str, planned: &Planned, photo: &Path) -> Line {
     ];
     let mut script = String::new();
     let mut rest = command;
-    let (mut single, mut double) = (false, false);
+    let mut quote = None;
     while let Some(next) = rest.chars().next() {
-        let word = words.iter().find(|(word, ..)| rest.starts_with(word));
-        let length = match (word, next) {
-            (Some((word, name, value)), _) => {
-                script.push_str(&placed(name, value, double));
-                rest = &rest[word.len()..];
-                continue;
-            }
-            (None, '\\') if cfg!(unix) && !single => {
-                1 + rest[1..].chars().next().map_or(0, char::len_utf8)
-            }
-            (None, _) => next.len_utf8(),
-        };
-        single ^= next == '\'' && !double;
-        double ^= next == '"' && !single;
-        script.push_str(&rest[..length]);
-        rest = &rest[length..];
+        if let Some((word, name, value)) = words.iter().find(|(word, ..)| rest.starts_with(word)) {
+            script += &placed(name, value, quote == Some('"'));
+            rest = &rest[word.len()..];
+            continue;
+        }
+        let escapes = cfg!(unix) && next == '\\' && quote != Some('\'');
+        let taken = rest.chars().take(if escapes { 2 } else { 1 });
+        let (own, after) = rest.split_at(taken.map(char::len_utf8).sum());
+        script += own;
+        rest = after;
+        if quote == Some(next) {
+            quote = None;
+        } else if quote.is_none() && (next == '"' || cfg!(unix) && next == '\'') {
+            quote = Some(next);
+        }
     }
     let values = words.map(|(_, name, value)| (name, value)).into();
     Line { script, values }
 }
 
-/// A value's place in the text of a command: the variable that holds it.
-#[cfg(unix)]
-fn placed(name: &str, _value: &str, in_quotes: bool) -> String {
-    if in_quotes {
-        format!("${{{name}}}")
-    } else {
-        format!("\"${{{name}}}\"")
-    }
-}
-
-/// A value's place in the text of a command: the value, for this shell reads a
-/// variable's value as text of the command. Captures' names have no quotes and no
-/// percent signs.
-#[cfg(windows)]
-fn placed(_name: &str, value: &str, in_quotes: bool) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "/._-+:=@\\".contains(c);
-    if in_quotes || value.chars().all(plain) {
+/// A value's place in the text of a command. A plain value means itself to every shell,
+/// whatever the quotes. Another one stays in its variable; but not on Windows, whose
+/// shell reads a variable's value as text of the command, and where captures' names have
+/// no quotes and no percent signs.
+fn placed(name: &str, value: &str, in_quotes: bool) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+:=@".contains(c);
+    let text = if !value.is_empty() && value.chars().all(plain) {
+        return value.to_owned();
+    } else if cfg!(windows) {
         value.to_owned()
     } else {
-        format!("\"{value}\"")
+        format!("${{{name}}}")
+    };
+    if in_quotes {
+        text
+    } else {
+        format!("\"{text}\"")
     }
 }
 
@@ -225,12 +221,8 @@ mod tests {
     }
 
     fn says(command: &str, photo: &str) -> String {
-        let ran = run(
-            &filled(command, &planned(), Path::new(photo)),
-            Duration::from_secs(20),
-            &|| false,
-        );
-        match ran.unwrap() {
+        let line = filled(command, &planned(), Path::new(photo));
+        match run(&line, Duration::from_secs(20), &|| false).unwrap() {
             Ran::Ended(_, words) => words,
             ran => panic!("{ran:?}"),
         }
@@ -243,6 +235,22 @@ mod tests {
             says(command, "/it's a/007.png"),
             "<-o></it's a/007.png></it's a/007.png></it's a/007.raw><7><0.25><row-1-inverse><home><{x,y}><{a}><{role}>"
         );
+    }
+
+    #[test]
+    fn a_plain_name_goes_through_every_quote_and_a_second_shell() {
+        for command in [
+            "printf '<%s>' {photo}",
+            "printf '<%s>' '{photo}'",
+            "printf '<%s>' \"{photo}\"",
+            "sh -c 'printf \"<%s>\" {photo}'",
+            "sh -c \"printf '<%s>' '{photo}'\"",
+            "env -i sh -c 'printf \"<%s>\" \"{photo}\"'",
+        ] {
+            assert_eq!(says(command, "/a/7.png"), "</a/7.png>", "{command}");
+        }
+        let command = "sh -c 'printf \"<%s>\" {photo}'";
+        assert_eq!(says(command, "/it's a/7.png"), "</it's a/7.png>");
     }
 
     #[test]
@@ -263,7 +271,8 @@ mod tests {
                 "echo {photo}",
                 "echo \"{photo}\"",
                 "echo '{photo}'",
-                "sh -c 'echo {photo}'",
+                "echo '--out={photo}' '{index}{photo}'",
+                "sh -c 'echo {photo} \"{photo}\"'",
                 "echo \"$(echo {photo})\" `echo {photo}`",
                 "true # it's {photo}",
                 "cat <<END\n{photo}\nEND",
