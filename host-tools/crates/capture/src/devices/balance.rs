@@ -55,9 +55,10 @@ impl Balances {
     /// Groups the balances by how bright they are and, among equals, by how far
     /// what is added is apart; `None` if there are too few.
     ///
-    /// Both keys are sums whose noise has nothing to do with that of the balance:
-    /// groups by the brightest value would collect those whose noise is high.
-    pub(crate) fn new(mut balances: Vec<Balance>) -> Option<Self> {
+    /// Balances stand in the order of the pixels. Both keys of one are those of its two
+    /// neighbours, whose noise is not its own: groups by its own values would collect those
+    /// whose noise is high, and noise that grows with the light would pass for a curve.
+    pub(crate) fn new(balances: &[Balance]) -> Option<Self> {
         if balances.len() < FEWEST {
             return None;
         }
@@ -74,12 +75,21 @@ impl Balances {
                 0.0
             }
         };
-        balances.sort_by(|a, b| brightness(a).total_cmp(&brightness(b)));
-        let size = balances.len().div_ceil(GROUPS);
+        let last = balances.len() - 1;
+        let around = |at: usize, key: &dyn Fn(&Balance) -> f32| {
+            let (before, after) = (at.checked_sub(1).unwrap_or(1), (at + 1).min(last));
+            let after = if after == at { at - 1 } else { after };
+            key(&balances[before]) + key(&balances[after])
+        };
+        let mut keyed: Vec<(f32, f32, Balance)> = (balances.iter().enumerate())
+            .map(|(at, balance)| (around(at, &brightness), around(at, &apart), *balance))
+            .collect();
+        keyed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let size = keyed.len().div_ceil(GROUPS);
         let mut ends = Vec::new();
         let mut begin = 0;
-        for group in balances.chunks_mut(size) {
-            group.sort_by(|a, b| apart(a).total_cmp(&apart(b)));
+        for group in keyed.chunks_mut(size) {
+            group.sort_by(|a, b| a.1.total_cmp(&b.1));
             let size = group.len().div_ceil(GROUPS);
             let inner = group.chunks(size).scan(begin, |end, part| {
                 *end += part.len();
@@ -88,6 +98,7 @@ impl Balances {
             ends.extend(inner);
             begin += group.len();
         }
+        let balances = keyed.into_iter().map(|(_, _, balance)| balance).collect();
         Some(Self { balances, ends })
     }
 

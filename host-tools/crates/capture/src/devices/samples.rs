@@ -41,7 +41,7 @@ pub(super) fn fit(
         let (balances, pairs) = code_pairs(sequence, photographs, &pixels, response)?;
         (balances, CameraSource::Pairs { pairs })
     };
-    Ok(CameraFit::new(balances, source, response))
+    Ok(CameraFit::new(&balances, source, response))
 }
 
 /// Each pattern and its inverse against white and black.
