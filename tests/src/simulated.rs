@@ -1,7 +1,7 @@
 //! Simulated photographs: captures of the scenes that come with the tools, tables learned
 //! from them, and the errors that are on the wall then.
 
-use iltm::build_table::{BuiltTable, build_table};
+use iltm::build_table::{BuiltTable, TableOptions, build_table};
 use iltm::capture::{CaptureOptions, NO_CELL, Registration, pattern_set};
 
 use iltm::progress::Silent;
@@ -46,7 +46,14 @@ pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
 /// What is learned from a capture with the usual options.
 pub fn learned(capture: &Path) -> BuiltTable {
     let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
-    build_table(capture, &photographs, &solve, None, &Silent).expect("a good capture")
+    build_table(
+        capture,
+        &photographs,
+        &solve,
+        &TableOptions::default(),
+        &Silent,
+    )
+    .expect("a good capture")
 }
 
 /// Mean light of the pixels of each cell.

@@ -340,6 +340,15 @@ pub(super) struct Solve {
     /// grey that every live cell reaches
     #[arg(long, value_name = "LIGHT", conflicts_with = "content")]
     pub(super) white: Option<f64>,
+    /// Most samples of the gains, which are finer than the cells: more of them correct finer
+    /// texture and make the table larger; by default as fine as the camera tells, at most
+    /// one a pixel of the projector
+    #[arg(long, value_name = "WxH", value_parser = frame_size)]
+    pub(super) gain_resolution: Option<FrameSize>,
+    /// Leave light that is there without the projector as it is, for a room that is darker
+    /// in the show than in the photographs; by default it counts as a part of the picture
+    #[arg(long)]
+    pub(super) keep_ambient: bool,
     /// Picture or video (PNG, Y4M) that is going to be shown: reference white is the
     /// brightest that cuts no more of it than --clip-share; may be repeated
     #[arg(long, value_name = "FILE")]

@@ -7,7 +7,7 @@ use super::progress::progress;
 use super::summary::{self, remarks, summary};
 use super::table_words;
 use super::tables::{check, seal};
-use crate::build_table::{BuiltTable, build_table_from};
+use crate::build_table::{BuiltTable, TableOptions, build_table_from};
 use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
@@ -67,7 +67,11 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
         measurements,
         &arguments.capture,
         &options,
-        white,
+        &TableOptions {
+            white,
+            gain_resolution: arguments.gain_resolution,
+            keep_ambient: arguments.keep_ambient,
+        },
         bars.as_ref(),
     );
     bars.end();

@@ -9,7 +9,7 @@ pub mod sample;
 mod video;
 mod words;
 
-use crate::build_table::{BuildError, BuiltTable, build_table};
+use crate::build_table::{BuildError, BuiltTable, TableOptions, build_table};
 use crate::capture::CaptureOptions;
 use crate::report::{Example, Report, ReportError, Wanted, stills};
 use crate::solve::SolveOptions;
@@ -112,7 +112,13 @@ pub fn run(out: &Path, progress: &dyn Progress) -> Result<DemoOutcome, DemoError
     progress.end();
     clock.lap("writing the sample");
     let (photographs, options) = (CaptureOptions::default(), SolveOptions::default());
-    let built = build_table(&paths.capture, &photographs, &options, None, progress)?;
+    let built = build_table(
+        &paths.capture,
+        &photographs,
+        &options,
+        &TableOptions::default(),
+        progress,
+    )?;
     write_bytes(&paths.table, &built.compiled.image)?;
     clock.lap("from photographs to table");
     video::write(&paths.video, size(VIDEO), progress)?;

@@ -49,6 +49,42 @@ fn a_border_stays_black_and_frames_of_the_size_inside_it_are_put_there() {
 }
 
 #[test]
+fn gains_are_as_fine_as_the_camera_tells_or_as_was_said() {
+    let user = bordered();
+    let size = |table: &str| {
+        let fine = &user.json(&format!("inspect {table}"))["fine_gain"];
+        (fine["cols"].as_u64(), fine["rows"].as_u64())
+    };
+    let (wide, tall) = size("b.iltm");
+    // Whole samples of a cell, not more than the 280 x 160 pixels inside the border.
+    assert!(
+        wide.is_some_and(|wide| wide % 21 == 0 && (84..=280).contains(&wide)),
+        "{wide:?}"
+    );
+    assert!(
+        tall.is_some_and(|tall| tall % 13 == 0 && (52..=160).contains(&tall)),
+        "{tall:?}"
+    );
+    user.says("solve c -o coarse.iltm --gain-resolution 50x50");
+    assert_eq!(size("coarse.iltm"), (Some(42), Some(39)));
+    user.says("solve c -o cells.iltm --gain-resolution 41x25");
+    assert_eq!(size("cells.iltm"), (None, None));
+}
+
+#[test]
+fn ambient_light_is_left_as_it_is_when_asked() {
+    let user = bordered();
+    user.says("solve c -o kept.iltm --keep-ambient");
+    let effects = |table: &str| {
+        let inspected = user.json(&format!("inspect {table}"));
+        let kept = inspected["provenance"]["ambient_kept"].as_bool();
+        (inspected["effects"].to_string().contains("ambient"), kept)
+    };
+    assert_eq!(effects("b.iltm"), (true, None));
+    assert_eq!(effects("kept.iltm"), (false, Some(true)));
+}
+
+#[test]
 fn another_aspect_is_refused_everywhere_unless_it_is_said_how() {
     let user = bordered();
     grey(user, "wide.png", (192, 108));

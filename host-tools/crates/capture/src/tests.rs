@@ -328,14 +328,16 @@ fn the_fine_flood_follows_the_albedo_inside_a_cell_and_keeps_each_cells_mean() {
         ..TestCapture::default()
     };
     let measured = scene.read();
-    let fine = FineFlood::new(&measured);
-    assert_eq!((fine.rows, fine.cols), (5 * fine.factor, 6 * fine.factor));
-    assert!((4..=6).contains(&fine.factor), "{}", fine.factor);
+    let fine = FineFlood::new(&measured, None);
+    let factor = fine.factor[0];
+    assert_eq!(fine.factor, [factor; 2]);
+    assert_eq!((fine.rows, fine.cols), (5 * factor, 6 * factor));
+    assert!((4..=6).contains(&factor), "{factor}");
     let plane = &fine.channels[0];
     for cell in 0..30 {
-        let (row, col) = (cell / 6 * fine.factor, cell % 6 * fine.factor);
-        let inside = |k: usize| plane[(row + k / fine.factor) * fine.cols + col + k % fine.factor];
-        let samples = fine.factor * fine.factor;
+        let (row, col) = (cell / 6 * factor, cell % 6 * factor);
+        let inside = |k: usize| plane[(row + k / factor) * fine.cols + col + k % factor];
+        let samples = factor * factor;
         let mean = (0..samples).map(|k| f64::from(inside(k))).sum::<f64>() / samples as f64;
         let observed = measured.channels[0].observations[(cell, 0)];
         assert!(
@@ -345,9 +347,9 @@ fn the_fine_flood_follows_the_albedo_inside_a_cell_and_keeps_each_cells_mean() {
     }
     let light = scene.direct + 29.0 * scene.bounced;
     for (at, &sample) in plane.iter().enumerate() {
-        let place = ((at % fine.cols) as f64 + 0.5) / fine.factor as f64;
+        let place = ((at % fine.cols) as f64 + 0.5) / factor as f64;
         let truth = light * (0.6 + 0.1 * place);
-        let (row, col) = (at / fine.cols / fine.factor, at % fine.cols / fine.factor);
+        let (row, col) = (at / fine.cols / factor, at % fine.cols / factor);
         // Cells at the border are measured with pixels that are up to 0.45 dark.
         let border = row == 0 || row == 4 || col == 0 || col == 5;
         let limit = if border { 0.09 } else { 0.02 };
@@ -359,8 +361,8 @@ fn the_fine_flood_follows_the_albedo_inside_a_cell_and_keeps_each_cells_mean() {
 #[test]
 fn a_subdivision_of_one_is_the_flood_observation_itself() {
     let measured = TestCapture::default().read();
-    let fine = FineFlood::with_factor(&measured, 0);
-    assert_eq!((fine.rows, fine.cols, fine.factor), (5, 6, 1));
+    let fine = FineFlood::with_factor(&measured, [0, 0]);
+    assert_eq!((fine.rows, fine.cols, fine.factor), (5, 6, [1, 1]));
     for (fine, observed) in fine.channels[0]
         .iter()
         .zip(&measured.channels[0].observations.column(0))

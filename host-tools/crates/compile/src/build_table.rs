@@ -2,9 +2,10 @@
 
 use crate::provenance::Provenance;
 use crate::reference_white::{ReferenceWhite, WhiteRequest};
-use crate::{CompileError, CompileOptions, Compiled};
+use crate::{CompileError, CompileOptions, Compiled, FineGains};
 use iltm_capture::{CaptureError, CaptureOptions, FineFlood, Measurements};
 use iltm_picture::progress::Progress;
+use iltm_runtime::FrameSize;
 use iltm_solve::{Compensation, InverseTransport, SolveError, SolveOptions, SolveReport};
 use std::path::Path;
 use thiserror::Error;
@@ -17,12 +18,27 @@ pub struct BuiltTable {
     /// The inverse light transport that the table has: without an operator if
     /// [`SolveReport::compensation`] says so.
     pub inverse: InverseTransport,
+    /// Gains finer than the cells; `None` if there are none.
+    pub fine: Option<FineGains>,
     /// How the inverse came about.
     pub report: SolveReport,
     /// The reference white, and why it is that.
     pub white: ReferenceWhite,
     /// The table.
     pub compiled: Compiled,
+}
+
+/// What a table is to be, beside what the photographs say.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct TableOptions<'c> {
+    /// Reference white; the brightest even grey that every live cell reaches if left out.
+    pub white: Option<WhiteRequest<'c>>,
+    /// Most samples of the gains that are finer than the cells; as fine as the camera tells, at
+    /// most a sample a pixel of the projector, if left out.
+    pub gain_resolution: Option<FrameSize>,
+    /// Leaves light that is there without the projector as it is, instead of counting it as a
+    /// part of the picture.
+    pub keep_ambient: bool,
 }
 
 /// Why a capture did not become a table.
@@ -61,11 +77,11 @@ pub fn build_table(
     capture: &Path,
     photographs: &CaptureOptions,
     options: &SolveOptions,
-    white: Option<WhiteRequest<'_>>,
+    table: &TableOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<BuiltTable, BuildError> {
     let measurements = iltm_capture::read(capture, photographs, progress)?;
-    build_table_from(measurements, capture, options, white, progress)
+    build_table_from(measurements, capture, options, table, progress)
 }
 
 /// The same from photographs that have been read before; `capture` is where.
@@ -76,11 +92,11 @@ pub fn build_table_from(
     measurements: Measurements,
     capture: &Path,
     options: &SolveOptions,
-    white: Option<WhiteRequest<'_>>,
+    table: &TableOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<BuiltTable, BuildError> {
     let (inverse, report) = iltm_solve::solve(&measurements, options, progress)?;
-    let inverse = match report.compensation {
+    let mut inverse = match report.compensation {
         Compensation::Operator => inverse,
         Compensation::GainOnly => iltm_solve::gain_only(&(&measurements).into(), &report)?,
         Compensation::Nothing => {
@@ -92,9 +108,18 @@ pub fn build_table_from(
         }
     };
     progress.begin("compiling the table", 0);
-    let fine = crate::gain::fine_gains(&inverse, &FineFlood::new(&measurements));
-    let white = ReferenceWhite::new(&inverse, fine.as_ref(), white)?;
-    let provenance = Provenance::new(capture, &measurements, &report, &white);
+    if table.keep_ambient {
+        for channel in &mut inverse.channels {
+            channel.ambient.fill(0.0);
+        }
+    }
+    let flood = FineFlood::new(&measurements, table.gain_resolution);
+    let fine = crate::gain::fine_gains(&inverse, &flood);
+    let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white)?;
+    let provenance = Provenance {
+        ambient_kept: table.keep_ambient,
+        ..Provenance::new(capture, &measurements, &report, &white)
+    };
     let options = CompileOptions {
         label: provenance.label(),
         projector: measurements.devices.projector.clone(),
@@ -109,6 +134,7 @@ pub fn build_table_from(
     Ok(BuiltTable {
         measurements,
         inverse,
+        fine,
         report,
         white,
         compiled,

@@ -33,6 +33,9 @@ pub struct Provenance {
     pub lambda: f64,
     /// Largest over smallest singular value of the forward transport.
     pub condition: f64,
+    /// Whether light that is there without the projector was left as it is.
+    #[serde(skip_serializing_if = "is_false")]
+    pub ambient_kept: bool,
     /// Names of the gates that failed and were ignored.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ignored_gates: Vec<String>,
@@ -119,6 +122,7 @@ impl Provenance {
                 bernoulli: report.photographs.bernoulli,
             }),
             live_cells: report.live_cells,
+            ambient_kept: false,
             lambda: report.lambda,
             condition: report.condition,
             ignored_gates: failed.map(|gate| gate.name.to_string()).collect(),
@@ -154,6 +158,11 @@ impl Provenance {
         // A struct of numbers and strings always has a TOML form.
         toml::to_string(self).unwrap_or_default()
     }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+const fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 fn if_readable<'de, T: DeserializeOwned, D: Deserializer<'de>>(

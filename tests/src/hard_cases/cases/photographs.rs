@@ -5,7 +5,7 @@ use super::super::closed_loop::errors;
 use super::super::grid;
 use super::super::observations::out_of_focus;
 use super::super::photographs::TestCamera;
-use iltm::build_table::{BuiltTable, build_table};
+use iltm::build_table::{BuiltTable, TableOptions, build_table};
 use iltm::capture::CaptureOptions;
 use iltm::progress::Silent;
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -145,7 +145,7 @@ fn table(scene: &CoaxialScene, camera: TestCamera, settings: &str) -> Result<Bui
         folder.path(),
         &CaptureOptions::default(),
         &SolveOptions::default(),
-        None,
+        &TableOptions::default(),
         &Silent,
     );
     let folder_name = folder.path().display().to_string();

@@ -2,7 +2,9 @@
 //!
 //! Video has more pixels than the grid has cells, so its gain map needs more
 //! than one flood value a cell. With fine stripes, the projector map says which
-//! pixels see a sample. Without, the map from cells to the camera goes through
+//! pixels see a sample, and by how much: the value of a sample is the light whose
+//! reciprocal, as a gain, brings all of them nearest to an even light
+//! (`even_gains`). Without, the map from cells to the camera goes through
 //! the cells' mean positions, linear between them: it may bend at every cell, as
 //! it does where the surface has a crease, and it does not reach across an edge
 //! where the surface ends.
@@ -11,50 +13,70 @@ use super::measurements::Measurements;
 use crate::registration::cell_map::Registration;
 use crate::registration::projector_map::ProjectorMap;
 use iltm_picture::statistics::median;
-use iltm_runtime::Grid;
+use iltm_runtime::{FrameSize, Grid};
+use rayon::prelude::*;
 
-/// Camera pixels that one fine sample should average at least.
+/// Camera pixels that one fine sample should average at least where only the cells tell where it
+/// is.
 const PIXELS_A_SAMPLE: f64 = 4.0;
 
-/// Finest subdivision of a cell's side.
+/// The same where each pixel's place is known.
+const MAPPED_PIXELS_A_SAMPLE: f64 = 1.0;
+
+/// Finest subdivision of a cell's side where only the cells tell where a sample is.
 const MAX_FACTOR: usize = 8;
 
 /// Least weight of usable camera pixels in a fine sample, of a full footprint.
 const LEAST_COVER: f32 = 0.1;
 
+/// Share of the row sums of `A' B^2 A` that holds a gain near its sample's own best: where a
+/// camera is coarser than the samples, differences of neighbours are noise.
+const HELD: f32 = 0.04;
+
+/// Residual, relative to the right side, at which gains are found.
+const SMALL: f64 = 1e-4;
+
+/// Steps of conjugate gradients at most; some ten are usual.
+const MOST_STEPS: usize = 60;
+
+/// Most by which a sample's neighbours change its own best gain, a factor.
+const MOST_CHANGE: f32 = 4.0;
+
 /// Light observed under white at each point of a grid finer than the cells.
 #[derive(Clone, PartialEq, Debug)]
 pub struct FineFlood {
-    /// Rows, `factor` times the grid's.
+    /// Rows, a multiple of the grid's.
     pub rows: usize,
-    /// Columns, `factor` times the grid's.
+    /// Columns, a multiple of the grid's.
     pub cols: usize,
-    /// Fine samples along a cell's side, 1 to 8.
-    pub factor: usize,
+    /// Fine samples along a cell's width and height.
+    pub factor: [usize; 2],
     /// Flood light with black subtracted in camera units, one plane a channel,
     /// row by row, length `rows * cols`; zeros in cells that are not live.
     /// Without a projector map, the mean over a cell's samples is its observation.
     pub channels: Vec<Vec<f32>>,
+    /// Whether the projector map said which pixels see a sample.
+    pub mapped: bool,
     /// The flood observation of each cell that a solve works with, one plane a
     /// channel, length `N`.
     pub observed: Vec<Vec<f64>>,
 }
 
 impl FineFlood {
-    /// Resamples the flood photograph, as finely as leaves each sample about four
-    /// camera pixels.
+    /// Resamples the flood photograph as finely as leaves each sample a camera pixel, at most as
+    /// finely as the projector's pixels; where only the cells tell where a sample is, four camera
+    /// pixels. There are no more than `most` samples.
     #[must_use]
-    pub fn new(measurements: &Measurements) -> Self {
-        Self::with_factor(measurements, natural_factor(measurements))
+    pub fn new(measurements: &Measurements, most: Option<FrameSize>) -> Self {
+        Self::with_factor(measurements, natural_factor(measurements, most))
     }
 
-    /// The same with a subdivision of each cell's side by `factor`, clamped to
-    /// 1 to 8.
+    /// The same with a subdivision of each cell's width and height, at least 1.
     #[must_use]
-    pub fn with_factor(measurements: &Measurements, factor: usize) -> Self {
-        let factor = factor.clamp(1, MAX_FACTOR);
+    pub fn with_factor(measurements: &Measurements, factor: [usize; 2]) -> Self {
+        let factor = factor.map(|side| side.max(1));
         let grid = measurements.grid;
-        let (rows, cols) = (grid.rows() * factor, grid.cols() * factor);
+        let (rows, cols) = (grid.rows() * factor[1], grid.cols() * factor[0]);
         let mut channels = vec![vec![0.0; rows * cols]; measurements.channels.len()];
         let surface = Surface::new(measurements);
         let mapped = match &measurements.map {
@@ -78,8 +100,8 @@ impl FineFlood {
                     scaled(&samples, flood)
                 };
                 for (at, sample) in samples.into_iter().enumerate() {
-                    let row = cell / grid.cols() * factor + at / factor;
-                    let col = cell % grid.cols() * factor + at % factor;
+                    let row = cell / grid.cols() * factor[1] + at / factor[0];
+                    let col = cell % grid.cols() * factor[0] + at % factor[0];
                     channels[channel][row * cols + col] = sample;
                 }
             }
@@ -93,6 +115,7 @@ impl FineFlood {
             cols,
             factor,
             channels,
+            mapped: mapped.is_some(),
             observed: observed.collect(),
         }
     }
@@ -101,58 +124,185 @@ impl FineFlood {
 /// The flood photograph gathered by the projector map.
 struct MappedFlood {
     grid: Grid,
-    factor: usize,
-    /// Light times area, one plane a channel, and area, row by row over all samples.
-    light: Vec<Vec<f32>>,
-    area: Vec<f32>,
+    factor: [usize; 2],
+    /// Light that each sample's gain answers, one plane a channel, row by row over all samples;
+    /// `None` where no pixel sees one.
+    light: Vec<Vec<Option<f32>>>,
 }
 
 impl MappedFlood {
-    fn new(measurements: &Measurements, map: &ProjectorMap, factor: usize) -> Self {
+    fn new(measurements: &Measurements, map: &ProjectorMap, factor: [usize; 2]) -> Self {
         let grid = measurements.grid;
-        let (rows, cols) = (grid.rows() * factor, grid.cols() * factor);
-        let mut light = vec![vec![0.0; rows * cols]; measurements.flood.len()];
-        let mut area = vec![0.0; rows * cols];
-        // Side of a camera's pixel in samples: as wide as it is, it adds to what it covers.
-        let side = (factor as f64 / measurements.registration.cell_side()) as f32;
-        for (pixel, place) in map.position.iter().enumerate() {
-            let [across, down] = map.in_cells(*place, grid).map(|at| at * factor as f32);
-            if across.is_nan() || down.is_nan() || !measurements.is_inside(pixel) {
-                continue;
-            }
-            for (row, tall) in covered(down, side, rows) {
-                for (col, wide) in covered(across, side, cols) {
-                    let (at, share) = (row * cols + col, tall * wide);
-                    area[at] += share;
-                    for (light, flood) in light.iter_mut().zip(&measurements.flood) {
-                        light[at] += share * flood[pixel];
-                    }
-                }
-            }
-        }
+        let side = measurements.registration.cell_side();
+        let views = map
+            .position
+            .iter()
+            .enumerate()
+            .filter_map(|(pixel, place)| {
+                let [across, down] = map.in_cells(*place, grid);
+                let place = [across * factor[0] as f32, down * factor[1] as f32];
+                let known = !place[0].is_nan() && !place[1].is_nan();
+                (known && measurements.is_inside(pixel)).then_some(PixelView { pixel, place })
+            });
+        let views = Views {
+            rows: grid.rows() * factor[1],
+            cols: grid.cols() * factor[0],
+            // As wide as a pixel is, it sees what it covers.
+            side: factor.map(|factor| (factor as f64 / side) as f32),
+            pixels: views.collect(),
+        };
+        let light = measurements.flood.par_iter();
         Self {
             grid,
             factor,
-            light,
-            area,
+            light: light.map(|flood| views.even_light(flood)).collect(),
         }
     }
 
     /// Samples of each plane in one cell, row by row; `None` where no pixel sees one.
     fn samples(&self, cell: usize) -> Vec<Vec<Option<f32>>> {
-        let (cols, factor) = (self.grid.cols() * self.factor, self.factor);
-        let first = cell / self.grid.cols() * factor * cols + cell % self.grid.cols() * factor;
-        let value = |plane: &Vec<f32>, sample: usize| {
-            let at = first + sample / factor * cols + sample % factor;
-            (self.area[at] >= LEAST_COVER).then(|| plane[at] / self.area[at])
-        };
-        let plane = |plane| {
-            (0..factor * factor)
-                .map(|sample| value(plane, sample))
-                .collect()
+        let [wide, tall] = self.factor;
+        let cols = self.grid.cols() * wide;
+        let first = cell / self.grid.cols() * tall * cols + cell % self.grid.cols() * wide;
+        let at = |sample: usize| first + sample / wide * cols + sample % wide;
+        let plane = |plane: &Vec<Option<f32>>| {
+            let samples = (0..wide * tall).map(|sample| plane[at(sample)]);
+            samples.collect()
         };
         self.light.iter().map(plane).collect()
     }
+}
+
+/// A camera pixel, and the place that it sees in samples.
+struct PixelView {
+    pixel: usize,
+    place: [f32; 2],
+}
+
+/// Which samples camera pixels see: a sparse matrix `A` of shares, a row a pixel.
+struct Views {
+    rows: usize,
+    cols: usize,
+    /// Width and height of a camera's pixel in samples.
+    side: [f32; 2],
+    pixels: Vec<PixelView>,
+}
+
+impl Views {
+    /// Samples that a pixel covers and its shares of them, of its own area.
+    fn seen(&self, view: &PixelView) -> impl Iterator<Item = (usize, f32)> {
+        let [across, down] = view.place;
+        let ([width, height], cols) = (self.side, self.cols);
+        covered(down, height, self.rows).flat_map(move |(row, tall)| {
+            covered(across, width, cols)
+                .map(move |(col, wide)| (row * cols + col, tall * wide / (width * height)))
+        })
+    }
+
+    /// The reciprocal of [`even_gains`](Self::even_gains), where there are any.
+    fn even_light(&self, flood: &[f32]) -> Vec<Option<f32>> {
+        let gains = self.even_gains(flood);
+        gains.into_iter().map(|gain| Some(1.0 / gain?)).collect()
+    }
+
+    /// Gains `z` of the samples with which the flood's light `b` comes nearest to an even 1, over
+    /// all camera pixels: `sum over c of (b_c (A z)_c - (A 1)_c)^2` is least.
+    ///
+    /// Where a sample lies on two paints, or a pixel sees two samples, no gain is right for all
+    /// pixels, and the mean light's is far from the best. Conjugate gradients; a share of the
+    /// matrix's row sums holds what the pixels do not tell near each sample's own best.
+    fn even_gains(&self, flood: &[f32]) -> Vec<Option<f32>> {
+        let samples = self.rows * self.cols;
+        let (mut area, mut right, mut weight) = (
+            vec![0.0_f32; samples],
+            vec![0.0_f32; samples],
+            vec![0.0_f32; samples],
+        );
+        for view in &self.pixels {
+            let light = flood[view.pixel];
+            let whole: f32 = self.seen(view).map(|(_, share)| share).sum();
+            for (at, share) in self.seen(view) {
+                area[at] += share * self.side[0] * self.side[1];
+                right[at] += share * light * whole;
+                weight[at] += share * light * light * whole;
+            }
+        }
+        let known: Vec<bool> = (area.iter().zip(&weight))
+            .map(|(area, weight)| *area >= LEAST_COVER && *weight > 0.0)
+            .collect();
+        let own: Vec<f32> = (known.iter().zip(right.iter().zip(&weight)))
+            .map(|(known, (right, weight))| if *known { right / weight } else { 0.0 })
+            .collect();
+        let hold: Vec<f32> = weight.iter().map(|weight| HELD * weight).collect();
+        // (A' B^2 A + hold) change = A' B (A 1 - B A own), B the flood's light.
+        let normal = |gains: &[f32]| {
+            let mut product: Vec<f32> = gains.iter().zip(&hold).map(|(z, h)| z * h).collect();
+            for view in &self.pixels {
+                let light = flood[view.pixel];
+                let seen: f32 = self.seen(view).map(|(at, share)| share * gains[at]).sum();
+                for (at, share) in self.seen(view) {
+                    product[at] += share * light * light * seen;
+                }
+            }
+            zero_unknown(&mut product, &known);
+            product
+        };
+        let mut residual: Vec<f32> = normal(&own);
+        for (residual, ((own, hold), right)) in
+            residual.iter_mut().zip(own.iter().zip(&hold).zip(&right))
+        {
+            *residual = right + own * hold - *residual;
+        }
+        zero_unknown(&mut residual, &known);
+        let scaled = |residual: &[f32]| -> Vec<f32> {
+            let pairs = residual.iter().zip(weight.iter().zip(&known));
+            pairs
+                .map(|(r, (weight, known))| if *known { r / weight } else { 0.0 })
+                .collect()
+        };
+        let mut gains = own.clone();
+        let mut direction = scaled(&residual);
+        let mut size = dot(&residual, &direction);
+        let small = SMALL * SMALL * dot(&right, &scaled(&right));
+        for _ in 0..MOST_STEPS {
+            if size <= small {
+                break;
+            }
+            let product = normal(&direction);
+            let step = (size / dot(&direction, &product)) as f32;
+            for at in 0..samples {
+                gains[at] += step * direction[at];
+                residual[at] -= step * product[at];
+            }
+            let next = scaled(&residual);
+            let after = dot(&residual, &next);
+            let turn = (after / size) as f32;
+            for (direction, next) in direction.iter_mut().zip(next) {
+                *direction = next + turn * *direction;
+            }
+            size = after;
+        }
+        let bounded = |(gain, own): (f32, f32)| gain.clamp(own / MOST_CHANGE, own * MOST_CHANGE);
+        let pairs = gains.into_iter().zip(own).zip(known);
+        pairs
+            .map(|(pair, known)| known.then(|| bounded(pair)))
+            .collect()
+    }
+}
+
+fn zero_unknown(values: &mut [f32], known: &[bool]) {
+    for (value, known) in values.iter_mut().zip(known) {
+        if !known {
+            *value = 0.0;
+        }
+    }
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| f64::from(*a) * f64::from(*b))
+        .sum()
 }
 
 /// Samples along a side of `count` that an interval of `side` around `middle` covers, and how much
@@ -167,19 +317,18 @@ fn covered(middle: f32, side: f32, count: usize) -> impl Iterator<Item = (usize,
 }
 
 /// Fills unknown samples of a cell with the nearest known ones' mean.
-fn filled(samples: &[Option<f32>], factor: usize) -> Vec<f32> {
+fn filled(samples: &[Option<f32>], [wide, tall]: [usize; 2]) -> Vec<f32> {
     let value = |at: usize| {
-        let (row, col) = (at / factor, at % factor);
-        let near = (0..factor).find_map(|reach| {
+        let (row, col) = (at / wide, at % wide);
+        let near = (0..wide.max(tall)).find_map(|reach| {
             let (mut sum, mut count) = (0.0, 0.0_f32);
-            for (other, sample) in samples.iter().enumerate() {
-                let (down, across) = (
-                    (other / factor).abs_diff(row),
-                    (other % factor).abs_diff(col),
-                );
-                if let (true, Some(sample)) = (down.max(across) == reach, sample) {
-                    sum += sample;
-                    count += 1.0;
+            let rows = row.saturating_sub(reach)..(row + reach + 1).min(tall);
+            for other in rows {
+                for across in col.saturating_sub(reach)..(col + reach + 1).min(wide) {
+                    if let Some(sample) = samples[other * wide + across] {
+                        sum += sample;
+                        count += 1.0;
+                    }
                 }
             }
             (count > 0.0).then(|| sum / count)
@@ -190,8 +339,9 @@ fn filled(samples: &[Option<f32>], factor: usize) -> Vec<f32> {
 }
 
 /// Subdivision that leaves [`PIXELS_A_SAMPLE`] in a live cell of median size.
-fn natural_factor(measurements: &Measurements) -> usize {
-    let mut pixels = vec![0.0_f64; measurements.grid.cells()];
+fn natural_factor(measurements: &Measurements, most: Option<FrameSize>) -> [usize; 2] {
+    let grid = measurements.grid;
+    let mut pixels = vec![0.0_f64; grid.cells()];
     for &cell in &measurements.registration.seen_cell {
         if let Some(pixels) = pixels.get_mut(cell as usize) {
             *pixels += 1.0;
@@ -200,7 +350,19 @@ fn natural_factor(measurements: &Measurements) -> usize {
     let of_live = (pixels.iter().zip(&measurements.live))
         .filter_map(|(&pixels, &live)| live.then_some(pixels));
     let usual = median(of_live.collect()).unwrap_or(0.0);
-    ((usual / PIXELS_A_SAMPLE).sqrt() as usize).clamp(1, MAX_FACTOR)
+    let (needed, finest) = match &measurements.map {
+        Some(Ok(map)) => {
+            let inner = map.projector.inner();
+            let pixels = [inner.width() / grid.cols(), inner.height() / grid.rows()];
+            (MAPPED_PIXELS_A_SAMPLE, pixels)
+        }
+        _ => (PIXELS_A_SAMPLE, [MAX_FACTOR; 2]),
+    };
+    let told = (usual / needed).sqrt() as usize;
+    let most = most.map_or([usize::MAX; 2], |most| {
+        [most.width() / grid.cols(), most.height() / grid.rows()]
+    });
+    std::array::from_fn(|axis| told.min(finest[axis]).min(most[axis]).max(1))
 }
 
 /// Fills samples that no pixel covers with the others' mean and scales all so
@@ -235,32 +397,35 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// Samples of each plane in one cell, `factor * factor` a plane, row by row;
-    /// `None` where no usable pixel is near.
-    fn samples(&self, cell: usize, factor: usize, planes: &[Vec<f32>]) -> Vec<Vec<Option<f32>>> {
-        let empty = vec![vec![None; factor * factor]; planes.len()];
+    /// Samples of each plane in one cell, row by row; `None` where no usable pixel is near.
+    fn samples(
+        &self,
+        cell: usize,
+        [wide, tall]: [usize; 2],
+        planes: &[Vec<f32>],
+    ) -> Vec<Vec<Option<f32>>> {
+        let empty = vec![vec![None; wide * tall]; planes.len()];
         let Some(centre) = self.registration.centre[cell] else {
             return empty;
         };
         let [across, down] = self.registration.steps(self.grid, cell);
         let longest = across.iter().chain(&down).map(|[x, y]| x.hypot(*y));
         // A point a camera pixel, so that the footprint has no gaps.
-        let points = (longest.fold(0.0, f64::max) / factor as f64)
+        let points = (longest.fold(0.0, f64::max) / wide.min(tall) as f64)
             .ceil()
             .max(1.0) as usize;
         let at = |u: f64, v: f64| -> [f64; 2] {
             let (across, down) = (across[usize::from(u > 0.0)], down[usize::from(v > 0.0)]);
             std::array::from_fn(|k| centre[k] + u * across[k] + v * down[k])
         };
-        let parts = factor * points;
-        let offset = |part: usize| (part as f64 + 0.5) / parts as f64 - 0.5;
+        let offset = |part: usize, parts: usize| (part as f64 + 0.5) / parts as f64 - 0.5;
         let mut samples = empty;
-        for (place, (row, col)) in (0..factor * factor).map(|p| (p, (p / factor, p % factor))) {
+        for (place, (row, col)) in (0..wide * tall).map(|p| (p, (p / wide, p % wide))) {
             let mut sums = vec![0.0_f32; planes.len()];
             let mut cover = 0.0;
             for point in 0..points * points {
-                let u = offset(col * points + point % points);
-                let v = offset(row * points + point / points);
+                let u = offset(col * points + point % points, wide * points);
+                let v = offset(row * points + point / points, tall * points);
                 self.gather(cell, at(u, v), planes, &mut sums, &mut cover);
             }
             if cover >= LEAST_COVER * (points * points) as f32 {
@@ -334,6 +499,64 @@ mod tests {
         assert_eq!((shares(-3.0), shares(9.0)), (vec![], vec![]));
     }
 
+    /// A row of samples, each seen by two camera pixels of half its width.
+    fn two_pixels_a_sample(samples: usize) -> Views {
+        let view = |pixel: usize| PixelView {
+            pixel,
+            place: [pixel as f32 / 2.0 + 0.25, 0.5],
+        };
+        Views {
+            rows: 1,
+            cols: samples,
+            side: [0.5, 1.0],
+            pixels: (0..2 * samples).map(view).collect(),
+        }
+    }
+
+    #[test]
+    fn the_gain_of_a_sample_on_two_paints_is_the_one_of_least_squares() {
+        // The third sample lies on a paint of 0.8 and one of 0.2.
+        let flood = [0.8, 0.8, 0.8, 0.8, 0.8, 0.2, 0.2, 0.2];
+        let gains = two_pixels_a_sample(4).even_gains(&flood);
+        let wanted = [1.25, 1.25, (0.8 + 0.2) / (0.64 + 0.04), 5.0];
+        for (gain, wanted) in gains.iter().zip(wanted) {
+            assert!((gain.unwrap() - wanted).abs() < 1e-3, "{gains:?}");
+        }
+    }
+
+    #[test]
+    fn pixels_that_see_two_samples_each_still_tell_both() {
+        // Pixels as wide as the samples, half a sample beside them: each sees a mean.
+        let truth = [1.0_f32, 1.0, 2.0, 2.0, 2.0];
+        let view = |pixel: usize| PixelView {
+            pixel,
+            place: [pixel as f32 / 2.0 + 0.5, 0.5],
+        };
+        let views = Views {
+            rows: 1,
+            cols: truth.len(),
+            side: [1.0, 1.0],
+            pixels: (0..2 * truth.len() - 1).map(view).collect(),
+        };
+        // Light with which the true gains make every pixel even.
+        let flood: Vec<f32> = (0..9)
+            .map(|pixel| 2.0 / (truth[pixel / 2] + truth[pixel.div_ceil(2)]))
+            .collect();
+        let gains = views.even_gains(&flood);
+        for (gain, truth) in gains.iter().zip(truth) {
+            assert!((gain.unwrap() / truth - 1.0).abs() < 0.02, "{gains:?}");
+        }
+    }
+
+    #[test]
+    fn what_no_pixel_sees_and_what_is_dark_has_no_gain() {
+        let mut views = two_pixels_a_sample(4);
+        views.pixels.truncate(6);
+        let gains = views.even_gains(&[0.5, 0.5, 0.0, 0.0, 0.5, 0.5]);
+        let known: Vec<bool> = gains.iter().map(Option::is_some).collect();
+        assert_eq!(known, [true, false, true, false]);
+    }
+
     #[test]
     fn an_unknown_sample_has_the_mean_of_the_nearest_known_ones() {
         let samples = [
@@ -347,7 +570,7 @@ mod tests {
             None,
             None,
         ];
-        let filled: Vec<f32> = filled(&samples, 3);
+        let filled: Vec<f32> = filled(&samples, [3, 3]);
         assert_eq!(filled, [1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 2.0, 2.0, 2.0]);
     }
 }

@@ -1,8 +1,7 @@
 //! Headroom: how bright white is, why, and what of the content is cut at that.
 
 use super::Content;
-use iltm_capture::FineFlood;
-use iltm_compile::{build_table::BuiltTable, clip_thresholds::ClipThresholds, gain::fine_gains};
+use iltm_compile::{build_table::BuiltTable, clip_thresholds::ClipThresholds};
 use iltm_picture::{
     LightPicture, Picture,
     canvas::Canvas,
@@ -84,11 +83,10 @@ fn previews<'c>(
     content: &'c [Content],
     files: &mut Vec<PictureFile>,
 ) -> Vec<Preview<'c>> {
-    let fine = fine_gains(&learned.inverse, &FineFlood::new(&learned.measurements));
     let mut previews = Vec::new();
     for (index, content) in content.iter().take(SHOWN).enumerate() {
         let light = content.light();
-        let found = ClipThresholds::of(&learned.inverse, fine.as_ref(), &light);
+        let found = ClipThresholds::of(&learned.inverse, learned.fine.as_ref(), &light);
         let Ok(Some(thresholds)) = found else {
             continue;
         };

@@ -6,11 +6,11 @@ use super::judge::{ReferenceTransport, of_other_grid};
 use super::points::{Common, of_bits, of_tiers};
 use super::{Missing, Point, Sweep, Tradeoff, TradeoffError};
 use crate::{microseconds_at, tier_costs};
-use iltm_capture::{CaptureOptions, FineFlood, Measurements, read_reference};
+use iltm_capture::{CaptureOptions, Measurements, read_reference};
 use iltm_compile::{
     CompileOptions, Provenance,
-    build_table::{BuildError, BuiltTable, build_table_from},
-    compile, cost, gain,
+    build_table::{BuildError, BuiltTable, TableOptions, build_table_from},
+    compile, cost,
     ladder::TARGETS,
 };
 use iltm_picture::progress::Progress;
@@ -62,7 +62,13 @@ pub(super) fn of_capture(
     let channels = measurements.channels.len();
     let reference = read_reference(folder, measurements.grid, channels)?;
     let options = SolveOptions::default();
-    let learned = build_table_from(measurements, folder, &options, None, progress)?;
+    let learned = build_table_from(
+        measurements,
+        folder,
+        &options,
+        &TableOptions::default(),
+        progress,
+    )?;
     let truth = reference.map(|transports| ReferenceTransport {
         transports,
         white: learned.compiled.white,
@@ -120,12 +126,7 @@ impl Base<'_> {
 
     /// Tiers between those of the table.
     fn between(&self) -> Result<Vec<Point>, TradeoffError> {
-        let BuiltTable {
-            measurements,
-            inverse,
-            ..
-        } = self.learned;
-        let fine = gain::fine_gains(inverse, &FineFlood::new(measurements));
+        let BuiltTable { inverse, fine, .. } = self.learned;
         let options = CompileOptions {
             targets: Some(BETWEEN.to_vec()),
             ..self.options()
@@ -181,7 +182,13 @@ impl Base<'_> {
         measurements: Measurements,
         options: &SolveOptions,
     ) -> Result<BuiltTable, BuildError> {
-        build_table_from(measurements, self.folder, options, None, self.progress)
+        build_table_from(
+            measurements,
+            self.folder,
+            options,
+            &TableOptions::default(),
+            self.progress,
+        )
     }
 
     /// Points of what was learned in another way; why there are none goes to `missing`.
