@@ -1,11 +1,10 @@
 //! Output of a command: words for people, JSON for programs, files whole or not at all.
 
 use super::active::Active;
-use super::failure::{Failure, Kind, cannot_read, cannot_write};
+use super::failure::{Failure, Kind, cannot_write};
 use iltm_picture::{html::PictureFile, unfinished, whole_file, whole_folder};
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -161,10 +160,6 @@ fn last(mut data: Value) -> String {
 /// Writes a file whole or not at all: beside its place, then renamed.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     whole_file::write(path, bytes).map_err(|error| cannot_write(&error.path, &error.source))
-}
-
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
-    fs::read(path).map_err(|error| cannot_read(path, &error))
 }
 
 /// Makes a folder and those that it lies in.

@@ -5,9 +5,13 @@
 use super::user::{Ended, User, contains, table};
 use ed25519_dalek::{Signature, VerifyingKey};
 use image::Luma;
-use std::fmt::Write;
+use std::fmt::Write as _;
 #[cfg(target_os = "linux")]
 use std::fs::File;
+#[cfg(target_os = "linux")]
+use std::io::Write as _;
+#[cfg(target_os = "linux")]
+use std::process::Stdio;
 use std::sync::OnceLock;
 
 fn without_lines(user: &User, unwanted: &str) {
@@ -413,4 +417,39 @@ fn a_picture_comes_out_with_its_own_size_and_kind() {
         assert_eq!((picture.width(), picture.height()), (width, height));
         assert!(matches!(picture, image::DynamicImage::ImageLuma8(_)));
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn files_without_an_end_are_refused() {
+    let user = User::with_capture();
+    user.write("t.iltm", table());
+    std::os::unix::fs::symlink("/dev/zero", user.path("zero.iltm")).expect("writable");
+    user.remove("capture/capture.csv");
+    let list = user.path("capture/capture.csv");
+    std::os::unix::fs::symlink("/dev/zero", list).expect("writable");
+    for (code, line) in [
+        (3, "inspect zero.iltm"),
+        (3, "verify zero.iltm -o v"),
+        (3, "tradeoff zero.iltm -o o"),
+        (3, "flash zero.iltm"),
+        (3, "compensate zero.iltm w.png -o p.png --watch"),
+        (3, "compensate t.iltm zero.iltm -o p.png"),
+        (3, "check capture"),
+        (3, "solve SAMPLE -o s.iltm --content zero.iltm"),
+        (17, "key show zero.iltm"),
+        (17, "sign t.iltm --key zero.iltm"),
+        (3, "simulate zero.iltm -o c"),
+    ] {
+        let refused = user.fails(code, line);
+        contains(&refused, &["neither a regular file nor a pipe"]);
+    }
+    // A pipe has no length that could be asked before.
+    let mut child = user.iltm("inspect /dev/stdin");
+    let mut child = child.stdin(Stdio::piped()).spawn().expect("it is there");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    while pipe.write_all(&[0; 1 << 14]).is_ok() {}
+    let refused = Ended::of(child);
+    assert_eq!(refused.code, 7, "{}", refused.said);
+    contains(&refused.said, &["longer than 268435456 bytes"]);
 }
