@@ -443,7 +443,7 @@ impl From<CaptureFolderError> for Failure {
 impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Self {
         match error {
-            FolderError::Taken { .. } => Self::new(
+            FolderError::Taken { .. } | FolderError::Foreign { .. } => Self::new(
                 Kind::Write,
                 error,
                 "Choose another folder, or move that one away.",

@@ -207,6 +207,7 @@ fn a_failure_in_json_is_one_object_with_kind_and_next_step() {
 #[test]
 fn solve_in_json_is_one_object_with_the_figures() {
     let solved = User::new().run("--json solve SAMPLE -o t.iltm");
+    assert_eq!(solved.code, 0, "{}", solved.said);
     // Not a terminal: no progress bars.
     let mut said = solved.said.lines();
     assert!(said.all(|line| line.starts_with("{\"progress\"")));
@@ -304,7 +305,7 @@ fn bounces_of_what_is_no_photograph_of_the_projection_are_refused() {
         (
             "capture -o capture/photos",
             9,
-            &["it is there already, and not empty"],
+            &["it holds 0", ".png, which this command does not make"],
         ),
     ] {
         let refused = user.run(&format!("bounces {line}"));
@@ -315,8 +316,30 @@ fn bounces_of_what_is_no_photograph_of_the_projection_are_refused() {
 }
 
 #[test]
+fn what_is_there_is_replaced_or_left_alone_or_kept_from_being_lost() {
+    let user = User::with_table();
+    std::fs::create_dir(user.path("full")).expect("writable");
+    user.write("full/mine", "mine");
+    user.says("key new -o k");
+    for (code, line) in [
+        (9, "patterns -o full --rows 3 --cols 4 --projector 64x48"),
+        (9, "simulate SCENES/stage.toml -o full"),
+        (9, "verify t.iltm -o full --projector 640x400"),
+        (9, "bounces SAMPLE -o full"),
+        (17, "key new -o full/mine"),
+        (0, "man -o full"),
+        (0, "man -o full"),
+        (0, "sign t.iltm --key k -o t.iltm"),
+    ] {
+        user.fails(code, line);
+        assert_eq!(user.text("full/mine"), "mine", "{line}");
+    }
+}
+
+#[test]
 fn bounces_add_up_to_the_photograph_in_files_too() {
     let user = User::new();
+    user.says("bounces SAMPLE -o b --photo 4");
     let data = user.json("bounces SAMPLE -o b");
     let layers = data["layers"].as_array().expect("a list");
     let shares = layers
@@ -345,6 +368,16 @@ fn bounces_add_up_to_the_photograph_in_files_too() {
     for layer in layers {
         picture(layer["layer"].as_str().expect("a name"));
     }
+    let files = data["files"].as_array().expect("a list");
+    assert_eq!(
+        user.names("b").len(),
+        files.len(),
+        "nothing of the first run"
+    );
+    contains(
+        &user.text("b/bounces.html"),
+        &["straight from the projector", "1st bounce: direct"],
+    );
     let lines = user.text("b/bounces.csv");
     assert_eq!(lines.lines().count(), layers.len() + 1);
 }

@@ -45,7 +45,7 @@ pub use light_picture::LightPicture;
 pub use picture::{Picture, Samples};
 pub use response::{Declared, Response};
 pub use whole_file::{FileError, WholeFile};
-pub use whole_folder::{FolderError, WholeFolder, check_free};
+pub use whole_folder::{FolderError, WholeFolder, check_free, check_own};
 
 /// Most pixels of a picture: twice those of 8K video. A header that says more is
 /// refused before any memory is taken.
