@@ -32,7 +32,7 @@ pub fn page(bounces: &Bounces) -> Option<String> {
                 h2 { "Bounce by bounce" }
                 p {
                     "Left, all pictures to the photograph's scale. Right, the same brightened, where it is too dark "
-                    "to be seen. " (noise_words(bounces))
+                    "to be seen."
                 }
                 h3 { "Photograph" }
                 div .half { figure {
@@ -47,7 +47,7 @@ pub fn page(bounces: &Bounces) -> Option<String> {
                 p .quiet {
                     "Light: share of the photograph's sum; these add up to 100 %. Energy: share of its sum of squares, "
                     "which does not add up, since bounces overlap. Brightest: of the camera's full scale. Last column: "
-                    "root mean square, in units of the camera's noise in the mean of a cell."
+                    "root mean square, in units of the camera's noise in the mean of a cell. " (noise_words(bounces))
                 }
                 p .quiet {
                     code { "bounces.npy" } " holds the layers as numbers, " code { "bounces.csv" } " this table, and a PNG "
