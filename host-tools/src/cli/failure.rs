@@ -478,6 +478,7 @@ pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
         io::ErrorKind::StorageFull => "Free some space and run the command again.",
         io::ErrorKind::PermissionDenied => "Choose a folder that you may write to.",
         io::ErrorKind::NotFound => "Make the folder first, or choose another.",
+        io::ErrorKind::IsADirectory => "Name a file.",
         _ => "Check the folder and run the command again.",
     };
     let message = format!("{}: cannot be written: {error}", path.display());

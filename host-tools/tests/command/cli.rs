@@ -334,6 +334,9 @@ fn what_is_there_is_replaced_or_left_alone_or_kept_from_being_lost() {
         user.fails(code, line);
         assert_eq!(user.text("full/mine"), "mine", "{line}");
     }
+    for line in ["solve SAMPLE -o full", "sign t.iltm --key k -o full"] {
+        contains(&user.fails(9, line), &["next: Name a file."]);
+    }
 }
 
 #[test]
