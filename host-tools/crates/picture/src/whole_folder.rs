@@ -291,7 +291,7 @@ mod tests {
         let around = tempfile::tempdir().unwrap();
         let out = around.path().join("results");
         let make = |name: &str| {
-            let folder = WholeFolder::replace(&out, |name| name.ends_with(".csv"))?;
+            let folder = WholeFolder::replace(&out, |name| name.ends_with("csv"))?;
             folder.file(name, name)?;
             folder.finish()
         };
