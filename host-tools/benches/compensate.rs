@@ -180,7 +180,8 @@ fn run(case: &Case) -> (f64, f64) {
         let done = if case.live {
             let file = tempfile::NamedTempFile::new().expect("a file");
             std::fs::write(file.path(), &image).expect("a table's file");
-            let (bytes, watch) = FileWatch::read(file.path()).expect("the same");
+            let (bytes, watch) =
+                FileWatch::read(file.path(), image.len() as u64).expect("the same");
             let live = Live {
                 budget: Some(Duration::from_millis(16)),
                 newer: &mut || watch.newer(),

@@ -57,13 +57,14 @@ const SAME: u32 = 1 << RATIO_BITS;
 const MOST: u32 = u32::MAX;
 
 /// Cost of one sample at a tier without operator, of one outside the operator at the
-/// others, and of one multiplication in it, in instructions. Only their ratios count,
-/// and only until they have been measured. The first is the largest that it is anywhere
-/// in `docs/instructions.csv`, in proportion to the second: a tier that is expected to
-/// take longer than it does might never be tried.
-const GAIN_COST: u64 = 17;
-const SAMPLE_COST: u64 = 40;
-const MULTIPLICATION_COST: u64 = 4;
+/// others, and of one multiplication in it. Only their ratios count, and only until they
+/// have been measured. A tier that is expected to take longer than it does may never be
+/// tried, while one that is tried in vain costs a frame. So these are the least by which a
+/// tier differs from the one below: the first two for frames of many pixels a cell, the
+/// last for long rows of entries and odd grids, where samples take the most.
+const GAIN_COST: u64 = 44;
+const SAMPLE_COST: u64 = 64;
+const MULTIPLICATION_COST: u64 = 1;
 
 /// A tier for every frame.
 #[derive(Clone, Debug)]

@@ -22,6 +22,7 @@ pub mod instructions;
 pub mod line_faults;
 pub mod made_up;
 pub mod reference_pages;
+pub mod rights;
 pub mod simulated;
 pub mod slots;
 pub mod stages;

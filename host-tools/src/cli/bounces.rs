@@ -7,7 +7,7 @@ use super::progress::progress;
 use crate::bounces::{self, BouncesError, BouncesOptions, Layer, LayerKind, WrittenBounces};
 use crate::capture::CaptureOptions;
 use iltm_picture::{
-    check_free,
+    check_own,
     numbers::{number, percent},
 };
 use serde_json::{Value, json};
@@ -17,7 +17,7 @@ use std::time::Instant;
 pub(super) fn run(arguments: &Bounces, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
     // A folder that is in the way is known before the work, not after it.
-    check_free(&arguments.output)?;
+    check_own(&arguments.output, bounces::is_own)?;
     let options = BouncesOptions {
         photograph: arguments.photo,
         capture: CaptureOptions {
@@ -39,10 +39,11 @@ pub(super) fn run(arguments: &Bounces, output: &Output) -> Result<(), Failure> {
     let mut text = text(&found);
     let _ = writeln!(
         text,
-        "\n{folder}: {} files in {seconds:.2} s; look at bounces.png\n\
+        "\n{folder}: {} files in {seconds:.2} s; look at {}\n\
          \x20           the layers in bounces.npy add up to the photograph to {:.1e}, the 16-bit\n\
          \x20           pictures, in which negative light is black, to {:.1e} of full scale",
         written.files.len(),
+        arguments.output.join(bounces::PAGE).display(),
         written.largest_gap,
         written.largest_gap_of_pictures,
     );
@@ -126,7 +127,7 @@ fn text(found: &bounces::Bounces) -> String {
         );
     }
     let confidence = found.report.prediction.confidence;
-    if confidence < 2.0 {
+    if confidence < bounces::PROOF {
         let _ = writeln!(
             text,
             "            the photographs do not prove that there are bounces at all: {confidence:.1} \

@@ -10,10 +10,9 @@ use crate::session::{
     CameraDriver, CaptureSession, CommandCamera, CommandScreen, Screen, SessionError,
     SessionOptions, ShootEvent, State, Summary, WatchedFolder, ranges, with_window,
 };
-use iltm_picture::{png, progress::Progress};
+use iltm_picture::{foreign_file, png, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
@@ -122,7 +121,7 @@ fn photograph(
 /// Width and height of the slides: those of the first that can be read.
 fn slide_size(session: &CaptureSession) -> (u32, u32) {
     let size = |path: &Path| {
-        let picture = png::read(BufReader::new(File::open(path).ok()?)).ok()?;
+        let picture = png::read(BufReader::new(foreign_file::open(path).ok()?)).ok()?;
         Some((
             picture.size().width() as u32,
             picture.size().height() as u32,

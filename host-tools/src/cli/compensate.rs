@@ -2,16 +2,16 @@
 
 use super::args::Compensate;
 use super::failure::{Failure, Kind, cannot_read};
-use super::output::{Output, read_file};
+use super::output::Output;
 use super::progress::progress;
-use super::tables::check;
+use super::tables::{check, read_table, watch_table};
 use super::words::advice_for_white;
 use crate::compile::Provenance;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
 use crate::video::watch::FileWatch;
 use crate::video::y4m::Y4mError;
 use crate::video::{CompensateOptions, Compensator, FrameTotals, Input, VideoError};
-use iltm_picture::WholeFile;
+use iltm_picture::{WholeFile, foreign_file};
 use iltm_runtime::pipeline::Encoding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -30,10 +30,10 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     }
     let path = &arguments.table;
     let (image, watch) = if arguments.watch {
-        let read = FileWatch::read(path).map_err(|error| cannot_read(path, &error))?;
-        (read.0, Some(read.1))
+        let (image, watch) = watch_table(path)?;
+        (image, Some(watch))
     } else {
-        (read_file(path)?, None)
+        (read_table(path)?, None)
     };
     let table = check(path, &image)?;
     let settings = settings(arguments);
@@ -89,7 +89,7 @@ fn opened(path: &Path) -> Result<Input<Box<dyn Read + Send>>, Failure> {
     let input: Box<dyn Read + Send> = if is_pipe(path) {
         Box::new(io::stdin())
     } else {
-        Box::new(File::open(path).map_err(|error| cannot_read(path, &error))?)
+        Box::new(foreign_file::open(path).map_err(|error| cannot_read(path, &error))?)
     };
     Ok(Input::of(input)?)
 }

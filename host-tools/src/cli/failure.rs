@@ -443,7 +443,7 @@ impl From<CaptureFolderError> for Failure {
 impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Self {
         match error {
-            FolderError::Taken { .. } => Self::new(
+            FolderError::Taken { .. } | FolderError::Foreign { .. } => Self::new(
                 Kind::Write,
                 error,
                 "Choose another folder, or move that one away.",
@@ -478,6 +478,7 @@ pub(super) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
         io::ErrorKind::StorageFull => "Free some space and run the command again.",
         io::ErrorKind::PermissionDenied => "Choose a folder that you may write to.",
         io::ErrorKind::NotFound => "Make the folder first, or choose another.",
+        io::ErrorKind::IsADirectory => "Name a file.",
         _ => "Check the folder and run the command again.",
     };
     let message = format!("{}: cannot be written: {error}", path.display());

@@ -2,9 +2,9 @@
 
 use super::args::Inspect;
 use super::failure::Failure;
-use super::output::{Output, read_file};
+use super::output::Output;
 use super::table_words;
-use super::tables::check_sealed;
+use super::tables::{check_sealed, read_table};
 use super::words::{day, key_id, lines, named};
 use crate::compile::Provenance;
 use crate::compile::cost::{CLOCK, RATE};
@@ -22,7 +22,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 pub(super) fn run(arguments: &Inspect, output: &Output) -> Result<(), Failure> {
-    let file = read_file(&arguments.table)?;
+    let file = read_table(&arguments.table)?;
     let (table, seal) = check_sealed(&arguments.table, &file)?;
     if let Some(path) = &arguments.key {
         verify(

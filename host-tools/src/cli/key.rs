@@ -3,8 +3,8 @@
 use super::args::{Install, Key, KeyCommand, Sign, Technician};
 use super::connect::connect;
 use super::failure::{Failure, Kind};
-use super::output::{Output, read_file, write_file};
-use super::tables::{check, seal, version_of_now};
+use super::output::{Output, write_file};
+use super::tables::{check, read_table, seal, version_of_now};
 use super::words::{in_use, key_id, number};
 use crate::compile::sign::{new_key, new_technician, read_key, read_public_key};
 use crate::device::{DeviceError, rejection_next_step};
@@ -171,7 +171,7 @@ fn agree(
 /// `iltm sign`
 pub(super) fn sign(arguments: &Sign, output: &Output) -> Result<(), Failure> {
     let key = read_key(&arguments.key)?;
-    let file = read_file(&arguments.table)?;
+    let file = read_table(&arguments.table)?;
     check(&arguments.table, &file)?;
     let signed = seal(&file, &key, &arguments.seal)?;
     let path = arguments.output.as_ref().unwrap_or(&arguments.table);

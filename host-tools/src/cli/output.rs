@@ -1,11 +1,10 @@
 //! Output of a command: words for people, JSON for programs, files whole or not at all.
 
 use super::active::Active;
-use super::failure::{Failure, Kind, cannot_read, cannot_write};
+use super::failure::{Failure, Kind, cannot_write};
 use iltm_picture::{html::PictureFile, unfinished, whole_file, whole_folder};
 use serde_json::{Value, json};
 use std::borrow::Cow;
-use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -127,22 +126,38 @@ impl Output {
     }
 }
 
-/// The text without what a terminal obeys: names in a stranger's files and from a device's line
-/// may hold control characters.
+/// The text without what a terminal obeys, and without what hides or reorders other letters: names
+/// in a stranger's files and from a device's line may hold both.
 pub(super) fn printable(text: &str) -> Cow<'_, str> {
-    let obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
-    if !text.contains(obeyed) {
+    if !text.contains(is_obeyed) {
         return Cow::Borrowed(text);
     }
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
-        if obeyed(c) {
-            safe.extend(c.escape_debug());
+        if is_obeyed(c) {
+            safe.extend(c.escape_unicode());
         } else {
             safe.push(c);
         }
     }
     Cow::Owned(safe)
+}
+
+fn is_obeyed(c: char) -> bool {
+    match c {
+        '\n' | '\t' => false,
+        // Marks of direction, joiners, blanks without width, separators of lines, tags.
+        '\u{ad}'
+        | '\u{61c}'
+        | '\u{180e}'
+        | '\u{200b}'..='\u{200f}'
+        | '\u{2028}'..='\u{202e}'
+        | '\u{2060}'..='\u{206f}'
+        | '\u{feff}'
+        | '\u{fff9}'..='\u{fffb}'
+        | '\u{e0000}'..='\u{e007f}' => true,
+        _ => c.is_control(),
+    }
 }
 
 /// The names and contents of pictures as files.
@@ -161,10 +176,6 @@ fn last(mut data: Value) -> String {
 /// Writes a file whole or not at all: beside its place, then renamed.
 pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     whole_file::write(path, bytes).map_err(|error| cannot_write(&error.path, &error.source))
-}
-
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
-    fs::read(path).map_err(|error| cannot_read(path, &error))
 }
 
 /// Makes a folder and those that it lies in.
@@ -200,5 +211,8 @@ mod tests {
             printable("a\u{1b}]0;X\u{7}\nb\u{9b}"),
             "a\\u{1b}]0;X\\u{7}\nb\\u{9b}"
         );
+        // An override of the direction would show this name as scene.iltm.
+        assert_eq!(printable("s\u{202e}mtli.enec"), "s\\u{202e}mtli.enec");
+        assert_eq!(printable("Größe 5 µm, 東"), "Größe 5 µm, 東");
     }
 }

@@ -2,9 +2,10 @@
 
 use super::args::Simulate;
 use super::failure::{Failure, Kind};
-use super::output::{Output, read_file};
+use super::output::Output;
 use super::progress::progress;
 use super::simulate_chain::ChainedSlides;
+use super::tables::read_table;
 use crate::capture::pattern_set;
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::Scene;
@@ -179,7 +180,7 @@ fn photograph(
         let slides = ChainedSlides {
             folder,
             chain,
-            table: &read_file(path)?,
+            table: &read_table(path)?,
             path,
             grid: camera.grid(),
             response: scene.projector.response,

@@ -6,9 +6,8 @@ use super::tables::check;
 use crate::capture::Settings;
 use crate::session::{Layout, slide_name};
 use crate::video::{CompensateOptions, Compensator, VideoError};
-use iltm_picture::{Picture, Response, Samples, png};
+use iltm_picture::{Picture, Response, Samples, foreign_file, png};
 use iltm_runtime::{FrameSize, Grid};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::str::FromStr;
@@ -90,7 +89,7 @@ impl ChainedSlides<'_> {
                 path: path.clone(),
                 source,
             };
-            let file = BufReader::new(File::open(&path).map_err(read)?);
+            let file = BufReader::new(foreign_file::open(&path).map_err(read)?);
             let mut slide = png::read(file).map_err(VideoError::Png)?;
             for _ in 0..times {
                 let mut inner = layout.unframed(&slide).ok_or_else(|| {

@@ -117,17 +117,20 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
 
 /// Whether a file can be put in a place, before the work for it is done.
 fn check_place(file: &Path) -> Result<(), Failure> {
-    let next_step = "Make the folder first, or choose another file with -o.";
-    let refuse = |why: String| {
+    let refuse = |why: String, next_step| {
         let message = format!("{}: cannot be written: {why}", file.display());
         Err(Failure::new(Kind::Write, message, next_step))
     };
     if file.is_dir() {
-        return refuse("it is a folder".to_owned());
+        return refuse("it is a folder".to_owned(), "Name a file.");
     }
     match file.parent() {
         Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            refuse(format!("there is no folder {}", folder.display()))
+            let why = format!("there is no folder {}", folder.display());
+            refuse(
+                why,
+                "Make the folder first, or choose another file with -o.",
+            )
         }
         _ => Ok(()),
     }

@@ -2,9 +2,9 @@
 
 use super::args::Tradeoff as Arguments;
 use super::failure::{Failure, Kind, cannot_read};
-use super::output::{Output, make_folder, read_file, write_files};
+use super::output::{Output, make_folder, write_files};
 use super::progress::progress;
-use super::tables::check;
+use super::tables::{check, read_table};
 use crate::tradeoff::{Tradeoff, TradeoffError};
 use serde_json::json;
 use std::fmt::Write;
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &Arguments, output: &Output) -> Result<(), Failure>
         bars.end();
         found.map_err(failed)?
     } else {
-        let file = read_file(input)?;
+        let file = read_table(input)?;
         let table = check(input, &file)?;
         let found = Tradeoff::of_table(&input.display().to_string(), &table, bars.as_ref());
         bars.end();

@@ -3,10 +3,10 @@
 use super::args::{SerialLine, Verify};
 use super::connect::connect;
 use super::failure::{Failure, Kind};
-use super::output::{self, Output, read_file, write_files};
+use super::output::{self, Output, write_files};
 use super::progress::progress;
 use super::summary::gates;
-use super::tables::check;
+use super::tables::{check, read_table};
 use super::words::{number, table_in_use};
 use crate::compile::Provenance;
 use crate::session::Layout;
@@ -21,7 +21,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &Verify, output: &Output) -> Result<(), Failure> {
-    let image = read_file(&arguments.table)?;
+    let image = read_table(&arguments.table)?;
     let table = check(&arguments.table, &image)?;
     let bars = progress(output);
     let result = match (&arguments.output, &arguments.capture) {

@@ -5,9 +5,13 @@
 use super::user::{Ended, User, contains, table};
 use ed25519_dalek::{Signature, VerifyingKey};
 use image::Luma;
-use std::fmt::Write;
+use std::fmt::Write as _;
 #[cfg(target_os = "linux")]
 use std::fs::File;
+#[cfg(target_os = "linux")]
+use std::io::Write as _;
+#[cfg(target_os = "linux")]
+use std::process::Stdio;
 use std::sync::OnceLock;
 
 fn without_lines(user: &User, unwanted: &str) {
@@ -203,8 +207,10 @@ fn a_failure_in_json_is_one_object_with_kind_and_next_step() {
 #[test]
 fn solve_in_json_is_one_object_with_the_figures() {
     let solved = User::new().run("--json solve SAMPLE -o t.iltm");
+    assert_eq!(solved.code, 0, "{}", solved.said);
     // Not a terminal: no progress bars.
-    assert_eq!((solved.code, &*solved.said), (0, ""));
+    let mut said = solved.said.lines();
+    assert!(said.all(|line| line.starts_with("{\"progress\"")));
     let data = solved.json();
     assert_eq!(data["rows"], 13);
     assert_eq!(data["photographs"]["bernoulli"], 40);
@@ -299,7 +305,7 @@ fn bounces_of_what_is_no_photograph_of_the_projection_are_refused() {
         (
             "capture -o capture/photos",
             9,
-            &["it is there already, and not empty"],
+            &["it holds 0", ".png, which this command does not make"],
         ),
     ] {
         let refused = user.run(&format!("bounces {line}"));
@@ -310,8 +316,33 @@ fn bounces_of_what_is_no_photograph_of_the_projection_are_refused() {
 }
 
 #[test]
+fn what_is_there_is_replaced_or_left_alone_or_kept_from_being_lost() {
+    let user = User::with_table();
+    std::fs::create_dir(user.path("full")).expect("writable");
+    user.write("full/mine", "mine");
+    user.says("key new -o k");
+    for (code, line) in [
+        (9, "patterns -o full --rows 3 --cols 4 --projector 64x48"),
+        (9, "simulate SCENES/stage.toml -o full"),
+        (9, "verify t.iltm -o full --projector 640x400"),
+        (9, "bounces SAMPLE -o full"),
+        (17, "key new -o full/mine"),
+        (0, "man -o full"),
+        (0, "man -o full"),
+        (0, "sign t.iltm --key k -o t.iltm"),
+    ] {
+        user.fails(code, line);
+        assert_eq!(user.text("full/mine"), "mine", "{line}");
+    }
+    for line in ["solve SAMPLE -o full", "sign t.iltm --key k -o full"] {
+        contains(&user.fails(9, line), &["next: Name a file."]);
+    }
+}
+
+#[test]
 fn bounces_add_up_to_the_photograph_in_files_too() {
     let user = User::new();
+    user.says("bounces SAMPLE -o b --photo 4");
     let data = user.json("bounces SAMPLE -o b");
     let layers = data["layers"].as_array().expect("a list");
     let shares = layers
@@ -340,6 +371,16 @@ fn bounces_add_up_to_the_photograph_in_files_too() {
     for layer in layers {
         picture(layer["layer"].as_str().expect("a name"));
     }
+    let files = data["files"].as_array().expect("a list");
+    assert_eq!(
+        user.names("b").len(),
+        files.len(),
+        "nothing of the first run"
+    );
+    contains(
+        &user.text("b/bounces.html"),
+        &["straight from the projector", "1st bounce: direct"],
+    );
     let lines = user.text("b/bounces.csv");
     assert_eq!(lines.lines().count(), layers.len() + 1);
 }
@@ -413,4 +454,39 @@ fn a_picture_comes_out_with_its_own_size_and_kind() {
         assert_eq!((picture.width(), picture.height()), (width, height));
         assert!(matches!(picture, image::DynamicImage::ImageLuma8(_)));
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn files_without_an_end_are_refused() {
+    let user = User::with_capture();
+    user.write("t.iltm", table());
+    std::os::unix::fs::symlink("/dev/zero", user.path("zero.iltm")).expect("writable");
+    user.remove("capture/capture.csv");
+    let list = user.path("capture/capture.csv");
+    std::os::unix::fs::symlink("/dev/zero", list).expect("writable");
+    for (code, line) in [
+        (3, "inspect zero.iltm"),
+        (3, "verify zero.iltm -o v"),
+        (3, "tradeoff zero.iltm -o o"),
+        (3, "flash zero.iltm"),
+        (3, "compensate zero.iltm w.png -o p.png --watch"),
+        (3, "compensate t.iltm zero.iltm -o p.png"),
+        (3, "check capture"),
+        (3, "solve SAMPLE -o s.iltm --content zero.iltm"),
+        (17, "key show zero.iltm"),
+        (17, "sign t.iltm --key zero.iltm"),
+        (3, "simulate zero.iltm -o c"),
+    ] {
+        let refused = user.fails(code, line);
+        contains(&refused, &["neither a regular file nor a pipe"]);
+    }
+    // A pipe has no length that could be asked before.
+    let mut child = user.iltm("inspect /dev/stdin");
+    let mut child = child.stdin(Stdio::piped()).spawn().expect("it is there");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    while pipe.write_all(&[0; 1 << 14]).is_ok() {}
+    let refused = Ended::of(child);
+    assert_eq!(refused.code, 7, "{}", refused.said);
+    contains(&refused.said, &["longer than 268435456 bytes"]);
 }

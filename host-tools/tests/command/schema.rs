@@ -1,11 +1,12 @@
 //! Schemas of what `--json` prints: every object that a test sees is held against the schema of
 //! its command in `docs/json/`.
 
+use super::user::User;
 use jsonschema::{Retrieve, Uri, Validator};
 use serde_json::Value;
 use std::error::Error;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../docs/json")
@@ -26,11 +27,16 @@ fn of(line: &str) -> (String, Validator) {
     } else {
         folder().join("usage.json")
     };
-    let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{command}: {error}"));
+    (command, read(&file))
+}
+
+fn read(file: &Path) -> Validator {
+    let text = fs::read_to_string(file);
+    let text = text.unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let schema: Value = serde_json::from_str(&text).expect("JSON");
     let options = jsonschema::options().with_base_uri("iltm:/usage.json");
     let validator = options.with_retriever(Beside).build(&schema);
-    (command, validator.expect("a schema"))
+    validator.expect("a schema")
 }
 
 /// Schemas that others refer to lie in the same folder.
@@ -70,9 +76,25 @@ pub(crate) fn check(line: &str, printed: &str) {
 }
 
 #[test]
+fn long_work_tells_programs_how_far_it_is_on_standard_error() {
+    let schema = read(&folder().join("progress.json"));
+    let said = User::new().run("check SAMPLE --json").said;
+    let lines: Vec<Value> = said
+        .lines()
+        .filter(|line| line.starts_with("{\"progress\""))
+        .map(|line| serde_json::from_str(line).expect("an object a line"))
+        .collect();
+    assert!(lines.len() > 1, "{said}");
+    for line in &lines {
+        assert!(schema.is_valid(line), "{line}");
+    }
+    assert!(!User::new().run("check SAMPLE").said.contains("progress"));
+}
+
+#[test]
 fn every_command_has_a_schema_that_says_what_each_field_is() {
     let commands = iltm::cli::command();
-    let mut names = vec!["usage".to_owned(), "error".to_owned()];
+    let mut names = ["usage", "error", "progress"].map(str::to_owned).to_vec();
     for command in commands.get_subcommands() {
         let name = command.get_name();
         let inner: Vec<_> = command.get_subcommands().collect();

@@ -210,6 +210,12 @@ pub(super) fn write<F: NorFlash, R: Record>(
     index: u32,
     record: &R,
 ) -> Result<(), StoreError> {
+    // A worn sector may have bits that no erase brings back. Flash with ECC must not be written
+    // there: it may lose the whole unit, or fault where it is read.
+    if !flash::is_blank(flash, part, place(index), RECORD as u32)? {
+        let offset = part.start.saturating_add(place(index));
+        return Err(StoreError::Flash { offset });
+    }
     flash::write(flash, part, place(index), &bytes(record))
 }
 

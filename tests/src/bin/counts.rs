@@ -5,11 +5,13 @@
 //!     cargo run --release -p iltm-tests --bin counts -- costs > docs/costs.csv
 //!     cargo run --release -p iltm-tests --bin counts -- stages > docs/stages.csv
 //!     cargo run --release -p iltm-tests --bin counts -- sizes > docs/firmware-sizes.csv
+//!     cargo run --release -p iltm-tests --bin counts -- rights
 //!
-//! The last builds the firmware with every choice of stages, 32 in all.
+//! `sizes` builds the firmware with every choice of stages, 32 in all. `rights` says what a device
+//! takes to look at a right (`docs/flashing.md`).
 
 use iltm_tests::instructions::{self, count};
-use iltm_tests::{costs, stages};
+use iltm_tests::{costs, rights, stages};
 
 fn main() {
     match std::env::args().nth(1).as_deref() {
@@ -28,6 +30,7 @@ fn main() {
                 println!("{}", stages::size_line(&stages));
             }
         }
-        _ => panic!("name a list: instructions, costs, stages or sizes"),
+        Some("rights") => rights::print(),
+        _ => panic!("name a list: instructions, costs, stages, sizes or rights"),
     }
 }

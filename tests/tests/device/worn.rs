@@ -3,7 +3,7 @@
 
 use iltm::picture::Response as ProjectorResponse;
 use iltm_runtime::link::{Refusal, Response};
-use iltm_tests::flash_simulator::Wear;
+use iltm_tests::flash_simulator::{Violations, Wear};
 use iltm_tests::slots::{SimDevice, Step, TRIAL_S, provision};
 use iltm_tests::{signing_key, wedge_table_for};
 
@@ -130,6 +130,9 @@ fn the_record_that_counts_outlives_a_part_that_wears_out() {
                         }
                     }
                 }
+                // Stuck bits are found before they are written over.
+                let violations = device.flash().violations();
+                assert_eq!(violations, Violations::default(), "{what}");
                 let again = device.clone().restarted();
                 assert!(
                     again.runs(runs),

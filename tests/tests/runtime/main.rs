@@ -4,6 +4,7 @@
 
 mod costs;
 mod foreign_bytes;
+mod governor;
 mod hard_frames;
 mod image;
 mod stages;

@@ -8,9 +8,10 @@ use ed25519_dalek::pkcs8::spki::DecodePublicKey;
 use ed25519_dalek::pkcs8::spki::der::pem::{LineEnding, decode_vec, encode_string};
 use ed25519_dalek::pkcs8::{DecodePrivateKey, EncodePrivateKey, KeypairBytes};
 use ed25519_dalek::{Signature, Signer, SigningKey, VerifyingKey};
+use iltm_picture::foreign_file;
 use iltm_runtime::image::{ImageError, Seal, unseal};
 use iltm_runtime::trust::{Certificate, Deed};
-use std::fs::{self, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,9 @@ pub fn is_signed_by(file: &[u8], seal: &Seal, key: &VerifyingKey) -> bool {
     seal.key == Seal::key_id(key.as_bytes())
         && key.verify_strict(&file[..signed], &signature).is_ok()
 }
+
+/// Bytes of a key's file at most: many times one's.
+const MOST_BYTES: u64 = 1 << 16;
 
 /// Why a key cannot be had.
 #[derive(Debug, thiserror::Error)]
@@ -309,8 +313,8 @@ pub fn read_public_key(path: &Path) -> Result<VerifyingKey, KeyError> {
 }
 
 fn text(path: &Path) -> Result<String, KeyError> {
-    fs::read_to_string(path).map_err(|source| match source.kind() {
-        io::ErrorKind::InvalidData => KeyError::NoKey {
+    foreign_file::read_text(path, MOST_BYTES).map_err(|source| match source.kind() {
+        io::ErrorKind::InvalidData | io::ErrorKind::FileTooLarge => KeyError::NoKey {
             path: path.to_owned(),
             private: false,
         },
@@ -325,6 +329,7 @@ fn text(path: &Path) -> Result<String, KeyError> {
 mod tests {
     use super::*;
     use iltm_runtime::trust::{NoRight, Terms, Trust, allows};
+    use std::fs;
 
     #[test]
     fn a_new_key_is_read_again_and_never_overwritten() {

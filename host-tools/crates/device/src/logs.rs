@@ -4,8 +4,11 @@
 //! their number and the values.
 
 use defmt_decoder::{DecodeError, Encoding, Table};
-use std::fs;
+use iltm_picture::foreign_file;
 use std::path::{Path, PathBuf};
+
+/// Bytes of a firmware's ELF file at most: many times one with all its debug information.
+const MOST_BYTES: u64 = 1 << 28;
 
 /// Why the words of log messages cannot be had.
 #[derive(Debug, thiserror::Error)]
@@ -52,7 +55,7 @@ impl Logs {
     /// # Errors
     /// [`LogsError`].
     pub fn read(path: &Path) -> Result<Self, LogsError> {
-        let elf = fs::read(path).map_err(|source| LogsError::Read {
+        let elf = foreign_file::read(path, MOST_BYTES).map_err(|source| LogsError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -12,6 +12,7 @@
 //! | medians and quantiles | [`statistics`] |
 //! | HTML pages | [`html`] |
 //! | arrays as `NumPy` files | [`npy`] |
+//! | files of others, read up to a limit | [`foreign_file`] |
 //! | files and folders that are there whole or not at all | [`WholeFile`], [`WholeFolder`] |
 //! | temporary files, gone when the process is stopped | [`unfinished`] |
 //! | how far long work is | [`progress`] |
@@ -21,6 +22,7 @@ pub mod chart;
 mod colour_scale;
 mod contact_sheet;
 mod curve;
+pub mod foreign_file;
 pub mod html;
 mod lattice;
 mod light_picture;
@@ -43,7 +45,7 @@ pub use light_picture::LightPicture;
 pub use picture::{Picture, Samples};
 pub use response::{Declared, Response};
 pub use whole_file::{FileError, WholeFile};
-pub use whole_folder::{FolderError, WholeFolder, check_free};
+pub use whole_folder::{FolderError, WholeFolder, check_free, check_own};
 
 /// Most pixels of a picture: twice those of 8K video. A header that says more is
 /// refused before any memory is taken.

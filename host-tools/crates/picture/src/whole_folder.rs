@@ -19,6 +19,14 @@ pub enum FolderError {
         /// The folder.
         path: PathBuf,
     },
+    /// It would be replaced, and holds something that another command or a person made.
+    #[error("{}: it holds {name}, which this command does not make", path.display())]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+        /// What it holds.
+        name: String,
+    },
     /// A file or folder could not be written.
     #[error("{}: {source}", path.display())]
     Io {
@@ -46,7 +54,11 @@ pub struct WholeFolder {
     out: PathBuf,
     beside: TempDir,
     listed: Listed,
+    replaces: Option<IsOwn>,
 }
+
+/// Whether a folder's maker makes files of this name.
+pub type IsOwn = fn(&str) -> bool;
 
 impl WholeFolder {
     /// Begins a folder that is to be called `out`, where nothing or an empty folder is.
@@ -56,6 +68,17 @@ impl WholeFolder {
     pub fn create(out: &Path) -> Result<Self, FolderError> {
         check_free(out)?;
         Self::beside(out)
+    }
+
+    /// Begins a folder in the place of one that was made the same way, or of none.
+    ///
+    /// # Errors
+    /// Those of [`check_own`], or if nothing can be made beside it.
+    pub fn replace(out: &Path, is_own: IsOwn) -> Result<Self, FolderError> {
+        check_own(out, is_own)?;
+        let mut folder = Self::beside(out)?;
+        folder.replaces = Some(is_own);
+        Ok(folder)
     }
 
     /// Begins a folder that is to be called `out`, whatever is there.
@@ -81,6 +104,7 @@ impl WholeFolder {
             out,
             beside,
             listed,
+            replaces: None,
         })
     }
 
@@ -129,9 +153,15 @@ impl WholeFolder {
             out,
             beside,
             listed,
+            replaces,
         } = self;
         open_to_all(beside.path()).map_err(FolderError::io(&out))?;
         step(|| {
+            if let Some(is_own) = replaces {
+                // Somebody may have put something there meanwhile.
+                check_own(&out, is_own)?;
+                empty(&out).map_err(FolderError::io(&out))?;
+            }
             // An empty folder in its place gives way to the rename.
             let kept = beside.keep();
             let renamed = fs::rename(&kept, &out).map_err(|source| {
@@ -213,6 +243,33 @@ pub fn check_free(out: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
+/// Refuses a place that holds anything but files that its maker makes.
+///
+/// # Errors
+/// [`FolderError::Foreign`], [`FolderError::Taken`] if it is no folder, or what reading it gives.
+pub fn check_own(out: &Path, is_own: IsOwn) -> Result<(), FolderError> {
+    if !out.is_dir() {
+        return check_free(out);
+    }
+    for entry in fs::read_dir(out).map_err(FolderError::io(out))? {
+        let entry = entry.map_err(FolderError::io(out))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !is_own(&name) || entry.path().is_dir() {
+            let path = out.to_owned();
+            return Err(FolderError::Foreign { path, name });
+        }
+    }
+    Ok(())
+}
+
+/// Removes the files of a folder, if there is one.
+fn empty(folder: &Path) -> io::Result<()> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    fs::read_dir(folder)?.try_for_each(|entry| fs::remove_file(entry?.path()))
+}
+
 /// A temporary folder is for its owner only; what is written is like any other folder.
 #[cfg(unix)]
 fn open_to_all(folder: &Path) -> io::Result<()> {
@@ -228,6 +285,30 @@ fn open_to_all(_folder: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_is_replaced_whole_unless_it_holds_what_others_made() {
+        let around = tempfile::tempdir().unwrap();
+        let out = around.path().join("results");
+        let make = |name: &str| {
+            let folder = WholeFolder::replace(&out, |name| name.ends_with("csv"))?;
+            folder.file(name, name)?;
+            folder.finish()
+        };
+        let names = || {
+            let names = fs::read_dir(&out).unwrap();
+            let names = names.map(|entry| entry.unwrap().file_name());
+            names.collect::<Vec<_>>()
+        };
+        make("a.csv").unwrap();
+        make("b.csv").unwrap();
+        assert_eq!(names(), ["b.csv"]);
+        fs::write(out.join("photo.png"), "mine").unwrap();
+        let refused = make("c.csv").unwrap_err();
+        assert!(matches!(refused, FolderError::Foreign { name, .. } if name == "photo.png"));
+        assert_eq!(names().len(), 2);
+        assert_eq!(fs::read_dir(around.path()).unwrap().count(), 1);
+    }
 
     #[test]
     fn a_folder_that_is_not_finished_leaves_nothing() {

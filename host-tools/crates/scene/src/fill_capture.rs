@@ -4,9 +4,9 @@
 use super::simulation::SimulationError;
 use super::virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};
 use iltm_capture::{CaptureError, Settings, find_photo, listed};
-use iltm_picture::{Samples, png, progress::Progress, whole_file};
+use iltm_picture::{Samples, foreign_file, png, progress::Progress, whole_file};
 use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, resample::area::AreaAverage};
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -214,7 +214,7 @@ fn frame(
         path: path.to_owned(),
         reason,
     };
-    let file = File::open(path).map_err(|source| FillCaptureError::Io {
+    let file = foreign_file::open(path).map_err(|source| FillCaptureError::Io {
         path: path.to_owned(),
         source,
     })?;

@@ -7,8 +7,7 @@
 use super::SessionError;
 use super::plan::Planned;
 use super::shell::{self, Ran};
-use iltm_picture::{Picture, Samples, png};
-use std::fs::File;
+use iltm_picture::{Picture, Samples, foreign_file, png};
 use std::io::BufReader;
 use std::num::NonZeroU32;
 use std::rc::Rc;
@@ -179,7 +178,7 @@ impl Screen for WindowScreen {
         let refuse = |reason: String| SessionError::Display {
             reason: format!("{}: {reason}", planned.slide.display()),
         };
-        let file = File::open(&planned.slide).map_err(|error| refuse(error.to_string()))?;
+        let file = foreign_file::open(&planned.slide).map_err(|error| refuse(error.to_string()))?;
         let picture = png::read(BufReader::new(file)).map_err(|error| refuse(error.to_string()))?;
         if !matches!(picture.samples(), Samples::Eight(_)) {
             return Err(refuse("a display shows 8 bits, it has 16".to_owned()));

@@ -2,7 +2,7 @@
 
 use super::VideoError;
 use super::y4m::{MAGIC, Reader, YuvFrame};
-use iltm_picture::{Picture, png};
+use iltm_picture::{Picture, foreign_file, png};
 use std::fs::File;
 use std::io::{Chain, Cursor, Read};
 use std::path::Path;
@@ -25,7 +25,7 @@ impl Input<File> {
     /// # Errors
     /// [`VideoError::Open`] if it cannot be opened, and those of [`of`](Self::of).
     pub fn open(path: &Path) -> Result<Self, VideoError> {
-        let file = File::open(path).map_err(|source| VideoError::Open {
+        let file = foreign_file::open(path).map_err(|source| VideoError::Open {
             path: path.to_owned(),
             source,
         })?;

@@ -1,16 +1,14 @@
 //! Watch on a file that is read again when it changes.
 
+use iltm_picture::foreign_file;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, SystemTime};
 
 /// Time between two looks at the file.
 const PERIOD: Duration = Duration::from_millis(100);
-
-/// Most bytes that are read: many times the largest table.
-const MAX_BYTES: u64 = 1 << 30;
 
 /// What tells a file from its earlier self.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -52,18 +50,18 @@ pub struct FileWatch {
 }
 
 impl FileWatch {
-    /// Reads the file, and watches it from then on.
+    /// Reads the file of `most` bytes at most, and watches it from then on.
     ///
     /// # Errors
     /// What reading it gives.
-    pub fn read(path: &Path) -> Result<(Vec<u8>, Self), std::io::Error> {
+    pub fn read(path: &Path, most: u64) -> Result<(Vec<u8>, Self), std::io::Error> {
         // The stamp is older than the bytes: a change in between is read again.
         let stamp = Stamp::of(path);
-        let bytes = fs::read(path)?;
+        let bytes = foreign_file::read(path, most)?;
         let (send, changed) = channel();
         let (alive, ended) = channel();
         let path = path.to_owned();
-        thread::spawn(move || watch(&path, stamp, &send, &ended));
+        thread::spawn(move || watch(&path, most, stamp, &send, &ended));
         Ok((bytes, Self { changed, alive }))
     }
 
@@ -74,7 +72,13 @@ impl FileWatch {
     }
 }
 
-fn watch(path: &PathBuf, mut known: Option<Stamp>, send: &Sender<Vec<u8>>, ended: &Receiver<()>) {
+fn watch(
+    path: &Path,
+    most: u64,
+    mut known: Option<Stamp>,
+    send: &Sender<Vec<u8>>,
+    ended: &Receiver<()>,
+) {
     let mut before = known;
     while ended.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
         let now = Stamp::of(path);
@@ -82,10 +86,10 @@ fn watch(path: &PathBuf, mut known: Option<Stamp>, send: &Sender<Vec<u8>>, ended
         // that is gone may be about to be replaced.
         let still = now == before && now != known;
         before = now;
-        if !still || now.is_none_or(|stamp| stamp.bytes > MAX_BYTES) {
+        if !still || now.is_none() {
             continue;
         }
-        let Ok(bytes) = fs::read(path) else {
+        let Ok(bytes) = foreign_file::read(path, most) else {
             continue;
         };
         // Written to while it was read: the next looks will tell.

@@ -10,8 +10,8 @@ mod film;
 use super::args::Emulate;
 use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
-use super::output::{Output, read_file};
-use super::tables::check;
+use super::output::Output;
+use super::tables::{check, read_table};
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameFeed;
@@ -44,7 +44,7 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     if let Some(path) = &arguments.key {
         provision(&memory, path, arguments.device)?;
     }
-    let image = arguments.table.as_deref().map(read_file).transpose()?;
+    let image = arguments.table.as_deref().map(read_table).transpose()?;
     let table = match (&arguments.table, &image) {
         (Some(path), Some(image)) => Some(check(path, image)?),
         _ => None,

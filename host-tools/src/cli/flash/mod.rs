@@ -15,7 +15,8 @@ use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
 use super::fit::{Fit, ask_fit, not_compensating};
 use super::interrupt;
-use super::output::{Output, read_file};
+use super::output::Output;
+use super::tables::read_table;
 use super::words::{self, letter, table_name};
 use crate::device::DeviceError;
 use crate::device::upload::{Parcel, Upload, UploadError, UploadPlan, UploadSummary};
@@ -29,7 +30,7 @@ use std::time::{Duration, Instant};
 
 pub(super) fn run(arguments: &Flash, output: &Output) -> Result<(), Failure> {
     let untouched = |failure: Failure| failure.with(Active::Untouched);
-    let bytes = read_file(&arguments.table).map_err(untouched)?;
+    let bytes = read_table(&arguments.table).map_err(untouched)?;
     let table = Named::read(&arguments.table, &bytes).map_err(untouched)?;
     let connected = connect(&arguments.line, output);
     let mut connection = connected.map_err(|failure| match failure.kind {

@@ -6,6 +6,9 @@
 //! (`-icount shift=0`) a tick is 40 of them. Findings go to standard output through
 //! semihosting, a line a tier: tier, then instructions of the stages and of the
 //! whole frame, then samples clipped.
+//!
+//! If the second word is not 0, slot A holds a site's public key and a right of so many bytes
+//! to confirm table 1 on device 1, and the only finding is what the device takes to look at it.
 #![no_std]
 #![no_main]
 
@@ -20,6 +23,7 @@ use iltm_runtime::frame_buffers::ControlWords;
 use iltm_runtime::image::{Table, content, unseal};
 use iltm_runtime::pipeline::{Encoding, FrameError, FullPipeline, GridPipeline};
 use iltm_runtime::store::Slot;
+use iltm_runtime::trust::{Deed, Terms, Trust, allows};
 use iltm_runtime::units::ClippedSamples;
 use static_cell::ConstStaticCell;
 
@@ -117,6 +121,22 @@ fn full<const C: usize>(
     Ok((laps.instructions(), clipped))
 }
 
+/// Instructions that a right takes; `None` if it is none.
+#[inline(never)]
+fn right(slot: &[u8], length: usize, clock: &impl Clock) -> Option<u64> {
+    let (key, rest) = slot.split_first_chunk::<32>()?;
+    let trust = Trust {
+        key: Some(*key),
+        device: 1,
+    };
+    let terms = Terms { trust, floor: 0 };
+    let right = rest.get(..length)?;
+    let start = clock.ticks();
+    let allowed = allows(right, &Deed::Confirm { table: 1 }, 0, &terms, &mut || {});
+    let ticks = clock.ticks() - start;
+    allowed.is_ok().then_some(ticks * INSTRUCTIONS)
+}
+
 #[entry]
 fn main() -> ! {
     let (Some(board), Some(memory), Some(input)) =
@@ -125,6 +145,15 @@ fn main() -> ! {
         fault::restart();
     };
     let words = psram::self_test_words().load(0);
+    let length = psram::self_test_words().load(1) as usize;
+    if length > 0 {
+        match right(board.flash.slot(Slot::A), length, &board.clock) {
+            Some(instructions) => hprintln!("{}", instructions),
+            None => hprintln!("no right"),
+        }
+        debug::exit(debug::EXIT_SUCCESS);
+        fault::restart();
+    }
     let size = FrameSize::new(words as u16, (words >> 16) as u16);
     let image = unseal(content(board.flash.slot(Slot::A)));
     let table = image.ok().and_then(|(image, _)| Table::check(image).ok());

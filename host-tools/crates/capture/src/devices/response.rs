@@ -381,7 +381,7 @@ mod tests {
             values: [0.5, 0.01, 0.5, 0.01],
             weights: [1.0, 1.0, -1.0, -1.0],
         };
-        let found = fit(&[only; 1000], Response::Linear);
+        let found = fit(&vec![only; 1000], Response::Linear);
         assert!(!found.tells() && !found.contradicts(), "{found:?}");
         let source = CameraSource::Pairs { pairs: 1 };
         assert_eq!(

@@ -3,6 +3,7 @@
 use super::error::CaptureError;
 use super::role::Role;
 use super::stripe_role::STRIPES_FILE;
+use iltm_picture::foreign_file;
 use std::collections::HashMap;
 use std::fmt;
 use std::fs::File;
@@ -257,7 +258,7 @@ impl<R: ListedRole> ManifestOf<R> {
 pub(super) fn read_small(path: &Path, most: u64) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     let read = |file: File| file.take(most + 1).read_to_end(&mut bytes);
-    match File::open(path).and_then(read) {
+    match foreign_file::open(path).and_then(read) {
         Ok(_) => Ok(Some(bytes)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),

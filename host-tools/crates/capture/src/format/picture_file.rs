@@ -21,8 +21,12 @@ use std::sync::{Mutex, PoisonError};
 /// Pixels a picture may have: the largest medium-format sensors.
 pub(crate) const MAX_PIXELS: u64 = 160_000_000;
 
-/// Bytes a picture's pixels may take: [`MAX_PIXELS`] in colour with 16 bits.
-const MAX_DECODED: u64 = 1 << 30;
+/// Bytes of memory a picture may take while it is decoded: [`MAX_PIXELS`] in colour with 16
+/// bits, twice.
+const MAX_MEMORY: u64 = 2 << 30;
+
+/// Bytes a picture's file may have.
+const MAX_FILE: u64 = 1 << 30;
 
 /// Bytes from which pictures are decoded one after the other, whoever asks for them.
 const LARGE: u64 = 128 << 20;
@@ -115,8 +119,8 @@ pub(crate) struct Opened {
 
 /// What reads the pixels.
 enum Decoder {
-    /// The image crate.
-    Image(Box<dyn ImageDecoder>),
+    /// The image crate, and how many copies of the pixels it has at the end.
+    Image(Box<dyn ImageDecoder>, u64),
     /// Floating point grey, which the image crate has no type for.
     GreyFloat(Box<GreyFloat>),
 }
@@ -159,9 +163,8 @@ impl Opened {
         if !metadata.is_file() {
             return Err(refuse("it is not a regular file".to_owned()));
         }
-        let most = MAX_DECODED + DECODER_BYTES;
-        if metadata.len() > most {
-            return Err(refuse(format!("it has more than {most} bytes")));
+        if metadata.len() > MAX_FILE {
+            return Err(refuse(format!("it has more than {MAX_FILE} bytes")));
         }
         let mut file = File::open(&path).map_err(io)?;
         let format = sniff(&mut file).map_err(io)?;
@@ -178,12 +181,12 @@ impl Opened {
                 limit: MAX_PIXELS,
             });
         }
-        let bytes = decoder.decoded_bytes();
-        if bytes > MAX_DECODED {
+        let bytes = decoder.memory();
+        if bytes > MAX_MEMORY {
             return Err(refuse(format!(
-                "its pixels take {} MB of memory; at most {} are read",
+                "decoding it takes {} MB of memory; at most {} are used",
                 bytes >> 20,
-                MAX_DECODED >> 20
+                MAX_MEMORY >> 20
             )));
         }
         if width == 0 || height == 0 {
@@ -214,12 +217,17 @@ impl Opened {
     /// Bits of a sample: 8, 16, or 32 for floating point.
     pub(crate) fn bits(&self) -> u8 {
         match &self.decoder {
-            Decoder::Image(decoder) => {
+            Decoder::Image(decoder, _) => {
                 let colour = decoder.color_type();
                 8 * colour.bytes_per_pixel() / colour.channel_count()
             }
             Decoder::GreyFloat(_) => 32,
         }
+    }
+
+    /// Bytes of memory that decoding it takes, its pixels included.
+    pub(crate) fn memory(&self) -> u64 {
+        self.decoder.memory()
     }
 
     /// Decodes the pixels.
@@ -242,7 +250,7 @@ impl Opened {
             next_step,
         };
         let (width, channels) = (decoder.size().0 as usize, decoder.channels());
-        let large = decoder.decoded_bytes() > LARGE;
+        let large = decoder.memory() > LARGE;
         // Nothing is behind the lock that a thread could have left half done.
         let _one = large.then(|| {
             DECODING_LARGE
@@ -250,7 +258,7 @@ impl Opened {
                 .unwrap_or_else(PoisonError::into_inner)
         });
         let samples = match decoder {
-            Decoder::Image(decoder) => DynamicImage::from_decoder(decoder)
+            Decoder::Image(decoder, _) => DynamicImage::from_decoder(decoder)
                 .map_err(|error| (unreadable(format, &error), EXPORT))
                 .and_then(|decoded| without_alpha(decoded, width)),
             Decoder::GreyFloat(grey) => grey.decode().map_err(|reason| (reason, EXPORT)),
@@ -272,7 +280,7 @@ impl Decoder {
     /// Reads the header of a file of this format.
     fn new(format: FileFormat, file: File) -> Result<Self, String> {
         let mut limits = Limits::no_limits();
-        limits.max_alloc = Some(MAX_DECODED + DECODER_BYTES);
+        limits.max_alloc = Some(MAX_MEMORY + DECODER_BYTES);
         let words = |error: image::ImageError| unreadable(format, &error);
         if format == FileFormat::Tiff
             && let Some(grey) = GreyFloat::new(file.try_clone().map_err(|e| e.to_string())?)?
@@ -295,27 +303,32 @@ impl Decoder {
         };
         let mut decoder = boxed.map_err(words)?;
         decoder.set_limits(limits).map_err(words)?;
-        Ok(Self::Image(decoder))
+        let copies = match format {
+            FileFormat::Tiff | FileFormat::OpenExr => 2,
+            FileFormat::Png | FileFormat::Jpeg | FileFormat::Netpbm => 1,
+        };
+        Ok(Self::Image(decoder, copies))
     }
 
     fn size(&self) -> (u32, u32) {
         match self {
-            Self::Image(decoder) => decoder.dimensions(),
+            Self::Image(decoder, _) => decoder.dimensions(),
             Self::GreyFloat(grey) => grey.size,
         }
     }
 
-    /// Bytes of all pixels once they are decoded.
-    fn decoded_bytes(&self) -> u64 {
+    /// Bytes of memory that decoding takes.
+    fn memory(&self) -> u64 {
         match self {
-            Self::Image(decoder) => decoder.total_bytes(),
-            Self::GreyFloat(grey) => 4 * u64::from(grey.size.0) * u64::from(grey.size.1),
+            Self::Image(decoder, copies) => decoder.total_bytes().saturating_mul(*copies),
+            // At most 8 bytes of the file's and 4 of ours.
+            Self::GreyFloat(grey) => 12 * u64::from(grey.size.0) * u64::from(grey.size.1),
         }
     }
 
     fn channels(&self) -> usize {
         match self {
-            Self::Image(decoder) if decoder.color_type().has_color() => 3,
+            Self::Image(decoder, _) if decoder.color_type().has_color() => 3,
             _ => 1,
         }
     }
@@ -407,32 +420,43 @@ fn without_alpha(decoded: DynamicImage, width: usize) -> Result<Samples, (String
         DynamicImage::ImageLuma16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
         DynamicImage::ImageRgb16(picture) => Ok(Samples::Sixteen(picture.into_raw())),
         DynamicImage::ImageRgb32F(picture) => Ok(Samples::Float(picture.into_raw())),
-        DynamicImage::ImageLumaA8(picture) => opaque(&picture, 2, width).map(Samples::Eight),
-        DynamicImage::ImageRgba8(picture) => opaque(&picture, 4, width).map(Samples::Eight),
-        DynamicImage::ImageLumaA16(picture) => opaque(&picture, 2, width).map(Samples::Sixteen),
-        DynamicImage::ImageRgba16(picture) => opaque(&picture, 4, width).map(Samples::Sixteen),
-        DynamicImage::ImageRgba32F(picture) => opaque(&picture, 4, width).map(Samples::Float),
+        DynamicImage::ImageLumaA8(picture) => {
+            opaque(picture.into_raw(), 2, width).map(Samples::Eight)
+        }
+        DynamicImage::ImageRgba8(picture) => {
+            opaque(picture.into_raw(), 4, width).map(Samples::Eight)
+        }
+        DynamicImage::ImageLumaA16(picture) => {
+            opaque(picture.into_raw(), 2, width).map(Samples::Sixteen)
+        }
+        DynamicImage::ImageRgba16(picture) => {
+            opaque(picture.into_raw(), 4, width).map(Samples::Sixteen)
+        }
+        DynamicImage::ImageRgba32F(picture) => {
+            opaque(picture.into_raw(), 4, width).map(Samples::Float)
+        }
         other => Err((format!("its pixels are {:?}", other.color()), EXPORT)),
     }
 }
 
-/// The samples without the last of every `step`, the alpha.
+/// The samples without the last of every `step`, the alpha, in the memory that they had.
 fn opaque<T: Copy + PartialEq + image::Primitive>(
-    samples: &[T],
+    mut samples: Vec<T>,
     step: usize,
     width: usize,
 ) -> Result<Vec<T>, (String, &'static str)> {
-    let pixels = samples.chunks_exact(step);
     let seen_through = |pixel: &[T]| pixel.last() != Some(&T::DEFAULT_MAX_VALUE);
-    if let Some(at) = pixels.clone().position(seen_through) {
+    if let Some(at) = samples.chunks_exact(step).position(seen_through) {
         let (row, col) = (at / width, at % width);
         let reason = format!("pixel at row {row}, column {col} is transparent");
         return Err((reason, "Export the picture without an alpha channel."));
     }
-    Ok(pixels
-        .flat_map(|pixel| &pixel[..step - 1])
-        .copied()
-        .collect())
+    let mut at = 0;
+    samples.retain(|_| {
+        at += 1;
+        at % step != 0
+    });
+    Ok(samples)
 }
 
 fn unreadable(format: FileFormat, error: &image::ImageError) -> String {

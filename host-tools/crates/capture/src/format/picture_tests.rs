@@ -177,6 +177,20 @@ fn crc32(bytes: &[u8]) -> u32 {
 }
 
 #[test]
+fn the_memory_of_a_picture_counts_the_copies_that_its_decoder_makes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("photograph");
+    let memory = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        Opened::open(source(&path)).unwrap().memory()
+    };
+    let picture = DynamicImage::new_rgb16(3, 2);
+    assert_eq!(memory(&png(&picture)), 36);
+    assert_eq!(memory(&encode(&picture, ImageFormat::Tiff)), 72);
+    assert_eq!(memory(b"P6 12600 12600 65535\n"), 12_600 * 12_600 * 6);
+}
+
+#[test]
 fn a_folder_and_a_missing_file_are_told_apart() {
     let folder = tempfile::tempdir().unwrap();
     let error = Opened::open(source(folder.path())).err().unwrap();

@@ -21,15 +21,20 @@ pub fn grey_view(path: &Path, side: usize) -> Result<LightPicture, CaptureError>
     let opened = Opened::open(source)?;
     let ((width, height), channels) = (opened.size(), opened.channels());
     let camera = (width as usize, height as usize);
-    let grey = match opened.decode()? {
-        Samples::Eight(values) => means(&values, channels, |value| f32::from(value) / 255.0),
-        Samples::Sixteen(values) => means(&values, channels, |value| f32::from(value) / 65_535.0),
-        Samples::Float(values) => means(&values, channels, |value| value),
-    };
     let step = camera.0.max(camera.1).div_ceil(side.max(1)).max(1);
     let step = step.min(camera.0).min(camera.1);
+    let grey = match opened.decode()? {
+        Samples::Eight(values) => means(&values, channels, camera, step, |value| {
+            f32::from(value) / 255.0
+        }),
+        Samples::Sixteen(values) => {
+            let light = |value| f32::from(value) / 65_535.0;
+            means(&values, channels, camera, step, light)
+        }
+        Samples::Float(values) => means(&values, channels, camera, step, |value| value),
+    };
     let size = FrameSize::new((camera.0 / step) as u16, (camera.1 / step) as u16);
-    let view = size.and_then(|size| LightPicture::new(size, vec![shrunk(&grey, camera, step)]));
+    let view = size.and_then(|size| LightPicture::new(size, vec![grey]));
     view.ok_or_else(|| CaptureError::Picture {
         path: path.to_owned(),
         reason: format!("it has {width} x {height} pixels, which is no photograph"),
@@ -37,10 +42,25 @@ pub fn grey_view(path: &Path, side: usize) -> Result<LightPicture, CaptureError>
     })
 }
 
-fn means<T: Copy>(values: &[T], channels: usize, light: impl Fn(T) -> f32) -> Vec<f32> {
-    let pixels = values.chunks_exact(channels.max(1));
-    let mean = |pixel: &[T]| pixel.iter().map(|value| light(*value)).sum::<f32>();
-    pixels.map(|pixel| mean(pixel) / channels as f32).collect()
+/// Means of all channels over squares of `step` pixels, row by row; no more than a row of
+/// squares is held beside the values.
+fn means<T: Copy>(
+    values: &[T],
+    channels: usize,
+    (width, height): (usize, usize),
+    step: usize,
+    light: impl Fn(T) -> f32,
+) -> Vec<f32> {
+    let mean = |pixel: &[T]| {
+        let sum = pixel.iter().map(|value| light(*value)).sum::<f32>();
+        sum / channels as f32
+    };
+    let rows = values.chunks_exact(channels * width * step);
+    let squares = rows.take(height / step).flat_map(|row| {
+        let row: Vec<f32> = row.chunks_exact(channels).map(mean).collect();
+        shrunk(&row, (width, step), step)
+    });
+    squares.collect()
 }
 
 /// The means of squares of `step` pixels of a plane; what is left at the end is left out.

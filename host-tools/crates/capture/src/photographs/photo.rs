@@ -67,6 +67,8 @@ pub(crate) struct PhotoFormat {
     pub(crate) file: FileFormat,
     /// Bits of a sample, 32 for floating point.
     pub(crate) bits: u8,
+    /// Bytes of memory that decoding a file takes.
+    memory: usize,
     /// How values become light.
     pub(crate) reading: Reading,
     /// Light of each 8-bit value.
@@ -97,6 +99,7 @@ impl PhotoFormat {
             height: (height as usize / binning).max(1),
             file: opened.format(),
             bits: opened.bits(),
+            memory: opened.memory() as usize,
             eight: std::array::from_fn(|value| light_of(&reading.response, value as f64 / 255.0)),
             sixteen: (0..=u16::MAX)
                 .map(|value| light_of(&reading.response, f64::from(value) / 65_535.0))
@@ -112,9 +115,7 @@ impl PhotoFormat {
 
     /// Bytes of one photograph while it is being decoded.
     pub(crate) fn decoding_bytes(&self) -> usize {
-        let (width, height) = self.file_size;
-        let sample = usize::from(self.bits.max(16) / 8);
-        width as usize * height as usize * self.channels * sample + self.bytes()
+        self.memory + self.bytes()
     }
 
     /// Bytes of one decoded photograph.

@@ -10,7 +10,7 @@
 
 use super::Folders;
 use glob::Pattern;
-use iltm_picture::whole_file;
+use iltm_picture::{foreign_file, whole_file};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -18,6 +18,9 @@ use toml_edit::DocumentMut;
 
 /// What the file is called.
 const NAME: &str = "config.toml";
+
+/// Bytes of the file at most: a person writes it.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// Settings of the user.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -161,7 +164,7 @@ impl Config {
 }
 
 fn text(path: &Path) -> Result<String, ConfigError> {
-    match fs::read_to_string(path) {
+    match foreign_file::read_text(path, MOST_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(String::new()),
         read => read.map_err(|source| ConfigError::Io {
             path: path.to_owned(),

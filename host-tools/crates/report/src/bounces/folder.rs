@@ -1,7 +1,7 @@
 //! The folder of a separated photograph: numbers for programs, pictures for people.
 //!
 //! ```text
-//! bounces.png      all pictures side by side, as they are and brightened
+//! bounces.html     all pictures, as they are and brightened, complete in itself
 //! bounces.csv      a line a layer: shares of light and energy, brightness, noise
 //! bounces.npy      the layers, float32, rows x columns x channels x layers
 //! photograph.png   16 bits, 65,535 is the camera's full scale, black subtracted
@@ -10,8 +10,8 @@
 //! ```
 
 use super::Bounces;
+use super::page::page;
 use super::separate::{Layer, LayerKind, Separated};
-use super::sheet::sheet;
 use crate::frame_size;
 use iltm_picture::{FolderError, Picture, Samples, WholeFolder, npy, png};
 use rayon::prelude::*;
@@ -30,6 +30,9 @@ impl LayerKind {
         }
     }
 }
+
+/// The page's name in the folder.
+pub const PAGE: &str = "bounces.html";
 
 /// A file and what it is of.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -54,13 +57,23 @@ pub struct WrittenBounces {
     pub largest_gap: f64,
 }
 
+/// Whether [`write`] writes files of this name.
+#[must_use]
+pub fn is_own(name: &str) -> bool {
+    let picture = name.strip_suffix(".png");
+    let bounce = picture.and_then(|name| name.strip_prefix("bounce-"));
+    [PAGE, "bounces.csv", "bounces.npy"].contains(&name)
+        || picture.is_some_and(|name| ["photograph", "rest", "unseparated"].contains(&name))
+        || bounce.is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
 /// Writes a separated photograph into the folder `out`: beside its place first, then
-/// renamed, so that it is whole or not there.
+/// renamed, so that it is whole or not there. An earlier one is replaced.
 ///
 /// # Errors
-/// [`FolderError`] if something is in its place or it cannot be written.
+/// [`FolderError`] if something else is in its place or it cannot be written.
 pub fn write(bounces: &Bounces, out: &Path) -> Result<WrittenBounces, FolderError> {
-    let made = WholeFolder::create(out)?;
+    let made = WholeFolder::replace(out, is_own)?;
     let separated = &bounces.separated;
     let mut files = Vec::new();
     let mut add = |name: &str, what, bytes: Vec<u8>| {
@@ -70,8 +83,8 @@ pub fn write(bounces: &Bounces, out: &Path) -> Result<WrittenBounces, FolderErro
         });
         made.file(name, bytes)
     };
-    if let Some(sheet) = sheet(bounces) {
-        add("bounces.png", "all pictures, labelled", png::encode(&sheet))?;
+    if let Some(page) = page(bounces) {
+        add(PAGE, "all pictures, for people", page.into_bytes())?;
     }
     add(
         "bounces.csv",

@@ -13,20 +13,22 @@
 //!                       noise             what a bounce has to exceed to be seen
 //!                       separate          one bounce after the other, until the noise
 //!                       folder            pictures, numbers, and
-//!                       sheet             the one that people look at
+//!                       page              the one that people look at; sheet: a picture of it
 //! ```
 
 mod bounce_operator;
 mod folder;
 mod noise;
+mod page;
 mod separate;
 mod sheet;
 #[cfg(test)]
 mod tests;
 
 pub use bounce_operator::BounceOperator;
-pub use folder::{FileOf, WrittenBounces, write};
+pub use folder::{FileOf, PAGE, WrittenBounces, is_own, write};
 pub use noise::PhotographNoise;
+pub use page::{PROOF, page};
 pub use separate::{Layer, LayerKind, MOST_BOUNCES, Separated};
 pub use sheet::sheet;
 

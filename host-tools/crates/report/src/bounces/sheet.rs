@@ -22,7 +22,7 @@ pub fn sheet(bounces: &Bounces) -> Option<Picture> {
     let separated = &bounces.separated;
     let shown = |planes: &[Vec<f32>]| shown(separated.size, planes);
     let photograph = shown(&separated.photograph)?;
-    let bright = photograph.quantile(BRIGHT);
+    let bright = bright_of(&photograph);
     let mut plain = vec![Tile::new(
         ("Photograph", "black subtracted"),
         &photograph.for_display(),
@@ -42,7 +42,7 @@ pub fn sheet(bounces: &Bounces) -> Option<Picture> {
         let mut tile = Tile::new((&title(layer.kind), &shares), &light.for_display());
         tile.captions.push(noise);
         plain.push(tile);
-        let factor = round_factor(bright / light.quantile(BRIGHT).max(1e-9));
+        let factor = factor_for(&light, bright);
         brightened.push(if factor > 1.0 {
             let words = format!("{factor} times brighter");
             Tile::new(("", &words), &light.scaled(factor).for_display())
@@ -62,7 +62,7 @@ pub fn sheet(bounces: &Bounces) -> Option<Picture> {
     sheet.compose()
 }
 
-fn heading(bounces: &Bounces) -> String {
+pub(super) fn heading(bounces: &Bounces) -> String {
     let shot = &bounces.shot;
     match bounces.averaged {
         1 => format!(
@@ -73,7 +73,7 @@ fn heading(bounces: &Bounces) -> String {
     }
 }
 
-fn title(kind: LayerKind) -> String {
+pub(super) fn title(kind: LayerKind) -> String {
     match kind {
         LayerKind::Bounce(1) => "1st bounce: direct".to_owned(),
         LayerKind::Bounce(2) => "2nd bounce".to_owned(),
@@ -90,18 +90,32 @@ fn notes(bounces: &Bounces) -> Vec<String> {
             "Light: sum over all pixels, of the photograph's; these add up to 100 %. Energy: sum of \
              squares; bounces overlap, so these do not."
         ),
-        format!(
-            "Noise: the camera's in the mean of a cell, {:.2e} of full scale (a pixel's is {:.2e}). \
-             Light that was there under black ({} of all) is subtracted.",
-            bounces.noise.cell,
-            bounces.noise.pixel,
-            percent(bounces.ambient_share),
-        ),
+        noise_words(bounces),
     ]
 }
 
-/// The picture at a size that suits the sheet.
-fn shown((width, height): (usize, usize), planes: &[Vec<f32>]) -> Option<LightPicture> {
+pub(super) fn noise_words(bounces: &Bounces) -> String {
+    format!(
+        "Noise: the camera's in the mean of a cell, {:.2e} of full scale (a pixel's is {:.2e}). \
+         Light that was there under black ({} of all) is subtracted.",
+        bounces.noise.cell,
+        bounces.noise.pixel,
+        percent(bounces.ambient_share),
+    )
+}
+
+/// What a picture's brightness is judged by.
+pub(super) fn bright_of(light: &LightPicture) -> f64 {
+    light.quantile(BRIGHT)
+}
+
+/// How many times brighter a layer is shown beside a photograph that is this bright.
+pub(super) fn factor_for(layer: &LightPicture, bright: f64) -> f64 {
+    round_factor(bright / bright_of(layer).max(1e-9))
+}
+
+/// The picture at a size that suits sheet and page.
+pub(super) fn shown((width, height): (usize, usize), planes: &[Vec<f32>]) -> Option<LightPicture> {
     let mut light = LightPicture::new(frame_size(width, height)?, planes.to_vec())?;
     while light.size().width() > WIDEST && light.size().height() > 1 {
         light = light.halved();

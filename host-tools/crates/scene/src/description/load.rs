@@ -6,10 +6,10 @@ use super::{
 };
 use crate::geometry::Polygon;
 use crate::pinhole::Pinhole;
+use iltm_picture::foreign_file;
 use iltm_runtime::Grid;
 use nalgebra::{Vector2, Vector3};
 use std::fmt::Display;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -27,7 +27,8 @@ impl Scene {
     /// [`SceneError`] with the key, the panel or the line.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let mut bytes = Vec::new();
-        let read = File::open(path).and_then(|f| f.take(MOST_BYTES + 1).read_to_end(&mut bytes));
+        let read =
+            foreign_file::open(path).and_then(|f| f.take(MOST_BYTES + 1).read_to_end(&mut bytes));
         read.map_err(|source| SceneError {
             path: path.to_owned(),
             problem: source.into(),

@@ -7,11 +7,12 @@ use super::{Cause, Expected, VerifyError, refused};
 use iltm_capture::VERIFY_FILE;
 use iltm_capture::{CaptureError, CellPlanes, CellReadings, Settings, Shot, find_photo, remeasure};
 use iltm_compile::Provenance;
-use iltm_picture::{LightPicture, Picture, Response, Samples, png, progress::Progress};
+use iltm_picture::{
+    LightPicture, Picture, Response, Samples, foreign_file, png, progress::Progress,
+};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::{Compensator, VideoError};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
@@ -167,7 +168,7 @@ fn wanted_pictures(
 ) -> Result<Vec<Pictures>, VerifyError> {
     let path = folder.join(TABLE_FILE);
     let own = format!("{:08x}", table.id());
-    let made_with = std::fs::read_to_string(&path).unwrap_or_default();
+    let made_with = foreign_file::read_text(&path, 64).unwrap_or_default();
     if made_with.trim() != own {
         return Err(VerifyError::NotOfTable { path, own });
     }
@@ -267,7 +268,7 @@ fn pictures(
 /// A picture of one pixel a cell, 8 bits, as many channels as the table.
 fn read(folder: &Path, name: &Path, table: &Table<'_>) -> Result<Picture, VerifyError> {
     let path = folder.join(name);
-    let file = File::open(&path).map_err(|source| {
+    let file = foreign_file::open(&path).map_err(|source| {
         if source.kind() == ErrorKind::NotFound {
             let missing = vec![name.to_owned()];
             let folder = folder.to_owned();

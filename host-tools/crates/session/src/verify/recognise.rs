@@ -67,7 +67,7 @@ pub fn recognise(
     let manifest = VerifyManifest::read(folder)?;
     let copies = WholeFolder::create(&folder.join(PHOTOS_FOLDER)).map_err(|error| match error {
         FolderError::Taken { path } => VerifyError::Photographed { path },
-        error @ FolderError::Io { .. } => error.into(),
+        error => error.into(),
     })?;
     let photographs = look_at_all(from, progress)?;
     let cards = photographs.iter().filter_map(|seen| seen.card);

@@ -230,7 +230,7 @@ fn a_file_is_read_again_once_it_is_replaced_or_written_over() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.iltm");
     std::fs::write(&path, b"one").unwrap();
-    let (first, watch) = FileWatch::read(&path).unwrap();
+    let (first, watch) = FileWatch::read(&path, 100).unwrap();
     assert_eq!(first, b"one");
     let wait = |expected: &[u8]| {
         for _ in 0..3_000 {
