@@ -53,7 +53,9 @@ fn a_photograph_takes_its_pixels_memory_once_or_twice_and_little_more() {
     ] {
         picture.save_with_format(&path, format).unwrap();
         let pixels = picture.as_bytes().len() as f64;
-        let stats = peak(|| drop(PhotoStats::read(&path).unwrap()));
+        let stats = peak(|| {
+            PhotoStats::read(&path).unwrap();
+        });
         let grey = peak(|| drop(grey_view(&path, 500).unwrap()));
         let most = 2.0e6 + copies * pixels;
         let what = picture.color();
