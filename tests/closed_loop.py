@@ -222,7 +222,7 @@ class Renderer:
 
     def channels(self, image):
         image = np.array(image)
-        return image if self.colour else image[..., 1:2]
+        return image if self.colour else image.mean(-1, keepdims=True)
 
     def dark(self):
         """Ambient light from everywhere, of any brightness."""
