@@ -1,14 +1,16 @@
 //! Picture error: how far a picture is from the wanted one, pixel by pixel, in numbers that other
 //! people use too.
 
+use crate::numbers::percent;
 use crate::statistics::quantile;
 use crate::{LightPicture, Response};
 use palette::color_difference::Ciede2000;
 use palette::white_point::D65;
 use palette::{FromColor, Lab, LinSrgb};
+use serde::{Deserialize, Serialize};
 
 /// How far a picture is from the wanted one. One factor on its brightness is free.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct PictureError {
     /// Root mean square of the difference over pixels and channels, in linear light, of the
     /// wanted light's.
@@ -21,6 +23,7 @@ pub struct PictureError {
     /// Structural similarity of sRGB values (Wang, Bovik, Sheikh, Simoncelli, *Image quality
     /// assessment*, IEEE Trans. Image Processing 2004), mean over all windows of 11 x 11 pixels;
     /// `None` if no window fits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ssim: Option<f64>,
     /// CIE Delta E 2000, mean over pixels; 1 is just seen.
     pub delta_e: f64,
@@ -41,6 +44,35 @@ const SSIM_MEAN: f64 = 0.01 * 0.01;
 const SSIM_VARIANCE: f64 = 0.03 * 0.03;
 
 impl PictureError {
+    /// Mean of each figure; `None` of none.
+    #[must_use]
+    pub fn mean(errors: &[Self]) -> Option<Self> {
+        let count = errors.len() as f64;
+        let of = |figure: fn(&Self) -> f64| errors.iter().map(figure).sum::<f64>() / count;
+        let ssims: Option<Vec<f64>> = errors.iter().map(|error| error.ssim).collect();
+        (!errors.is_empty()).then(|| Self {
+            relative: of(|error| error.relative),
+            worst_places: of(|error| error.worst_places),
+            psnr: of(|error| error.psnr),
+            ssim: ssims.map(|ssims| ssims.iter().sum::<f64>() / count),
+            delta_e: of(|error| error.delta_e),
+        })
+    }
+
+    /// The figures for people.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let similar = self
+            .ssim
+            .map_or_else(String::new, |ssim| format!(", SSIM {ssim:.3}"));
+        format!(
+            "99 % of places within {}, PSNR {:.1} dB{similar}, Delta E 2000 {:.2}",
+            percent(self.worst_places),
+            self.psnr,
+            self.delta_e,
+        )
+    }
+
     /// Compares linear light, the wanted white being 1, in the pixels `judged`. `None` if there
     /// are none, if the wanted picture is black there or the other one as a whole is no brighter
     /// than black, or if the two are not of one kind.
