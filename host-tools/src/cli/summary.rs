@@ -41,10 +41,17 @@ pub(super) fn summary(built: &BuiltTable) -> Value {
         "recovery": report.recovery,
         "compensation": report.compensation.to_string(),
         "predicted_error": {
-            "uncompensated": report.prediction.uncompensated,
-            "gain_only": report.prediction.gain_only,
+            "uncompensated": built.predicted.uncompensated,
+            "gain_only": built.predicted.gain_only,
             // `null` where the inverse found would let light grow without end.
-            "compensated": report.prediction.compensated,
+            "compensated": built.predicted.compensated,
+            "by_cells": built.predicted.by_cells,
+            "figures": built.predicted.figures.map(|figures| json!({
+                "worst_places": figures.worst_places,
+                "psnr": figures.psnr,
+                "ssim": figures.ssim,
+                "delta_e": figures.delta_e,
+            })),
         },
         "reference_white": built.compiled.white,
         "white": built.white,
@@ -224,8 +231,8 @@ pub(super) fn text(built: &BuiltTable) -> String {
     let prediction = report.prediction;
     let _ = writeln!(
         text,
-        "held out    {:.4} off with the operator, {:.4} with the best gains alone, {:.4} with nothing,\n\
-         \x20           in {} photographs that the solve had not seen",
+        "held out    by cells {:.4} off with the operator, {:.4} with the best gains alone, {:.4} with\n\
+         \x20           nothing, in {} photographs that the solve had not seen",
         prediction.compensated,
         prediction.gain_only,
         prediction.uncompensated,

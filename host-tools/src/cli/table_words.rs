@@ -1,4 +1,4 @@
-//! A table in five lines: how good it is, how bright, what it is, and what to do next.
+//! A table in six lines: how good it is, how bright, what it is, and what to do next.
 
 use crate::compile::{Provenance, cost::CLOCK};
 use crate::report::tier_costs;
@@ -19,8 +19,7 @@ enum Grade {
     Poor,
 }
 
-/// An eye just sees a contrast of about one per cent, and a prediction counts the noise of
-/// the photographs that it comes from as well, which is not on the wall.
+/// An eye just sees a contrast of about one per cent where light is even; in pictures it takes more.
 const GOOD: f64 = 0.015;
 
 /// What is seen without anything to compare with.
@@ -91,12 +90,16 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
             } else {
                 ": gains alone, no bounces are cancelled".to_owned()
             };
-            writeln!(
+            let _ = writeln!(
                 text,
                 "{:<12}{} of the picture is predicted to be off{before}{alone}",
                 Grade::of(error).word(),
                 percent(error),
-            )
+            );
+            let figures = provenance.predicted_error.and_then(|error| error.figures);
+            figures.map_or(Ok(()), |figures| {
+                writeln!(text, "{:<12}{}", "pixels", figures.words())
+            })
         }
     };
     if let Some(brightness) = provenance.brightness {

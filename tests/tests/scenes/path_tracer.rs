@@ -2,8 +2,10 @@
 //! the same scenes: Mitsuba 3, the sample captures. Nothing is fitted but the unit of
 //! light and the ambient light.
 
-use iltm::capture::{Manifest, Role};
+use iltm::capture::{CaptureOptions, Manifest, Role};
+use iltm::progress::Silent;
 use iltm::scene::Forced;
+use iltm::solve::SolveOptions;
 use iltm_tests::simulated::{host_tools, scene, simulation};
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -171,5 +173,29 @@ fn photographs_of_the_path_tracer_differ_by_their_noise() {
         // What is left beside the noise.
         let beside = (off * off - by_noise * by_noise).max(0.0).sqrt();
         assert!(beside < 0.006, "{sample}: {beside}");
+    }
+}
+
+/// The samples' tables, compensated frames of which the path tracer rendered
+/// (`tests/closed_loop.py`), against what their photographs predict.
+#[test]
+fn what_a_viewer_sees_is_predicted_as_the_path_tracer_shows_it() {
+    for (sample, rendered) in [("m-panels", 0.0181), ("m-panels-colour", 0.0576)] {
+        let capture = host_tools().join("samples").join(sample);
+        let learned = iltm::build_table::build_table(
+            &capture,
+            &CaptureOptions::default(),
+            &SolveOptions::default(),
+            &iltm::build_table::TableOptions::default(),
+            &Silent,
+        );
+        let predicted = learned.unwrap().predicted;
+        println!("{sample}: {predicted:?}");
+        let factor = predicted.compensated / rendered;
+        assert!((1.0 / 1.3..1.3).contains(&factor), "{sample}: {factor}");
+        let figures = predicted.figures.expect("pixels are seen");
+        assert!(figures.relative.to_bits() == predicted.compensated.to_bits());
+        assert!(figures.worst_places > 2.0 * figures.relative);
+        assert!(figures.ssim.is_some_and(|ssim| ssim > 0.95));
     }
 }

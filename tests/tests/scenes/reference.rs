@@ -49,7 +49,8 @@ fn learned(method: Method) -> (InverseTransport, f64) {
         method,
         ..SolveOptions::default()
     };
-    let (inverse, _) = solve(measurements(), &options, &Silent).expect("the sample can be solved");
+    let solved = solve(measurements(), &options, &Silent).expect("the sample can be solved");
+    let inverse = solved.inverse;
     let white = uniform_white(&inverse).expect("lit");
     (inverse, white)
 }

@@ -44,6 +44,7 @@ pub use cells::fine_flood::FineFlood;
 pub use cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 pub use cells::noise::{NoiseModel, NoiseSource};
 pub use cells::nonlinearity::Nonlinearity;
+pub use cells::pixel_light::PixelLight;
 pub use devices::{
     CameraFit, CameraSource, ColourMixingMatrix, Devices, Fall, Probe, Ramp, RampPoint,
 };

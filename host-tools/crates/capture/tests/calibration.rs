@@ -117,7 +117,8 @@ impl Mixed {
 /// wanted: of the projector's primaries if they were unmixed, else of the camera's
 /// channels.
 fn error(measured: &Measurements, mix: [[f64; 3]; 3]) -> f64 {
-    let (inverse, _) = solve(measured, &SolveOptions::default(), &Silent).unwrap();
+    let solved = solve(measured, &SolveOptions::default(), &Silent);
+    let inverse = solved.unwrap().inverse;
     let cells = measured.grid.cells();
     let wanted = [0, 1, 2].map(|channel| {
         DVector::from_fn(cells, |cell, _| {

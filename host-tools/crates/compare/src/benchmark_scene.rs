@@ -94,7 +94,7 @@ impl BenchmarkScene {
     ) -> Result<Self, BenchmarkSceneError> {
         let measurements = iltm_capture::read(folder, &CaptureOptions::default(), progress)?;
         check_size(measurements.grid)?;
-        let (inverse, _) = solve(&measurements, &SolveOptions::default(), progress)?;
+        let inverse = solve(&measurements, &SolveOptions::default(), progress)?.inverse;
         let cells = measurements.grid.cells();
         let channel = inverse.channels.len() / 2;
         let measured = read_reference(folder, measurements.grid, inverse.channels.len())?;

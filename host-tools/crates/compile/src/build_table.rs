@@ -1,12 +1,12 @@
 //! Building a table: the whole job on photographs, from a capture to a checked image.
 
-use crate::provenance::Provenance;
+use crate::provenance::{PredictedError, Provenance};
 use crate::reference_white::{ReferenceWhite, WhiteRequest};
-use crate::{CompileError, CompileOptions, Compiled, FineGains};
+use crate::{CompileError, CompileOptions, Compiled, FineGains, ViewerError};
 use iltm_capture::{CaptureError, CaptureOptions, FineFlood, Measurements};
 use iltm_picture::progress::Progress;
 use iltm_runtime::FrameSize;
-use iltm_solve::{Compensation, InverseTransport, SolveError, SolveOptions, SolveReport};
+use iltm_solve::{Compensation, InverseTransport, SolveError, SolveOptions, SolveReport, Solved};
 use std::path::Path;
 use thiserror::Error;
 
@@ -22,10 +22,20 @@ pub struct BuiltTable {
     pub fine: Option<FineGains>,
     /// How the inverse came about.
     pub report: SolveReport,
+    /// What a viewer is predicted to see.
+    pub predicted: PredictedError,
     /// The reference white, and why it is that.
     pub white: ReferenceWhite,
     /// The table.
     pub compiled: Compiled,
+}
+
+impl BuiltTable {
+    /// Predicted error of the way to project that the table has.
+    #[must_use]
+    pub fn predicted_error(&self) -> f64 {
+        self.predicted.of(self.report.compensation)
+    }
 }
 
 /// What a table is to be, beside what the photographs say.
@@ -95,17 +105,27 @@ pub fn build_table_from(
     table: &TableOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<BuiltTable, BuildError> {
-    let (inverse, report) = iltm_solve::solve(&measurements, options, progress)?;
+    let Solved {
+        inverse,
+        report,
+        trials,
+    } = iltm_solve::solve(&measurements, options, progress)?;
+    if report.compensation == Compensation::Nothing {
+        return Err(BuildError::Worse {
+            uncompensated: report.prediction.uncompensated,
+            gain_only: report.prediction.gain_only,
+            compensated: report.prediction.compensated,
+        });
+    }
+    progress.begin("predicting what a viewer sees", 0);
+    let flood = FineFlood::new(&measurements, table.gain_resolution);
+    let gain_only = iltm_solve::gain_only(&(&measurements).into(), &report)?;
+    let viewer = ViewerError::predict(&measurements, &trials, &gain_only, &flood);
+    let predicted = PredictedError::new(&report, viewer);
+    progress.end();
     let mut inverse = match report.compensation {
-        Compensation::Operator => inverse,
-        Compensation::GainOnly => iltm_solve::gain_only(&(&measurements).into(), &report)?,
-        Compensation::Nothing => {
-            return Err(BuildError::Worse {
-                uncompensated: report.prediction.uncompensated,
-                gain_only: report.prediction.gain_only,
-                compensated: report.prediction.compensated,
-            });
-        }
+        Compensation::GainOnly => gain_only,
+        Compensation::Operator | Compensation::Nothing => inverse,
     };
     progress.begin("compiling the table", 0);
     if table.keep_ambient {
@@ -113,19 +133,18 @@ pub fn build_table_from(
             channel.ambient.fill(0.0);
         }
     }
-    let flood = FineFlood::new(&measurements, table.gain_resolution);
     let fine = crate::gain::fine_gains(&inverse, &flood);
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white)?;
     let provenance = Provenance {
         ambient_kept: table.keep_ambient,
-        ..Provenance::new(capture, &measurements, &report, &white)
+        ..Provenance::new(capture, &measurements, &report, predicted, &white)
     };
     let options = CompileOptions {
         label: provenance.label(),
         projector: measurements.devices.projector.clone(),
         pixels: measurements.settings.projector.pixels(),
         reference_white: Some(white.light),
-        inverse_error: report.predicted_error(),
+        inverse_error: predicted.of(report.compensation),
         provenance: provenance.to_text(),
         targets: None,
     };
@@ -136,6 +155,7 @@ pub fn build_table_from(
         inverse,
         fine,
         report,
+        predicted,
         white,
         compiled,
     })

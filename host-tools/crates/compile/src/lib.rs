@@ -12,6 +12,7 @@
 //! | gains, also finer than the cells | [`gain`] |
 //! | projector codes by drive | [`response`] |
 //! | bytes | [`image`] |
+//! | what a viewer would see of natural images | [`ViewerError`] |
 //! | what a frame takes on the board | [`cost`] |
 //! | the seal behind them | [`sign`] |
 //!
@@ -33,9 +34,11 @@ pub mod sign;
 mod table;
 #[cfg(test)]
 mod test_scene;
+mod viewer_error;
 
 pub use brightness::Brightness;
 pub use gain::FineGains;
 pub use ladder::Ladder;
 pub use provenance::{Photographs, PredictedError, Provenance};
 pub use table::{CompileError, CompileOptions, Compiled, compile};
+pub use viewer_error::ViewerError;

@@ -2,9 +2,11 @@
 
 use crate::brightness::Brightness;
 use crate::reference_white::ReferenceWhite;
+use crate::viewer_error::ViewerError;
 use iltm_capture::{Measurements, Settings};
+use iltm_picture::PictureError;
 use iltm_runtime::image::Label;
-use iltm_solve::{Recovery, SolveReport};
+use iltm_solve::{Compensation, Recovery, SolveReport};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
@@ -41,7 +43,7 @@ pub struct Provenance {
     pub ignored_gates: Vec<String>,
     /// Name of the [`Compensation`](iltm_solve::Compensation).
     pub compensation: String,
-    /// Errors that held-out photographs predict.
+    /// What a viewer is predicted to see.
     #[serde(deserialize_with = "if_readable")]
     pub predicted_error: Option<PredictedError>,
     /// Constants of the theorem about the paper's method.
@@ -82,7 +84,8 @@ pub struct Photographs {
     pub bernoulli: usize,
 }
 
-/// Predicted errors, relative to the wanted light.
+/// Errors that a viewer is predicted to see of natural images, relative to the wanted light, pixel
+/// by pixel; by cells where pixels tell nothing.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct PredictedError {
     /// With the picture as it is.
@@ -91,6 +94,50 @@ pub struct PredictedError {
     pub gain_only: f64,
     /// With the operator.
     pub compensated: f64,
+    /// The table's error by cells, as held-out photographs predict it: what a verification by cells
+    /// may expect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_cells: Option<f64>,
+    /// The table's error in other people's figures; `None` where pixels tell nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub figures: Option<PictureError>,
+}
+
+impl PredictedError {
+    pub(crate) fn new(report: &SolveReport, viewer: Option<ViewerError>) -> Self {
+        let cells = report.prediction;
+        let by_cells = Some(report.predicted_error());
+        let Some(viewer) = viewer else {
+            return Self {
+                uncompensated: cells.uncompensated,
+                gain_only: cells.gain_only,
+                compensated: cells.compensated,
+                by_cells,
+                figures: None,
+            };
+        };
+        Self {
+            uncompensated: viewer.uncompensated.relative,
+            gain_only: viewer.gain_only.relative,
+            compensated: viewer.compensated.relative,
+            by_cells,
+            figures: Some(match report.compensation {
+                Compensation::Operator => viewer.compensated,
+                Compensation::GainOnly => viewer.gain_only,
+                Compensation::Nothing => viewer.uncompensated,
+            }),
+        }
+    }
+
+    /// Error of one way to project.
+    #[must_use]
+    pub const fn of(&self, compensation: Compensation) -> f64 {
+        match compensation {
+            Compensation::Operator => self.compensated,
+            Compensation::GainOnly => self.gain_only,
+            Compensation::Nothing => self.uncompensated,
+        }
+    }
 }
 
 impl Provenance {
@@ -99,6 +146,7 @@ impl Provenance {
         capture: &Path,
         measurements: &Measurements,
         report: &SolveReport,
+        predicted: PredictedError,
         white: &ReferenceWhite,
     ) -> Self {
         let folder = || {
@@ -127,11 +175,7 @@ impl Provenance {
             condition: report.condition,
             ignored_gates: failed.map(|gate| gate.name.to_string()).collect(),
             compensation: report.compensation.to_string(),
-            predicted_error: Some(PredictedError {
-                uncompensated: report.prediction.uncompensated,
-                gain_only: report.prediction.gain_only,
-                compensated: report.prediction.compensated,
-            }),
+            predicted_error: Some(predicted),
             recovery: report.recovery,
             mixing: mixing.filter(|_| measurements.devices.unmixed),
             white: Some(*white),

@@ -6,6 +6,7 @@
 //! | pictures as codes, and as PNG files | [`Picture`], [`png`] |
 //! | pictures as linear light | [`LightPicture`] |
 //! | response curves, declared and measured | [`Response`], [`Curve`] |
+//! | how far a picture is from another | [`PictureError`] |
 //! | between pixels and cells | [`Lattice`] |
 //! | numbers as colours, lines and words | [`ColourScale`], [`chart`], [`numbers`] |
 //! | pictures and letters on one picture | [`ContactSheet`], [`canvas`] |
@@ -29,6 +30,7 @@ mod light_picture;
 pub mod npy;
 pub mod numbers;
 mod picture;
+mod picture_error;
 pub mod png;
 pub mod progress;
 mod response;
@@ -43,6 +45,7 @@ pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
 pub use lattice::Lattice;
 pub use light_picture::LightPicture;
 pub use picture::{Picture, Samples};
+pub use picture_error::PictureError;
 pub use response::{Declared, Response};
 pub use whole_file::{FileError, WholeFile};
 pub use whole_folder::{FolderError, WholeFolder, check_free, check_own};

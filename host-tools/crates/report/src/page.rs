@@ -7,7 +7,7 @@ use iltm_picture::{
     chart::{Chart, ChartAxis, Series},
     html::{capitalised, colour_bar, document, grouped, img_named, number, percent},
 };
-use iltm_solve::{Compensation, Prediction};
+use iltm_solve::Compensation;
 use maud::{Markup, html};
 
 /// What the page says that photographs cannot.
@@ -50,10 +50,9 @@ impl Report<'_> {
     /// fetched, nothing runs.
     #[must_use]
     pub fn html(&self, words: &Words) -> String {
-        let prediction = self.learned.report.prediction;
         let body = html! {
             main {
-                (self.opening(words, prediction))
+                (self.opening(words))
                 (self.scene())
                 (self.pictures_section())
                 (self.bounces())
@@ -67,7 +66,8 @@ impl Report<'_> {
         document(&words.title, "", &body)
     }
 
-    fn opening(&self, words: &Words, prediction: Prediction) -> Markup {
+    fn opening(&self, words: &Words) -> Markup {
+        let predicted = self.learned.predicted;
         let counts = self.learned.report.photographs;
         let chosen = self.learned.report.compensation;
         let mark = |way| if way == chosen { "best" } else { "" };
@@ -77,13 +77,17 @@ impl Report<'_> {
                 h1 { (words.title) }
                 p .lead { (words.scene) }
                 div .numbers {
-                    (headline(prediction.uncompensated, "projected as it is", ""))
+                    (headline(predicted.uncompensated, "projected as it is", ""))
                     (headline(self.gains_alone(), "each pixel's brightness and colour corrected", mark(Compensation::GainOnly)))
-                    (headline(prediction.compensated, "interreflections cancelled as well", mark(Compensation::Operator)))
+                    (headline(predicted.compensated, "interreflections cancelled as well", mark(Compensation::Operator)))
+                }
+                @if let Some(figures) = predicted.figures {
+                    p { "As the table projects: " (figures.words()) "." }
                 }
                 p .quiet {
-                    "Error of the projection relative to the wanted image, by " (counts.held_out)
-                    " photographs that were kept out of the solve (and chose its one weight): "
+                    "Error of natural images on the wall relative to the wanted ones, pixel by pixel, ambient light "
+                    "included, as the photographs predict it (" (counts.held_out) " of them were kept out of the solve "
+                    "for this, and chose its one weight): "
                     span .formula { "\u{2016}s\u{b7}photograph \u{2212} wanted\u{2016} / \u{2016}wanted\u{2016}" }
                     ", with the one factor s for all pixels and colours that suits the photograph best, so that a "
                     "dim projection alone is no error."
@@ -148,8 +152,8 @@ impl Report<'_> {
                     "anyway, the input is clipped at black, and an error remains that no projector could avoid."
                 }
                 p .quiet {
-                    "What they cannot show is how far the learned transport itself is off: the held-out photographs "
-                    "put that at " (percent(self.learned.report.predicted_error())) ". It comes on top of the errors below (as the root of the sum "
+                    "What they cannot show is how far the learned transport itself is off: the photographs "
+                    "put that at " (percent(self.learned.predicted_error())) ". It comes on top of the errors below (as the root of the sum "
                     "of squares)."
                 }
                 @for example in &self.examples { (self.example(example)) }
@@ -291,7 +295,7 @@ impl Report<'_> {
     }
 
     fn accuracy(&self) -> Markup {
-        let own = self.learned.report.predicted_error();
+        let own = self.learned.predicted_error();
         let tiers = self.ladder.iter();
         let series = Series {
             points: tiers

@@ -10,10 +10,11 @@
 //! are held out together: the one would tell the other.
 
 use super::gain_only::gains;
+use super::observed::Observed;
 use super::options::GainOnly;
 use super::prepare::Prepared;
 use super::report::Prediction;
-use super::solution::Candidate;
+use super::solution::{Candidate, Solution, Trial};
 use iltm_capture::Role;
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
@@ -90,7 +91,29 @@ fn groups(prepared: &Prepared) -> Vec<Vec<usize>> {
 /// Inverses, one a channel, with the photographs they have not seen.
 pub(super) struct Judged<'j> {
     pub(super) split: &'j Split,
+    solution: Solution,
     pub(super) candidates: Vec<Candidate>,
+}
+
+impl<'j> Judged<'j> {
+    pub(super) fn new(split: &'j Split, solution: Solution, live: &[bool]) -> Self {
+        Self {
+            split,
+            candidates: solution.candidates(live),
+            solution,
+        }
+    }
+
+    /// The same in camera units, for who judges more than cells.
+    pub(super) fn trial(self, observed: &Observed<'_>, prepared: &Prepared) -> Trial {
+        let all: Vec<usize> = (0..prepared.roles.len()).collect();
+        let thrown = |candidate: &Candidate| candidate.thrown(prepared, &all);
+        Trial {
+            thrown: self.candidates.iter().map(thrown).collect(),
+            inverse: self.solution.in_camera_units(observed, prepared, None),
+            held_out: self.split.held_out.clone(),
+        }
+    }
 }
 
 /// Squared misfit `||T p - c||^2` over all channels of the photographs `chosen`;

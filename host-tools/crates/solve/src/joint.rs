@@ -153,10 +153,8 @@ impl<'p> Solver<'p> {
         for fold in &mut folds {
             if let Some(mut best) = fold.best.take() {
                 self.add_deviations(&mut best, &fold.photographs, choice.lambda, TRIAL, progress);
-                choice.judged.push(Judged {
-                    split: fold.split,
-                    candidates: best.candidates(&self.prepared.live),
-                });
+                let live = &self.prepared.live;
+                choice.judged.push(Judged::new(fold.split, best, live));
             }
         }
         // The solve of all photographs starts from here.

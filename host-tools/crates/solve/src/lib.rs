@@ -72,7 +72,10 @@ pub use flux::Flux;
 pub use forward::Inverse;
 pub use gain_only::gain_only;
 pub use haar::Haar;
-pub use natural_images::{DARKEST_SHOWN, DARKEST_WANTED, IMAGES, natural_images, wanted_images};
+pub use natural_images::{
+    DARKEST_SHOWN, DARKEST_WANTED, IMAGES, SUPERSAMPLING, fine_natural_images, natural_images,
+    wanted_images,
+};
 pub use observability::{LeftOut, WhyLeftOut};
 pub use observed::{CellNoise, Observed, ObservedChannel};
 pub use options::{GainOnly, Method, SolveOptions, UnknownMethod};
@@ -80,7 +83,7 @@ pub use report::{
     Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };
 pub use restricted_isometry::Recovery;
-pub use solution::{ChannelInverse, InverseTransport};
+pub use solution::{ChannelInverse, InverseTransport, Solved, Trial};
 
 use clipped_projection::ClippedProjection;
 use convergence::Stop;
@@ -120,8 +123,8 @@ pub fn solve(
     measurements: &Measurements,
     options: &SolveOptions,
     progress: &dyn Progress,
-) -> Result<(InverseTransport, SolveReport), SolveError> {
-    solve_observed(&measurements.into(), options, progress)
+) -> Result<Solved, SolveError> {
+    solve_judged(&measurements.into(), options, progress)
 }
 
 /// [`solve`] for observations that are not from photographs.
@@ -133,6 +136,15 @@ pub fn solve_observed(
     options: &SolveOptions,
     progress: &dyn Progress,
 ) -> Result<(InverseTransport, SolveReport), SolveError> {
+    let solved = solve_judged(observed, options, progress)?;
+    Ok((solved.inverse, solved.report))
+}
+
+fn solve_judged(
+    observed: &Observed<'_>,
+    options: &SolveOptions,
+    progress: &dyn Progress,
+) -> Result<Solved, SolveError> {
     let mut clock = Clock::new();
     options.check()?;
     let prepared = Prepared::new(observed)?;
@@ -189,12 +201,14 @@ pub fn solve_observed(
         recovery,
         seconds,
     };
-    Ok((
-        outcome
+    let trial = |judged: Judged<'_>| judged.trial(observed, &prepared);
+    Ok(Solved {
+        trials: outcome.judged.into_iter().map(trial).collect(),
+        inverse: outcome
             .solution
             .in_camera_units(observed, &prepared, deblurred.map(|s| s.parts)),
         report,
-    ))
+    })
 }
 
 /// What clipping makes of natural images, and the inverse that undoes the projector's blur
@@ -334,10 +348,7 @@ impl<'t> Task<'t> {
             let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
             let trial = solve(&chosen, "solving without the held-out photographs")?;
             iterations += trial.convergence.iterations;
-            judged.push(Judged {
-                split,
-                candidates: trial.candidates(&self.prepared.live),
-            });
+            judged.push(Judged::new(split, trial, &self.prepared.live));
         }
         seconds.choose = clock.lap();
         let solution = solve(&usable, "solving")?;

@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 pub const IMAGES: usize = 16;
 
 /// Samples along each side of a cell.
-const SUPERSAMPLING: usize = 4;
+pub const SUPERSAMPLING: usize = 4;
 
 /// Discs an image; enough that no part of it stays bare.
 const DISCS: usize = 1_500;
@@ -26,10 +26,8 @@ const MOST_RADIUS: f64 = 0.4;
 /// Linear light of natural-looking images, `N x IMAGES`, 0 to 1.
 #[must_use]
 pub fn natural_images(grid: Grid) -> DMatrix<f64> {
-    let mut random = fastrand::Rng::with_seed(0x1E4F);
     let mut images = DMatrix::zeros(grid.cells(), IMAGES);
-    for mut image in images.column_iter_mut() {
-        let fine = dead_leaves(grid, &mut random);
+    for (mut image, fine) in images.column_iter_mut().zip(fine_natural_images(grid)) {
         let width = grid.cols() * SUPERSAMPLING;
         for (index, light) in fine.iter().enumerate() {
             let (row, col) = (index / width / SUPERSAMPLING, index % width / SUPERSAMPLING);
@@ -37,6 +35,12 @@ pub fn natural_images(grid: Grid) -> DMatrix<f64> {
         }
     }
     images
+}
+
+/// The same images with [`SUPERSAMPLING`] times the grid's rows and columns, row by row.
+pub fn fine_natural_images(grid: Grid) -> impl Iterator<Item = Vec<f64>> {
+    let mut random = fastrand::Rng::with_seed(0x1E4F);
+    (0..IMAGES).map(move |_| dead_leaves(grid, &mut random))
 }
 
 /// Darkest light of [`wanted_images`], of white: walls that light each other cannot be

@@ -5,6 +5,7 @@ use super::convergence::Convergence;
 use super::forward::{Inverse, product};
 use super::observed::Observed;
 use super::prepare::Prepared;
+use super::report::SolveReport;
 use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
 
@@ -59,6 +60,29 @@ impl InverseTransport {
     }
 }
 
+/// What a solve found.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// The inverse from all photographs.
+    pub inverse: InverseTransport,
+    /// How it came about.
+    pub report: SolveReport,
+    /// Inverses to judge it by; no photograph is held out of two.
+    pub trials: Vec<Trial>,
+}
+
+/// An inverse that has not seen some of the photographs.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// Which, by column of the patterns.
+    pub held_out: Vec<usize>,
+    /// The inverse. It does not undo the projector's blur.
+    pub inverse: InverseTransport,
+    /// What cells that took no part throw on the others, as projector input, by cell and photograph,
+    /// one a channel; `None` if all took part.
+    pub thrown: Vec<Option<DMatrix<f64>>>,
+}
+
 /// What a method found.
 #[derive(Debug)]
 pub(super) struct Solution {
@@ -94,10 +118,16 @@ impl Candidate {
     /// Light in the photographs `chosen`.
     pub(super) fn light(&self, prepared: &Prepared, chosen: &[usize]) -> Option<DMatrix<f64>> {
         let mut projected = prepared.patterns.select_columns(chosen);
-        if let (Some(thrown), Some(unseen)) = (&self.thrown, &prepared.unseen) {
-            projected += product(thrown, &unseen.select_columns(chosen));
+        if let Some(thrown) = self.thrown(prepared, chosen) {
+            projected += thrown;
         }
         self.inverse.light(&projected)
+    }
+
+    /// What cells that are not live throw on the others in the photographs `chosen`.
+    pub(super) fn thrown(&self, prepared: &Prepared, chosen: &[usize]) -> Option<DMatrix<f64>> {
+        let (thrown, unseen) = (self.thrown.as_ref()?, prepared.unseen.as_ref()?);
+        Some(product(thrown, &unseen.select_columns(chosen)))
     }
 }
 

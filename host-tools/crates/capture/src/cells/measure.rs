@@ -5,9 +5,11 @@ use super::drift::Drift;
 use super::measurements::{ChannelMeasurements, Measurements};
 use super::noise::{NoiseModel, NoiseSource};
 use super::noise_samples::NoiseSamples;
+use super::pixel_light::PixelSamples;
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
 use crate::photographs::Photographs;
+use crate::photographs::sampled::Sampled;
 use iltm_picture::progress::Progress;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -17,6 +19,7 @@ pub(crate) struct CellLight {
     /// One entry a channel: `N x shots`, camera units, 0 where a cell is not live.
     pub(crate) channels: Vec<DMatrix<f64>>,
     samples: NoiseSamples,
+    pub(crate) pixels: PixelSamples,
 }
 
 /// Averages every photograph over the pixels of each cell.
@@ -27,12 +30,14 @@ pub(crate) fn observe(
     sequence: &Sequence,
     photographs: &mut Photographs<'_>,
     cells: &CellPixels,
+    sampled: &Sampled,
     progress: &dyn Progress,
 ) -> Result<CellLight, CaptureError> {
     let shots: Vec<usize> = (0..sequence.shots.len()).collect();
     let empty = DMatrix::zeros(cells.live.len(), shots.len());
     let mut channels = vec![empty; photographs.format.channels];
     let mut samples = NoiseSamples::new(sequence, cells);
+    let mut pixels = PixelSamples::new(&sampled.pixels, shots.len());
     photographs.for_batches(&shots, progress, |photos| {
         let means: Vec<Vec<Vec<f64>>> = photos
             .par_iter()
@@ -43,9 +48,14 @@ pub(crate) fn observe(
                 light.column_mut(*shot).copy_from_slice(&mean);
             }
             samples.keep(*shot, photo);
+            pixels.keep(*shot, photo);
         }
     })?;
-    Ok(CellLight { channels, samples })
+    Ok(CellLight {
+        channels,
+        samples,
+        pixels,
+    })
 }
 
 /// Everything that the photographs yield.

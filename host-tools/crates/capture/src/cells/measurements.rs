@@ -3,6 +3,7 @@
 
 use super::cell_pixels::LeftOut;
 use super::noise::{NoiseModel, NoiseSource};
+use super::pixel_light::PixelLight;
 use crate::devices::Devices;
 use crate::format::picture_file::FileFormat;
 use crate::format::role::Role;
@@ -38,6 +39,8 @@ pub struct Measurements {
     pub live: Vec<bool>,
     /// Camera pixels kept for each cell, length `N`.
     pub pixels: Vec<u32>,
+    /// Light of some camera pixels in each view.
+    pub pixel_light: PixelLight,
     /// Where each cell is in the photographs.
     pub registration: Registration,
     /// The flood photograph with black subtracted, one plane a channel, row by

@@ -9,6 +9,7 @@
 //! | brightness of a photograph against all others | `leave_one_out`, `drift`, `mains_banding` |
 //! | whether light adds up, and why not | `superposition`, `nonlinearity` |
 //! | between the cells and within one | `cell_interpolation`, `fine_flood` |
+//! | pixel by pixel, some of them | `pixel_light` |
 
 mod cell_interpolation;
 pub(crate) mod cell_pixels;
@@ -21,6 +22,7 @@ pub(crate) mod measurements;
 pub(crate) mod noise;
 mod noise_samples;
 pub(crate) mod nonlinearity;
+pub(crate) mod pixel_light;
 pub(crate) mod superposition;
 
 use crate::format::error::CaptureError;
@@ -36,11 +38,13 @@ use measurements::ChannelMeasurements;
 use nalgebra::DMatrix;
 use noise::NoiseSource;
 use nonlinearity::Nonlinearity;
+use pixel_light::PixelLight;
 use superposition::Sums;
 
 /// Light of all cells, and what it shows of the session.
 pub(crate) struct CellEvidence {
     pub(crate) channels: Vec<ChannelMeasurements>,
+    pub(crate) pixel_light: PixelLight,
     pub(crate) noise: NoiseSource,
     pub(crate) steadiness: Steadiness,
     pub(crate) banding: Option<MainsBanding>,
@@ -63,13 +67,13 @@ impl CellEvidence {
         sequence: &Sequence,
         photographs: &mut Photographs<'_>,
         registration: &Registration,
-        pixels: &CellPixels,
+        (pixels, saturated): (&CellPixels, &[bool]),
         sampled: &Sampled,
         power: Option<f64>,
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
         progress.begin("measuring cells", sequence.shots.len() as u64);
-        let light = measure::observe(sequence, photographs, pixels, progress)?;
+        let light = measure::observe(sequence, photographs, pixels, sampled, progress)?;
         progress.end();
         let live = &pixels.live;
         let bands = |steadiness: &Steadiness, light: &[DMatrix<f64>]| {
@@ -94,14 +98,18 @@ impl CellEvidence {
         let sums = Sums::new(sequence, summed, live);
         let off = sums.as_ref().is_some_and(Sums::off);
         let find = || nonlinearity::find(sequence, live, &light.channels, sampled);
+        let nonlinearity = off.then(find);
+        let banding = bands(&steadiness, &light.channels);
+        let pixel_light = (light.pixels).average(sequence, &steadiness.drift, saturated);
         Ok(Self {
-            nonlinearity: off.then(find),
+            nonlinearity,
             sums,
-            banding: bands(&steadiness, &light.channels),
+            banding,
             straightened: power.map(straighten),
             steadiness,
             channels: observed.channels,
             noise: observed.noise,
+            pixel_light,
         })
     }
 }

@@ -33,7 +33,9 @@ impl Sampled {
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
         let (width, height) = (photographs.format.width, photographs.format.height);
-        let fits = MOST_BYTES / (SIDE * SIDE * size_of::<f32>() * shots.max(1));
+        // What becomes of them are the channels' light and its sum, by shot.
+        let values = (photographs.format.channels + 1) * shots.max(1);
+        let fits = MOST_BYTES / (SIDE * SIDE * size_of::<f32>() * values);
         let pixels = squares(width, height, fits.clamp(16, MOST_SQUARES));
         let mut taken = Vec::with_capacity(shots);
         progress.begin("comparing photographs and patterns", shots as u64);

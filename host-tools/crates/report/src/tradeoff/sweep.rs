@@ -118,7 +118,7 @@ impl Base<'_> {
             projector: self.learned.measurements.devices.projector.clone(),
             pixels: None,
             reference_white: None,
-            inverse_error: self.learned.report.predicted_error(),
+            inverse_error: self.learned.predicted_error(),
             targets: None,
             provenance: String::new(),
         }
@@ -258,7 +258,7 @@ impl Base<'_> {
         };
         let timed = microseconds_at(&coarse, inverse.grid).map_err(TradeoffError::Timing)?;
         let size = FrameSize::of_grid(inverse.grid);
-        let own = self.learned.report.predicted_error();
+        let own = self.learned.predicted_error();
         let common = self
             .common
             .again(Sweep::Grid, format!("operator of {grid} cells"));

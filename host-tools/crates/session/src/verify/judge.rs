@@ -10,6 +10,7 @@ use super::outcome::decide;
 use super::readings::Shown;
 use super::{Cause, ChainFault, Expected, Outcome, Readings, VerifyError};
 use iltm_capture::{CellPlanes, Gate};
+use iltm_compile::Provenance;
 use iltm_picture::LightPicture;
 use iltm_report::{Comparison, tier_costs};
 use iltm_runtime::{FrameSize, image::Table};
@@ -383,8 +384,13 @@ fn bound(
     viewpoint: f64,
     lit: &LiveCells,
 ) -> Bound {
-    let own = table.inverse_error().to_num::<f64>();
-    let predicted = tier_costs(table).last().map(|step| step.total);
+    // Cells are measured here, which err less than pixels.
+    let predicted = Provenance::read(table.provenance()).predicted_error;
+    let by_cells = predicted.and_then(|predicted| predicted.by_cells);
+    let own = by_cells.unwrap_or_else(|| table.inverse_error().to_num());
+    let predicted = tier_costs(table)
+        .last()
+        .map(|step| step.left_out.hypot(own));
     let range = |image: &ImageVerdict| image.modelled.map(|modelled| modelled[1]);
     let ranges: Vec<Option<f64>> = images.iter().map(range).collect();
     bound_of(

@@ -1,0 +1,598 @@
+//! Viewer error: what a viewer would see of natural images, predicted pixel by pixel by an inverse
+//! that has not seen all photographs.
+//!
+//! A table believes that a pixel's light is what the projector throws there and what bounces there:
+//! `D + B` with `D = p / g` and `B = (U K c) / g`, for a pattern `p`, gains `g` and the cells'
+//! light `c`. What a photograph shows beyond that is the table's error. It has two parts:
+//!
+//! | part | found from | in a natural image |
+//! |---|---|---|
+//! | how far direct and bounced light of a pixel are off: `a D + b B` | all photographs: two numbers of a pixel, which nothing fitted before; once from either half of them, so that the product of both has no noise | the same `a` and `b` |
+//! | the rest, which is the operator's and differs from photograph to photograph | held-out photographs: products of neighbouring pixels, which have no noise either | less, by the contrast of the image's cells |
+
+use crate::FineGains;
+use crate::gain::fine_gains;
+use iltm_capture::{FineFlood, Measurements, PixelLight};
+use iltm_picture::{LightPicture, PictureError};
+use iltm_runtime::{FrameSize, Grid};
+use iltm_solve::{
+    DARKEST_WANTED, Inverse, InverseTransport, SUPERSAMPLING, Trial, fine_natural_images,
+};
+use nalgebra::{DMatrix, DVector};
+
+/// Natural images that are looked at.
+const LOOKED_AT: usize = 6;
+
+/// Camera pixels around one that must see the same light of a pattern: at an edge, the pattern's
+/// own edge counts and not the table.
+const CLEAR: f32 = 0.75;
+
+/// Camera pixels between two whose errors are compared: neighbours share noise where a camera
+/// interpolates its colours.
+const APART: usize = 2;
+
+/// Ways to halve the photographs: by the last bits of their numbers.
+const HALVINGS: usize = 3;
+
+/// What codes of 8 bits take away of an image, root mean square of light: half a step at most, and
+/// a step at usual brightness is 1.7/255 of white.
+const CODES: f64 = 1.7 / 255.0 / 3.464;
+
+/// A fit is made where direct and bounced light differ by more than this.
+const LEAST_DETERMINANT: f64 = 0.02;
+
+/// What a viewer would see of natural images.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct ViewerError {
+    /// Of the images as they are.
+    pub uncompensated: PictureError,
+    /// With gains alone.
+    pub gain_only: PictureError,
+    /// With the inverse.
+    pub compensated: PictureError,
+}
+
+impl ViewerError {
+    /// Predicts it from the photographs that the `trials` have not seen. `None` if they are too
+    /// few, or if too few pixels are seen.
+    #[must_use]
+    pub fn predict(
+        measurements: &Measurements,
+        trials: &[Trial],
+        gain_only: &InverseTransport,
+        flood: &FineFlood,
+    ) -> Option<Self> {
+        let images = Images::new(measurements.grid);
+        let mut compensated = Vec::new();
+        for trial in trials {
+            let scene = Scene::new(measurements, &trial.inverse, flood);
+            let fits = scene.fits(measurements, trial);
+            compensated.extend(scene.with_errors(&images, &fits?));
+        }
+        let scene = Scene::new(measurements, &trials.first()?.inverse, flood);
+        let corrected = Scene::new(measurements, gain_only, flood);
+        let uncompensated = scene.projected(&images, |_, _| (1.0, None), true)?;
+        let gains = |channel: usize, site: usize| {
+            let gain = corrected.gains[channel][site];
+            (gain, Some(&gain_only.channels[channel].gain))
+        };
+        Some(Self {
+            uncompensated: PictureError::mean(&uncompensated)?,
+            gain_only: PictureError::mean(&scene.projected(&images, gains, false)?)?,
+            compensated: PictureError::mean(&compensated)?,
+        })
+    }
+}
+
+/// Natural images: each at the grid's size, and finer.
+struct Images {
+    cells: Vec<DVector<f64>>,
+    fine: Vec<Vec<f64>>,
+}
+
+impl Images {
+    fn new(grid: Grid) -> Self {
+        let wanted = |light: &mut f64| *light = DARKEST_WANTED + (1.0 - DARKEST_WANTED) * *light;
+        let fine = fine_natural_images(grid).take(LOOKED_AT).map(|mut image| {
+            image.iter_mut().for_each(wanted);
+            image
+        });
+        let fine: Vec<Vec<f64>> = fine.collect();
+        let width = grid.cols() * SUPERSAMPLING;
+        let cells = |image: &Vec<f64>| {
+            let mut cells = DVector::zeros(grid.cells());
+            for (at, light) in image.iter().enumerate() {
+                let (row, col) = (at / width / SUPERSAMPLING, at % width / SUPERSAMPLING);
+                cells[row * grid.cols() + col] += light / (SUPERSAMPLING * SUPERSAMPLING) as f64;
+            }
+            cells
+        };
+        Self {
+            cells: fine.iter().map(cells).collect(),
+            fine,
+        }
+    }
+}
+
+/// Four values around a place and their shares.
+#[derive(Clone, Copy)]
+struct Corners([(usize, f64); 4]);
+
+impl Corners {
+    /// Around a place in cells, on a grid with `factor` times the cells' columns and rows.
+    fn new([across, down]: [f32; 2], grid: Grid, factor: [usize; 2]) -> Self {
+        let along = |at: f32, count: usize, factor: usize| {
+            let last = (count * factor - 1) as f64;
+            let at = (f64::from(at) * factor as f64 - 0.5).clamp(0.0, last);
+            let before = at.floor();
+            (
+                before as usize,
+                (before + 1.0).min(last) as usize,
+                at - before,
+            )
+        };
+        let (left, right, x) = along(across, grid.cols(), factor[0]);
+        let (top, bottom, y) = along(down, grid.rows(), factor[1]);
+        let width = grid.cols() * factor[0];
+        Self([
+            (top * width + left, (1.0 - y) * (1.0 - x)),
+            (top * width + right, (1.0 - y) * x),
+            (bottom * width + left, y * (1.0 - x)),
+            (bottom * width + right, y * x),
+        ])
+    }
+
+    fn of(&self, values: &[f64]) -> f64 {
+        self.0.iter().map(|(at, share)| share * values[*at]).sum()
+    }
+}
+
+/// A pixel that is judged.
+struct Site {
+    /// Its number among the measured pixels.
+    at: usize,
+    /// Where it looks, in cells.
+    place: [f32; 2],
+    cells: Corners,
+}
+
+/// The scene as an inverse describes it, at the pixels that are judged.
+struct Scene<'s> {
+    grid: Grid,
+    sites: Vec<Site>,
+    /// All pixels that were measured.
+    pixels: usize,
+    inverses: Vec<Inverse>,
+    /// Ambient light by channel and cell.
+    ambient: Vec<&'s [f64]>,
+    /// `g` by channel and site.
+    gains: Vec<Vec<f64>>,
+}
+
+/// What is wrong with a table, by channel.
+struct Fits {
+    channels: Vec<ChannelFits>,
+    /// Mean square of the error that varies with the picture, for cells' light of variance 1.
+    varying: f64,
+}
+
+/// What is wrong at each site; `None` where the photographs do not tell.
+type ChannelFits = Vec<Option<SiteFit>>;
+
+/// How far off direct and bounced light are.
+#[derive(Clone, Copy)]
+struct SiteFit {
+    whole: [f64; 2],
+    /// The same from one half of the photographs and from the other, for each way to halve them.
+    halves: [Option<[[f64; 2]; 2]>; HALVINGS],
+}
+
+impl<'s> Scene<'s> {
+    fn new(measurements: &Measurements, inverse: &'s InverseTransport, flood: &FineFlood) -> Self {
+        let grid = measurements.grid;
+        let places = measurements.places();
+        let fine = fine_gains(inverse, flood);
+        let site = |(at, place): (usize, &Option<[f32; 2]>)| {
+            let place = (*place)?;
+            let cells = Corners::new(place, grid, [1; 2]);
+            let live = cells.0.iter().all(|(cell, _)| inverse.live[*cell]);
+            live.then_some(Site { at, place, cells })
+        };
+        let sites: Vec<Site> = places.iter().enumerate().filter_map(site).collect();
+        let gains = |channel: usize| {
+            let gain = |site: &Site| match &fine {
+                Some(FineGains { size, channels }) => {
+                    let factor = [size.width() / grid.cols(), size.height() / grid.rows()];
+                    Corners::new(site.place, grid, factor).of(&channels[channel])
+                }
+                None => site.cells.of(&inverse.channels[channel].gain),
+            };
+            sites.iter().map(gain).collect()
+        };
+        let channels = 0..inverse.channels.len();
+        Self {
+            grid,
+            gains: channels.clone().map(gains).collect(),
+            inverses: channels.map(|channel| inverse.channel(channel)).collect(),
+            ambient: inverse
+                .channels
+                .iter()
+                .map(|channel| &channel.ambient[..])
+                .collect(),
+            pixels: places.len(),
+            sites,
+        }
+    }
+
+    /// Light that bounces to each site, of cells with this light.
+    fn bounced(&self, channel: usize, received: &[f64]) -> Vec<f64> {
+        let sites = self.sites.iter().zip(&self.gains[channel]);
+        let bounced = |(site, gain): (&Site, &f64)| {
+            if *gain > 0.0 {
+                site.cells.of(received) / gain
+            } else {
+                0.0
+            }
+        };
+        sites.map(bounced).collect()
+    }
+
+    /// What photographs show beyond what the table believes.
+    fn fits(&self, measurements: &Measurements, trial: &Trial) -> Option<Fits> {
+        let light = &measurements.pixel_light;
+        let clear = CLEAR / measurements.registration.cell_side() as f32;
+        let blur = measurements.devices.blur;
+        let patterns = &measurements.patterns;
+        let blurred = (blur > 0.0).then(|| iltm_solve::blur(self.grid, blur) * patterns);
+        let thrown_at = |site: &Site, view: usize| match &blurred {
+            Some(blurred) => Some(site.cells.of(blurred.column(view).as_slice())),
+            None => lit(
+                self.grid,
+                site.place,
+                clear,
+                patterns.column(view).as_slice(),
+            ),
+        };
+        let (mut varying, mut contrast) = (Mean::default(), Mean::default());
+        let mut channels = Vec::new();
+        for (channel, inverse) in self.inverses.iter().enumerate() {
+            let observed = &measurements.channels[channel].observations;
+            let mut sums = vec![[[Sums::default(); 2]; HALVINGS]; self.sites.len()];
+            let mut held_out = vec![Vec::new(); self.sites.len()];
+            let mut received = &inverse.operator * observed;
+            if let Some(thrown) = &trial.thrown[channel] {
+                received += thrown;
+            }
+            // White tells no more than the gains, which come from it.
+            for view in Measurements::WHITE + 1..patterns.ncols() {
+                let is_held_out = trial.held_out.contains(&view);
+                if is_held_out {
+                    contrast.add(observed.column(view).variance());
+                }
+                let bounced = self.bounced(channel, received.column(view).as_slice());
+                for (at, site) in self.sites.iter().enumerate() {
+                    let gain = self.gains[channel][at];
+                    let thrown = thrown_at(site, view).filter(|_| gain > 0.0);
+                    let sample = thrown.map(|thrown| {
+                        let (direct, bounced) = (thrown / gain, bounced[at]);
+                        let seen = f64::from(light.channels[channel][view][site.at]);
+                        Sample {
+                            direct,
+                            bounced,
+                            error: seen - direct - bounced,
+                        }
+                    });
+                    if is_held_out {
+                        held_out[at].push(sample);
+                    }
+                    if let Some(sample) = sample {
+                        for (bit, halves) in sums[at].iter_mut().enumerate() {
+                            halves[view >> bit & 1].add(sample);
+                        }
+                    }
+                }
+            }
+            let fits: ChannelFits = sums.iter().map(SiteFit::new).collect();
+            varying.join(&self.varying(&held_out, &fits));
+            channels.push(fits);
+        }
+        let mut told = channels
+            .iter()
+            .flatten()
+            .flatten()
+            .flat_map(|fit| fit.halves);
+        told.any(|halves| halves.is_some()).then(|| Fits {
+            varying: (varying.mean() / contrast.mean()).max(0.0),
+            channels,
+        })
+    }
+
+    /// Mean square of what the fits do not explain, without noise: by products of pixels beside
+    /// each other.
+    fn varying(&self, samples: &[Vec<Option<Sample>>], fits: &ChannelFits) -> Mean {
+        let mut at_pixel = vec![None; self.pixels];
+        for (number, site) in self.sites.iter().enumerate() {
+            at_pixel[site.at] = Some(number);
+        }
+        let mut varying = Mean::default();
+        for (at, site) in self.sites.iter().enumerate() {
+            let (row, col) = (
+                site.at % (PixelLight::SIDE * PixelLight::SIDE) / PixelLight::SIDE,
+                site.at % PixelLight::SIDE,
+            );
+            let beside = [
+                (col + APART < PixelLight::SIDE, APART),
+                (row + APART < PixelLight::SIDE, APART * PixelLight::SIDE),
+            ];
+            for (_, offset) in beside.into_iter().filter(|(within, _)| *within) {
+                let Some(other) = at_pixel[site.at + offset] else {
+                    continue;
+                };
+                let (Some(own), Some(others)) = (fits[at], fits[other]) else {
+                    continue;
+                };
+                for (a, b) in samples[at].iter().zip(&samples[other]) {
+                    if let (Some(a), Some(b)) = (a, b) {
+                        varying.add(a.rest(own.whole) * b.rest(others.whole));
+                    }
+                }
+            }
+        }
+        varying
+    }
+
+    /// Natural images with the errors that were found.
+    fn with_errors(&self, images: &Images, fits: &Fits) -> Vec<PictureError> {
+        let judged = |at: usize| fits.channels.iter().all(|fits| fits[at].is_some());
+        let judged: Vec<bool> = (0..self.sites.len()).map(judged).collect();
+        let of_image = |(cells, fine): (&DVector<f64>, &Vec<f64>)| {
+            let wanted = self.wanted(fine);
+            // Square of the error with its noise, and without.
+            let (mut noisy, mut known) = (Mean::default(), Mean::default());
+            let mut errors = Vec::new();
+            for (channel, inverse) in self.inverses.iter().enumerate() {
+                let received = &inverse.operator * cells;
+                let bounced = self.bounced(channel, received.as_slice());
+                let sites = wanted.iter().zip(bounced).zip(&fits.channels[channel]);
+                let mut of_channel = Vec::with_capacity(wanted.len());
+                for ((light, bounced), fit) in sites {
+                    let off = |[a, b]: [f64; 2]| a * (light - bounced) + b * bounced;
+                    let whole = fit.map_or(0.0, |fit| off(fit.whole));
+                    of_channel.push(whole);
+                    if let Some(fit) = fit {
+                        noisy.add(whole * whole);
+                        let halves = fit.halves.into_iter().flatten();
+                        halves.for_each(|[a, b]| known.add(off(a) * off(b)));
+                    }
+                }
+                errors.push(of_channel);
+            }
+            let varying = fits.varying * cells.variance();
+            let square = known.mean().max(0.0) + varying + CODES * CODES;
+            let size = (square / noisy.mean().max(f64::MIN_POSITIVE)).sqrt();
+            let shown = errors.iter().map(|errors| {
+                let sites = wanted.iter().zip(errors);
+                sites.map(|(light, error)| light + size * error).collect()
+            });
+            self.compare(&shown.collect::<Vec<_>>(), &wanted, &judged)
+        };
+        let images = images.cells.iter().zip(&images.fine);
+        images.filter_map(of_image).collect()
+    }
+
+    /// Natural images as they would look with a projector input of so much a light in each site
+    /// and cell; `None` if light would grow without end.
+    fn projected<'g>(
+        &self,
+        images: &Images,
+        drive: impl Fn(usize, usize) -> (f64, Option<&'g Vec<f64>>),
+        with_ambient: bool,
+    ) -> Option<Vec<PictureError>> {
+        let mut errors = Vec::new();
+        let judged = vec![true; self.sites.len()];
+        for (cells, fine) in images.cells.iter().zip(&images.fine) {
+            let wanted = self.wanted(fine);
+            let mut shown = Vec::new();
+            for (channel, inverse) in self.inverses.iter().enumerate() {
+                let input = |(cell, light): (usize, &f64)| {
+                    drive(channel, 0)
+                        .1
+                        .map_or(*light, |gains| gains[cell] * light)
+                };
+                let input: Vec<f64> = cells.iter().enumerate().map(input).collect();
+                let light = inverse.light(&DMatrix::from_column_slice(input.len(), 1, &input))?;
+                let received = &inverse.operator * light.column(0);
+                let bounced = self.bounced(channel, received.as_slice());
+                let seen = |(at, bounced): (usize, f64)| {
+                    let gain = self.gains[channel][at];
+                    let direct = drive(channel, at).0 * wanted[at] / gain.max(f64::MIN_POSITIVE);
+                    let ambient = self.sites[at].cells.of(self.ambient[channel]);
+                    bounced + direct + if with_ambient { ambient } else { 0.0 }
+                };
+                shown.push(bounced.into_iter().enumerate().map(seen).collect());
+            }
+            errors.extend(self.compare(&shown, &wanted, &judged));
+        }
+        Some(errors)
+    }
+
+    /// An image at the sites.
+    fn wanted(&self, fine: &[f64]) -> Vec<f64> {
+        let at = |site: &Site| Corners::new(site.place, self.grid, [SUPERSAMPLING; 2]).of(fine);
+        self.sites.iter().map(at).collect()
+    }
+
+    /// Compares light at the sites, one plane a channel, square below square with a gap between.
+    fn compare(&self, shown: &[Vec<f64>], wanted: &[f64], judged: &[bool]) -> Option<PictureError> {
+        let square = PixelLight::SIDE * PixelLight::SIDE;
+        let squares = self.pixels / square;
+        let size = FrameSize::new(
+            PixelLight::SIDE as u16,
+            u16::try_from(squares * (PixelLight::SIDE + 1)).ok()?,
+        )?;
+        let at = |site: &Site| site.at + site.at / square * PixelLight::SIDE;
+        let plane = |values: &[f64]| {
+            let mut plane = vec![0.0; size.pixels()];
+            for (site, value) in self.sites.iter().zip(values) {
+                plane[at(site)] = *value as f32;
+            }
+            plane
+        };
+        let mut mask = vec![false; size.pixels()];
+        for (site, judged) in self.sites.iter().zip(judged) {
+            mask[at(site)] = *judged;
+        }
+        let wanted = LightPicture::new(size, vec![plane(wanted); shown.len()])?;
+        let shown = LightPicture::new(size, shown.iter().map(|light| plane(light)).collect())?;
+        PictureError::new(&shown, &wanted, &mask)
+    }
+}
+
+/// What a pattern throws on a place, if it is the same for `clear` cells around it.
+fn lit(grid: Grid, [across, down]: [f32; 2], clear: f32, pattern: &[f64]) -> Option<f64> {
+    let cell = |x: f32, y: f32| -> Option<f64> {
+        let inside = x >= 0.0 && y >= 0.0;
+        let (col, row) = (x as usize, y as usize);
+        let inside = inside && col < grid.cols() && row < grid.rows();
+        inside.then(|| pattern[row * grid.cols() + col])
+    };
+    let first = cell(across - clear, down - clear)?;
+    let others = [(1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+    let same = |(x, y): (f32, f32)| cell(across + x * clear, down + y * clear) == Some(first);
+    others.into_iter().all(same).then_some(first)
+}
+
+impl SiteFit {
+    fn new(sums: &[[Sums; 2]; HALVINGS]) -> Option<Self> {
+        let halves = |bit: usize| Some([sums[bit][0].fit()?, sums[bit][1].fit()?]);
+        let [first, second] = sums[0];
+        Some(Self {
+            whole: first.joined(second).fit()?,
+            halves: std::array::from_fn(halves),
+        })
+    }
+}
+
+/// A pixel in a photograph.
+#[derive(Clone, Copy)]
+struct Sample {
+    direct: f64,
+    bounced: f64,
+    /// What is seen beyond both.
+    error: f64,
+}
+
+impl Sample {
+    fn explained(self, [a, b]: [f64; 2]) -> f64 {
+        a * self.direct + b * self.bounced
+    }
+
+    fn rest(self, fit: [f64; 2]) -> f64 {
+        self.error - self.explained(fit)
+    }
+}
+
+/// Sums of products of direct light, bounced light and error over some photographs.
+#[derive(Clone, Copy, Default)]
+struct Sums([f64; 5]);
+
+impl Sums {
+    fn add(&mut self, sample: Sample) {
+        let Sample {
+            direct,
+            bounced,
+            error,
+        } = sample;
+        let products = [
+            direct * direct,
+            direct * bounced,
+            bounced * bounced,
+            direct * error,
+            bounced * error,
+        ];
+        *self = self.joined(Self(products));
+    }
+
+    fn joined(self, other: Self) -> Self {
+        Self(std::array::from_fn(|at| self.0[at] + other.0[at]))
+    }
+
+    /// How far off direct and bounced light are, by least squares; `None` where the photographs
+    /// do not tell the two apart.
+    fn fit(self) -> Option<[f64; 2]> {
+        let [dd, db, bb, de, be] = self.0;
+        let determinant = dd * bb - db * db;
+        let told = determinant > LEAST_DETERMINANT * dd * bb;
+        told.then(|| {
+            [
+                (bb * de - db * be) / determinant,
+                (dd * be - db * de) / determinant,
+            ]
+        })
+    }
+}
+
+/// A mean that is still growing.
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: f64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.sum += other.sum;
+        self.count += other.count;
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count.max(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_at_an_edge_of_a_pattern_is_not_judged() {
+        let grid = Grid::new(2, 3).unwrap();
+        let pattern = [1.0, 1.0, 0.0, 1.0, 1.0, 0.0];
+        assert_eq!(lit(grid, [1.0, 0.5], 0.1, &pattern), Some(1.0));
+        assert_eq!(lit(grid, [2.5, 1.0], 0.1, &pattern), Some(0.0));
+        assert_eq!(lit(grid, [1.95, 0.5], 0.1, &pattern), None);
+        assert_eq!(lit(grid, [0.05, 0.5], 0.1, &pattern), None);
+    }
+
+    #[test]
+    fn values_between_four_centres_are_linear_and_constant_beyond_them() {
+        let grid = Grid::new(2, 2).unwrap();
+        let values = [0.0, 1.0, 2.0, 3.0];
+        let at = |place| Corners::new(place, grid, [1; 2]).of(&values);
+        assert!((at([1.0, 1.0]) - 1.5).abs() < 1e-9);
+        assert!((at([0.75, 0.5]) - 0.25).abs() < 1e-6);
+        assert!((at([0.1, 1.9]) - 2.0).abs() < 1e-6);
+        let fine: Vec<f64> = (0..16).map(|at| f64::from(at % 4)).collect();
+        assert!((Corners::new([1.0, 1.0], grid, [2; 2]).of(&fine) - 1.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn errors_of_direct_and_bounced_light_are_told_apart_where_photographs_do() {
+        let sample = |direct: f64, bounced: f64| Sample {
+            direct,
+            bounced,
+            error: 0.1 * direct - 0.2 * bounced,
+        };
+        let mut sums = Sums::default();
+        sums.add(sample(1.0, 0.3));
+        assert_eq!(sums.fit(), None);
+        sums.add(sample(0.0, 0.2));
+        let [a, b] = sums.fit().unwrap();
+        assert!((a - 0.1).abs() < 1e-9 && (b + 0.2).abs() < 1e-9);
+    }
+}
