@@ -229,7 +229,7 @@ mod tests {
         ]
     }
 
-    /// What scikit-image 0.26 and OpenCV say of the same pictures:
+    /// What scikit-image 0.26 and `OpenCV` say of the same pictures:
     ///
     /// ```text
     /// import numpy as np, cv2
@@ -253,8 +253,8 @@ mod tests {
     #[test]
     fn figures_are_those_that_scikit_image_prints() {
         let theirs = [
-            (1, [0.042422, 0.063860, 37.2785, 0.981479, 0.83782]),
-            (3, [0.042433, 0.057671, 37.3300, 0.981561, 2.32810]),
+            (1, [0.042_422, 0.063_860, 37.2785, 0.981_479, 0.83782]),
+            (3, [0.042_433, 0.057_671, 37.3300, 0.981_561, 2.32810]),
         ];
         for (channels, theirs) in theirs {
             let [shown, wanted] = pair(channels);
