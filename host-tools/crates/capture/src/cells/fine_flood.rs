@@ -36,7 +36,7 @@ const HELD: f32 = 0.04;
 /// Residual, relative to the right side, at which gains are found.
 const SMALL: f64 = 1e-4;
 
-/// Steps of conjugate gradients at most; some ten are usual.
+/// Steps of conjugate gradients at most.
 const MOST_STEPS: usize = 60;
 
 /// Most by which a sample's neighbours change its own best gain, a factor.
@@ -227,8 +227,9 @@ impl Views {
                 weight[at] += share * light * light * whole;
             }
         }
-        let known: Vec<bool> = (area.iter().zip(&weight))
-            .map(|(area, weight)| *area >= LEAST_COVER && *weight > 0.0)
+        // Noise alone may leave less light than black: no gain answers that.
+        let known: Vec<bool> = (area.iter().zip(right.iter().zip(&weight)))
+            .map(|(area, (right, weight))| *area >= LEAST_COVER && *right > 0.0 && *weight > 0.0)
             .collect();
         let own: Vec<f32> = (known.iter().zip(right.iter().zip(&weight)))
             .map(|(known, (right, weight))| if *known { right / weight } else { 0.0 })
@@ -555,6 +556,8 @@ mod tests {
         let gains = views.even_gains(&[0.5, 0.5, 0.0, 0.0, 0.5, 0.5]);
         let known: Vec<bool> = gains.iter().map(Option::is_some).collect();
         assert_eq!(known, [true, false, true, false]);
+        let gains = two_pixels_a_sample(2).even_gains(&[0.5, 0.5, -0.01, 0.002]);
+        assert!(gains[0].is_some() && gains[1].is_none(), "{gains:?}");
     }
 
     #[test]
