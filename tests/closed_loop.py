@@ -382,7 +382,7 @@ def by_cell(wall, capture, compensate):
 def make_session(folder, kind, options):
     """Photographs of every slide of a folder that `iltm patterns` makes."""
     (width, height), camera, ambient = SESSIONS[kind]
-    grid = [f"--{name}={value}" for name, value in (("rows", options.rows), ("cols", options.cols)) if value]
+    grid = [f"--rows={options.rows}", f"--cols={options.cols}"]
     subprocess.run([options.iltm, "patterns", "-o", folder, "--projector", f"{width}x{height}", *grid,
                     "--photos", str(options.photos), "--camera", "linear"], check=True)
     renderer = Renderer(camera[::-1], (height, width), kind == "colour", options.samples, True)
@@ -403,13 +403,15 @@ def main():
     parser.add_argument("--iltm", default="target/release/iltm")
     parser.add_argument("--session", choices=SESSIONS, help="photographs of a whole session, made here")
     parser.add_argument("--photos", type=int, default=60, help="Bernoulli photographs of a session")
-    parser.add_argument("--rows", type=int, help="cells of a session; `iltm patterns` chooses")
-    parser.add_argument("--cols", type=int)
+    parser.add_argument("--rows", type=int, help="rows of cells of a session that is made")
+    parser.add_argument("--cols", type=int, help="columns of them")
     parser.add_argument("--samples", type=int, default=512, help="paths a pixel; of a session's photographs, 192 do")
     parser.add_argument("--cells", action="store_true", help="compare the mean light of each cell")
     parser.add_argument("--table", help="judge this table instead of learning one")
     parser.add_argument("--solve", default="", help="further arguments of `iltm solve`, as one word")
     options = parser.parse_args()
+    if options.session and not options.capture.exists() and not (options.rows and options.cols):
+        parser.error("a session that is made needs --rows and --cols")
     if options.session and not options.capture.exists():
         make_session(options.capture, options.session, options)
     capture = Capture(options.capture)
