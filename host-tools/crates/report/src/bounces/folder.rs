@@ -57,7 +57,7 @@ pub struct WrittenBounces {
     pub largest_gap: f64,
 }
 
-/// Whether [`write`] writes files of this name.
+/// Whether [`write()`] writes files of this name.
 #[must_use]
 pub fn is_own(name: &str) -> bool {
     let picture = name.strip_suffix(".png");
