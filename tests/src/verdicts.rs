@@ -154,7 +154,14 @@ impl VerdictRig {
             camera: self.learned.measurements.settings.camera.clone(),
             ..Settings::default()
         };
-        write(&table, &layout, (&settings, Slides::Both), &folder, &Silent).expect("written");
+        write(
+            &table,
+            &layout,
+            (&settings, Slides::Both { fine: false }),
+            &folder,
+            &Silent,
+        )
+        .expect("written");
         let simulation = simulation(&case.scene, Forced::default());
         let camera = VirtualCamera::new(&case.scene, &simulation, case.seed).expect("light");
         let camera = camera.with_faults(&case.faults);

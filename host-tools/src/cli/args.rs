@@ -75,6 +75,8 @@ pub(super) enum Command {
     Tradeoff(Tradeoff),
     /// Prove a table on the wall: test images to photograph, then a verdict
     Verify(Verify),
+    /// Feed photographs of compensated images back into a table
+    Refine(Refine),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -639,6 +641,10 @@ pub(super) struct Verify {
     /// Black pixels on each side; by default as the patterns of the scene had it, or none
     #[arg(long, value_name = "PIXELS", requires = "output")]
     pub(super) border: Option<u16>,
+    /// Leave out the stripes and images of the projector's own pixels, by which the error is seen
+    /// pixel by pixel and the table can be refined
+    #[arg(long, requires = "output", conflicts_with = "wanted")]
+    pub(super) no_dense: bool,
     /// Photographs of the film of a --wanted folder, with any names and as many as there are,
     /// in the order of the numbers in them: what each shows is known by the card before it
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
@@ -653,6 +659,24 @@ pub(super) struct Verify {
     /// and the table that it uses
     #[arg(long, value_name = "PORT", conflicts_with = "output")]
     pub(super) port: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Refine {
+    /// Table to refine
+    pub(super) table: PathBuf,
+    /// Folder made for it by `iltm verify`, with the photographs in it
+    #[arg(value_name = "FOLDER")]
+    pub(super) capture: PathBuf,
+    /// Where the better table goes; it is the same one if no step is confirmed by photographs
+    /// that it was not made from
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// Sign the table with this key
+    #[arg(long, value_name = "FILE")]
+    pub(super) key: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) seal: SealTerms,
 }
 
 #[derive(Clone, Debug, Args)]

@@ -374,6 +374,7 @@ impl From<VerifyError> for Failure {
             VerifyError::Slides(_) => Kind::Usage,
             VerifyError::NoManifest { .. } => Kind::Read,
             VerifyError::Order { .. }
+            | VerifyError::Map(_)
             | VerifyError::TooFewCells { .. }
             | VerifyError::Unrecognised { .. }
             | VerifyError::NoCards { other: None, .. } => Kind::Photographs,
@@ -383,8 +384,10 @@ impl From<VerifyError> for Failure {
             | VerifyError::Grid { .. } => Kind::OtherTable,
             VerifyError::Untold { .. } => Kind::Table,
             VerifyError::Photographed { .. } => Kind::Write,
-            VerifyError::Overexposed { .. } => Kind::Inconclusive,
+            VerifyError::Overexposed { .. } | VerifyError::Refused { .. } => Kind::Inconclusive,
+            VerifyError::Compile(error) => return error.into(),
             VerifyError::Missing { .. }
+            | VerifyError::NotFine
             | VerifyError::Unpaired { .. }
             | VerifyError::NoImages { .. }
             | VerifyError::Picture { .. }

@@ -28,6 +28,7 @@ mod output;
 mod patterns;
 mod ports;
 mod progress;
+mod refine;
 mod simulate;
 mod simulate_chain;
 mod solve;
@@ -84,6 +85,7 @@ pub fn run(meter: Option<Meter>) -> ExitCode {
         Command::Bounces(bounces) => bounces::run(bounces, &output),
         Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
         Command::Verify(verify) => verify::run(verify, &output),
+        Command::Refine(refine) => refine::run(refine, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),

@@ -116,7 +116,7 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
 }
 
 /// Whether a file can be put in a place, before the work for it is done.
-fn check_place(file: &Path) -> Result<(), Failure> {
+pub(super) fn check_place(file: &Path) -> Result<(), Failure> {
     let refuse = |why: String, next_step| {
         let message = format!("{}: cannot be written: {why}", file.display());
         Err(Failure::new(Kind::Write, message, next_step))

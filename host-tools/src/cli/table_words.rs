@@ -102,6 +102,15 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
             })
         }
     };
+    if let Some(refined) = provenance.refined.last() {
+        let _ = writeln!(
+            text,
+            "refined     {}: from {} of what a viewer sees to {}, by photographs of the wall",
+            refined.date.get(..10).unwrap_or_default(),
+            percent(refined.before),
+            percent(refined.after),
+        );
+    }
     if let Some(brightness) = provenance.brightness {
         let _ = writeln!(text, "brightness  {}", brightness.words());
     }

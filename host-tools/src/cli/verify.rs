@@ -58,7 +58,9 @@ fn prepare(
     let kind = if arguments.wanted {
         Slides::Wanted
     } else {
-        Slides::Both
+        Slides::Both {
+            fine: !arguments.no_dense,
+        }
     };
     let written = write(table, &layout, (&settings, kind), out, bars)?;
     bars.end();
@@ -67,6 +69,8 @@ fn prepare(
         "wanted": arguments.wanted,
         "pictures": written.pictures,
         "film": written.film,
+        "stripes": written.stripes,
+        "fine_images": written.fine.len(),
         "images": written.images.iter().map(|image| json!({
             "title": image.title,
             "clipped": image.clipped,
@@ -79,6 +83,14 @@ fn prepare(
     } else {
         "each as it is and compensated"
     };
+    let fine = match written.fine.len() {
+        0 => String::new(),
+        count => format!(
+            "{count} images and {} stripes of the projector's own pixels are among them: the error \
+             is seen pixel by pixel, and `iltm refine` can use it.\n",
+            written.stripes
+        ),
+    };
     let film = match (arguments.wanted, written.film) {
         (false, _) => "",
         (true, 0) => "The projection has too few pixels for a film with cards.\n",
@@ -86,7 +98,7 @@ fn prepare(
     };
     let text = format!(
         "{}: {} pictures to project and photograph ({} test images, {how};\n\
-         white, black and patterns that find the cells). {film}README.md in it says how. Then:\n\
+         white, black and patterns that find the cells). {fine}{film}README.md in it says how. Then:\n\
          iltm verify {} {}\n",
         out.display(),
         written.pictures,
@@ -268,6 +280,16 @@ fn data(
             "viewpoint": bound.viewpoint,
         },
         "images": verdict.images.iter().map(of_image).collect::<Vec<_>>(),
+        "viewer": verdict.pixels.as_ref().map(|pixels| json!({
+            "before": pixels.error[0],
+            "after": pixels.error[1],
+            "noise": pixels.noise,
+            "pixels": pixels.errors.len(),
+            "images": pixels.images.iter().map(|[before, after]| json!({
+                "before": before,
+                "after": after,
+            })).collect::<Vec<_>>(),
+        })),
         "wanted": verdict.wanted,
         "curve": { "power": verdict.curve.power, "left": verdict.curve.left },
         "brightness": verdict.brightness,
@@ -314,6 +336,16 @@ fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
         "cells       {} of {} compared",
         verdict.cells.0, verdict.cells.1
     );
+    if let Some(pixels) = &verdict.pixels {
+        let [before, after] = pixels.error;
+        let _ = writeln!(
+            text,
+            "viewer      sees {} of the light off, {} as the wall is: images finer than the cells, at {} pixels of the camera",
+            percent(after),
+            percent(before),
+            pixels.errors.len()
+        );
+    }
     match &verdict.drift.white {
         None => {
             text += "drift       not known: the table does not tell what light comes of an input\n";

@@ -30,7 +30,7 @@ enum Left {
 use Left::{AllOrNothing, WholeFiles};
 
 /// Every command that writes and needs no device, and about how many milliseconds it takes.
-const COMMANDS: [(&str, u64, Left); 16] = [
+const COMMANDS: [(&str, u64, Left); 17] = [
     ("demo --out d", 12_000, AllOrNothing),
     ("simulate scene.toml -o d --photos 10", 1500, AllOrNothing),
     ("simulate scene.toml --photograph s", 1500, WholeFiles),
@@ -51,6 +51,7 @@ const COMMANDS: [(&str, u64, Left); 16] = [
     ("compare SAMPLE -o d --photos 40", 15_000, AllOrNothing),
     ("verify t.iltm -o d --projector 640x400", 800, AllOrNothing),
     ("verify t.iltm v --report d", 1500, AllOrNothing),
+    ("refine t.iltm v -o d.iltm", 700, AllOrNothing),
     ("compensate t.iltm video.y4m -o d.y4m", 600, AllOrNothing),
     ("sign t.iltm --key k -o d.iltm", 20, AllOrNothing),
     ("man -o d", 60, AllOrNothing),

@@ -26,7 +26,7 @@ fn photographed() -> &'static User {
 pub(crate) fn copy() -> User {
     let user = User::new();
     user.write("t.iltm", photographed().read("t.iltm"));
-    for part in ["v", "v/patterns", "v/photos", "v/wanted"] {
+    for part in ["v", "v/patterns", "v/photos", "v/slides", "v/wanted"] {
         user.copy(&photographed().path(part), part);
     }
     user
@@ -71,6 +71,60 @@ fn a_good_table_passes_and_a_bound_below_the_noise_tells_nothing_with_the_same_f
     assert_eq!(slide.dimensions(), (640, 400));
     let row = [2, 3, 637].map(|x| slide[(x, 200)][0]);
     assert_eq!(row, [0, 255, 0]);
+}
+
+#[test]
+fn a_refined_table_errs_less_at_the_pixels_and_is_what_devices_take() {
+    let user = copy();
+    let before = user.json("verify t.iltm v")["viewer"].clone();
+    let said = user.json("refine t.iltm v -o u.iltm");
+    assert_eq!(said["refined"], true, "{said}");
+    user.says("verify u.iltm -o w --projector 640x400 --border 3");
+    user.says("simulate SCENES/m-panels.toml --photograph w --seed 10");
+    let verdict = user.json("verify u.iltm w");
+    assert_eq!(verdict["outcome"], "passed", "{verdict}");
+    let after = &verdict["viewer"];
+    let error = |of: &serde_json::Value| of["after"].as_f64().unwrap();
+    assert!(error(after) < 0.85 * error(&before), "{before} {after}");
+    // The step was held against images that it was not made from: they promise no more.
+    let promised = said["error"]["after"].as_f64().unwrap();
+    assert!(promised > 0.9 * error(after), "{said} {after}");
+    let inspected = user.says("inspect u.iltm");
+    contains(
+        &inspected,
+        &["refined     20", "by photographs of the wall"],
+    );
+    // Everything but gains, dates and words is the table's own.
+    let [own, refined] = ["t", "u"].map(|name| user.json(&format!("inspect {name}.iltm")));
+    assert_ne!(own["id"], refined["id"]);
+    for field in ["effects", "name", "reference_white", "rows", "channels"] {
+        assert_eq!(own[field], refined[field], "{field}");
+    }
+}
+
+#[test]
+fn a_table_is_refined_only_with_photographs_that_are_fit_for_it() {
+    let user = copy();
+    // Not of this folder's table.
+    user.says("refine t.iltm v -o u.iltm");
+    user.fails(37, "refine u.iltm v -o x.iltm");
+    user.fails(9, "refine t.iltm v -o nowhere/x.iltm");
+    fs::remove_dir_all(user.path("v/photos")).unwrap();
+    user.says("simulate SCENES/m-panels.toml --photograph v --seed 9 --fault tripod=1");
+    contains(
+        &user.fails(34, "refine t.iltm v -o x.iltm"),
+        &["cannot be fed back", "moved"],
+    );
+    user.says("verify t.iltm -o n --no-dense --projector 640x400");
+    user.says("simulate SCENES/m-panels.toml --photograph n");
+    contains(
+        &user.fails(4, "refine t.iltm n -o x.iltm"),
+        &["no fine stripes", "--no-dense"],
+    );
+    user.says("simulate SCENES/m-panels.toml --photograph v --seed 9");
+    user.remove("v/photos/030.png");
+    contains(&user.fails(4, "refine t.iltm v -o x.iltm"), &["missing"]);
+    assert!(!user.path("x.iltm").exists());
 }
 
 /// The same photographs taken anew with a fault, judged.

@@ -128,7 +128,7 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
     verify::write(
         &table,
         &layout,
-        (&settings, verify::Slides::Both),
+        (&settings, verify::Slides::Both { fine: false }),
         &folder,
         &Silent,
     )

@@ -44,7 +44,14 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
         camera: learned.measurements.settings.camera.clone(),
         ..Settings::default()
     };
-    write(&table, &layout, (&settings, Slides::Both), folder, &Silent).unwrap();
+    write(
+        &table,
+        &layout,
+        (&settings, Slides::Both { fine: false }),
+        folder,
+        &Silent,
+    )
+    .unwrap();
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
     let session = fill_capture::UnfilledCapture::read(folder, simulation.grid()).unwrap();

@@ -45,6 +45,7 @@ pub use cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 pub use cells::noise::{NoiseModel, NoiseSource};
 pub use cells::nonlinearity::Nonlinearity;
 pub use cells::pixel_light::PixelLight;
+pub use cells::pixel_views::{PixelView, PixelViews};
 pub use devices::{
     CameraFit, CameraSource, ColourMixingMatrix, Devices, Fall, Probe, Ramp, RampPoint,
 };
@@ -77,7 +78,7 @@ pub use registration::cell_map::{NO_CELL, Registration};
 pub use registration::map_file::MapFormat;
 pub use registration::projector_map::{MapError, MapSource, ProjectorMap};
 pub use registration::{MIN_REGRESSION, PixelCount, RegistrationMethod};
-pub use remeasure::{CellPlanes, CellReadings, remeasure};
+pub use remeasure::{CellPlanes, CellReadings, PixelReadings, Remeasured, remeasure};
 
 use evidence::CaptureEvidence;
 use format::sequence::{Selection, Sequence};

@@ -2,7 +2,10 @@
 //! anywhere: a Gray code among them says anew where the cells are.
 
 use crate::cells::cell_pixels::LeftOut;
+use crate::cells::fine_flood::finest_factor;
+use crate::cells::noise::NoiseModel;
 use crate::cells::nonlinearity::Nonlinearity;
+use crate::cells::pixel_views::PixelViews;
 use crate::devices::ColourMixingMatrix;
 use crate::evidence::CaptureEvidence;
 use crate::format::bracket::Bracket;
@@ -14,6 +17,7 @@ use crate::format::settings::Settings;
 use crate::photographs::grey_view::shrunk;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::registration::cell_map::Registration;
+use crate::registration::projector_map::{MapError, ProjectorMap};
 use crate::{Gate, gates};
 use iltm_picture::{LightPicture, progress::Progress};
 use iltm_runtime::{FrameSize, Grid};
@@ -51,15 +55,91 @@ pub struct CellReadings {
     pub views: Vec<LightPicture>,
     /// Camera pixels along a side of which one of the latter is the mean.
     pub step: usize,
+    /// Photographs of fine pictures, pixel by pixel; `None` without stripes finer than the cells.
+    pub pixels: Option<Result<PixelReadings, MapError>>,
+}
+
+/// Photographs of pictures finer than the cells, pixel by pixel.
+#[derive(Clone, Debug)]
+pub struct PixelReadings {
+    /// Width and height of the photographs.
+    pub camera: (usize, usize),
+    /// What the pixels see of the projector's own, its border left out.
+    pub views: PixelViews,
+    /// Samples along a cell's width and height that this camera tells apart.
+    pub factor: [usize; 2],
+    /// Light by picture, channel and pixel of `views`, ambient light included, camera units.
+    pub pictures: Vec<Vec<Vec<f32>>>,
+    /// Light under black by channel and pixel.
+    pub black: Vec<Vec<f32>>,
+    /// Noise of a pixel, by channel.
+    pub noise: Vec<NoiseModel>,
+}
+
+impl PixelReadings {
+    /// Those of no photograph yet, without saturated pixels.
+    fn new(
+        map: &ProjectorMap,
+        grid: Grid,
+        (registration, live): (&Registration, &[bool]),
+        saturated: &[bool],
+    ) -> Self {
+        let inner = map.projector.inner();
+        let views = PixelViews::new(map, grid, [1; 2], registration);
+        Self {
+            camera: registration.camera,
+            views: views
+                .over([inner.width(), inner.height()])
+                .without(saturated),
+            factor: finest_factor(grid, (registration, live), Some(map), None),
+            pictures: Vec::new(),
+            black: Vec::new(),
+            noise: Vec::new(),
+        }
+    }
+
+    /// Reads these photographs, and black.
+    fn read(
+        &mut self,
+        brackets: &[usize],
+        linear: &mut LinearPhotographs<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), CaptureError> {
+        let (views, pictures) = (&self.views, &mut self.pictures);
+        let of_plane = |plane: &Vec<f32>| {
+            let pixels = views.pixels().iter();
+            pixels.map(|view| plane[view.pixel as usize]).collect()
+        };
+        linear
+            .photographs
+            .for_batches(brackets, progress, |photos| {
+                let planes = photos.iter().map(|(_, photo)| photo.planes.iter());
+                pictures.extend(planes.map(|planes| planes.map(of_plane).collect()));
+            })?;
+        self.black = linear.black.iter().map(of_plane).collect();
+        Ok(())
+    }
+}
+
+/// What is photographed in a folder.
+#[derive(Clone, Copy, Debug)]
+pub struct Remeasured<'s> {
+    /// White, black, the Gray code of both axes and any Bernoulli patterns: they tell where the
+    /// cells are.
+    pub code: &'s [Shot],
+    /// Pictures that are measured cell by cell. Of these and the next, only photograph and line
+    /// are looked at.
+    pub pictures: &'s [Shot],
+    /// Pictures that are measured pixel by pixel, where stripes say what each pixel sees.
+    pub fine: &'s [Shot],
 }
 
 /// Most pixels across a photograph for people.
 const VIEW_WIDTH: usize = 400;
 
-/// Registers the cells by the photographs of `code` (white, black, the Gray code of both
-/// axes and any Bernoulli patterns) and measures them in those of `pictures`. Of the
-/// latter only photograph and line are looked at. With `mixing`, of camera channels by
-/// projector channels, all light is that of the projector's channels.
+/// Registers the cells by the photographs of the code and measures them in those of the pictures.
+/// With `mixing`, of camera channels by projector channels, all light is that of the projector's
+/// channels.
 ///
 /// # Errors
 /// [`CaptureError`] for whatever is missing, contradictory or unusable.
@@ -67,23 +147,27 @@ pub fn remeasure(
     folder: &Path,
     settings: &Settings,
     mixing: Option<[[f64; 3]; 3]>,
-    (code, pictures): (&[Shot], &[Shot]),
+    shots: Remeasured<'_>,
     progress: &dyn Progress,
 ) -> Result<CellReadings, CaptureError> {
     let options = CaptureOptions {
         min_bernoulli: 0,
         ..CaptureOptions::default()
     };
-    let mut code = code.to_vec();
-    let mut pictures = pictures.to_vec();
-    resolve(folder, &mut code)?;
-    resolve(folder, &mut pictures)?;
+    let mut code = shots.code.to_vec();
+    let mut pictures = shots.pictures.to_vec();
+    let mut fine = shots.fine.to_vec();
+    for list in [&mut code, &mut pictures, &mut fine] {
+        resolve(folder, list)?;
+    }
     let mut sequence = Sequence::read(folder, Selection::new(folder, &code, &options)?)?;
     // Behind the patterns, where only their places here lead to them.
     let first = sequence.brackets.len();
-    sequence
-        .brackets
-        .extend(Bracket::of_each(&pictures, sequence.longest));
+    let longest = sequence.longest;
+    for list in [&pictures, &fine] {
+        sequence.brackets.extend(Bracket::of_each(list, longest));
+    }
+    let last = first + pictures.len();
     let reading = settings.camera.reading();
     let mut linear = LinearPhotographs::read(folder, &sequence, &reading, progress)?;
     let known = mixing.map(|matrix| ColourMixingMatrix {
@@ -96,9 +180,12 @@ pub fn remeasure(
     let mut gates = gates::judge(&sequence, &found);
     let cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
     gates::settle(&mut gates, cause);
+    let models = found.cells.iter().flat_map(|cells| &cells.channels);
+    let noise = models.map(|channel| channel.noise_model).collect();
+    let map = found.map;
     let (registration, cells) = (found.registered.registration, found.pixels);
 
-    progress.begin("measuring cells", pictures.len() as u64);
+    progress.begin("measuring cells", (pictures.len() + fine.len()) as u64);
     let mut measure = |brackets: &[usize]| -> Result<Vec<CellPlanes>, CaptureError> {
         let mut light = Vec::with_capacity(brackets.len());
         linear
@@ -110,7 +197,7 @@ pub fn remeasure(
         Ok(light)
     };
     let white = measure(&sequence.white().shots)?;
-    let of_pictures: Vec<usize> = (first..sequence.brackets.len()).collect();
+    let of_pictures: Vec<usize> = (first..last).collect();
     let pictures = measure(&of_pictures)?;
     let camera = registration.camera;
     let step = camera.0.div_ceil(VIEW_WIDTH).max(1).min(camera.1.max(1));
@@ -125,6 +212,18 @@ pub fn remeasure(
             });
             views.extend(planes.filter_map(|planes| LightPicture::new(size?, planes)));
         })?;
+    let of_fine: Vec<usize> = (last..sequence.brackets.len()).collect();
+    let pixels = map.filter(|_| !of_fine.is_empty()).map(|map| {
+        let live = (&registration, &cells.live[..]);
+        map.map(|map| PixelReadings::new(&map, sequence.grid, live, &linear.saturated))
+    });
+    let pixels = match pixels {
+        Some(Ok(mut pixels)) => {
+            pixels.read(&of_fine, &mut linear, progress)?;
+            Some(Ok(PixelReadings { noise, ..pixels }))
+        }
+        other => other,
+    };
     progress.end();
     Ok(CellReadings {
         grid: sequence.grid,
@@ -139,5 +238,6 @@ pub fn remeasure(
         pictures,
         views,
         step,
+        pixels,
     })
 }

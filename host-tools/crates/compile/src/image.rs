@@ -25,6 +25,32 @@ impl ImageWriter {
         self.sections.push((kind, selector, bytes));
     }
 
+    /// The sections of a checked image.
+    pub(crate) fn of_image(image: &[u8]) -> Self {
+        let field = |row: &[u8], at: Range<usize>| -> usize {
+            let bytes = row.get(at).unwrap_or_default().iter().rev();
+            bytes.fold(0, |value, byte| value << 8 | usize::from(*byte))
+        };
+        let count = field(image, header::SECTIONS);
+        let rows = image.get(header::SIZE..).unwrap_or_default();
+        let section = |row: &[u8]| {
+            let start = field(row, entry::OFFSET);
+            let bytes = image.get(start..start + field(row, entry::LENGTH))?;
+            let kind = SectionKind::from_number(field(row, entry::KIND) as u16)?;
+            Some((kind, field(row, entry::SELECTOR) as u16, bytes.to_vec()))
+        };
+        let sections = rows.chunks_exact(entry::SIZE).take(count);
+        Self {
+            sections: sections.filter_map(section).collect(),
+        }
+    }
+
+    /// Puts a section in the place of all of its kind; takes them out if there is none.
+    pub(crate) fn replace(&mut self, kind: SectionKind, bytes: Option<Vec<u8>>) {
+        self.sections.retain(|(own, _, _)| *own != kind);
+        self.sections.extend(bytes.map(|bytes| (kind, 0, bytes)));
+    }
+
     /// The image.
     #[must_use]
     pub fn finish(mut self) -> Vec<u8> {

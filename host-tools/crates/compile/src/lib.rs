@@ -14,6 +14,7 @@
 //! | bytes | [`image`] |
 //! | what a viewer would see of natural images | [`ViewerError`] |
 //! | what a frame takes on the board | [`cost`] |
+//! | the same table with other gains | [`refined_table()`] |
 //! | the seal behind them | [`sign`] |
 //!
 //! The image is checked by the runtime's own reader before it is returned, so
@@ -29,6 +30,7 @@ pub mod ladder;
 mod provenance;
 pub mod quantise;
 pub mod reference_white;
+mod refined_table;
 pub mod response;
 pub mod sign;
 mod table;
@@ -39,6 +41,7 @@ mod viewer_error;
 pub use brightness::Brightness;
 pub use gain::FineGains;
 pub use ladder::Ladder;
-pub use provenance::{Photographs, PredictedError, Provenance};
+pub use provenance::{Photographs, PredictedError, Provenance, Refinement};
+pub use refined_table::{RefinedParts, refined_table};
 pub use table::{CompileError, CompileOptions, Compiled, compile};
 pub use viewer_error::ViewerError;

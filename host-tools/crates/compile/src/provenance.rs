@@ -71,6 +71,25 @@ pub struct Provenance {
     /// The `capture.toml` that it was made with.
     #[serde(deserialize_with = "if_readable")]
     pub capture: Option<Settings>,
+    /// How it was refined since, the first time first.
+    #[serde(
+        deserialize_with = "readable_ones",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub refined: Vec<Refinement>,
+}
+
+/// A round in which photographs of compensated images were fed back into a table.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Refinement {
+    /// When, UTC.
+    pub date: String,
+    /// Photographs that were fed back.
+    pub photographs: usize,
+    /// What a viewer saw of the images: relative error at camera pixels, without noise.
+    pub before: f64,
+    /// The same afterwards, as photographs that a step was not made from have it.
+    pub after: f64,
 }
 
 /// Photographs by what they show.
@@ -155,14 +174,13 @@ impl Provenance {
             name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
         };
         let scene = measurements.settings.scene.name.clone();
-        let date = chrono::Utc::now().format("%Y-%m-%d %H:%M:%S UTC");
         let failed = measurements.diagnostics.gates.iter();
         let failed = failed.filter(|gate| gate.fails());
         let mixing = measurements.devices.mixing().map(|mixing| mixing.matrix);
         Self {
             made_by: concat!("iltm ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene: scene.unwrap_or_else(folder),
-            date: date.to_string(),
+            date: Self::now(),
             method: report.method.to_string(),
             photographs: Some(Photographs {
                 white: report.photographs.white,
@@ -181,6 +199,7 @@ impl Provenance {
             white: Some(*white),
             brightness: Brightness::of(measurements, white.light),
             capture: Some(measurements.settings.clone()),
+            refined: Vec::new(),
         }
     }
 
@@ -188,6 +207,12 @@ impl Provenance {
     #[must_use]
     pub fn read(text: &str) -> Self {
         toml::from_str(text).unwrap_or_default()
+    }
+
+    /// Now, as a table says it.
+    pub(crate) fn now() -> String {
+        let now = chrono::Utc::now().format("%Y-%m-%d %H:%M:%S UTC");
+        now.to_string()
     }
 
     /// What people call the table: its scene, and the day when it was made.
@@ -213,6 +238,12 @@ fn if_readable<'de, T: DeserializeOwned, D: Deserializer<'de>>(
     from: D,
 ) -> Result<Option<T>, D::Error> {
     Ok(toml::Value::deserialize(from)?.try_into().ok())
+}
+
+fn readable_ones<'de, T: DeserializeOwned, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Vec<T>, D::Error> {
+    Ok(if_readable(from)?.unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::response;
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm_picture::ProjectorResponse;
 use iltm_runtime::{
+    FrameSize,
     haar::Basis,
     image::{
         ImageError, Label, Meta, Table, TierInfo,
@@ -213,7 +214,7 @@ pub fn compile(
     };
     image.section(SectionKind::Meta, 0, head.emit().to_vec());
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));
-    image.section(SectionKind::Gain, 0, halfwords(gains.cells));
+    image.section(SectionKind::Gain, 0, halfwords(gains.cells.iter().copied()));
     if let Some(ambient) = ambient(inverse, white) {
         image.section(SectionKind::Ambient, 0, halfwords(ambient));
     }
@@ -221,10 +222,7 @@ pub fn compile(
         image.section(SectionKind::Codes, 0, response::codes(&knots));
         image.section(SectionKind::Response, 0, halfwords(knots));
     }
-    if let (Some(fine), Some(values)) = (fine, gains.fine) {
-        let sides = [fine.size.height(), fine.size.width()];
-        let mut bytes = halfwords(sides.map(|side| side as u16));
-        bytes.extend(halfwords(values));
+    if let Some(bytes) = fine.and_then(|fine| gains.fine_section(fine.size)) {
         image.section(SectionKind::FineGain, 0, bytes);
     }
     for (selector, bytes) in operator.sections {
@@ -385,20 +383,29 @@ fn tiers(ladder: &Ladder, operator: &StoredOperator) -> Vec<u8> {
 }
 
 /// Gains as the image stores them.
-struct Gains {
-    fraction: u8,
-    cells: Vec<u16>,
-    fine: Option<Vec<u16>>,
+pub(crate) struct Gains {
+    pub(crate) fraction: u8,
+    pub(crate) cells: Vec<u16>,
+    pub(crate) fine: Option<Vec<u16>>,
 }
 
 impl Gains {
-    /// All gains with the most fraction bits that the largest one leaves.
     fn new(
         inverse: &InverseTransport,
         fine: Option<&FineGains>,
         white: f64,
     ) -> Result<Self, CompileError> {
         let cells: Vec<&[f64]> = inverse.channels.iter().map(|c| c.gain.as_slice()).collect();
+        Self::stored(&cells, fine, white)
+    }
+
+    /// All gains, of light relative to `white`, with the most fraction bits that the largest one
+    /// leaves.
+    pub(crate) fn stored(
+        cells: &[&[f64]],
+        fine: Option<&FineGains>,
+        white: f64,
+    ) -> Result<Self, CompileError> {
         let fine: Option<Vec<&[f64]>> =
             fine.map(|fine| fine.channels.iter().map(Vec::as_slice).collect());
         let all = cells.iter().chain(fine.iter().flatten());
@@ -421,24 +428,35 @@ impl Gains {
         let store = |channels: &[&[f64]]| interleave(channels, |gain| (gain * unit).round() as u16);
         Ok(Self {
             fraction,
-            cells: store(&cells),
+            cells: store(cells),
             fine: fine.as_deref().map(store),
         })
+    }
+
+    /// The section of the fine ones, of this size.
+    pub(crate) fn fine_section(&self, size: FrameSize) -> Option<Vec<u8>> {
+        let values = self.fine.clone()?;
+        let sides = [size.height(), size.width()];
+        let mut bytes = halfwords(sides.map(|side| side as u16));
+        bytes.extend(halfwords(values));
+        Some(bytes)
     }
 }
 
 /// Ambient light as the image stores it; `None` if every cell rounds to none.
 fn ambient(inverse: &InverseTransport, white: f64) -> Option<Vec<u16>> {
-    let channels: Vec<&[f64]> = inverse
-        .channels
-        .iter()
-        .map(|c| c.ambient.as_slice())
-        .collect();
+    let channels = inverse.channels.iter();
+    let channels: Vec<&[f64]> = channels.map(|c| c.ambient.as_slice()).collect();
+    stored_ambient(&channels, white)
+}
+
+/// Ambient light relative to `white` as the image stores it; `None` if every cell rounds to none.
+pub(crate) fn stored_ambient(channels: &[&[f64]], white: f64) -> Option<Vec<u16>> {
     let bits = |light: f64| {
         let bits = (light / white * f64::from(Light::ONE.to_bits())).round();
         (bits as u16).min(Light::ONE.to_bits())
     };
-    let stored = interleave(&channels, bits);
+    let stored = interleave(channels, bits);
     stored.iter().any(|bits| *bits > 0).then_some(stored)
 }
 

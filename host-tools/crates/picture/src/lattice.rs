@@ -11,10 +11,10 @@ struct Share {
     weights: [f64; 2],
 }
 
-/// The grid laid over a frame.
+/// A grid, or a smaller picture, laid over a frame.
 #[derive(Clone, Debug)]
 pub struct Lattice {
-    grid: Grid,
+    cells: FrameSize,
     frame: FrameSize,
     /// Interpolation along rows and columns of pixels.
     spread: [Vec<Share>; 2],
@@ -26,16 +26,22 @@ impl Lattice {
     /// `None` if some cell would cover no pixel.
     #[must_use]
     pub fn new(grid: Grid, frame: FrameSize) -> Option<Self> {
+        Self::between(FrameSize::of_grid(grid), frame)
+    }
+
+    /// The same of samples that are more than any grid has.
+    #[must_use]
+    pub fn between(cells: FrameSize, frame: FrameSize) -> Option<Self> {
         Some(Self {
-            grid,
+            cells,
             frame,
             spread: [
-                interpolation(grid.rows(), frame.height())?,
-                interpolation(grid.cols(), frame.width())?,
+                interpolation(cells.height(), frame.height())?,
+                interpolation(cells.width(), frame.width())?,
             ],
             gather: [
-                overlaps(grid.rows(), frame.height()),
-                overlaps(grid.cols(), frame.width()),
+                overlaps(cells.height(), frame.height()),
+                overlaps(cells.width(), frame.width()),
             ],
         })
     }
@@ -43,14 +49,14 @@ impl Lattice {
     /// Cells of the grid.
     #[must_use]
     pub const fn cells(&self) -> usize {
-        self.grid.cells()
+        self.cells.pixels()
     }
 
     /// `A`: means over the cells.
     #[must_use]
     pub fn average(&self, pixels: &[f32]) -> Vec<f64> {
-        let (width, cols) = (self.frame.width(), self.grid.cols());
-        let mut cells = vec![0.0; self.grid.cells()];
+        let (width, cols) = (self.frame.width(), self.cells.width());
+        let mut cells = vec![0.0; self.cells.pixels()];
         let mut line = vec![0.0; cols];
         for (row, share) in pixels.chunks_exact(width).zip(&self.gather[0]) {
             line.fill(0.0);
@@ -71,7 +77,7 @@ impl Lattice {
     /// `U`: linear interpolation between the cells' centres.
     #[must_use]
     pub fn expand(&self, cells: &[f64]) -> Vec<f32> {
-        let cols = self.grid.cols();
+        let cols = self.cells.width();
         let mut pixels = Vec::with_capacity(self.frame.pixels());
         for share in &self.spread[0] {
             let [above, below] = share.cells.map(|row| &cells[row * cols..][..cols]);

@@ -38,6 +38,7 @@ pub use error::{PatternsError, SessionError};
 pub use folder::{Made, SLIDES_FOLDER, slide_name, write};
 pub use latency::{Latency, measure};
 pub use layout::Layout;
+pub(crate) use order::fine_stripes;
 pub use order::{OrderOptions, Purpose, Slide, order};
 pub use plan::{Planned, State, planned, ranges, states};
 pub use screen::{CommandScreen, Screen, with_window};

@@ -101,7 +101,7 @@ pub fn order(layout: &Layout, options: &OrderOptions) -> Vec<Slide> {
 }
 
 /// Stripes finer than the cells, of both axes, as a projector that follows sRGB shows them.
-fn fine_stripes(layout: &Layout) -> Vec<Slide> {
+pub(crate) fn fine_stripes(layout: &Layout) -> Vec<Slide> {
     let (grid, inner) = (layout.grid(), layout.inner());
     let sides = [
         (CodeAxis::Column, grid.cols(), inner.width()),

@@ -10,6 +10,7 @@
 //! where the surface ends.
 
 use super::measurements::Measurements;
+use super::pixel_views::PixelViews;
 use crate::registration::cell_map::Registration;
 use crate::registration::projector_map::ProjectorMap;
 use iltm_picture::statistics::median;
@@ -133,24 +134,7 @@ struct MappedFlood {
 impl MappedFlood {
     fn new(measurements: &Measurements, map: &ProjectorMap, factor: [usize; 2]) -> Self {
         let grid = measurements.grid;
-        let side = measurements.registration.cell_side();
-        let views = map
-            .position
-            .iter()
-            .enumerate()
-            .filter_map(|(pixel, place)| {
-                let [across, down] = map.in_cells(*place, grid);
-                let place = [across * factor[0] as f32, down * factor[1] as f32];
-                let known = !place[0].is_nan() && !place[1].is_nan();
-                (known && measurements.is_inside(pixel)).then_some(PixelView { pixel, place })
-            });
-        let views = Views {
-            rows: grid.rows() * factor[1],
-            cols: grid.cols() * factor[0],
-            // As wide as a pixel is, it sees what it covers.
-            side: factor.map(|factor| (factor as f64 / side) as f32),
-            pixels: views.collect(),
-        };
+        let views = PixelViews::new(map, grid, factor, &measurements.registration);
         let light = measurements.flood.par_iter();
         Self {
             grid,
@@ -173,32 +157,7 @@ impl MappedFlood {
     }
 }
 
-/// A camera pixel, and the place that it sees in samples.
-struct PixelView {
-    pixel: usize,
-    place: [f32; 2],
-}
-
-/// Which samples camera pixels see: a sparse matrix `A` of shares, a row a pixel.
-struct Views {
-    rows: usize,
-    cols: usize,
-    /// Width and height of a camera's pixel in samples.
-    side: [f32; 2],
-    pixels: Vec<PixelView>,
-}
-
-impl Views {
-    /// Samples that a pixel covers and its shares of them, of its own area.
-    fn seen(&self, view: &PixelView) -> impl Iterator<Item = (usize, f32)> {
-        let [across, down] = view.place;
-        let ([width, height], cols) = (self.side, self.cols);
-        covered(down, height, self.rows).flat_map(move |(row, tall)| {
-            covered(across, width, cols)
-                .map(move |(col, wide)| (row * cols + col, tall * wide / (width * height)))
-        })
-    }
-
+impl PixelViews {
     /// The reciprocal of [`even_gains`](Self::even_gains), where there are any.
     fn even_light(&self, flood: &[f32]) -> Vec<Option<f32>> {
         let gains = self.even_gains(flood);
@@ -212,17 +171,17 @@ impl Views {
     /// pixels, and the mean light's is far from the best. Conjugate gradients; a share of the
     /// matrix's row sums holds what the pixels do not tell near each sample's own best.
     fn even_gains(&self, flood: &[f32]) -> Vec<Option<f32>> {
-        let samples = self.rows * self.cols;
+        let samples = self.samples();
         let (mut area, mut right, mut weight) = (
             vec![0.0_f32; samples],
             vec![0.0_f32; samples],
             vec![0.0_f32; samples],
         );
-        for view in &self.pixels {
-            let light = flood[view.pixel];
+        for view in self.pixels() {
+            let light = flood[view.pixel as usize];
             let whole: f32 = self.seen(view).map(|(_, share)| share).sum();
             for (at, share) in self.seen(view) {
-                area[at] += share * self.side[0] * self.side[1];
+                area[at] += share * self.area();
                 right[at] += share * light * whole;
                 weight[at] += share * light * light * whole;
             }
@@ -238,8 +197,8 @@ impl Views {
         // (A' B^2 A + hold) change = A' B (A 1 - B A own), B the flood's light.
         let normal = |gains: &[f32]| {
             let mut product: Vec<f32> = gains.iter().zip(&hold).map(|(z, h)| z * h).collect();
-            for view in &self.pixels {
-                let light = flood[view.pixel];
+            for view in self.pixels() {
+                let light = flood[view.pixel as usize];
                 let seen: f32 = self.seen(view).map(|(at, share)| share * gains[at]).sum();
                 for (at, share) in self.seen(view) {
                     product[at] += share * light * light * seen;
@@ -306,17 +265,6 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
         .sum()
 }
 
-/// Samples along a side of `count` that an interval of `side` around `middle` covers, and how much
-/// of each.
-fn covered(middle: f32, side: f32, count: usize) -> impl Iterator<Item = (usize, f32)> {
-    let (from, to) = (middle - side / 2.0, middle + side / 2.0);
-    let last = (to.ceil().max(0.0) as usize).min(count);
-    (from.max(0.0) as usize..last).filter_map(move |at| {
-        let share = to.min(at as f32 + 1.0) - from.max(at as f32);
-        (share > 0.0).then_some((at, share))
-    })
-}
-
 /// Fills unknown samples of a cell with the nearest known ones' mean.
 fn filled(samples: &[Option<f32>], [wide, tall]: [usize; 2]) -> Vec<f32> {
     let value = |at: usize| {
@@ -341,23 +289,40 @@ fn filled(samples: &[Option<f32>], [wide, tall]: [usize; 2]) -> Vec<f32> {
 
 /// Subdivision that leaves [`PIXELS_A_SAMPLE`] in a live cell of median size.
 fn natural_factor(measurements: &Measurements, most: Option<FrameSize>) -> [usize; 2] {
-    let grid = measurements.grid;
+    let map = match &measurements.map {
+        Some(Ok(map)) => Some(map),
+        _ => None,
+    };
+    finest_factor(
+        measurements.grid,
+        (&measurements.registration, &measurements.live),
+        map,
+        most,
+    )
+}
+
+/// The same of a registration and its live cells.
+pub(crate) fn finest_factor(
+    grid: Grid,
+    (registration, live): (&Registration, &[bool]),
+    map: Option<&ProjectorMap>,
+    most: Option<FrameSize>,
+) -> [usize; 2] {
     let mut pixels = vec![0.0_f64; grid.cells()];
-    for &cell in &measurements.registration.seen_cell {
+    for &cell in &registration.seen_cell {
         if let Some(pixels) = pixels.get_mut(cell as usize) {
             *pixels += 1.0;
         }
     }
-    let of_live = (pixels.iter().zip(&measurements.live))
-        .filter_map(|(&pixels, &live)| live.then_some(pixels));
+    let of_live = (pixels.iter().zip(live)).filter_map(|(&pixels, &live)| live.then_some(pixels));
     let usual = median(of_live.collect()).unwrap_or(0.0);
-    let (needed, finest) = match &measurements.map {
-        Some(Ok(map)) => {
+    let (needed, finest) = match map {
+        Some(map) => {
             let inner = map.projector.inner();
             let pixels = [inner.width() / grid.cols(), inner.height() / grid.rows()];
             (MAPPED_PIXELS_A_SAMPLE, pixels)
         }
-        _ => (PIXELS_A_SAMPLE, [MAX_FACTOR; 2]),
+        None => (PIXELS_A_SAMPLE, [MAX_FACTOR; 2]),
     };
     let told = (usual / needed).sqrt() as usize;
     let most = most.map_or([usize::MAX; 2], |most| {
@@ -394,7 +359,9 @@ impl<'a> Surface<'a> {
         Self {
             grid: measurements.grid,
             registration: &measurements.registration,
-            inner: pixels.map(|pixel| measurements.is_inside(pixel)).collect(),
+            inner: pixels
+                .map(|pixel| measurements.registration.is_inside(pixel))
+                .collect(),
         }
     }
 
@@ -485,33 +452,11 @@ impl<'a> Surface<'a> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_pixel_adds_to_each_sample_by_as_much_as_it_covers() {
-        let shares = |middle: f32| -> Vec<(usize, f32)> {
-            let covered = covered(middle, 0.5, 4);
-            covered
-                .map(|(at, share)| (at, (100.0 * share).round() / 100.0))
-                .collect()
-        };
-        assert_eq!(shares(1.25), [(1, 0.5)]);
-        assert_eq!(shares(2.0), [(1, 0.25), (2, 0.25)]);
-        assert_eq!(shares(-0.1), [(0, 0.15)]);
-        assert_eq!(shares(4.1), [(3, 0.15)]);
-        assert_eq!((shares(-3.0), shares(9.0)), (vec![], vec![]));
-    }
-
     /// A row of samples, each seen by two camera pixels of half its width.
-    fn two_pixels_a_sample(samples: usize) -> Views {
-        let view = |pixel: usize| PixelView {
-            pixel,
-            place: [pixel as f32 / 2.0 + 0.25, 0.5],
-        };
-        Views {
-            rows: 1,
-            cols: samples,
-            side: [0.5, 1.0],
-            pixels: (0..2 * samples).map(view).collect(),
-        }
+    fn two_pixels_a_sample(samples: usize) -> PixelViews {
+        let place = |pixel: u32| (pixel, [pixel as f32 / 2.0 + 0.25, 0.5]);
+        let places = (0..2 * samples as u32).map(place);
+        PixelViews::of_places([samples, 1], [0.5, 1.0], places)
     }
 
     #[test]
@@ -529,16 +474,9 @@ mod tests {
     fn pixels_that_see_two_samples_each_still_tell_both() {
         // Pixels as wide as the samples, half a sample beside them: each sees a mean.
         let truth = [1.0_f32, 1.0, 2.0, 2.0, 2.0];
-        let view = |pixel: usize| PixelView {
-            pixel,
-            place: [pixel as f32 / 2.0 + 0.5, 0.5],
-        };
-        let views = Views {
-            rows: 1,
-            cols: truth.len(),
-            side: [1.0, 1.0],
-            pixels: (0..2 * truth.len() - 1).map(view).collect(),
-        };
+        let place = |pixel: u32| (pixel, [pixel as f32 / 2.0 + 0.5, 0.5]);
+        let places = (0..2 * truth.len() as u32 - 1).map(place);
+        let views = PixelViews::of_places([truth.len(), 1], [1.0; 2], places);
         // Light with which the true gains make every pixel even.
         let flood: Vec<f32> = (0..9)
             .map(|pixel| 2.0 / (truth[pixel / 2] + truth[pixel.div_ceil(2)]))
@@ -551,8 +489,8 @@ mod tests {
 
     #[test]
     fn what_no_pixel_sees_and_what_is_dark_has_no_gain() {
-        let mut views = two_pixels_a_sample(4);
-        views.pixels.truncate(6);
+        let place = |pixel: u32| (pixel, [pixel as f32 / 2.0 + 0.25, 0.5]);
+        let views = PixelViews::of_places([4, 1], [0.5, 1.0], (0..6).map(place));
         let gains = views.even_gains(&[0.5, 0.5, 0.0, 0.0, 0.5, 0.5]);
         let known: Vec<bool> = gains.iter().map(Option::is_some).collect();
         assert_eq!(known, [true, false, true, false]);

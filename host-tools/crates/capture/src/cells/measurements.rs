@@ -9,7 +9,7 @@ use crate::format::picture_file::FileFormat;
 use crate::format::role::Role;
 use crate::format::settings::Settings;
 use crate::gate::Gate;
-use crate::registration::cell_map::{NO_CELL, Registration};
+use crate::registration::cell_map::Registration;
 use crate::registration::projector_map::{MapError, ProjectorMap};
 use crate::registration::{PixelCount, RegistrationMethod};
 use iltm_runtime::Grid;
@@ -61,20 +61,6 @@ impl Measurements {
     /// Column of the white pattern in [`Measurements::patterns`] and in every
     /// [`ChannelMeasurements::observations`].
     pub const WHITE: usize = 0;
-
-    /// Whether a pixel and its four neighbours all belong to the projection: one at its very
-    /// border is only partly lit.
-    pub(crate) fn is_inside(&self, pixel: usize) -> bool {
-        let (width, height) = self.registration.camera;
-        let seen = &self.registration.seen_cell;
-        let (x, y) = (pixel % width, pixel / width);
-        let lit = |pixel: usize| seen[pixel] != NO_CELL;
-        (1..width - 1).contains(&x)
-            && (1..height - 1).contains(&y)
-            && [pixel, pixel - 1, pixel + 1, pixel - width, pixel + width]
-                .into_iter()
-                .all(lit)
-    }
 }
 
 /// One colour channel of [`Measurements`].

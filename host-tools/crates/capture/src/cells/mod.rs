@@ -10,6 +10,7 @@
 //! | whether light adds up, and why not | `superposition`, `nonlinearity` |
 //! | between the cells and within one | `cell_interpolation`, `fine_flood` |
 //! | pixel by pixel, some of them | `pixel_light` |
+//! | what each pixel sees of a grid | `pixel_views` |
 
 mod cell_interpolation;
 pub(crate) mod cell_pixels;
@@ -23,6 +24,7 @@ pub(crate) mod noise;
 mod noise_samples;
 pub(crate) mod nonlinearity;
 pub(crate) mod pixel_light;
+pub(crate) mod pixel_views;
 pub(crate) mod superposition;
 
 use crate::format::error::CaptureError;

@@ -105,7 +105,7 @@ impl Measurements {
             let pixel = pixel as usize;
             let place = map.in_cells(map.position[pixel], self.grid);
             let known = place.iter().all(|at| at.is_finite());
-            (known && sound && self.is_inside(pixel)).then_some(place)
+            (known && sound && self.registration.is_inside(pixel)).then_some(place)
         };
         light.pixels.iter().zip(&light.sound).map(place).collect()
     }

@@ -33,6 +33,19 @@ impl Registration {
         let cells = self.centre.iter().flatten().count();
         (seen.count() as f64 / cells.max(1) as f64).sqrt()
     }
+
+    /// Whether a pixel and its four neighbours all belong to the projection: one at its very
+    /// border is only partly lit.
+    pub(crate) fn is_inside(&self, pixel: usize) -> bool {
+        let (width, height) = self.camera;
+        let (x, y) = (pixel % width, pixel / width);
+        let lit = |pixel: usize| self.seen_cell[pixel] != NO_CELL;
+        (1..width - 1).contains(&x)
+            && (1..height - 1).contains(&y)
+            && [pixel, pixel - 1, pixel + 1, pixel - width, pixel + width]
+                .into_iter()
+                .all(lit)
+    }
 }
 
 /// A camera pixel with a cell, while its registration is worked out.

@@ -2,7 +2,8 @@
 
 use super::Cause;
 use crate::PatternsError;
-use iltm_capture::CaptureError;
+use iltm_capture::{CaptureError, MapError};
+use iltm_compile::CompileError;
 use iltm_picture::FolderError;
 use iltm_video::VideoError;
 use std::path::PathBuf;
@@ -133,6 +134,25 @@ pub enum VerifyError {
         /// Channels of the table.
         table: usize,
     },
+    /// A folder has no images and stripes of the projector's own pixels.
+    #[error(
+        "the folder has no fine stripes, or fewer than three images of the projector's own pixels: nothing says where the camera's pixels look"
+    )]
+    NotFine,
+    /// The stripes do not tell where the camera's pixels look.
+    #[error("{0}")]
+    Map(MapError),
+    /// Photographs are not fit to be fed back into a table.
+    #[error("the photographs cannot be fed back into a table: {what}")]
+    Refused {
+        /// Why.
+        cause: Cause,
+        /// What a gate found.
+        what: String,
+    },
+    /// The refined gains cannot be stored.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
     /// A photograph fits another picture much better than its own.
     #[error(
         "{}: it shows the picture of {shows}, not its own, {own}: photographs were exchanged, or one is missing and all later ones moved up",
@@ -224,6 +244,15 @@ impl VerifyError {
                 "Put the photographs in the order of verify.csv, or take them again.".to_owned()
             }
             Self::Overexposed { .. } => Cause::Clipped.next_step().to_owned(),
+            Self::NotFine => {
+                "Make the folder with `iltm verify TABLE.iltm -o FOLDER`, without --wanted and \
+                 --no-dense, for a projector with at least four pixels along a cell's sides, and \
+                 photograph it."
+                    .to_owned()
+            }
+            Self::Map(error) => error.next_step().to_owned(),
+            Self::Refused { cause, .. } => cause.next_step().to_owned(),
+            Self::Compile(error) => error.next_step().to_owned(),
             Self::TooFewCells { .. } => {
                 "Point the camera so that it sees the whole projection, in focus.".to_owned()
             }

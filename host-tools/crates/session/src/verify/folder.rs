@@ -1,12 +1,15 @@
 //! Verification folder: writes the pictures that a table is verified with.
 
 use super::card::Card;
-use super::images::{MOST_CLIPPED, RANGES, test_images};
+use super::images::{MOST_CLIPPED, RANGES, fine_images, test_images};
 use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
 use super::{TestImage, VerifyError};
-use crate::{Layout, slide_name};
-use iltm_capture::{Pattern, Role, SETTINGS_FILE, Settings, VERIFY_FILE, numbered, pattern_set};
+use crate::{Layout, SLIDES_FOLDER, Slide, fine_stripes, slide_name};
+use iltm_capture::{
+    Pattern, Role, SETTINGS_FILE, STRIPES_FILE, Settings, StripeManifest, StripeRole, VERIFY_FILE,
+    numbered, pattern_set,
+};
 use iltm_picture::{Picture, Response, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
 use iltm_video::{Compensator, VideoError};
@@ -27,8 +30,12 @@ pub struct Written {
     /// Pictures of the film: all of them, each after its card; none if the projection has too
     /// few pixels for a card, or the slides are for a projector alone.
     pub film: usize,
-    /// The test images.
+    /// Fine stripes among the pictures.
+    pub stripes: usize,
+    /// The test images of one pixel a cell.
     pub images: Vec<TestImage>,
+    /// The test images of one pixel a pixel of the projector.
+    pub fine: Vec<TestImage>,
 }
 
 /// Random patterns beside the Gray code: without them camera pixels are found so roughly
@@ -43,18 +50,39 @@ const SEED: u64 = 0x5EE;
 
 /// A picture to project.
 struct VerifySlide {
-    role: VerifyRole,
-    /// One pixel a cell.
-    cells: Picture,
+    listed: ListedAs,
+    /// One pixel a cell; `None` if the slide says more than that.
+    cells: Option<Picture>,
     /// What the projector is sent.
     full: Picture,
+}
+
+/// In which list a slide stands, and as what.
+#[derive(Clone, Copy)]
+enum ListedAs {
+    Verify(VerifyRole),
+    Stripes(StripeRole),
+}
+
+impl VerifySlide {
+    fn cells(role: VerifyRole, cells: Picture, full: Picture) -> Self {
+        let (listed, cells) = (ListedAs::Verify(role), Some(cells));
+        Self {
+            listed,
+            cells,
+            full,
+        }
+    }
 }
 
 /// What the slides of a folder are.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Slides {
     /// Each test image as it is and as the table compensates it: for a projector alone.
-    Both,
+    Both {
+        /// Whether there are stripes and images of the projector's own pixels too.
+        fine: bool,
+    },
     /// Each test image as it should look: for a chain that compensates.
     Wanted,
 }
@@ -83,21 +111,27 @@ pub fn write(
     progress: &dyn Progress,
 ) -> Result<Written, VerifyError> {
     let images = test_images(table)?;
+    let fine = match kind {
+        Slides::Both { fine: true } => fine_images(table, layout.inner())?,
+        Slides::Both { fine: false } | Slides::Wanted => Vec::new(),
+    };
     let mut settings = settings.clone();
     let size = layout.projector();
     settings.projector.size = Some([size.width() as u16, size.height() as u16]);
     settings.projector.border = layout.border();
     let folder = WholeFolder::create(out)?;
-    for name in ["patterns", "slides", PHOTOS_FOLDER, "wanted"] {
+    for name in ["patterns", SLIDES_FOLDER, PHOTOS_FOLDER, "wanted"] {
         folder.folder(name)?;
     }
     let slides = match kind {
-        Slides::Both => slides(table, layout, &images)?,
+        Slides::Both { .. } => slides(table, layout, &images, &fine)?,
         Slides::Wanted => wanted_slides(table, layout, &images)?,
     };
     progress.begin("writing the pictures", slides.len() as u64);
     let written = slides.par_iter().enumerate().map(|(index, slide)| {
-        folder.picture(numbered("patterns", index as u32), &slide.cells)?;
+        if let Some(cells) = &slide.cells {
+            folder.picture(numbered("patterns", index as u32), cells)?;
+        }
         folder.picture(slide_name(index as u32), &slide.full)?;
         progress.advance(1);
         Ok(())
@@ -106,19 +140,26 @@ pub fn write(
     for (image, test) in images.iter().enumerate() {
         folder.picture(wanted_file(image as u8), &test.wanted)?;
     }
-    let manifest = VerifyManifest::numbered("patterns", (0..).zip(slides.iter().map(|s| s.role)));
+    for (image, test) in fine.iter().enumerate() {
+        folder.picture(fine_file(image as u8), &test.wanted)?;
+    }
+    let (manifest, stripes) = lists(&slides);
     folder.file(VERIFY_FILE, manifest.to_csv())?;
+    let stripes = (stripes.shots.len(), stripes);
+    if stripes.0 > 0 {
+        folder.file(STRIPES_FILE, stripes.1.to_csv())?;
+    }
     // Numbers and strings always have a TOML form.
     folder.file(
         SETTINGS_FILE,
         toml::to_string(&settings).unwrap_or_default(),
     )?;
     let film = match kind {
-        Slides::Both => 0,
+        Slides::Both { .. } => 0,
         Slides::Wanted => write_film(table, layout, &slides, &folder)?,
     };
     let readme = match kind {
-        Slides::Both => README,
+        Slides::Both { .. } => README,
         Slides::Wanted => {
             folder.file(TABLE_FILE, format!("{:08x}\n", table.id()))?;
             README_WANTED
@@ -131,8 +172,32 @@ pub fn write(
     Ok(Written {
         pictures: slides.len(),
         film,
+        stripes: stripes.0,
         images,
+        fine,
     })
+}
+
+/// The lists of these slides.
+fn lists(slides: &[VerifySlide]) -> (VerifyManifest, StripeManifest) {
+    let of = |fine: bool| {
+        let slides = (0..).zip(slides);
+        slides.filter_map(move |(index, slide)| match slide.listed {
+            ListedAs::Verify(role) if slide.cells.is_none() == fine => Some((index, role)),
+            _ => None,
+        })
+    };
+    let mut verify = VerifyManifest::numbered("patterns", of(false));
+    let fine = VerifyManifest::numbered(SLIDES_FOLDER, of(true));
+    verify.shots.extend(fine.shots);
+    verify.shots.sort_by_key(|shot| shot.index);
+    let stripes = (0..).zip(slides);
+    let stripes = stripes.filter_map(|(index, slide)| match slide.listed {
+        ListedAs::Stripes(role) => Some((index, role)),
+        ListedAs::Verify(_) => None,
+    });
+    let stripes = StripeManifest::numbered(SLIDES_FOLDER, stripes);
+    (verify, stripes)
 }
 
 /// Writes the film: every slide after its card, and a last card, after which nothing is a
@@ -171,13 +236,20 @@ pub(super) fn wanted_file(image: u8) -> PathBuf {
     Path::new("wanted").join(format!("{image}.png"))
 }
 
+/// The same of a fine test image.
+pub(super) fn fine_file(image: u8) -> PathBuf {
+    Path::new("wanted").join(format!("fine-{image}.png"))
+}
+
 /// All pictures in the order in which they are shown: white and black also in the middle
 /// and at the end, so that a lamp that changes meanwhile is noticed; random patterns also
-/// between the images and after them, so that a camera that moves there is.
+/// between the images and after them, so that a camera that moves there is. Fine stripes, where
+/// there are fine images, follow the code.
 fn slides(
     table: &Table<'_>,
     layout: &Layout,
     images: &[TestImage],
+    fine: &[TestImage],
 ) -> Result<Vec<VerifySlide>, VerifyError> {
     let curves = ProjectorCurves::new(table);
     let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
@@ -185,11 +257,8 @@ fn slides(
     let code = |(role, pattern): &(Role, Pattern)| -> Result<VerifySlide, VerifyError> {
         let lit = |cell: usize, _| 255 * u8::from(pattern.lit[cell]);
         let cells = Picture::of_codes(FrameSize::of_grid(table.grid()), 1, lit);
-        Ok(VerifySlide {
-            role: VerifyRole::Code(*role),
-            full: layout.slide(&cells)?,
-            cells,
-        })
+        let full = layout.slide(&cells)?;
+        Ok(VerifySlide::cells(VerifyRole::Code(*role), cells, full))
     };
     let coded = pattern_set(table.grid(), BERNOULLI, SEED);
     let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
@@ -199,6 +268,9 @@ fn slides(
     let (first, rest) = coded.split_at(coded.len() - between);
     let mut rest = rest.iter();
     let mut slides = all(first)?;
+    if !fine.is_empty() {
+        slides.extend(stripes(layout)?);
+    }
     slides.extend(ends()?);
     for (image, test) in (0..).zip(images) {
         let plain = plain(&test.wanted, &curves);
@@ -207,22 +279,45 @@ fn slides(
         let Some(full) = layout.framed(&full) else {
             unreachable!("slides have 8 bits and the size of the cells");
         };
-        slides.push(VerifySlide {
-            role: VerifyRole::Plain(image),
-            full: layout.slide(&plain)?,
-            cells: plain,
-        });
+        let shown = layout.slide(&plain)?;
+        slides.push(VerifySlide::cells(VerifyRole::Plain(image), plain, shown));
         slides.extend(rest.next().map(code).transpose()?);
-        slides.push(VerifySlide {
-            role: VerifyRole::Compensated(image),
-            cells: test.compensated.clone(),
-            full,
-        });
+        let (role, cells) = (VerifyRole::Compensated(image), test.compensated.clone());
+        slides.push(VerifySlide::cells(role, cells, full));
         slides.extend(rest.next().map(code).transpose()?);
+    }
+    for (image, test) in (0..).zip(fine) {
+        let plain = plain(&test.wanted, &curves);
+        for (role, picture) in [
+            (VerifyRole::FinePlain(image), &plain),
+            (VerifyRole::FineCompensated(image), &test.compensated),
+        ] {
+            slides.push(VerifySlide {
+                listed: ListedAs::Verify(role),
+                cells: None,
+                full: layout.slide(picture)?,
+            });
+        }
     }
     slides.extend(all(rest.as_slice())?);
     slides.extend(ends()?);
     Ok(slides)
+}
+
+/// Stripes finer than the cells.
+fn stripes(layout: &Layout) -> Result<Vec<VerifySlide>, VerifyError> {
+    let slide = |slide: Slide| {
+        let crate::Purpose::Stripes(role) = slide.purpose else {
+            return Ok(None);
+        };
+        Ok(Some(VerifySlide {
+            listed: ListedAs::Stripes(role),
+            cells: None,
+            full: layout.slide(&slide.picture)?,
+        }))
+    };
+    let slides = fine_stripes(layout).into_iter().map(slide);
+    slides.filter_map(Result::transpose).collect()
 }
 
 /// All slides for a chain that compensates, in the order in which they are shown.
@@ -235,11 +330,9 @@ fn wanted_slides(
     let levels = levels(table)?;
     let code = |(role, pattern): &(Role, Pattern)| -> Result<VerifySlide, VerifyError> {
         let lit = |cell: usize, _| 255 * u8::from(pattern.lit[cell]);
-        Ok(VerifySlide {
-            role: VerifyRole::Code(*role),
-            full: layout.slide(&grey(table, levels, &pattern.lit))?,
-            cells: Picture::of_codes(FrameSize::of_grid(table.grid()), 1, lit),
-        })
+        let cells = Picture::of_codes(FrameSize::of_grid(table.grid()), 1, lit);
+        let full = layout.slide(&grey(table, levels, &pattern.lit))?;
+        Ok(VerifySlide::cells(VerifyRole::Code(*role), cells, full))
     };
     let all = |shown: &[(Role, Pattern)]| shown.iter().map(code).collect::<Result<Vec<_>, _>>();
     let (first, rest) = coded.split_at(coded.len() - images.len() - AFTER_IMAGES);
@@ -247,11 +340,9 @@ fn wanted_slides(
     let mut slides = all(first)?;
     slides.extend(all(&coded[..2])?);
     for (image, test) in (0..).zip(images) {
-        slides.push(VerifySlide {
-            role: VerifyRole::Wanted(image),
-            full: layout.slide(&test.wanted)?,
-            cells: test.wanted.clone(),
-        });
+        let full = layout.slide(&test.wanted)?;
+        let (role, cells) = (VerifyRole::Wanted(image), test.wanted.clone());
+        slides.push(VerifySlide::cells(role, cells, full));
         slides.extend(rest.next().map(code).transpose()?);
     }
     slides.extend(all(rest.as_slice())?);

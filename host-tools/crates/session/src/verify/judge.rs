@@ -8,7 +8,7 @@
 
 use super::outcome::decide;
 use super::readings::Shown;
-use super::{Cause, ChainFault, Expected, Outcome, Readings, VerifyError};
+use super::{Cause, ChainFault, Expected, Outcome, PixelVerdict, Readings, VerifyError};
 use iltm_capture::{CellPlanes, Gate};
 use iltm_compile::Provenance;
 use iltm_picture::LightPicture;
@@ -193,6 +193,8 @@ pub struct TableVerdict {
     pub bound: Bound,
     /// Image by image.
     pub images: Vec<ImageVerdict>,
+    /// What a viewer sees of finer images; `None` without such.
+    pub pixels: Option<PixelVerdict>,
     /// What has changed.
     pub drift: Drift,
     /// Light of wanted white on the wall, of that under the projector's own white; mean over
@@ -271,6 +273,7 @@ pub fn judge(
         gates: readings.revisited.gates.clone(),
         error,
         bound,
+        pixels: PixelVerdict::new(table, readings),
         drift,
         brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),
@@ -759,6 +762,7 @@ mod tests {
         };
         Readings {
             shown: Vec::new(),
+            fine: Vec::new(),
             revisited: CellReadings {
                 grid: Grid::new(2, 2).unwrap(),
                 channels: 2,
@@ -772,6 +776,7 @@ mod tests {
                 pictures: Vec::new(),
                 views: Vec::new(),
                 step: 1,
+                pixels: None,
             },
             live: vec![true; 4],
             wanted: false,

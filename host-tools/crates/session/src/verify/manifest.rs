@@ -13,7 +13,7 @@ pub type VerifyShot = ShotOf<VerifyRole>;
 ///
 /// [`fmt::Display`] writes and [`VerifyRole::from_name`] reads the name that stands
 /// there: `white`, `black`, `column-B`, `column-B-inverse`, `row-B`, `row-B-inverse`,
-/// `bernoulli`, `plain-K`, `compensated-K`, `wanted-K`.
+/// `bernoulli`, `plain-K`, `compensated-K`, `wanted-K`, `fine-plain-K`, `fine-compensated-K`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum VerifyRole {
     /// To find the cells: any role of `capture.csv`.
@@ -24,6 +24,10 @@ pub enum VerifyRole {
     Compensated(u8),
     /// Test image K as it should look, for a chain that compensates.
     Wanted(u8),
+    /// Test image K of the projector's own pixels, as it is.
+    FinePlain(u8),
+    /// The same, compensated.
+    FineCompensated(u8),
 }
 
 impl VerifyRole {
@@ -41,16 +45,20 @@ impl VerifyRole {
             let image: u8 = digits.parse().ok()?;
             (digits == image.to_string()).then_some(image)
         };
-        if let Some(digits) = name.strip_prefix("plain-") {
-            return number(digits).map(Self::Plain);
+        let image = |prefix: &str| name.strip_prefix(prefix);
+        if let Some(digits) = image("plain-") {
+            number(digits).map(Self::Plain)
+        } else if let Some(digits) = image("compensated-") {
+            number(digits).map(Self::Compensated)
+        } else if let Some(digits) = image("wanted-") {
+            number(digits).map(Self::Wanted)
+        } else if let Some(digits) = image("fine-plain-") {
+            number(digits).map(Self::FinePlain)
+        } else if let Some(digits) = image("fine-compensated-") {
+            number(digits).map(Self::FineCompensated)
+        } else {
+            Role::from_name(name).map(Self::Code)
         }
-        if let Some(digits) = name.strip_prefix("compensated-") {
-            return number(digits).map(Self::Compensated);
-        }
-        if let Some(digits) = name.strip_prefix("wanted-") {
-            return number(digits).map(Self::Wanted);
-        }
-        Role::from_name(name).map(Self::Code)
     }
 }
 
@@ -61,6 +69,8 @@ impl fmt::Display for VerifyRole {
             Self::Plain(image) => write!(f, "plain-{image}"),
             Self::Compensated(image) => write!(f, "compensated-{image}"),
             Self::Wanted(image) => write!(f, "wanted-{image}"),
+            Self::FinePlain(image) => write!(f, "fine-plain-{image}"),
+            Self::FineCompensated(image) => write!(f, "fine-compensated-{image}"),
         }
     }
 }
@@ -75,7 +85,8 @@ impl ListedRole for VerifyRole {
     fn unknown(role: &str) -> String {
         format!(
             "unknown role \"{role}\"; it must be white, black, column-B, row-B (the latter \
-             two also with -inverse), bernoulli, plain-K, compensated-K or wanted-K"
+             two also with -inverse), bernoulli, plain-K, compensated-K or wanted-K (the first \
+             two also with fine-)"
         )
     }
 }
@@ -94,7 +105,15 @@ mod tests {
         let images = [0, 1, 10, 255].map(VerifyRole::Plain);
         let compensated = [0, 1, 10, 255].map(VerifyRole::Compensated);
         let wanted = [0, 1, 10, 255].map(VerifyRole::Wanted);
-        for role in [&codes[..], &images, &compensated, &wanted].concat() {
+        let fine = [0, 1, 10, 255]
+            .map(|image| {
+                [
+                    VerifyRole::FinePlain(image),
+                    VerifyRole::FineCompensated(image),
+                ]
+            })
+            .concat();
+        for role in [&codes[..], &images, &compensated, &wanted, &fine].concat() {
             assert_eq!(VerifyRole::from_name(&role.to_string()), Some(role));
         }
     }
@@ -102,7 +121,7 @@ mod tests {
     #[test]
     fn an_unknown_role_is_told_which_ones_there_are() {
         let text = VerifyRole::unknown("flat");
-        for word in ["\"flat\"", "plain-K", "wanted-K", "bernoulli"] {
+        for word in ["\"flat\"", "plain-K", "wanted-K", "fine-", "bernoulli"] {
             assert!(text.contains(word), "{text}");
         }
     }

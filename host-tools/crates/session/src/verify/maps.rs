@@ -1,17 +1,22 @@
 //! Pictures of a verdict: maps of the cells, and the photographs of the wall.
 
 use super::judge::over_images;
-use super::{Readings, TableVerdict};
+use super::pixels::{on_camera, seen, wanted};
+use super::{PixelVerdict, Readings, TableVerdict};
 use iltm_capture::NO_CELL;
 use iltm_picture::{
     ColourScale, LightPicture, Palette, Picture,
     canvas::{Canvas, Colour, FontWeight, RasterHeight, Type},
     html::{PictureFile, picture_file},
+    statistics::quantile,
 };
 use iltm_runtime::{FrameSize, Grid, image::Table};
 
 /// Pixels that the longer side of a map should have at least.
 const MAP_SIDE: usize = 480;
+
+/// Most pixels across a picture of the camera's own.
+const MOST_WIDTH: usize = 900;
 
 /// Grey of cells that were not compared.
 const UNKNOWN: [u8; 3] = [88, 92, 100];
@@ -23,7 +28,8 @@ pub(super) const MARKED: usize = 3;
 const MARK: Colour = [255, 64, 32];
 
 /// Every picture of the page, by name: `worst-cells`, `worst-cells-before`, `worst-seen`,
-/// `drift`, and of each test image `K-wanted`, `K-before`, `K-after`.
+/// `drift`, of each test image `K-wanted`, `K-before`, `K-after`, and of finer ones
+/// `pixel-errors`, `fine-wanted`, `fine-before`, `fine-after`.
 #[must_use]
 pub fn pictures(
     table: &Table<'_>,
@@ -72,6 +78,7 @@ pub fn pictures(
             files.extend(light.map(|light| picture_file(&name, &light.for_display())));
         }
     }
+    files.extend(pixel_pictures(table, readings, verdict, scale));
     // The most even image shows the marks best.
     let last = readings.shown.iter().rev().find(|shown| {
         let light = shown.wanted.iter().flatten();
@@ -84,6 +91,55 @@ pub fn pictures(
         files.push(picture_file("worst-seen", &picture));
     }
     files
+}
+
+/// The error of every pixel, and the first of the finer images, at the camera's resolution or as
+/// near to it as a page has room for.
+fn pixel_pictures(
+    table: &Table<'_>,
+    readings: &Readings,
+    verdict: &TableVerdict,
+    scale: f64,
+) -> Vec<PictureFile> {
+    let (Some(judged), Some(Ok(pixels))) = (&verdict.pixels, &readings.revisited.pixels) else {
+        return Vec::new();
+    };
+    let fitting = |planes: &[Vec<f32>]| {
+        let mut picture = on_camera(pixels, planes)?;
+        while picture.size().width() > MOST_WIDTH {
+            picture = picture.halved();
+        }
+        Some(picture)
+    };
+    let mut files = Vec::new();
+    let colours = pixel_scale(judged);
+    if let Some(errors) = fitting(std::slice::from_ref(&judged.errors)) {
+        let values = errors.planes()[0].iter().map(|error| f64::from(*error));
+        files.push(picture_file(
+            "pixel-errors",
+            &colours.picture(errors.size(), values),
+        ));
+    }
+    let (Some(first), Some(white)) = (readings.fine.first(), judged.white.first()) else {
+        return files;
+    };
+    let wanted = wanted(pixels, first);
+    let all = [
+        ("fine-wanted", wanted, scale * white),
+        ("fine-before", seen(table, pixels, 0), scale),
+        ("fine-after", seen(table, pixels, 1), scale),
+    ];
+    for (name, planes, scale) in all {
+        let light = fitting(&planes).map(|light| light.scaled(scale).for_display());
+        files.extend(light.map(|light| picture_file(name, &light)));
+    }
+    files
+}
+
+/// Colours of the map of the pixels' errors: up to what 99 of 100 are below.
+pub(super) fn pixel_scale(judged: &PixelVerdict) -> ColourScale {
+    let worst = quantile(&mut judged.errors.clone(), 0.99).unwrap_or(0.0);
+    ColourScale::linear(Palette::Magma, rounded(f64::from(worst)))
 }
 
 /// What photographs are multiplied by on a screen: all by the same, so that one that is darker

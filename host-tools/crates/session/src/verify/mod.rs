@@ -13,6 +13,8 @@
 //!                expected  the light that the table expects of any input
 //!                judge     errors before and after, drift, what they are held against
 //!                chain     what a chain did that was to compensate
+//!                pixels    what a viewer sees, at every pixel of the camera
+//!                refine    photographs fed back into the table's gains
 //!                outcome   passed, failed, or these photographs cannot tell; and why
 //!                page      all of it for people, with maps of the worst cells
 //! ```
@@ -28,8 +30,10 @@ mod manifest;
 mod maps;
 mod outcome;
 mod page;
+mod pixels;
 mod readings;
 mod recognise;
+mod refine;
 mod response;
 #[cfg(test)]
 #[path = "../../../compile/src/test_scene.rs"]
@@ -39,12 +43,14 @@ pub use chain::ChainFault;
 pub use error::VerifyError;
 pub use expected::Expected;
 pub use folder::{Slides, Written, write};
-pub use images::{TestImage, test_images};
+pub use images::{TestImage, fine_images, test_images};
 pub use judge::{Bound, Curve, Drift, ImageVerdict, TableVerdict, WhiteChange, WorstCell, judge};
 pub use manifest::{VerifyManifest, VerifyRole, VerifyShot};
 pub use maps::pictures;
 pub use outcome::{Cause, Outcome, refused};
 pub use page::{Handover, brightness_words, html, reason};
-pub use readings::{Readings, Shown};
+pub use pixels::PixelVerdict;
+pub use readings::{FineShown, Readings, Shown};
 pub use recognise::{Recognised, recognise};
+pub use refine::{Refined, refine};
 pub use response::ProjectorCurves;

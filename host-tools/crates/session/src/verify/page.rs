@@ -1,10 +1,11 @@
 //! Page of a verdict: one HTML file with everything inside.
 
 use super::judge::{MOST_NOISE, MOST_VIEWPOINT};
-use super::maps::{MARKED, drift_scale, error_scale};
+use super::maps::{MARKED, drift_scale, error_scale, pixel_scale};
 use super::outcome::colour;
-use super::{Cause, ImageVerdict, Outcome, TableVerdict, TestImage};
+use super::{Cause, ImageVerdict, Outcome, PixelVerdict, TableVerdict, TestImage};
 use iltm_compile::Provenance;
+use iltm_picture::PictureError;
 use iltm_picture::html::{PictureFile, capitalised, colour_bar, document, img_named, percent};
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
@@ -35,6 +36,7 @@ pub fn html(
     let body = html! { main {
         (opening(answer, verdict))
         (identity(table, verdict, handover))
+        @if let Some(judged) = &verdict.pixels { (viewer(judged, files)) }
         (pictures(verdict, images, files))
         (worst(verdict, files))
         (unchecked(verdict, handover))
@@ -113,7 +115,7 @@ fn unchecked(verdict: &TableVerdict, handover: &Handover) -> Markup {
             @if handover.device.is_none() { li { "Which table is on a device: none was asked." } }
             li { "Tiers below the table's top one, which a device uses when time is short." }
             @if compared < known { li { (known - compared) " of the table's " (known) " cells, which the camera did not see clearly." } }
-            li { "Detail within a cell, and creases: a cell's mean light is compared." }
+            @if verdict.pixels.is_none() { li { "Detail within a cell, and creases: a cell's mean light is compared." } }
             li { "Content other than the test images: darker or more saturated pictures may be cut." }
             li { "Other places to stand, glossy surfaces from there, and other light in the room than during these photographs." }
         }
@@ -289,7 +291,7 @@ fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile])
             .map(|test| test.title.as_str())
     };
     html! { section {
-        h2 { "The wall in the photographs" }
+        h2 { "The wall in the photographs, cell by cell" }
         p { "All at the same brightness. On the left the wanted light, drawn where the camera sees each cell." }
         @for image in &verdict.images {
             div .example {
@@ -305,6 +307,37 @@ fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile])
                         figcaption .error { "Compensated: error " b { (percent(image.error[1])) } }
                     }
                 }
+            }
+        }
+    } }
+}
+
+/// What a viewer sees of images of the projector's own pixels.
+fn viewer(judged: &PixelVerdict, files: &[PictureFile]) -> Markup {
+    let [before, after] = judged.error;
+    let figures = |half: usize| {
+        let images: Vec<PictureError> = judged.images.iter().map(|pair| pair[half]).collect();
+        PictureError::mean(&images).map(|mean| mean.words())
+    };
+    html! { section {
+        h2 { "What a viewer sees" }
+        p {
+            "Natural images of the projector's own pixels, compared at " (judged.errors.len())
+            " pixels of the camera: " b { (percent(after)) } " of the light is off, "
+            (percent(before)) " as the wall is. The camera's noise, "
+            (percent(judged.noise)) " in one photograph, is taken out."
+        }
+        div .three {
+            figure { (img_named(files, "fine-wanted", "Wanted")) figcaption { "Wanted" } }
+            figure { (img_named(files, "fine-before", "Photograph of the wall without compensation")) figcaption { "As it is" } }
+            figure { (img_named(files, "fine-after", "Photograph of the wall with compensation")) figcaption { "Compensated" } }
+        }
+        div .half {
+            figure .cells { (img_named(files, "pixel-errors", "Error of every pixel of the camera")) (colour_bar(&pixel_scale(judged), false)) figcaption { "Error of every pixel over " (judged.images.len()) " images, compensated, relative to reference white, noise included" } }
+            div {
+                @if let Some(words) = figures(0) { p { "As it is: " (words) "." } }
+                @if let Some(words) = figures(1) { p { "Compensated: " (words) "." } }
+                p .quiet { "These figures include the noise of the photographs. " code { "iltm refine" } " feeds the photographs back into the table." }
             }
         }
     } }

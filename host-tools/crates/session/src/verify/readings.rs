@@ -1,11 +1,14 @@
 //! A verification folder with its photographs, read back and checked.
 
-use super::folder::{TABLE_FILE, grey, levels, plain, wanted_file};
+use super::folder::{TABLE_FILE, fine_file, grey, levels, plain, wanted_file};
 use super::manifest::{VerifyManifest, VerifyRole, VerifyShot};
 use super::response::ProjectorCurves;
 use super::{Cause, Expected, VerifyError, refused};
+use crate::Layout;
 use iltm_capture::VERIFY_FILE;
-use iltm_capture::{CaptureError, CellPlanes, CellReadings, Settings, Shot, find_photo, remeasure};
+use iltm_capture::{
+    CaptureError, CellPlanes, CellReadings, Remeasured, Settings, Shot, find_photo, remeasure,
+};
 use iltm_compile::Provenance;
 use iltm_picture::{
     LightPicture, Picture, Response, Samples, foreign_file, png, progress::Progress,
@@ -35,11 +38,25 @@ pub struct Shown {
     pub views: [Option<LightPicture>; 2],
 }
 
+/// A test image of the projector's own pixels that was photographed.
+#[derive(Clone, Debug)]
+pub struct FineShown {
+    /// Its number in `verify.csv`.
+    pub image: u8,
+    /// The light that was wanted, relative to reference white; without the projector's border.
+    pub wanted: LightPicture,
+    /// Whether the projector's range cut a sample of the compensated picture, by channel.
+    pub cut: Vec<Vec<bool>>,
+}
+
 /// Everything that the photographs of a verification folder say.
 #[derive(Clone, Debug)]
 pub struct Readings {
     /// The test images, by number.
     pub shown: Vec<Shown>,
+    /// Those of the projector's own pixels, by number; [`CellReadings::pixels`] has the
+    /// photographs of each, as it is and compensated.
+    pub fine: Vec<FineShown>,
     /// The cells, white and black.
     pub revisited: CellReadings,
     /// Cells that the table has gains for and that were measured, length `N`.
@@ -73,12 +90,19 @@ impl Readings {
         let mixing = Provenance::read(table.provenance()).mixing;
         let mut code: Vec<Shot> = Vec::new();
         let mut images: BTreeMap<u8, [Option<VerifyShot>; 2]> = BTreeMap::new();
+        let mut fine_images: BTreeMap<u8, [Option<VerifyShot>; 2]> = BTreeMap::new();
         let mut wanted = false;
         for shot in manifest.shots {
             match shot.role {
                 VerifyRole::Code(role) => code.push(with_role(&shot, role)),
                 VerifyRole::Plain(image) => images.entry(image).or_default()[0] = Some(shot),
                 VerifyRole::Compensated(image) => images.entry(image).or_default()[1] = Some(shot),
+                VerifyRole::FinePlain(image) => {
+                    fine_images.entry(image).or_default()[0] = Some(shot);
+                }
+                VerifyRole::FineCompensated(image) => {
+                    fine_images.entry(image).or_default()[1] = Some(shot);
+                }
                 VerifyRole::Wanted(image) => {
                     wanted = true;
                     images.insert(image, [Some(shot.clone()), Some(shot)]);
@@ -89,19 +113,10 @@ impl Readings {
         if images.is_empty() {
             return Err(VerifyError::NoImages { path: path() });
         }
-        let mut pairs = Vec::new();
-        for (image, pair) in images {
-            let lacking = |what| VerifyError::Unpaired {
-                path: path(),
-                image,
-                what,
-            };
-            let [own, compensated] = pair;
-            let own = own.ok_or_else(|| lacking("plain"))?;
-            let compensated = compensated.ok_or_else(|| lacking("compensated"))?;
-            pairs.push((image, [own, compensated]));
-        }
-        check_all_there(folder, &code, &pairs)?;
+        let pairs = paired(images, folder)?;
+        let fine_pairs = paired(fine_images, folder)?;
+        check_all_there(folder, &code, [&pairs, &fine_pairs].into_iter().flatten())?;
+        let fine = fine_pictures(folder, table, &settings, &fine_pairs)?;
         let pictures = if wanted {
             wanted_pictures(folder, table, &pairs)?
         } else {
@@ -114,7 +129,15 @@ impl Readings {
         let shots: Vec<Shot> = flat
             .map(|shot| with_role(shot, iltm_capture::Role::White))
             .collect();
-        let revisited = remeasure(folder, &settings, mixing, (&code, &shots), progress)?;
+        let fine_shots: Vec<Shot> = (fine_pairs.iter().flat_map(|(_, pair)| pair))
+            .map(|shot| with_role(shot, iltm_capture::Role::White))
+            .collect();
+        let photographs = Remeasured {
+            code: &code,
+            pictures: &shots,
+            fine: &fine_shots,
+        };
+        let revisited = remeasure(folder, &settings, mixing, photographs, progress)?;
         let live = live(folder, table, &revisited)?;
         let mut expected = Expected::new(table);
         let photographed = if wanted { 1 } else { 2 };
@@ -140,12 +163,31 @@ impl Readings {
         }
         Ok(Self {
             shown,
+            fine,
             live,
             flood: flood(table, wanted)?,
             wanted,
             revisited,
         })
     }
+}
+
+/// Both pictures of each test image.
+fn paired(
+    images: BTreeMap<u8, [Option<VerifyShot>; 2]>,
+    folder: &Path,
+) -> Result<Vec<(u8, [VerifyShot; 2])>, VerifyError> {
+    let pair = |(image, [own, compensated]): (u8, [Option<VerifyShot>; 2])| {
+        let lacking = |what| VerifyError::Unpaired {
+            path: folder.join(VERIFY_FILE),
+            image,
+            what,
+        };
+        let own = own.ok_or_else(|| lacking("plain"))?;
+        let compensated = compensated.ok_or_else(|| lacking("compensated"))?;
+        Ok((image, [own, compensated]))
+    };
+    images.into_iter().map(pair).collect()
 }
 
 /// The projector's input under what stands for white.
@@ -198,13 +240,13 @@ fn with_role(shot: &VerifyShot, role: iltm_capture::Role) -> Shot {
     }
 }
 
-fn check_all_there(
+fn check_all_there<'p>(
     folder: &Path,
     code: &[Shot],
-    pairs: &[(u8, [VerifyShot; 2])],
+    pairs: impl Iterator<Item = &'p (u8, [VerifyShot; 2])>,
 ) -> Result<(), VerifyError> {
     let of_code = code.iter().map(|shot| (shot.index, &shot.photo));
-    let of_images = pairs.iter().flat_map(|(_, pair)| pair);
+    let of_images = pairs.flat_map(|(_, pair)| pair);
     let of_images = of_images.map(|shot| (shot.index, &shot.photo));
     let mut missing = Vec::new();
     for (index, photo) in of_code.chain(of_images) {
@@ -265,8 +307,69 @@ fn pictures(
     pairs.iter().map(of_pair).collect()
 }
 
+/// The same of test images of the projector's own pixels.
+fn fine_pictures(
+    folder: &Path,
+    table: &Table<'_>,
+    settings: &Settings,
+    pairs: &[(u8, [VerifyShot; 2])],
+) -> Result<Vec<FineShown>, VerifyError> {
+    if pairs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let [width, height] = settings.projector.size.unwrap_or_default();
+    let size = FrameSize::new(width, height).unwrap_or(FrameSize::of_grid(table.grid()));
+    let layout = Layout::new(table.grid(), size, settings.projector.border)?;
+    let curves = ProjectorCurves::new(table);
+    let compensator = Compensator::new(table, iltm_video::CompensateOptions::default())?;
+    let of_pair = |(image, shots): &(u8, [VerifyShot; 2])| {
+        let wanted = read_of_size(folder, &fine_file(*image), table, layout.inner())?;
+        let mut made = wanted.clone();
+        compensator.picture(&mut made)?;
+        let cut = cut(&made);
+        for (shot, expected) in shots.iter().zip([plain(&wanted, &curves), made]) {
+            let given = read_of_size(folder, &shot.pattern, table, size)?;
+            if layout.framed(&expected).as_ref() != Some(&given) {
+                return Err(VerifyError::OtherTable {
+                    path: folder.join(&shot.pattern),
+                    image: *image,
+                });
+            }
+        }
+        Ok(FineShown {
+            image: *image,
+            wanted: LightPicture::decode(&wanted, Response::Srgb),
+            cut,
+        })
+    };
+    pairs.iter().map(of_pair).collect()
+}
+
+/// Which samples of a compensated picture the projector's range may have cut, by channel.
+fn cut(picture: &Picture) -> Vec<Vec<bool>> {
+    let Samples::Eight(samples) = picture.samples() else {
+        unreachable!("`read_of_size` takes 8 bits only");
+    };
+    let channels = picture.channels();
+    let of_channel = |channel: usize| {
+        let codes = samples.iter().skip(channel).step_by(channels);
+        codes.map(|code| [0, u8::MAX].contains(code)).collect()
+    };
+    (0..channels).map(of_channel).collect()
+}
+
 /// A picture of one pixel a cell, 8 bits, as many channels as the table.
 fn read(folder: &Path, name: &Path, table: &Table<'_>) -> Result<Picture, VerifyError> {
+    read_of_size(folder, name, table, FrameSize::of_grid(table.grid()))
+}
+
+/// The same of another size.
+fn read_of_size(
+    folder: &Path,
+    name: &Path,
+    table: &Table<'_>,
+    expected: FrameSize,
+) -> Result<Picture, VerifyError> {
     let path = folder.join(name);
     let file = foreign_file::open(&path).map_err(|source| {
         if source.kind() == ErrorKind::NotFound {
@@ -279,11 +382,15 @@ fn read(folder: &Path, name: &Path, table: &Table<'_>) -> Result<Picture, Verify
     })?;
     let picture = png::read(BufReader::new(file)).map_err(VideoError::Png)?;
     let (grid, size) = (table.grid(), picture.size());
-    if size != FrameSize::of_grid(grid) {
+    if size != expected {
         return Err(VerifyError::Grid {
             path,
             found: format!("{} x {}", size.height(), size.width()),
-            expected: grid.to_string(),
+            expected: if expected == FrameSize::of_grid(grid) {
+                grid.to_string()
+            } else {
+                format!("{} x {} pixels", expected.height(), expected.width())
+            },
         });
     }
     let suits = picture.channels() == usize::from(table.channels());

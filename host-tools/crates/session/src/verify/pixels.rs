@@ -1,0 +1,167 @@
+//! Pixel errors: what a viewer sees of the test images of the projector's own pixels, at every
+//! pixel of the camera.
+//!
+//! A camera pixel sees some pixels of the projector, which fine stripes tell; its light is compared
+//! with what was wanted there: all light, or the projector's alone where the table leaves ambient
+//! light as it is. The camera's noise is known and taken out of the error, but not of PSNR, SSIM
+//! and Delta E.
+
+use super::Readings;
+use super::readings::FineShown;
+use iltm_capture::PixelReadings;
+use iltm_compile::Provenance;
+use iltm_picture::{LightPicture, PictureError};
+use iltm_runtime::{FrameSize, image::Table};
+
+/// What a viewer sees, pixel by pixel.
+#[derive(Clone, PartialEq, Debug)]
+pub struct PixelVerdict {
+    /// Figures of each image, as it is and compensated, noise included.
+    pub images: Vec<[PictureError; 2]>,
+    /// Relative error without noise, as the images are and compensated: root mean square over
+    /// them.
+    pub error: [f64; 2],
+    /// Relative error that noise makes in one photograph.
+    pub noise: f64,
+    /// Error of each pixel that is judged, compensated, noise included, relative to reference
+    /// white: root mean square over images and channels.
+    pub errors: Vec<f32>,
+    /// Camera units of reference white, by image.
+    pub white: Vec<f64>,
+}
+
+impl PixelVerdict {
+    /// Judges the photographs; `None` without fine images, or if no pixel can be judged.
+    #[must_use]
+    pub fn new(table: &Table<'_>, readings: &Readings) -> Option<Self> {
+        let pixels = readings.revisited.pixels.as_ref()?.as_ref().ok()?;
+        let mut images = Vec::new();
+        let mut squares = [0.0_f64; 2];
+        let mut noises = 0.0;
+        let mut errors = vec![0.0; pixels.views.pixels().len()];
+        let mut white = Vec::new();
+        for (at, shown) in readings.fine.iter().enumerate() {
+            let wanted = wanted(pixels, shown);
+            let mut of_image = [None; 2];
+            for half in 0..2 {
+                let seen = seen(table, pixels, 2 * at + half);
+                let error = PictureError::new(
+                    &on_camera(pixels, &seen)?,
+                    &on_camera(pixels, &wanted)?,
+                    &judged(pixels),
+                )?;
+                let noise = noise(pixels, &seen, &wanted);
+                squares[half] += (error.relative.powi(2) - noise).max(0.0);
+                if half == 1 {
+                    noises += noise;
+                    let scale = scale(&seen, &wanted);
+                    add_errors(&mut errors, &seen, &wanted, scale);
+                    white.push(scale);
+                }
+                of_image[half] = Some(error);
+            }
+            let [own, compensated] = of_image;
+            images.push([own?, compensated?]);
+        }
+        let count = images.len() as f64;
+        (!images.is_empty()).then(|| Self {
+            error: squares.map(|square| (square / count).sqrt()),
+            noise: (noises / count).sqrt(),
+            errors: errors
+                .into_iter()
+                .map(|square| (square / count as f32).sqrt())
+                .collect(),
+            white,
+            images,
+        })
+    }
+}
+
+/// Light of wanted white that suits a photograph best, camera units.
+fn scale(seen: &[Vec<f32>], wanted: &[Vec<f32>]) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for (seen, wanted) in seen.iter().flatten().zip(wanted.iter().flatten()) {
+        product += f64::from(*seen) * f64::from(*wanted);
+        square += f64::from(*wanted).powi(2);
+    }
+    (product / square).max(f64::MIN_POSITIVE)
+}
+
+/// Adds the squares of an image's errors, mean over its channels.
+fn add_errors(errors: &mut [f32], seen: &[Vec<f32>], wanted: &[Vec<f32>], scale: f64) {
+    let share = 1.0 / seen.len().max(1) as f32;
+    for (seen, wanted) in seen.iter().zip(wanted) {
+        for (error, (seen, wanted)) in errors.iter_mut().zip(seen.iter().zip(wanted)) {
+            let off = seen / scale as f32 - wanted;
+            *error += share * off * off;
+        }
+    }
+}
+
+/// Light of a photograph that counts, by channel and pixel, camera units.
+pub(super) fn seen(table: &Table<'_>, pixels: &PixelReadings, picture: usize) -> Vec<Vec<f32>> {
+    let light = &pixels.pictures[picture];
+    if !Provenance::read(table.provenance()).ambient_kept {
+        return light.clone();
+    }
+    let planes = light.iter().zip(&pixels.black);
+    planes
+        .map(|(light, black)| light.iter().zip(black).map(|(l, b)| l - b).collect())
+        .collect()
+}
+
+/// Wanted light at each pixel, by channel.
+pub(super) fn wanted(pixels: &PixelReadings, shown: &FineShown) -> Vec<Vec<f32>> {
+    let planes = shown.wanted.planes().iter();
+    planes.map(|plane| at_pixels(pixels, plane)).collect()
+}
+
+/// Mean of what each pixel sees of a plane of the projector's pixels.
+pub(super) fn at_pixels(pixels: &PixelReadings, plane: &[f32]) -> Vec<f32> {
+    let views = &pixels.views;
+    let seen = |view| {
+        let seen = views.seen(view);
+        let (sum, whole) = seen.fold((0.0, 0.0), |(sum, whole), (at, share)| {
+            (sum + share * plane[at], whole + share)
+        });
+        if whole > 0.0 { sum / whole } else { 0.0 }
+    };
+    views.pixels().iter().map(seen).collect()
+}
+
+/// Values of the pixels in a picture of the camera's size.
+pub(super) fn on_camera(pixels: &PixelReadings, planes: &[Vec<f32>]) -> Option<LightPicture> {
+    let (width, height) = pixels.camera;
+    let size = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
+    let plane = |values: &Vec<f32>| {
+        let mut plane = vec![0.0; size.pixels()];
+        for (view, value) in pixels.views.pixels().iter().zip(values) {
+            plane[view.pixel as usize] = *value;
+        }
+        plane
+    };
+    LightPicture::new(size, planes.iter().map(plane).collect())
+}
+
+fn judged(pixels: &PixelReadings) -> Vec<bool> {
+    let (width, height) = pixels.camera;
+    let mut judged = vec![false; width * height];
+    for view in pixels.views.pixels() {
+        judged[view.pixel as usize] = true;
+    }
+    judged
+}
+
+/// Square of the relative error that noise makes in a photograph, at the brightness of what was
+/// wanted that suits it best.
+fn noise(pixels: &PixelReadings, seen: &[Vec<f32>], wanted: &[Vec<f32>]) -> f64 {
+    let white = scale(seen, wanted);
+    let (mut variance, mut square) = (0.0, 0.0);
+    for ((seen, wanted), model) in seen.iter().zip(wanted).zip(&pixels.noise) {
+        for (seen, wanted) in seen.iter().zip(wanted) {
+            variance += model.variance(f64::from(*seen));
+            square += f64::from(*wanted).powi(2);
+        }
+    }
+    variance / (square * white * white).max(f64::MIN_POSITIVE)
+}
