@@ -28,6 +28,9 @@ its say. There, every rendering uses the same random numbers, and light that bou
 is blurred within its panel: superposition holds exactly, no noise of the rendering
 is left, and only the camera adds its own.
 
+With --refine, the photographs of `iltm verify` are made in the same way, `iltm refine` feeds them
+back into the table, and the new table is judged; so many rounds.
+
 With --cells, the mean light of each cell is compared instead, over the pixels that
 the cell mostly lights, as the paper does.
 """
@@ -335,17 +338,18 @@ def judge(wall, first, second, wanted, inside):
     return error, worst, psnr, ssim[windows].mean(), difference[inside].mean(), alone
 
 
-def by_pixel(wall, capture, compensate):
+def by_pixel(wall, capture, compensate, methods=METHODS):
     view = View(capture.white.shape[:2], capture.projector, 4)
-    rows = {name: [] for name in METHODS}
+    rows = {name: [] for name in methods}
     for image in natural(capture.projector, capture.colour):
         wanted = view.shown(image)
-        for name, arguments in METHODS.items():
+        for name, arguments in methods.items():
             drive = image if arguments is None else compensate(image, arguments)
             photos = [wall.photograph(drive) for _ in range(1 if wall.renderer.frozen else 2)]
             rows[name].append(judge(wall, photos[0], photos[-1], wanted, view.inside))
-    print(f"{view.inside.sum()} camera pixels, frames of {capture.projector[1]} x {capture.projector[0]}")
-    print("             error    99 %   PSNR   SSIM    dE   projector")
+    if methods is METHODS:
+        print(f"{view.inside.sum()} camera pixels, frames of {capture.projector[1]} x {capture.projector[0]}")
+        print("             error    99 %   PSNR   SSIM    dE   projector")
     for name, row in rows.items():
         print("{:11} {:7.4f} {:7.3f} {:6.1f} {:6.3f} {:5.2f} {:8.4f}".format(name, *np.mean(row, 0)))
 
@@ -379,14 +383,10 @@ def by_cell(wall, capture, compensate):
         print(f"{name:11} {np.mean(each):.4f}")
 
 
-def make_session(folder, kind, options):
-    """Photographs of every slide of a folder that `iltm patterns` makes."""
-    (width, height), camera, ambient = SESSIONS[kind]
-    grid = [f"--rows={options.rows}", f"--cols={options.cols}"]
-    subprocess.run([options.iltm, "patterns", "-o", folder, "--projector", f"{width}x{height}", *grid,
-                    "--photos", str(options.photos), "--camera", "linear"], check=True)
-    renderer = Renderer(camera[::-1], (height, width), kind == "colour", options.samples, True)
-    random = np.random.default_rng(1)
+def photograph_slides(renderer, folder, kind, seed=1):
+    """A photograph of every slide of a folder, by a camera of 12 bits that is exposed for white."""
+    (width, height), _, ambient = SESSIONS[kind]
+    random = np.random.default_rng(seed)
     white = renderer.light(np.ones((height, width)))
     exposure, well, steps = 0.8 / np.percentile(white, 99.5), 20_000, 2**12 - 1
     for slide in sorted((folder / "slides").glob("*.png")):
@@ -394,6 +394,16 @@ def make_session(folder, kind, options):
         electrons = random.poisson(np.clip(exposure * light, 0, None) * well)
         photo = (electrons + random.normal(0, 5, light.shape)) / well
         write(folder / "photos" / slide.name, np.round(np.clip(photo, 0, 1) * steps) / steps, 16)
+
+
+def make_session(folder, kind, options):
+    """Photographs of every slide of a folder that `iltm patterns` makes."""
+    (width, height), camera, _ = SESSIONS[kind]
+    grid = [f"--rows={options.rows}", f"--cols={options.cols}"]
+    subprocess.run([options.iltm, "patterns", "-o", folder, "--projector", f"{width}x{height}", *grid,
+                    "--photos", str(options.photos), "--camera", "linear"], check=True)
+    renderer = Renderer(camera[::-1], (height, width), kind == "colour", options.samples, True)
+    photograph_slides(renderer, folder, kind)
     subprocess.run([options.iltm, "check", folder], check=True)
 
 
@@ -407,11 +417,14 @@ def main():
     parser.add_argument("--cols", type=int, help="columns of them")
     parser.add_argument("--samples", type=int, default=512, help="paths a pixel; of a session's photographs, 192 do")
     parser.add_argument("--cells", action="store_true", help="compare the mean light of each cell")
+    parser.add_argument("--refine", type=int, default=0, help="rounds of `iltm refine`, of a session")
     parser.add_argument("--table", help="judge this table instead of learning one")
     parser.add_argument("--solve", default="", help="further arguments of `iltm solve`, as one word")
     options = parser.parse_args()
     if options.session and not options.capture.exists() and not (options.rows and options.cols):
         parser.error("a session that is made needs --rows and --cols")
+    if options.refine and not options.session:
+        parser.error("--refine photographs the wall as sessions do: give --session")
     if options.session and not options.capture.exists():
         make_session(options.capture, options.session, options)
     capture = Capture(options.capture)
@@ -429,6 +442,13 @@ def main():
 
         wall = Wall(capture, options.samples, options.session is not None)
         (by_cell if options.cells else by_pixel)(wall, capture, compensate)
+        for at in range(1, options.refine + 1):
+            folder, better = scratch / f"verify-{at}", scratch / f"refined-{at}.iltm"
+            subprocess.run([options.iltm, "verify", table, "-o", folder], check=True, capture_output=True)
+            photograph_slides(wall.renderer, folder, options.session, 1 + at)
+            subprocess.run([options.iltm, "refine", table, folder, "-o", better], check=True)
+            table = better
+            by_pixel(wall, capture, compensate, {f"round {at}": []})
 
 
 if __name__ == "__main__":

@@ -221,6 +221,13 @@ fn a_table_that_was_signed_again_to_revoke_others_is_another_file() {
     let said = user.says(&device.at("flash 5.iltm --confirm"));
     assert!(said.ends_with("is in use already.\n"), "{said}");
     assert_eq!(device.writes(), sent);
+    // A file of the same table whose signature is false is not what is in use.
+    let mut tampered = signed(&tables()[0], 5);
+    *tampered.last_mut().expect("long") ^= 1;
+    user.write("tampered.iltm", &tampered);
+    let said = user.fails(23, &device.at("flash tampered.iltm --key site.key"));
+    contains(&said, &["signature"]);
+    assert_eq!(device.writes(), sent);
     let revoking = iltm_tests::signed(&tables()[0], &key(), 5, 5, 0);
     user.write("revoking.iltm", &revoking);
     let said = user.says(&device.at("flash revoking.iltm --key site.key"));

@@ -4,6 +4,7 @@
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
+use crate::cells::noise::NoiseModel;
 use crate::devices::{CameraFit, ColourMixingMatrix, Devices, MeasuredDevices};
 use crate::format::error::CaptureError;
 use crate::format::picture_file::FileFormat;
@@ -42,8 +43,9 @@ pub(crate) struct CaptureEvidence {
     pub(crate) map: Option<Result<ProjectorMap, MapError>>,
     /// The photograph of white, as it is drawn.
     pub(crate) white: WhitePhotograph,
-    /// The flood photograph with black subtracted, one plane a channel.
-    flood: Vec<Vec<f32>>,
+    /// White's light with black subtracted, one plane a channel, and how many photographs of white
+    /// it is as good as.
+    flood: (Vec<Vec<f32>>, usize),
 }
 
 /// The photograph of white, for whoever draws it.
@@ -141,13 +143,15 @@ impl CaptureEvidence {
         let format = &linear.photographs.format;
         let files = (format.file, format.bits);
         let white = WhitePhotograph::new(linear, registration);
-        let flood = linear.flood_without_black();
+        let models = cells.iter().flat_map(|cells| &cells.channels);
+        let models: Vec<NoiseModel> = models.map(|channel| channel.noise_model).collect();
+        let flood = linear.flood_of_pairs(sequence, &models, progress)?;
         let blur = settings.projector.blur;
         Ok(Self {
             files,
             response_stated: settings.camera.response != Declared::Unsaid,
             clipped,
-            devices: devices.with_blur(sequence.grid, registration, &flood, blur),
+            devices: devices.with_blur(sequence.grid, registration, &flood.0, blur),
             order: order::find(sequence, &sampled),
             moved: movement::find(sequence, &sampled, registration),
             cells,
@@ -193,7 +197,8 @@ impl CaptureEvidence {
             pixels: self.pixels.counts(),
             live: self.pixels.live,
             registration: self.registered.registration,
-            flood: self.flood,
+            flood: self.flood.0,
+            flood_photographs: self.flood.1,
             map: self.map,
             devices: self.devices,
             settings: settings.clone(),

@@ -91,7 +91,7 @@ impl PixelReadings {
             views: views
                 .over([inner.width(), inner.height()])
                 .without(saturated),
-            factor: finest_factor(grid, (registration, live), Some(map), None),
+            factor: finest_factor(grid, (registration, live), Some(map), 1, None),
             pictures: Vec::new(),
             black: Vec::new(),
             noise: Vec::new(),

@@ -359,6 +359,33 @@ fn the_fine_flood_follows_the_albedo_inside_a_cell_and_keeps_each_cells_mean() {
 }
 
 #[test]
+fn patterns_with_their_inverses_show_white_too() {
+    // Noise is as large in the dark, so that black counts: there are as many photographs of it.
+    let scene = |repeats: usize| TestCapture {
+        pitch: 12.3,
+        noise: 0.01,
+        repeats,
+        ..TestCapture::default()
+    };
+    let scatter = |measured: &Measurements| {
+        let cells = &measured.registration.cell_of_pixel;
+        let light: Vec<f32> = (cells.iter().zip(&measured.flood[0]))
+            .filter(|(cell, _)| **cell == 14)
+            .map(|(_, light)| *light)
+            .collect();
+        let mean = light.iter().sum::<f32>() / light.len() as f32;
+        let square = light.iter().map(|light| (light - mean).powi(2));
+        f64::from((square.sum::<f32>() / light.len() as f32).sqrt())
+    };
+    let alone = scene(1).read();
+    // White and black, of one photograph each.
+    assert!(scatter(&alone) < 1.2 * 0.01 * 2.0_f64.sqrt());
+    let two = scene(2).read();
+    assert!(two.flood_photographs >= 2);
+    assert!(scatter(&two) < 1.2 * 0.01, "{}", scatter(&two));
+}
+
+#[test]
 fn a_subdivision_of_one_is_the_flood_observation_itself() {
     let measured = TestCapture::default().read();
     let fine = FineFlood::with_factor(&measured, [0, 0]);

@@ -66,9 +66,11 @@ fn flash(
     let slots = slots.map_err(|error| connection.failed(&error))?;
     let site = connection.authorise(arguments.key.as_deref())?;
     let parcel = Parcel::new(bytes);
-    let in_use = match table.check(connection.client.device(), &slots)? {
+    let now = table.check(connection.client.device(), &slots)?;
+    // Also of a table that is there already: the file is not, and may be brought elsewhere.
+    table.check_signature(bytes, site.as_ref(), &slots)?;
+    let in_use = match now {
         Now::Send if slots.key.is_some() => {
-            table.check_signature(bytes, site.as_ref(), &slots)?;
             if site.is_none() && !arguments.dry_run {
                 let error = DeviceError::Refused {
                     request: "begin",

@@ -17,12 +17,12 @@ use iltm_picture::statistics::median;
 use iltm_runtime::{FrameSize, Grid};
 use rayon::prelude::*;
 
-/// Camera pixels that one fine sample should average at least where only the cells tell where it
-/// is.
-const PIXELS_A_SAMPLE: f64 = 4.0;
+/// Camera pixels that one fine sample should have at least.
+const PIXELS_A_SAMPLE: f64 = 1.0;
 
-/// The same where each pixel's place is known.
-const MAPPED_PIXELS_A_SAMPLE: f64 = 1.0;
+/// Values that it should average where only the cells tell where it is: pixels times photographs
+/// of white's light. Noise would else be seen on the wall.
+const VALUES_A_SAMPLE: f64 = 4.0;
 
 /// Finest subdivision of a cell's side where only the cells tell where a sample is.
 const MAX_FACTOR: usize = 8;
@@ -65,8 +65,8 @@ pub struct FineFlood {
 
 impl FineFlood {
     /// Resamples the flood photograph as finely as leaves each sample a camera pixel, at most as
-    /// finely as the projector's pixels; where only the cells tell where a sample is, four camera
-    /// pixels. There are no more than `most` samples.
+    /// finely as the projector's pixels; where only the cells tell where a sample is, four values of
+    /// pixels and photographs too. There are no more than `most` samples.
     #[must_use]
     pub fn new(measurements: &Measurements, most: Option<FrameSize>) -> Self {
         Self::with_factor(measurements, natural_factor(measurements, most))
@@ -287,7 +287,7 @@ fn filled(samples: &[Option<f32>], [wide, tall]: [usize; 2]) -> Vec<f32> {
     (0..samples.len()).map(value).collect()
 }
 
-/// Subdivision that leaves [`PIXELS_A_SAMPLE`] in a live cell of median size.
+/// Subdivision that leaves each sample in a live cell of median size its pixels and values.
 fn natural_factor(measurements: &Measurements, most: Option<FrameSize>) -> [usize; 2] {
     let map = match &measurements.map {
         Some(Ok(map)) => Some(map),
@@ -297,6 +297,7 @@ fn natural_factor(measurements: &Measurements, most: Option<FrameSize>) -> [usiz
         measurements.grid,
         (&measurements.registration, &measurements.live),
         map,
+        measurements.flood_photographs,
         most,
     )
 }
@@ -306,6 +307,7 @@ pub(crate) fn finest_factor(
     grid: Grid,
     (registration, live): (&Registration, &[bool]),
     map: Option<&ProjectorMap>,
+    photographs: usize,
     most: Option<FrameSize>,
 ) -> [usize; 2] {
     let mut pixels = vec![0.0_f64; grid.cells()];
@@ -316,13 +318,13 @@ pub(crate) fn finest_factor(
     }
     let of_live = (pixels.iter().zip(live)).filter_map(|(&pixels, &live)| live.then_some(pixels));
     let usual = median(of_live.collect()).unwrap_or(0.0);
-    let (needed, finest) = match map {
-        Some(map) => {
-            let inner = map.projector.inner();
-            let pixels = [inner.width() / grid.cols(), inner.height() / grid.rows()];
-            (MAPPED_PIXELS_A_SAMPLE, pixels)
-        }
-        None => (PIXELS_A_SAMPLE, [MAX_FACTOR; 2]),
+    let (needed, finest) = if let Some(map) = map {
+        let inner = map.projector.inner();
+        let pixels = [inner.width() / grid.cols(), inner.height() / grid.rows()];
+        (PIXELS_A_SAMPLE, pixels)
+    } else {
+        let needed = VALUES_A_SAMPLE / photographs.max(1) as f64;
+        (needed.max(PIXELS_A_SAMPLE), [MAX_FACTOR; 2])
     };
     let told = (usual / needed).sqrt() as usize;
     let most = most.map_or([usize::MAX; 2], |most| {

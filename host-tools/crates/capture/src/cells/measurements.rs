@@ -43,9 +43,12 @@ pub struct Measurements {
     pub pixel_light: PixelLight,
     /// Where each cell is in the photographs.
     pub registration: Registration,
-    /// The flood photograph with black subtracted, one plane a channel, row by
-    /// row, camera units: the size is [`Registration::camera`].
+    /// White's light with black subtracted, one plane a channel, row by row, camera units: the
+    /// size is [`Registration::camera`]. The mean of the photographs of white, and of the sums of
+    /// patterns with their inverses.
     pub flood: Vec<Vec<f32>>,
+    /// How many photographs of white `flood` is as good as.
+    pub flood_photographs: usize,
     /// The projector map of stripes finer than the cells, or why they give none; `None` without
     /// any.
     pub map: Option<Result<ProjectorMap, MapError>>,

@@ -28,9 +28,8 @@ pub(super) fn judge(
     let verdict = Verdict::of(number, NOTABLE, MOST);
     let what = match verdict {
         Verdict::Pass => format!(
-            "patterns and their inverses add up to white within {:.2} %",
-            // Never within nothing.
-            (1e4 * number).ceil().max(1.0) / 100.0
+            "patterns and their inverses add up to white but for {:.2} %",
+            100.0 * number
         ),
         _ => format!(
             "light does not add up: patterns and their inverses together are {:+.1} % off white \

@@ -2,6 +2,7 @@
 //! black, which all others are seen against.
 
 use super::{Photographs, channel_sum};
+use crate::cells::noise::NoiseModel;
 use crate::format::bracket::Bracket;
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
@@ -14,6 +15,9 @@ use std::path::Path;
 /// Flood light of a pixel, as a share of the 95th percentile of all pixels, from which the
 /// projector lights it: below, it only sees light from elsewhere.
 const LIT_SHARE: f32 = 0.05;
+
+/// Share by which patterns and their inverses may be off white's light and still tell it.
+const MOST_APART: f64 = 0.03;
 
 /// Photographs and the two that all others are seen against.
 pub(crate) struct LinearPhotographs<'a> {
@@ -177,6 +181,73 @@ impl<'a> LinearPhotographs<'a> {
             .map(|(flood, black)| flood.iter().zip(black).map(|(w, b)| w - b).collect())
             .collect()
     }
+
+    /// The same from white and from each pattern that was photographed together with its inverse:
+    /// both together show white's light, and black twice. They count by the noise that each
+    /// channel has. Says how many photographs of white it is as good as. Where the sums are not
+    /// white's light by [`MOST_APART`], white has its say alone.
+    ///
+    /// # Errors
+    /// A photograph's own error.
+    pub(crate) fn flood_of_pairs(
+        &mut self,
+        sequence: &Sequence,
+        noise: &[NoiseModel],
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Vec<f32>>, usize), CaptureError> {
+        let mut flood = self.flood_without_black();
+        let whites = sequence.white().shots.len();
+        let pairs = sequence.code_pairs();
+        let first = |view: usize| sequence.views[view].shots.first().copied();
+        let both = pairs.iter().flat_map(|(a, b)| [*a, *b]);
+        let all: Vec<usize> = both.filter_map(first).collect();
+        if pairs.is_empty() {
+            return Ok((flood, whites));
+        }
+        let (mean, _) = self.photographs.mean(&all, progress)?;
+        let mut as_good_as = f64::INFINITY;
+        for (channel, flood) in flood.iter_mut().enumerate() {
+            let black = &self.black[channel];
+            let sums = mean[channel].iter().zip(black);
+            let sums: Vec<f32> = sums.map(|(mean, black)| 2.0 * (mean - black)).collect();
+            let total = |plane: &[f32]| plane.iter().map(|v| f64::from(*v)).sum::<f64>();
+            let brighter = total(&sums) / total(flood);
+            let light = quantile(&mut flood.clone(), 0.9).map_or(0.0, f64::from);
+            let model = noise.get(channel).copied().unwrap_or_default();
+            let counts = [whites, pairs.len(), sequence.black.len()];
+            let (share, good) = share_of_pairs(model, light, counts);
+            // Written so that what is not a number is left out.
+            if (brighter - 1.0).abs() <= MOST_APART {
+                as_good_as = as_good_as.min(good);
+                for (flood, sum) in flood.iter_mut().zip(sums) {
+                    *flood += share * (sum / brighter as f32 - *flood);
+                }
+            } else {
+                as_good_as = 0.0;
+            }
+        }
+        Ok((flood, whites.max(as_good_as as usize)))
+    }
+}
+
+/// Share of pairs of patterns in white's light that leaves the least noise, and how many
+/// photographs of white the result is as good as. `counts` are photographs of white, pairs, and
+/// photographs of black.
+///
+/// White has the noise of one photograph and of one black, a pair that of two dimmer ones and of
+/// two blacks, which all pairs share: with a share `s`, `(1 - s)^2 w + s^2 p + (1 + s)^2 b`.
+fn share_of_pairs(model: NoiseModel, light: f64, counts: [usize; 3]) -> (f32, f64) {
+    let [whites, pairs, blacks] = counts.map(|count| count.max(1) as f64);
+    let white = model.variance(light) / whites;
+    let pair = (model.variance(light) + model.floor) / pairs;
+    let black = model.floor / blacks;
+    let all = white + pair + black;
+    if all.is_nan() || all <= 0.0 {
+        return ((pairs / (pairs + whites)) as f32, pairs + whites);
+    }
+    let share = ((white - black) / all).max(0.0);
+    let left = (1.0 - share).powi(2) * white + share.powi(2) * pair + (1.0 + share).powi(2) * black;
+    (share as f32, whites * (white + black) / left)
 }
 
 #[cfg(test)]
@@ -185,6 +256,25 @@ mod tests {
     use crate::format::sequence::{CaptureOptions, Selection};
     use crate::test_capture::TestCapture;
     use crate::{Manifest, Settings};
+
+    #[test]
+    fn pairs_count_where_the_dark_has_little_noise() {
+        let shot = NoiseModel {
+            shot: 1e-4,
+            floor: 0.0,
+        };
+        let (share, good) = share_of_pairs(shot, 0.8, [1, 9, 1]);
+        assert!((share - 0.9).abs() < 1e-6 && (good - 10.0).abs() < 1e-6);
+        // Noise that is the same in the dark: two blacks are worse than one.
+        let floor = NoiseModel {
+            shot: 0.0,
+            floor: 1e-4,
+        };
+        assert_eq!(share_of_pairs(floor, 0.8, [1, 9, 1]).0.to_bits(), 0);
+        let (share, good) = share_of_pairs(floor, 0.8, [1, 9, 9]);
+        assert!(share > 0.5 && good > 1.8, "{share} {good}");
+        assert!(share_of_pairs(NoiseModel::default(), 0.8, [1, 9, 1]).0 > 0.8);
+    }
 
     #[test]
     fn a_pixel_that_was_saturated_once_stays_so() {
