@@ -3,11 +3,12 @@
 //!
 //! A table believes that a pixel's light is what the projector throws there and what bounces there:
 //! `D + B` with `D = p / g` and `B = (U K c) / g`, for a pattern `p`, gains `g` and the cells'
-//! light `c`. What a photograph shows beyond that is the table's error. It has two parts:
+//! light `c`. What a photograph shows beyond that is the table's error. It has three parts:
 //!
 //! | part | found from | in a natural image |
 //! |---|---|---|
 //! | how far direct and bounced light of a pixel are off: `a D + b B` | all photographs: two numbers of a pixel, which nothing fitted before; once from either half of them, so that the product of both has no noise | the same `a` and `b` |
+//! | how far gains change over as much as a place is off: photographs seen from the same wrong places do not show it | the map from cells to the camera, and its error | the same, of direct light |
 //! | the rest, which is the operator's and differs from photograph to photograph | held-out photographs: products of neighbouring pixels, which have no noise either | less, by the contrast of the image's cells |
 
 use crate::FineGains;
@@ -33,6 +34,14 @@ const APART: usize = 2;
 
 /// Ways to halve the photographs: by the last bits of their numbers.
 const HALVINGS: usize = 3;
+
+/// Cells that a place which only the cells tell is off, root mean square in each direction: what
+/// fine stripes say of the path tracer's sessions.
+const PLACE_OFF: f32 = 0.03;
+
+/// The same in camera pixels, of the light within one: gains that change from pixel to pixel change
+/// within them too, and where they do is not known.
+const WITHIN_PIXEL: f32 = 0.25;
 
 /// What codes of 8 bits take away of an image, root mean square of light: half a step at most, and
 /// a step at usual brightness is 1.7/255 of white.
@@ -167,6 +176,8 @@ struct Scene<'s> {
     ambient: Vec<&'s [f64]>,
     /// `g` by channel and site.
     gains: Vec<Vec<f64>>,
+    /// Square of how far they change over as much as a place is off, relative to themselves.
+    unsteady: Vec<Vec<f64>>,
 }
 
 /// What is wrong with a table, by channel.
@@ -199,20 +210,35 @@ impl<'s> Scene<'s> {
             live.then_some(Site { at, place, cells })
         };
         let sites: Vec<Site> = places.iter().enumerate().filter_map(site).collect();
+        let gain_at = |channel: usize, place: [f32; 2]| match &fine {
+            Some(FineGains { size, channels }) => {
+                let factor = [size.width() / grid.cols(), size.height() / grid.rows()];
+                Corners::new(place, grid, factor).of(&channels[channel])
+            }
+            None => Corners::new(place, grid, [1; 2]).of(&inverse.channels[channel].gain),
+        };
         let gains = |channel: usize| {
-            let gain = |site: &Site| match &fine {
-                Some(FineGains { size, channels }) => {
-                    let factor = [size.width() / grid.cols(), size.height() / grid.rows()];
-                    Corners::new(site.place, grid, factor).of(&channels[channel])
-                }
-                None => site.cells.of(&inverse.channels[channel].gain),
+            let sites = sites.iter();
+            sites.map(|site| gain_at(channel, site.place)).collect()
+        };
+        let off = places_off(measurements);
+        let unsteady = |channel: usize| {
+            let at = |site: &Site| {
+                let [x, y] = site.place;
+                let own = gain_at(channel, site.place);
+                let around = [(x - off, y), (x + off, y), (x, y - off), (x, y + off)];
+                let change = around.map(|(x, y)| gain_at(channel, [x, y]) / own - 1.0);
+                let square: f64 = change.iter().map(|change| change * change).sum();
+                // Left and right are one direction, up and down the other.
+                if own > 0.0 { square / 2.0 } else { 0.0 }
             };
-            sites.iter().map(gain).collect()
+            sites.iter().map(at).collect()
         };
         let channels = 0..inverse.channels.len();
         Self {
             grid,
             gains: channels.clone().map(gains).collect(),
+            unsteady: channels.clone().map(unsteady).collect(),
             inverses: channels.map(|channel| inverse.channel(channel)).collect(),
             ambient: inverse
                 .channels
@@ -349,13 +375,16 @@ impl<'s> Scene<'s> {
             let wanted = self.wanted(fine);
             // Square of the error with its noise, and without.
             let (mut noisy, mut known) = (Mean::default(), Mean::default());
+            let mut unsteady = Mean::default();
             let mut errors = Vec::new();
             for (channel, inverse) in self.inverses.iter().enumerate() {
                 let received = &inverse.operator * cells;
                 let bounced = self.bounced(channel, received.as_slice());
                 let sites = wanted.iter().zip(bounced).zip(&fits.channels[channel]);
+                let sites = sites.zip(&self.unsteady[channel]);
                 let mut of_channel = Vec::with_capacity(wanted.len());
-                for ((light, bounced), fit) in sites {
+                for (((light, bounced), fit), change) in sites {
+                    unsteady.add(change * light * light);
                     let off = |[a, b]: [f64; 2]| a * (light - bounced) + b * bounced;
                     let whole = fit.map_or(0.0, |fit| off(fit.whole));
                     of_channel.push(whole);
@@ -368,7 +397,7 @@ impl<'s> Scene<'s> {
                 errors.push(of_channel);
             }
             let varying = fits.varying * cells.variance();
-            let square = known.mean().max(0.0) + varying + CODES * CODES;
+            let square = known.mean().max(0.0) + unsteady.mean() + varying + CODES * CODES;
             let size = (square / noisy.mean().max(f64::MIN_POSITIVE)).sqrt();
             let shown = errors.iter().map(|errors| {
                 let sites = wanted.iter().zip(errors);
@@ -446,6 +475,17 @@ impl<'s> Scene<'s> {
         let shown = LightPicture::new(size, shown.iter().map(|light| plane(light)).collect())?;
         PictureError::new(&shown, &wanted, &mask)
     }
+}
+
+/// How far off the places of pixels are, in cells, root mean square in each direction.
+fn places_off(measurements: &Measurements) -> f32 {
+    let Some(Ok(map)) = &measurements.map else {
+        let pixels = measurements.registration.cell_side() as f32;
+        return PLACE_OFF.hypot(WITHIN_PIXEL / pixels);
+    };
+    let pixels = map.projector.inner().width() as f32 / measurements.grid.cols() as f32;
+    // Of both directions together.
+    map.usual_uncertainty().unwrap_or(0.0) / 2.0_f32.sqrt() / pixels
 }
 
 /// What a pattern throws on a place, if it is the same for `clear` cells around it.
