@@ -154,7 +154,11 @@ fn verdict(
             found.slides, found.cards, found.photographs
         )
     });
-    let text = recognised.unwrap_or_default() + &text(&verdict, &images, &page);
+    let blind = match &readings.revisited.pixels {
+        Some(Err(error)) => format!("viewer      not judged: {error}. {}\n", error.next_step()),
+        Some(Ok(_)) | None => String::new(),
+    };
+    let text = recognised.unwrap_or_default() + &blind + &text(&verdict, &images, &page);
     if verdict.outcome == Outcome::Passed {
         output.result(&data, &text);
         return Ok(());

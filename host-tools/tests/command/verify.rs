@@ -121,7 +121,21 @@ fn a_table_is_refined_only_with_photographs_that_are_fit_for_it() {
         &user.fails(4, "refine t.iltm n -o x.iltm"),
         &["no fine stripes", "--no-dense"],
     );
+    fs::remove_dir_all(user.path("v/photos")).unwrap();
     user.says("simulate SCENES/m-panels.toml --photograph v --seed 9");
+    // Without a stripe there is a verdict on the cells, and none on what a viewer sees.
+    let stripes = String::from_utf8(user.read("v/stripes.csv")).unwrap();
+    let stripe = stripes
+        .lines()
+        .nth(1)
+        .and_then(|line| line.rsplit(',').next());
+    user.remove(&format!("v/{}", stripe.unwrap().trim()));
+    let missing = "photographs of fine stripes are missing";
+    contains(
+        &user.says("verify t.iltm v"),
+        &["viewer      not judged", missing, "PASSED"],
+    );
+    contains(&user.fails(5, "refine t.iltm v -o x.iltm"), &[missing]);
     user.remove("v/photos/030.png");
     contains(&user.fails(4, "refine t.iltm v -o x.iltm"), &["missing"]);
     assert!(!user.path("x.iltm").exists());
