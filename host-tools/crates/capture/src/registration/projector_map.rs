@@ -49,6 +49,13 @@ const NOISE_REACH: usize = 2;
 /// the neighbour's code is as good.
 const MOST_APART: f32 = 0.25;
 
+/// Part of a wave that a camera's pixel may cover: of one that it covers whole, nothing is seen.
+const MOST_OF_WAVE: f32 = 0.7;
+
+/// How many halves as the last bit tells apart a camera's pixel may cover: stripes are two wide, and
+/// those of four give as much light as dark.
+const MOST_OF_STRIPE: f32 = 3.0;
+
 /// Share of the pixels that see waves in which code and waves may contradict each other.
 const MOST_WRONG: f64 = 0.2;
 
@@ -233,9 +240,10 @@ pub(crate) fn find(
     match StripeManifest::read_if_there(folder)? {
         Some(manifest) => {
             let found = listed(folder, sequence, settings, manifest, linear, progress)?;
-            Ok(Some(
-                found.and_then(|found| found.map(registration, linear)),
-            ))
+            Ok(Some(found.and_then(|found| {
+                let seen = registration.cell_side() as f32;
+                found.told_apart(seen).map(registration, linear)
+            })))
         }
         None if sequence.finer.is_empty() => Ok(None),
         None => {
@@ -457,6 +465,23 @@ impl Fine {
 }
 
 impl Decoding {
+    /// Leaves out what is too fine for a camera that sees a cell with `pixels` of its own along a
+    /// side: its contrast is there by chance, or turned round.
+    fn told_apart(mut self, pixels: f32) -> Self {
+        for (light, (side, _, _)) in self.light.iter_mut().zip(&mut self.scale) {
+            let halves = |bits: usize| (1_u32 << bits) as f32;
+            let pixel = *side * halves(light.bits.len()) / pixels;
+            if pixel > MOST_OF_WAVE * WAVE as f32 {
+                light.waves = None;
+            }
+            while !light.bits.is_empty() && pixel > MOST_OF_STRIPE * *side {
+                light.bits.pop();
+                *side *= 2.0;
+            }
+        }
+        self
+    }
+
     /// Puts both axes together.
     fn map(
         &self,
@@ -621,5 +646,46 @@ impl WaveLight {
             0.5 * (sum / count).sqrt()
         };
         (0..width * height).into_par_iter().map(at).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells of 96 pixels, halved four times, and waves.
+    fn decoding() -> Decoding {
+        let light = || AxisLight {
+            bits: vec![Vec::new(); 4],
+            waves: Some(WaveLight {
+                wave: [Vec::new(), Vec::new()],
+                rest: Vec::new(),
+            }),
+        };
+        Decoding {
+            projector: ProjectorPixels::whole(FrameSize::new(960, 960).unwrap()),
+            cols: 10,
+            scale: [(6.0, 0.0, 0); 2],
+            light: [light(), light()],
+        }
+    }
+
+    #[test]
+    fn a_coarse_camera_is_asked_for_no_stripes_finer_than_its_pixels() {
+        for (pixels, waves, bits, side) in [
+            (48.0, true, 4, 6.0),
+            (18.0, true, 4, 6.0),
+            (16.0, false, 4, 6.0),
+            (6.0, false, 4, 6.0),
+            (5.0, false, 3, 12.0),
+            (1.0, false, 1, 48.0),
+        ] {
+            let found = decoding().told_apart(pixels);
+            for (light, (own, _, _)) in found.light.iter().zip(found.scale) {
+                let told = (light.waves.is_some(), light.bits.len());
+                assert_eq!(told, (waves, bits), "{pixels}");
+                assert!((own - side).abs() < 1e-6, "{pixels}");
+            }
+        }
     }
 }
