@@ -8,7 +8,7 @@ use crate::gate::{Evidence, Gate, GateName, Verdict};
 
 /// Misfit of the declared camera response beyond that of the best one.
 const WARN: f64 = 0.004;
-const MOST: f64 = 0.008;
+const MOST: f64 = 0.006;
 
 /// Steps of 255 that the projector's measured response may be off the declared one.
 const WARN_STEPS: f64 = 2.5;
