@@ -99,7 +99,7 @@ pub fn refine(
         })
         .sum();
     let before = (seen.square / seen.wanted).sqrt();
-    let after = ((seen.square - gained).max(0.0) / seen.wanted).sqrt();
+    let after = ((seen.square - seen.by_black - gained).max(0.0) / seen.wanted).sqrt();
     let confirmed = gained > 0.0;
     let steps: Vec<Vec<f32>> = sums
         .par_iter()
@@ -245,8 +245,10 @@ struct Seen {
     images: Vec<Vec<Residual>>,
     /// Light under black as these photographs have it, where the table counts it.
     ambient: Option<CellPlanes>,
-    /// Sum of the squares of what is wrong, without noise, and of what was wanted.
+    /// Sum of the squares of what is wrong, without noise, as photographed; how much of it that
+    /// black takes away; and the sum of the squares of what was wanted.
     square: f64,
+    by_black: f64,
     wanted: f64,
 }
 
@@ -299,30 +301,27 @@ impl Seen {
                 }
             }
         }
-        let kept = Provenance::read(table.provenance()).ambient_kept;
-        let mut ambient = (!kept).then(|| black(table, readings, white));
-        if let Some(now) = &ambient {
+        let (mut ambient, mut by_black) = (None, 0.0);
+        if !Provenance::read(table.provenance()).ambient_kept {
             let expected = super::Expected::new(table);
-            let taken = take_black(&mut images, pixels, table, (now, expected.ambient()));
-            if taken > 0.0 {
-                square -= taken;
-            } else {
-                ambient = None;
-            }
+            let own = expected.ambient();
+            let now = black(readings, own, white);
+            by_black = take_black(&mut images, pixels, table, (&now, own)).max(0.0);
+            ambient = (by_black > 0.0).then_some(now);
         }
         Self {
             images,
             ambient,
             square: square.max(0.0),
+            by_black,
             wanted,
         }
     }
 }
 
 /// Light under black in the cells, relative to reference white.
-fn black(table: &Table<'_>, readings: &Readings, white: f64) -> CellPlanes {
-    let own = super::Expected::new(table);
-    let channels = readings.revisited.black.iter().zip(own.ambient());
+fn black(readings: &Readings, own: &CellPlanes, white: f64) -> CellPlanes {
+    let channels = readings.revisited.black.iter().zip(own);
     let of_channel = |(now, own): (&Vec<f64>, &Vec<f64>)| {
         let cells = now.iter().zip(own).zip(&readings.live);
         cells
