@@ -149,6 +149,22 @@ fn fine_stripes_that_are_missing_or_out_of_order_are_named_and_the_rest_is_used(
     contains(&said, &["contradict each other"]);
 }
 
+/// The camera has a pixel for 7.6 of the projector's along a row, and for 4.6 along a column.
+#[test]
+fn a_camera_that_sees_waves_along_one_axis_alone_gets_the_map_that_it_can_tell() {
+    let user = User::new();
+    user.says(
+        "patterns -o c --rows 13 --cols 21 --photos 10 --projector 1200x420 --no-calibration",
+    );
+    user.says("simulate SCENES/m-panels.toml --photograph c");
+    let told = user.json("check c");
+    assert!(told["map_fault"].is_null(), "{told}");
+    let map = &user.json("check c --map wall.npy")["map"];
+    assert_eq!(map["source"], "code", "{map}");
+    // The code's stripes are four pixels wide at most.
+    assert!(map["uncertainty"].as_f64().unwrap() < 2.0, "{map}");
+}
+
 /// A rig of others: Gray code down to the pixel of a small projector, seen by a camera with four
 /// pixels for each.
 #[test]

@@ -1,5 +1,6 @@
 //! Cell map: which camera pixel belongs to which cell, and where the cells are.
 
+use iltm_picture::statistics::median;
 use iltm_runtime::Grid;
 
 /// What [`Registration`] holds for a camera pixel without a cell.
@@ -32,6 +33,34 @@ impl Registration {
         let seen = self.seen_cell.iter().filter(|cell| **cell != NO_CELL);
         let cells = self.centre.iter().flatten().count();
         (seen.count() as f64 / cells.max(1) as f64).sqrt()
+    }
+
+    /// What a pixel covers of the cells along their width and their height, in cells: the median
+    /// over the cells that the camera sees beside both neighbours.
+    ///
+    /// A camera that looks from the side sees many pixels of the projector in one of its own along
+    /// one axis, and few along the other.
+    #[must_use]
+    pub fn pixel_in_cells(&self, grid: Grid) -> [f64; 2] {
+        let (rows, cols) = (grid.rows(), grid.cols());
+        let step = |from: usize, to: usize| -> Option<[f64; 2]> {
+            let ([x0, y0], [x1, y1]) = (self.centre[from]?, self.centre[to]?);
+            Some([x1 - x0, y1 - y0])
+        };
+        let covered = |row: usize, col: usize| -> Option<[f64; 2]> {
+            let cell = row * cols + col;
+            let (right, down) = (step(cell, cell + 1)?, step(cell, cell + cols)?);
+            let area = (right[0] * down[1] - right[1] * down[0]).abs();
+            let extent = |[x, y]: [f64; 2]| (x.abs() + y.abs()) / area;
+            (area > 0.0).then(|| [extent(down), extent(right)])
+        };
+        let cells = (0..rows.saturating_sub(1))
+            .flat_map(|row| (0..cols.saturating_sub(1)).map(move |col| (row, col)));
+        let covered: Vec<[f64; 2]> = cells.filter_map(|(row, col)| covered(row, col)).collect();
+        [0, 1].map(|axis: usize| {
+            let all = covered.iter().map(|both| both[axis]).collect();
+            median(all).unwrap_or_else(|| 1.0 / self.cell_side())
+        })
     }
 
     /// Whether a pixel and its four neighbours all belong to the projection: one at its very
