@@ -241,11 +241,19 @@ pub(super) fn text(built: &BuiltTable) -> String {
     text
 }
 
-/// Why a table has gains and no operator; `None` of one with an operator.
+/// Why a table has gains and no operator, or not even those; `None` of one with an operator.
 fn no_operator(built: &BuiltTable) -> Option<String> {
     let report = &built.report;
-    if report.compensation != Compensation::GainOnly {
-        return None;
+    match report.compensation {
+        Compensation::Operator => return None,
+        Compensation::GainOnly => {}
+        Compensation::Nothing => {
+            return Some(format!(
+                "the table changes nothing: the wall errs by {:.4} as it is, and gains, rounded to \
+                 the projector's codes, by {:.4}",
+                built.predicted.uncompensated, built.predicted.gain_only
+            ));
+        }
     }
     let (clipped, prediction) = (report.clipped, report.prediction);
     let cancelled = 100.0 * prediction.cancelled();

@@ -2,6 +2,7 @@
 
 use crate::compile::{Provenance, cost::CLOCK};
 use crate::report::tier_costs;
+use crate::solve::Compensation;
 use iltm_picture::numbers::percent;
 use iltm_runtime::image::Table;
 use serde_json::{Value, json};
@@ -87,6 +88,8 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
                 });
             let alone = if table.operator().is_some() {
                 format!(", {} with gains alone", percent(gains))
+            } else if provenance.compensation == Compensation::Nothing.to_string() {
+                ": even enough, pictures are left as they are".to_owned()
             } else {
                 ": gains alone, no bounces are cancelled".to_owned()
             };

@@ -254,3 +254,26 @@ fn what_cannot_be_is_said_before_the_work_and_with_the_right_code() {
     let said = user.fails(2, "compensate t.iltm header.y4m -o out.png");
     contains(&said, &["out.png", "Y4M"]);
 }
+
+#[test]
+fn a_table_of_an_even_wall_leaves_pictures_as_they_are() {
+    let user = User::new();
+    let size = "--projector 128x96 --no-calibration";
+    user.says(&format!(
+        "patterns -o c --rows 24 --cols 32 --photos 20 {size}"
+    ));
+    user.says("simulate SCENES/flat-screen.toml --photograph c");
+    let said = user.says("solve c -o t.iltm");
+    contains(
+        &said,
+        &["pictures are left as they are", "the table changes nothing"],
+    );
+    let codes = |x: u32, y: u32| Luma([((x + 128 * y) % 251) as u8]);
+    let picture = GrayImage::from_fn(128, 96, codes);
+    picture.save(user.path("p.png")).expect("writable");
+    user.says("compensate t.iltm p.png -o q.png");
+    let made = user.picture("q.png").into_luma8();
+    for (was, is) in picture.pixels().zip(made.pixels()) {
+        assert!(was.0[0].abs_diff(is.0[0]) <= 1, "{was:?} {is:?}");
+    }
+}

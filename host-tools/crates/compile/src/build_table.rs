@@ -15,8 +15,8 @@ use thiserror::Error;
 pub struct BuiltTable {
     /// The registered photographs.
     pub measurements: Measurements,
-    /// The inverse light transport that the table has: without an operator if
-    /// [`SolveReport::compensation`] says so.
+    /// The inverse light transport that the table has: without an operator, or with the same gain
+    /// everywhere, if [`SolveReport::compensation`] says so.
     pub inverse: InverseTransport,
     /// Gains finer than the cells; `None` if there are none.
     pub fine: Option<FineGains>,
@@ -78,7 +78,8 @@ pub enum BuildError {
 }
 
 /// Reads a capture, solves it and compiles the table; one without an operator if
-/// photographs that the solve had not seen do not show that the operator helps.
+/// photographs that the solve had not seen do not show that the operator helps, and one that
+/// leaves pictures as they are if the wall is as even as a projector's codes can make it.
 ///
 /// # Errors
 /// [`BuildError`] by the step that failed; also if photographs that the solve had
@@ -107,7 +108,7 @@ pub fn build_table_from(
 ) -> Result<BuiltTable, BuildError> {
     let Solved {
         inverse,
-        report,
+        mut report,
         trials,
     } = iltm_solve::solve(&measurements, options, progress)?;
     if report.compensation == Compensation::Nothing {
@@ -121,22 +122,31 @@ pub fn build_table_from(
     let flood = FineFlood::new(&measurements, table.gain_resolution);
     let gain_only = iltm_solve::gain_only(&(&measurements).into(), &report)?;
     let viewer = ViewerError::predict(&measurements, &trials, &gain_only, &flood);
+    let as_even = |viewer: ViewerError| viewer.uncompensated.relative <= viewer.gain_only.relative;
+    if report.compensation == Compensation::GainOnly && viewer.is_some_and(as_even) {
+        report.compensation = Compensation::Nothing;
+    }
     let predicted = PredictedError::new(&report, viewer);
     progress.end();
     let mut inverse = match report.compensation {
         Compensation::GainOnly => gain_only,
-        Compensation::Operator | Compensation::Nothing => inverse,
+        Compensation::Nothing => crate::gain::even(gain_only),
+        Compensation::Operator => inverse,
     };
     progress.begin("compiling the table", 0);
-    if table.keep_ambient {
+    let ambient_kept = table.keep_ambient || report.compensation == Compensation::Nothing;
+    if ambient_kept {
         for channel in &mut inverse.channels {
             channel.ambient.fill(0.0);
         }
     }
-    let fine = crate::gain::fine_gains(&inverse, &flood);
+    let fine = match report.compensation {
+        Compensation::Nothing => None,
+        _ => crate::gain::fine_gains(&inverse, &flood),
+    };
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white)?;
     let provenance = Provenance {
-        ambient_kept: table.keep_ambient,
+        ambient_kept,
         ..Provenance::new(capture, &measurements, &report, predicted, &white)
     };
     let options = CompileOptions {

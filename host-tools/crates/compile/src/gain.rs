@@ -14,6 +14,24 @@ pub struct FineGains {
     pub channels: Vec<Vec<f64>>,
 }
 
+/// The same inverse with one gain for all live cells and channels, that of their mean light: a
+/// table that leaves pictures as they are.
+pub(crate) fn even(mut inverse: InverseTransport) -> InverseTransport {
+    let lit = |gain: &f64| *gain > 0.0;
+    let gains = inverse.channels.iter().flat_map(|channel| &channel.gain);
+    let (light, count) = gains
+        .filter(|gain| lit(gain))
+        .fold((0.0, 0.0), |(light, count), gain| {
+            (light + 1.0 / gain, count + 1.0)
+        });
+    let gains = inverse.channels.iter_mut();
+    let gains = gains.flat_map(|channel| &mut channel.gain);
+    for gain in gains.filter(|gain| lit(gain)) {
+        *gain = count / light;
+    }
+    inverse
+}
+
 /// Darkest flood light, relative to its cell's, that still gets its own gain;
 /// darker samples are treated as being that bright, since noise rules there.
 const LEAST_FLOOD: f64 = 0.2;

@@ -410,12 +410,13 @@ impl<'s> Scene<'s> {
     }
 
     /// Natural images as they would look with a projector input of so much a light in each site
-    /// and cell; `None` if light would grow without end.
+    /// and cell: as they are with ambient light, or by a table that takes it away, rounds to
+    /// codes and has gains of wrong places. `None` if light would grow without end.
     fn projected<'g>(
         &self,
         images: &Images,
         drive: impl Fn(usize, usize) -> (f64, Option<&'g Vec<f64>>),
-        with_ambient: bool,
+        as_it_is: bool,
     ) -> Option<Vec<PictureError>> {
         let mut errors = Vec::new();
         let judged = vec![true; self.sites.len()];
@@ -436,7 +437,11 @@ impl<'s> Scene<'s> {
                     let gain = self.gains[channel][at];
                     let direct = drive(channel, at).0 * wanted[at] / gain.max(f64::MIN_POSITIVE);
                     let ambient = self.sites[at].cells.of(self.ambient[channel]);
-                    bounced + direct + if with_ambient { ambient } else { 0.0 }
+                    if as_it_is {
+                        return bounced + direct + ambient;
+                    }
+                    let unsteady = self.unsteady[channel][at] * wanted[at] * wanted[at];
+                    bounced + direct + either_sign(at) * (unsteady + CODES * CODES).sqrt()
                 };
                 shown.push(bounced.into_iter().enumerate().map(seen).collect());
             }
@@ -475,6 +480,12 @@ impl<'s> Scene<'s> {
         let shown = LightPicture::new(size, shown.iter().map(|light| plane(light)).collect())?;
         PictureError::new(&shown, &wanted, &mask)
     }
+}
+
+/// 1 or -1, without an order that an image could have.
+fn either_sign(at: usize) -> f64 {
+    let mixed = (at as u32).wrapping_mul(0x9e37_79b9);
+    if mixed >> 31 == 0 { 1.0 } else { -1.0 }
 }
 
 /// How far off the places of pixels are, in cells, root mean square in each direction.

@@ -10,7 +10,9 @@
 //! where the surface ends.
 
 use super::measurements::Measurements;
+use super::noise::NoiseSource;
 use super::pixel_views::PixelViews;
+use super::wiener_filter;
 use crate::registration::cell_map::Registration;
 use crate::registration::projector_map::ProjectorMap;
 use iltm_picture::statistics::median;
@@ -80,8 +82,9 @@ impl FineFlood {
         let (rows, cols) = (grid.rows() * factor[1], grid.cols() * factor[0]);
         let mut channels = vec![vec![0.0; rows * cols]; measurements.channels.len()];
         let surface = Surface::new(measurements);
+        let flood = quiet_flood(measurements, &surface.inner);
         let mapped = match &measurements.map {
-            Some(Ok(map)) => Some(MappedFlood::new(measurements, map, factor)),
+            Some(Ok(map)) => Some(MappedFlood::new(measurements, &flood, map, factor)),
             _ => None,
         };
         for cell in (0..grid.cells()).filter(|&cell| measurements.live[cell]) {
@@ -90,7 +93,7 @@ impl FineFlood {
             let by_map = seen.as_ref().is_some_and(known);
             let samples = match seen {
                 Some(seen) if by_map => seen,
-                _ => surface.samples(cell, factor, &measurements.flood),
+                _ => surface.samples(cell, factor, &flood),
             };
             for (channel, samples) in samples.into_iter().enumerate() {
                 let observations = &measurements.channels[channel].observations;
@@ -122,6 +125,22 @@ impl FineFlood {
     }
 }
 
+/// White's light without the noise that is known to be in it.
+fn quiet_flood(measurements: &Measurements, inside: &[bool]) -> Vec<Vec<f32>> {
+    // Where nothing was photographed twice, texture passes for noise.
+    if measurements.diagnostics.noise == NoiseSource::Texture {
+        return measurements.flood.clone();
+    }
+    let width = measurements.registration.camera.0;
+    let photographs = measurements.flood_photographs.max(1) as f64;
+    let planes = measurements.flood.iter().zip(&measurements.channels);
+    let filtered = planes.map(|(plane, channel)| {
+        let variance = |light: f64| channel.noise_model.variance(light) / photographs;
+        wiener_filter::filtered(plane, width, inside, variance)
+    });
+    filtered.collect()
+}
+
 /// The flood photograph gathered by the projector map.
 struct MappedFlood {
     grid: Grid,
@@ -132,10 +151,15 @@ struct MappedFlood {
 }
 
 impl MappedFlood {
-    fn new(measurements: &Measurements, map: &ProjectorMap, factor: [usize; 2]) -> Self {
+    fn new(
+        measurements: &Measurements,
+        flood: &[Vec<f32>],
+        map: &ProjectorMap,
+        factor: [usize; 2],
+    ) -> Self {
         let grid = measurements.grid;
         let views = PixelViews::new(map, grid, factor, &measurements.registration);
-        let light = measurements.flood.par_iter();
+        let light = flood.par_iter();
         Self {
             grid,
             factor,
@@ -172,23 +196,27 @@ impl PixelViews {
     /// matrix's row sums holds what the pixels do not tell near each sample's own best.
     fn even_gains(&self, flood: &[f32]) -> Vec<Option<f32>> {
         let samples = self.samples();
-        let (mut area, mut right, mut weight) = (
-            vec![0.0_f32; samples],
-            vec![0.0_f32; samples],
-            vec![0.0_f32; samples],
-        );
+        let mut area = vec![0.0_f32; samples];
         for view in self.pixels() {
-            let light = flood[view.pixel as usize];
-            let whole: f32 = self.seen(view).map(|(_, share)| share).sum();
             for (at, share) in self.seen(view) {
                 area[at] += share * self.area();
+            }
+        }
+        // What a pixel sees of a sample that is hardly seen counts as the others do.
+        let covered: Vec<bool> = area.iter().map(|area| *area >= LEAST_COVER).collect();
+        let seen = |view| self.seen(view).filter(|(at, _)| covered[*at]);
+        let (mut right, mut weight) = (vec![0.0_f32; samples], vec![0.0_f32; samples]);
+        for view in self.pixels() {
+            let light = flood[view.pixel as usize];
+            let whole: f32 = seen(view).map(|(_, share)| share).sum();
+            for (at, share) in seen(view) {
                 right[at] += share * light * whole;
                 weight[at] += share * light * light * whole;
             }
         }
         // Noise alone may leave less light than black: no gain answers that.
-        let known: Vec<bool> = (area.iter().zip(right.iter().zip(&weight)))
-            .map(|(area, (right, weight))| *area >= LEAST_COVER && *right > 0.0 && *weight > 0.0)
+        let known: Vec<bool> = (right.iter().zip(&weight))
+            .map(|(right, weight)| *right > 0.0 && *weight > 0.0)
             .collect();
         let own: Vec<f32> = (known.iter().zip(right.iter().zip(&weight)))
             .map(|(known, (right, weight))| if *known { right / weight } else { 0.0 })
@@ -199,9 +227,9 @@ impl PixelViews {
             let mut product: Vec<f32> = gains.iter().zip(&hold).map(|(z, h)| z * h).collect();
             for view in self.pixels() {
                 let light = flood[view.pixel as usize];
-                let seen: f32 = self.seen(view).map(|(at, share)| share * gains[at]).sum();
-                for (at, share) in self.seen(view) {
-                    product[at] += share * light * light * seen;
+                let light_there: f32 = seen(view).map(|(at, share)| share * gains[at]).sum();
+                for (at, share) in seen(view) {
+                    product[at] += share * light * light * light_there;
                 }
             }
             zero_unknown(&mut product, &known);
@@ -487,6 +515,22 @@ mod tests {
         for (gain, truth) in gains.iter().zip(truth) {
             assert!((gain.unwrap() / truth - 1.0).abs() < 0.02, "{gains:?}");
         }
+    }
+
+    #[test]
+    fn a_sample_that_is_hardly_seen_leaves_the_others_as_they_are() {
+        // Pixels as wide as a sample; none of them looks at the last sample but for a tenth.
+        let places = [[0.5, 0.5], [1.0, 0.5], [1.5, 0.5], [1.59, 0.5]];
+        let places = places
+            .into_iter()
+            .zip(0..)
+            .map(|(place, pixel)| (pixel, place));
+        let views = PixelViews::of_places([3, 1], [1.0; 2], places);
+        let gains = views.even_gains(&[0.5; 4]);
+        for gain in &gains[..2] {
+            assert!((gain.unwrap() - 2.0).abs() < 1e-3, "{gains:?}");
+        }
+        assert!(gains[2].is_none(), "{gains:?}");
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! | noise of a pixel | `noise`, `noise_samples` |
 //! | brightness of a photograph against all others | `leave_one_out`, `drift`, `mains_banding` |
 //! | whether light adds up, and why not | `superposition`, `nonlinearity` |
-//! | between the cells and within one | `cell_interpolation`, `fine_flood` |
+//! | between the cells and within one | `cell_interpolation`, `fine_flood`, `wiener_filter` |
 //! | pixel by pixel, some of them | `pixel_light` |
 //! | what each pixel sees of a grid | `pixel_views` |
 
@@ -26,6 +26,7 @@ pub(crate) mod nonlinearity;
 pub(crate) mod pixel_light;
 pub(crate) mod pixel_views;
 pub(crate) mod superposition;
+mod wiener_filter;
 
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
