@@ -7,6 +7,7 @@ use crate::video::watch::FileWatch;
 use ed25519_dalek::SigningKey;
 use iltm_picture::foreign_file;
 use iltm_runtime::image::{Seal, Table, unseal};
+use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -54,6 +55,52 @@ pub(super) fn check_sealed<'a>(
     checked.map_err(|error| no_table(path, error))
 }
 
+/// What a table needs memory for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TableSize {
+    pub(super) bytes: usize,
+    pub(super) grid: Grid,
+    channels: u8,
+    /// Samples of the gains finer than the cells.
+    fine: Option<FrameSize>,
+}
+
+impl TableSize {
+    /// That of a file of so many bytes.
+    pub(super) fn new(table: &Table<'_>, bytes: usize) -> Self {
+        Self {
+            bytes,
+            grid: table.grid(),
+            channels: table.channels(),
+            fine: table.fine_gain().map(|fine| fine.size()),
+        }
+    }
+
+    /// How to solve again for a table that has room in so many bytes.
+    pub(super) fn advice(&self, room: usize) -> String {
+        let coarser = "Solve for a coarser grid.".to_owned();
+        let Some(fine) = self.fine else {
+            return coarser;
+        };
+        let sample = size_of::<u16>() * usize::from(self.channels);
+        let others = self.bytes.saturating_sub(fine.pixels() * sample);
+        let most = room.saturating_sub(others) / sample;
+        let (cols, rows) = (self.grid.cols(), self.grid.rows());
+        let (wide, tall) = (fine.width() / cols, fine.height() / rows);
+        let sizes = (1..=wide.max(tall)).rev();
+        let mut sizes = sizes.map(|side| (cols * side.min(wide), rows * side.min(tall)));
+        match sizes.find(|(width, height)| width * height <= most) {
+            Some((width, height)) => format!(
+                "Solve again with --gain-resolution {width}x{height}: most of the table are its \
+                 gains, {} x {} of them.",
+                fine.width(),
+                fine.height()
+            ),
+            None => coarser,
+        }
+    }
+}
+
 /// Signs a file on the terms of the command line.
 pub(super) fn seal(file: &[u8], key: &SigningKey, given: &Given) -> Result<Vec<u8>, Failure> {
     let version = given.table_version.unwrap_or_else(version_of_now);
@@ -84,4 +131,31 @@ pub(super) fn version_of_now() -> u32 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH);
     let minutes = now.map_or(0, |now| now.as_secs() / 60);
     u32::try_from(minutes).unwrap_or(u32::MAX).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_that_is_too_large_is_made_smaller_by_its_gains_first() {
+        // 100 x 60 gains of two bytes, and 1,000 bytes of others.
+        let size = TableSize {
+            bytes: 13_000,
+            grid: Grid::new(6, 10).unwrap(),
+            channels: 1,
+            fine: FrameSize::new(100, 60),
+        };
+        for (room, gains) in [(12_999, "90x54"), (5_000, "50x30"), (1_120, "10x6")] {
+            let advice = size.advice(room);
+            assert!(
+                advice.contains(&format!("--gain-resolution {gains}:")),
+                "{advice}"
+            );
+        }
+        for (room, fine) in [(1_119, size.fine), (12_999, None)] {
+            let advice = TableSize { fine, ..size }.advice(room);
+            assert!(advice.contains("coarser grid"), "{advice}");
+        }
+    }
 }

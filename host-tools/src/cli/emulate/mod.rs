@@ -11,7 +11,7 @@ use super::args::Emulate;
 use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
 use super::output::Output;
-use super::tables::{check, read_table};
+use super::tables::{TableSize, check, read_table};
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameFeed;
@@ -49,8 +49,8 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
         (Some(path), Some(image)) => Some(check(path, image)?),
         _ => None,
     };
-    if let (Some(path), Some(image)) = (&arguments.table, &image) {
-        put_table(&memory, path, image)?;
+    if let (Some(path), Some(image), Some(table)) = (&arguments.table, &image, &table) {
+        put_table(&memory, path, image, table)?;
     }
     let frames = frames(arguments, table.as_ref())?;
     let firmware = match &arguments.firmware {
@@ -118,15 +118,24 @@ fn provision(memory: &BoardMemory, path: &Path, device: u64) -> Result<(), Failu
     })
 }
 
-fn put_table(memory: &BoardMemory, path: &Path, image: &[u8]) -> Result<(), Failure> {
+fn put_table(
+    memory: &BoardMemory,
+    path: &Path,
+    image: &[u8],
+    table: &Table<'_>,
+) -> Result<(), Failure> {
     memory.put_table(image).map_err(|error| {
+        if error.kind() != io::ErrorKind::FileTooLarge {
+            return cannot_write(memory.path(), &error);
+        }
+        let room = psram::SLOT_A.len();
         let message = format!(
-            "{}: does not fit the board's flash: {error}; a slot has {} bytes and the table {}",
+            "{}: the table has {} bytes; the board's flash has room for {room}",
             path.display(),
-            psram::SLOT_A.len(),
             image.len()
         );
-        Failure::new(Kind::Table, message, "Solve for a coarser grid.")
+        let advice = TableSize::new(table, image.len()).advice(room);
+        Failure::new(Kind::TooLarge, message, advice)
     })
 }
 

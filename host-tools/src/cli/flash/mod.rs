@@ -228,7 +228,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
         "baud": connection.baud,
         "board": connection.client.device().board.as_str(),
         "table": table_name(Some(table.called)),
-        "bytes": table.bytes,
+        "bytes": table.size.bytes,
         "slot": slot.to_string(),
         "sectors": sectors,
         "differing": differing,
@@ -249,7 +249,7 @@ fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &
     output.people(&format!(
         "table    {}, {} bytes, {}\ndevice   {} at {}\nin use   {}\nslot {slot}   {what}\n",
         table.called,
-        table.bytes,
+        table.size.bytes,
         table.signer(),
         connection.client.device().board,
         connection.port,

@@ -1,7 +1,7 @@
 //! Preflight: checks of a table against a device before anything is sent.
 
 use super::super::failure::{Failure, Kind};
-use super::super::tables::check_sealed;
+use super::super::tables::{TableSize, check_sealed};
 use super::super::words::{CalledTable, key_id, uses};
 use crate::compile::sign::is_signed_by;
 use crate::device::rejection_next_step;
@@ -18,8 +18,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct Named {
     path: PathBuf,
     pub(super) called: CalledTable,
-    pub(super) bytes: usize,
-    cells: usize,
+    pub(super) size: TableSize,
     seal: Option<Seal>,
 }
 
@@ -54,8 +53,7 @@ impl Named {
                     },
                 }),
             },
-            bytes: bytes.len(),
-            cells: table.grid().cells(),
+            size: TableSize::new(&table, bytes.len()),
             seal,
         })
     }
@@ -71,7 +69,7 @@ impl Named {
     /// Whether the device will take it, as far as its terms tell;
     /// [`check_signature`](Self::check_signature) looks at the signature.
     pub(super) fn check(&self, device: &Hello, slots: &Slots) -> Result<Now, Failure> {
-        if uses(slots, self.called.name, self.bytes) {
+        if uses(slots, self.called.name, self.size.bytes) {
             if slots.trial_ms > 0 {
                 return Ok(Now::OnTrial);
             }
@@ -87,17 +85,19 @@ impl Named {
             return Err(self.other_on_trial());
         }
         let limits = &device.limits;
-        if self.bytes as u64 > u64::from(limits.table_bytes) {
+        let (bytes, cells) = (self.size.bytes, self.size.grid.cells());
+        if bytes as u64 > u64::from(limits.table_bytes) {
             let why = format!(
-                "the table has {} bytes; the device has room for {}",
-                self.bytes, limits.table_bytes
+                "the table has {bytes} bytes; the device has room for {}",
+                limits.table_bytes
             );
-            return refused(Kind::TooLarge, why, "Solve for a coarser grid.");
+            let advice = self.size.advice(limits.table_bytes as usize);
+            return refused(Kind::TooLarge, why, &advice);
         }
-        if self.cells as u64 > u64::from(limits.cells) {
+        if cells as u64 > u64::from(limits.cells) {
             let why = format!(
-                "the table has {} cells; the device can take {}",
-                self.cells, limits.cells
+                "the table has {cells} cells; the device can take {}",
+                limits.cells
             );
             return refused(Kind::TooLarge, why, "Solve for a coarser grid.");
         }
