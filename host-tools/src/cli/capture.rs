@@ -192,7 +192,7 @@ fn finished(summary: Summary, arguments: &Capture) -> (Value, String) {
         "discard": summary.latency.map(|latency| latency.discard),
     });
     let mut text = format!(
-        "capture     {capture}: {} photographs taken, all {} are there\n",
+        "capture     {capture}: {} taken, all {} photographs are there\n",
         summary.taken, summary.all
     );
     // A folder to verify a table with is none to solve.

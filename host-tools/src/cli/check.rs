@@ -4,7 +4,7 @@ use super::args::Check;
 use super::failure::{Failure, Kind};
 use super::output::{Output, write_file, write_files};
 use super::progress::progress;
-use super::summary::{gates, map_fault};
+use super::summary::{gates, map_fault, uncalibrated};
 use crate::capture::{self, CaptureOptions, Examined, Gate, MapSource, ProjectorMap, Verdict};
 use crate::report;
 use serde_json::{Value, json};
@@ -56,8 +56,15 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         "page": page.as_ref().map(|page| page.display().to_string()),
     });
     let mut text = text(&examined.gates);
-    if let Some(fault) = &fault {
+    let mut remarks = warned(&examined.gates);
+    // What refuses the photographs explains the stripes too.
+    if let (Some(fault), []) = (&fault, &failed[..]) {
         let _ = writeln!(text, "warn stripes       {fault}");
+        remarks.push("stripes");
+    }
+    if let Some(missing) = examined.measurements.as_ref().and_then(uncalibrated) {
+        let _ = writeln!(text, "warn calibration   {missing}");
+        remarks.push("calibration");
     }
     if let (Some(map), Some((path, _))) = (&map, &arguments.map) {
         let _ = writeln!(text, "{}: {}", path.display(), words(map));
@@ -66,7 +73,7 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         let _ = writeln!(text, "{}: what each gate saw", page.display());
     }
     if failed.is_empty() {
-        text += &passed(&examined.gates);
+        text += &passed(&remarks, &not_judged(&examined.gates));
         output.result(&data, &text);
         return Ok(());
     }
@@ -139,15 +146,30 @@ fn not_judged(gates: &[Gate]) -> Vec<&'static str> {
     open.map(|gate| gate.name.name()).collect()
 }
 
+/// Names of the gates that found something that can be lived with.
+fn warned(gates: &[Gate]) -> Vec<&'static str> {
+    let warn = |gate: &&Gate| gate.verdict == Verdict::Warn;
+    gates.iter().filter(warn).map(|g| g.name.name()).collect()
+}
+
 /// The last line of a check that no gate fails.
-fn passed(gates: &[Gate]) -> String {
-    match not_judged(gates).as_slice() {
-        [] => "passed: these photographs can be used\n".to_owned(),
-        open => format!(
-            "passed, as far as it was judged: nothing is known of {}\n",
+fn passed(remarks: &[&str], open: &[&str]) -> String {
+    let mut line = "passed".to_owned();
+    if !open.is_empty() {
+        let _ = write!(
+            line,
+            ", as far as it was judged: nothing is known of {}",
             open.join(", ")
-        ),
+        );
     }
+    if remarks.is_empty() {
+        if open.is_empty() {
+            line += ": these photographs can be used";
+        }
+    } else {
+        let _ = write!(line, "; see the remarks on {} above", remarks.join(", "));
+    }
+    line + "\n"
 }
 
 /// What scripts get for a capture that does not pass.

@@ -156,6 +156,9 @@ fn verdict(
     });
     let blind = match &readings.revisited.pixels {
         Some(Err(error)) => format!("viewer      not judged: {error}. {}\n", error.next_step()),
+        Some(Ok(_)) if verdict.pixels.is_none() => {
+            "viewer      not judged by these photographs\n".to_owned()
+        }
         Some(Ok(_)) | None => String::new(),
     };
     let text = recognised.unwrap_or_default() + &blind + &text(&verdict, &images, &page);
@@ -167,16 +170,16 @@ fn verdict(
     let (kind, says) = match verdict.outcome {
         Outcome::Inconclusive => (
             Kind::Inconclusive,
-            "these photographs cannot tell whether it keeps its promise",
+            "these photographs cannot tell whether it keeps its promise".to_owned(),
         ),
-        _ => (Kind::Verdict, "it does not keep its promise"),
+        _ => {
+            let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
+            let says =
+                format!("it does not keep its promise: error {error}, at most {limit} passes");
+            (Kind::Verdict, says)
+        }
     };
-    let message = format!(
-        "{}: {says}: error {}, at most {} passes",
-        arguments.table.display(),
-        percent(verdict.error[1]),
-        percent(verdict.bound.limit)
-    );
+    let message = format!("{}: {says}", arguments.table.display());
     let todo = verdict.cause.map_or("", Cause::next_step);
     let next_step = format!(
         "{} {todo} The page is {}.",

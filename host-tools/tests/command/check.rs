@@ -149,6 +149,28 @@ fn fine_stripes_that_are_missing_or_out_of_order_are_named_and_the_rest_is_used(
     contains(&said, &["contradict each other"]);
 }
 
+#[test]
+fn calibration_photographs_that_are_missing_are_named_and_the_last_line_says_so() {
+    let user = User::new();
+    user.says("patterns -o c --rows 13 --cols 21 --photos 20 --projector 174x110 --border 3");
+    user.says("simulate SCENES/m-panels.toml --photograph c");
+    let whole = user.says("check c");
+    assert!(!whole.contains("calibration   "), "{whole}");
+    let list = user.text("c/calibration.csv");
+    let line = list.lines().nth(3).unwrap();
+    user.remove(&format!("c/{}", line.rsplit(',').next().unwrap().trim()));
+    let said = user.says("check c");
+    contains(
+        &said,
+        &[
+            "warn calibration   1 of ",
+            "see the remarks on ",
+            "calibration above",
+        ],
+    );
+    contains(&user.says("solve c -o t.iltm"), &["note        1 of "]);
+}
+
 /// The camera has a pixel for 7.6 of the projector's along a row, and for 4.6 along a column.
 #[test]
 fn a_camera_that_sees_waves_along_one_axis_alone_gets_the_map_that_it_can_tell() {

@@ -158,6 +158,11 @@ fn bad_photographs_pass_no_table_and_fail_none_and_the_cause_is_named() {
         assert_eq!(said["error"]["exit"], 34, "{fault}: {said}");
         let found = (&said["outcome"], &said["cause"]);
         assert_eq!(found, (&"inconclusive".into(), &cause.into()), "{said}");
+        // Nor do they tell what a viewer sees, or how bright white is.
+        assert!(said["viewer"].is_null(), "{said}");
+        let people = user.fails(34, "verify t.iltm v");
+        let unknown = ["viewer      not judged", "brightness  Not judged"];
+        contains(&people, &unknown);
     }
     // What is wrong on the wall stays wrong.
     let said = with_fault(&user, "vivid");
@@ -199,6 +204,21 @@ fn a_chain_that_compensates_once_passes_and_every_other_is_named() {
         capture.display()
     ));
     user.fails(37, "verify u.iltm w");
+}
+
+#[test]
+fn photographs_that_differ_among_themselves_are_not_fed_back() {
+    let user = copy();
+    // Below what the gate of movement sees, above what the table promises.
+    let said = with_fault(&user, "tripod=0.2");
+    let found = (&said["outcome"], &said["cause"]);
+    assert_eq!(found, (&"inconclusive".into(), &"noise".into()), "{said}");
+    let next = said["error"]["next_step"].as_str().unwrap();
+    contains(next, &["Fix tripod"]);
+    contains(
+        &user.fails(34, "refine t.iltm v -o x.iltm"),
+        &["cannot be fed back", "differ among themselves"],
+    );
 }
 
 /// A card of a film as a camera sees it: smaller, on a dark wall.

@@ -61,13 +61,15 @@ impl CameraDriver for CommandCamera<'_> {
             Ok(Ran::Ended(status, words)) if status.success() => words,
             Ok(Ran::Ended(status, words)) => {
                 return Err(refuse(format!(
-                    "the camera command ended with {status}; it says: {words}"
+                    "the camera command ended with {status}{}",
+                    shell::says(&words)
                 )));
             }
             Ok(Ran::TooLong(words)) => {
                 return Err(refuse(format!(
-                    "the camera command took longer than {} s; it says: {words}",
-                    self.patience.as_secs_f64()
+                    "the camera command took longer than {} s{}",
+                    self.patience.as_secs_f64(),
+                    shell::says(&words)
                 )));
             }
             Ok(Ran::Stopped) => return Err(SessionError::Stopped),
@@ -76,8 +78,9 @@ impl CameraDriver for CommandCamera<'_> {
         match endings(&photo).as_slice() {
             [file] => Ok(file.clone()),
             [] => Err(refuse(format!(
-                "the camera command wrote no {}; it says: {words}",
-                photo.file_name().unwrap_or_default().to_string_lossy()
+                "the camera command wrote no {}{}",
+                photo.file_name().unwrap_or_default().to_string_lossy(),
+                shell::says(&words)
             ))),
             several => Err(refuse(format!(
                 "the camera command wrote {} files of that name; one is wanted",

@@ -61,11 +61,13 @@ impl Screen for CommandScreen<'_> {
         match shell::run(&line, SHOWING, self.stop) {
             Ok(Ran::Ended(status, _)) if status.success() => Ok(()),
             Ok(Ran::Ended(status, words)) => Err(refuse(format!(
-                "`{command}` ended with {status}; it says: {words}"
+                "`{command}` ended with {status}{}",
+                shell::says(&words)
             ))),
             Ok(Ran::TooLong(words)) => Err(refuse(format!(
-                "`{command}` did not return within {} s; it says: {words}",
-                SHOWING.as_secs()
+                "`{command}` did not return within {} s{}",
+                SHOWING.as_secs(),
+                shell::says(&words)
             ))),
             Ok(Ran::Stopped) => Err(SessionError::Stopped),
             Err(error) => Err(refuse(format!("`{command}` cannot be run: {error}"))),

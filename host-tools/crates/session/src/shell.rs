@@ -105,6 +105,14 @@ fn placed(name: &str, value: &str, in_quotes: bool) -> String {
     }
 }
 
+/// What a command said, to be added to a sentence; nothing of one that said nothing.
+pub(super) fn says(words: &str) -> String {
+    match words.trim() {
+        "" => String::new(),
+        words => format!("; it says: {words}"),
+    }
+}
+
 /// Runs a command until it ends, takes longer than `patience`, or `stop` says so.
 /// Nothing that it started in the meantime is left running in the last two cases.
 ///

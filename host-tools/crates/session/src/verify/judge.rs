@@ -193,7 +193,8 @@ pub struct TableVerdict {
     pub bound: Bound,
     /// Image by image.
     pub images: Vec<ImageVerdict>,
-    /// What a viewer sees of finer images; `None` without such.
+    /// What a viewer sees of finer images; `None` without such, and where the photographs cannot
+    /// tell.
     pub pixels: Option<PixelVerdict>,
     /// What has changed.
     pub drift: Drift,
@@ -273,7 +274,10 @@ pub fn judge(
         gates: readings.revisited.gates.clone(),
         error,
         bound,
-        pixels: PixelVerdict::new(table, readings),
+        // Photographs that cannot tell by cells tell less by pixels.
+        pixels: (outcome != Outcome::Inconclusive)
+            .then(|| PixelVerdict::new(table, readings))
+            .flatten(),
         drift,
         brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),

@@ -144,8 +144,8 @@ impl Cause {
                  dynamic modes, keep other light out, and photograph again."
             }
             Self::Noise => {
-                "Expose longer or lower the camera's gain (ISO) until white reaches 80 % of full \
-                 scale, keep other light out, and photograph again."
+                "Fix tripod, projector and scene, use a remote release, keep other light out, expose \
+                 until white reaches 80 % of full scale at the least gain (ISO), and photograph again."
             }
             Self::Viewpoint => {
                 "Put the camera where it stood for the table's own photographs, and photograph \

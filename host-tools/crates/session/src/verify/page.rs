@@ -61,7 +61,7 @@ fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
         @if let Some(cause) = verdict.cause { p { b { "Next: " } (cause.next_step()) } }
         div .numbers {
             div .number { b { (percent(before)) } span { @if verdict.wanted { "error without the table, expected" } @else { "error of the wall as it is" } } }
-            div .number.(colour) { b { (percent(after)) } span { "with the table" } }
+            div .number.(colour) { b { (percent(after)) } span { "with the table, by the mean light of cells" } }
             div .number { b { (percent(verdict.bound.limit)) } span { "the most that passes" } }
         }
         p { (brightness_words(verdict)) }
@@ -71,6 +71,9 @@ fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
 /// How bright white is with the table.
 #[must_use]
 pub fn brightness_words(verdict: &TableVerdict) -> String {
+    if verdict.outcome == Outcome::Inconclusive {
+        return "Not judged by these photographs.".to_owned();
+    }
     format!(
         "White is {:.0} % of what the projector makes alone.",
         100.0 * verdict.brightness
@@ -194,6 +197,8 @@ const fn harm([before, after]: [f64; 2]) -> &'static str {
 /// Why it passed or not, a sentence or two.
 #[must_use]
 pub fn reason(verdict: &TableVerdict) -> String {
+    // Plain letters: terminals have it too.
+    use iltm_picture::numbers::percent;
     let [before, after] = verdict.error;
     let harm = harm(verdict.error);
     let bound = &verdict.bound;
@@ -218,8 +223,13 @@ pub fn reason(verdict: &TableVerdict) -> String {
             } else {
                 "Slides that this program compensated; player and device were not verified"
             };
+            let viewer = verdict.pixels.as_ref().map_or_else(String::new, |pixels| {
+                let seen = percent(pixels.error[1]);
+                format!(" A viewer sees {seen} of the light off, images finer than the cells.")
+            });
             return format!(
-                "The error is {}, {:.1} times smaller than without the table. {of}.",
+                "By the mean light of cells the error is {}, {:.1} times smaller than without the \
+                 table.{viewer} {of}.",
                 percent(after),
                 before / after.max(1e-9)
             );
@@ -278,7 +288,14 @@ pub fn reason(verdict: &TableVerdict) -> String {
         }
     };
     if verdict.outcome == Outcome::Failed {
-        format!("{harm}{why}")
+        let unnamed = verdict.wanted && verdict.cause != Some(Cause::Chain);
+        let chain = if unnamed {
+            " A picture that is shifted by less than a cell, or scaled, looks like this too: first \
+             see that player, device and projector show it pixel for pixel."
+        } else {
+            ""
+        };
+        format!("{harm}{why}{chain}")
     } else {
         why
     }
