@@ -167,17 +167,13 @@ fn verdict(
         return Ok(());
     }
     output.findings(&text);
-    let (kind, says) = match verdict.outcome {
-        Outcome::Inconclusive => (
-            Kind::Inconclusive,
-            "these photographs cannot tell whether it keeps its promise".to_owned(),
-        ),
-        _ => {
-            let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
-            let says =
-                format!("it does not keep its promise: error {error}, at most {limit} passes");
-            (Kind::Verdict, says)
-        }
+    let (kind, says) = if verdict.outcome == Outcome::Inconclusive {
+        let says = "these photographs cannot tell whether it keeps its promise";
+        (Kind::Inconclusive, says.to_owned())
+    } else {
+        let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
+        let says = format!("it does not keep its promise: error {error}, at most {limit} passes");
+        (Kind::Verdict, says)
     };
     let message = format!("{}: {says}", arguments.table.display());
     let todo = verdict.cause.map_or("", Cause::next_step);

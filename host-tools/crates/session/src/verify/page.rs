@@ -7,6 +7,7 @@ use super::{Cause, ImageVerdict, Outcome, PixelVerdict, TableVerdict, TestImage}
 use iltm_compile::Provenance;
 use iltm_picture::PictureError;
 use iltm_picture::html::{PictureFile, capitalised, colour_bar, document, img_named, percent};
+use iltm_picture::numbers::percent as plain;
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
 
@@ -194,12 +195,32 @@ const fn harm([before, after]: [f64; 2]) -> &'static str {
     }
 }
 
+/// How good a table is that passed.
+fn good(verdict: &TableVerdict) -> String {
+    let [before, after] = verdict.error;
+    let of = if verdict.wanted {
+        "The chain that was photographed compensates"
+    } else {
+        "Slides that this program compensated; player and device were not verified"
+    };
+    let viewer = verdict.pixels.as_ref().map_or_else(String::new, |pixels| {
+        let seen = plain(pixels.error[1]);
+        format!(" A viewer sees {seen} of the light off, images finer than the cells.")
+    });
+    format!(
+        "By the mean light of cells the error is {}, {:.1} times smaller than without the \
+         table.{viewer} {of}.",
+        plain(after),
+        before / after.max(1e-9)
+    )
+}
+
 /// Why it passed or not, a sentence or two.
 #[must_use]
 pub fn reason(verdict: &TableVerdict) -> String {
     // Plain letters: terminals have it too.
-    use iltm_picture::numbers::percent;
-    let [before, after] = verdict.error;
+    let percent = plain;
+    let [_, after] = verdict.error;
     let harm = harm(verdict.error);
     let bound = &verdict.bound;
     let level = verdict.drift.white.iter().flat_map(|white| &white.level);
@@ -217,23 +238,7 @@ pub fn reason(verdict: &TableVerdict) -> String {
         )
     };
     let why = match verdict.cause {
-        None => {
-            let of = if verdict.wanted {
-                "The chain that was photographed compensates"
-            } else {
-                "Slides that this program compensated; player and device were not verified"
-            };
-            let viewer = verdict.pixels.as_ref().map_or_else(String::new, |pixels| {
-                let seen = percent(pixels.error[1]);
-                format!(" A viewer sees {seen} of the light off, images finer than the cells.")
-            });
-            return format!(
-                "By the mean light of cells the error is {}, {:.1} times smaller than without the \
-                 table.{viewer} {of}.",
-                percent(after),
-                before / after.max(1e-9)
-            );
-        }
+        None => return good(verdict),
         Some(Cause::Noise) => apart("Photographs of the same picture differ among themselves by"),
         Some(Cause::Viewpoint) => apart(
             "From where the camera stands, white differs from what the table expects from cell to \
