@@ -32,11 +32,11 @@ use ed25519_dalek::SigningKey;
 use ed25519_dalek::pkcs8::EncodePrivateKey;
 use ed25519_dalek::pkcs8::spki::der::pem::LineEnding;
 use iltm::compile::sign::{SealTerms, sign};
-use iltm::compile::{CompileOptions, compile};
+use iltm::compile::{CompileOptions, FineGains, compile};
 use iltm::picture::Response;
 use iltm::solve::{ChannelInverse, InverseTransport};
-use iltm_runtime::Grid;
 use iltm_runtime::image::Label;
+use iltm_runtime::{FrameSize, Grid};
 use nalgebra::DMatrix;
 
 /// A grid of these sides.
@@ -143,6 +143,20 @@ pub fn named_table(name: &str, date: u32) -> Vec<u8> {
         ..CompileOptions::default()
     };
     let compiled = compile(&wedge(grid(4, 6), 1), None, &options);
+    compiled.expect("the wedge is a plain scene").image
+}
+
+/// A small grey table image with this many gains along each cell's sides.
+pub fn fine_table(side: usize) -> Vec<u8> {
+    let (rows, cols) = (4, 6);
+    let size = FrameSize::new((side * cols) as u16, (side * rows) as u16);
+    let size = size.expect("sides fit 16 bits");
+    let fine = FineGains {
+        size,
+        channels: vec![vec![1.5; size.pixels()]],
+    };
+    let grid = grid(rows as u16, cols as u16);
+    let compiled = compile(&wedge(grid, 1), Some(&fine), &CompileOptions::default());
     compiled.expect("the wedge is a plain scene").image
 }
 

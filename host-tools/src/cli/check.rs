@@ -4,7 +4,7 @@ use super::args::Check;
 use super::failure::{Failure, Kind};
 use super::output::{Output, write_file, write_files};
 use super::progress::progress;
-use super::summary::{gates, map_fault, uncalibrated};
+use super::summary::{gates, map_fault};
 use crate::capture::{self, CaptureOptions, Examined, Gate, MapSource, ProjectorMap, Verdict};
 use crate::report;
 use serde_json::{Value, json};
@@ -62,7 +62,8 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         let _ = writeln!(text, "warn stripes       {fault}");
         remarks.push("stripes");
     }
-    if let Some(missing) = examined.measurements.as_ref().and_then(uncalibrated) {
+    let measured = examined.measurements.as_ref();
+    if let Some(missing) = measured.and_then(|m| m.devices.uncalibrated()) {
         let _ = writeln!(text, "warn calibration   {missing}");
         remarks.push("calibration");
     }

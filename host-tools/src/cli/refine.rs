@@ -7,7 +7,7 @@ use super::progress::progress;
 use super::solve::check_place;
 use super::tables::{check_sealed, read_table, seal};
 use crate::compile::sign::read_key;
-use crate::verify::{Cause, Readings, VerifyError, judge, reason, refine};
+use crate::verify::{Readings, refine};
 use iltm_picture::numbers::percent;
 use iltm_runtime::image::unseal;
 use serde_json::json;
@@ -19,14 +19,9 @@ pub(super) fn run(arguments: &Refine, output: &Output) -> Result<(), Failure> {
     let (table, sealed) = check_sealed(&arguments.table, &file)?;
     let bars = progress(output);
     let readings = Readings::read(&arguments.capture, &table, bars.as_ref())?;
-    let verdict = judge(&arguments.capture, &table, &readings, None)?;
-    if verdict.cause == Some(Cause::Noise) {
-        let (cause, what) = (Cause::Noise, reason(&verdict));
-        return Err(VerifyError::Refused { cause, what }.into());
-    }
     bars.begin("refining the gains", 0);
     let image = unseal(&file).map_or(&file[..], |(image, _)| image);
-    let refined = refine(image, &table, &readings);
+    let refined = refine(&arguments.capture, image, &table, &readings);
     bars.end();
     let refined = refined?;
     let written = match &key {

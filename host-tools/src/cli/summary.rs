@@ -181,23 +181,10 @@ pub(super) fn remarks(built: &BuiltTable) -> String {
     if let Some(Err(fault)) = &built.measurements.map {
         let _ = writeln!(text, "note        {}", map_fault(fault));
     }
-    if let Some(missing) = uncalibrated(&built.measurements) {
+    if let Some(missing) = built.measurements.devices.uncalibrated() {
         let _ = writeln!(text, "note        {missing}");
     }
     text
-}
-
-/// How many calibration photographs are missing, if any are.
-pub(super) fn uncalibrated(measurements: &Measurements) -> Option<String> {
-    let (listed, taken) = measurements.devices.calibration;
-    (taken < listed).then(|| {
-        format!(
-            "{} of {listed} calibration photographs are missing: the devices are measured from the \
-             others, or taken as declared. Take them with `iltm capture`, which goes on where it \
-             stopped",
-            listed - taken
-        )
-    })
 }
 
 /// Why fine stripes serve nothing, and what to do about it.

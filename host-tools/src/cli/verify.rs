@@ -295,7 +295,7 @@ fn data(
         })),
         "wanted": verdict.wanted,
         "curve": { "power": verdict.curve.power, "left": verdict.curve.left },
-        "brightness": verdict.brightness,
+        "brightness": (verdict.outcome != Outcome::Inconclusive).then_some(verdict.brightness),
         "drift": {
             "level": white.map(|white| &white.level),
             "shape": white.map(|white| white.shape),

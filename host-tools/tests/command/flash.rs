@@ -5,9 +5,10 @@ use super::user::{Ended, User, contains, interrupt};
 use ed25519_dalek::SigningKey;
 use iltm::user::Folders;
 use iltm::user::emulated::{self, BoardRegistration};
+use iltm_runtime::frame_buffers::psram;
 use iltm_runtime::link::{FrameKind, SlotState};
 use iltm_tests::fake_device::{FakeDevice, FakePort, FakeTables, SECTOR, slot};
-use iltm_tests::{key_file, named_table, signing_key, wedge_table};
+use iltm_tests::{fine_table, key_file, named_table, signing_key, wedge_table};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Read;
@@ -310,6 +311,27 @@ fn a_table_that_is_too_large_is_refused_before_it_is_sent() {
     user.write("t.iltm", &large);
     let said = user.fails(20, &device.at("flash t.iltm"));
     contains(&said, &[&format!("room for {room}"), "No table is in use"]);
+    assert_eq!(device.writes(), 0);
+}
+
+#[test]
+fn a_table_that_its_gains_make_too_large_is_refused_with_as_many_as_fit() {
+    let (user, device) = (user(), Device::new());
+    let gains = |room: usize| {
+        let fits = (1..).take_while(|side| fine_table(*side).len() <= room);
+        fits.last().expect("one fits")
+    };
+    // The board's memory is larger than that of the device in the tests.
+    for (room, command) in [
+        (slot(0).len(), device.at("flash l.iltm")),
+        (psram::SLOT_A.len(), "emulate l.iltm".to_owned()),
+    ] {
+        let most = gains(room);
+        user.write("l.iltm", fine_table(most + 1));
+        let said = user.fails(20, &command);
+        let advice = format!("--gain-resolution {}x{}:", 6 * most, 4 * most);
+        contains(&said, &[&format!("room for {room}"), &advice]);
+    }
     assert_eq!(device.writes(), 0);
 }
 

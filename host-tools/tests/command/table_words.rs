@@ -276,4 +276,7 @@ fn a_table_of_an_even_wall_leaves_pictures_as_they_are() {
     for (was, is) in picture.pixels().zip(made.pixels()) {
         assert!(was.0[0].abs_diff(is.0[0]) <= 1, "{was:?} {is:?}");
     }
+    // Who asks for a white does not want pictures as they are.
+    let said = user.says("solve c -o w.iltm --white 0.3");
+    assert!(!said.contains("pictures are left"), "{said}");
 }

@@ -160,6 +160,7 @@ fn bad_photographs_pass_no_table_and_fail_none_and_the_cause_is_named() {
         assert_eq!(found, (&"inconclusive".into(), &cause.into()), "{said}");
         // Nor do they tell what a viewer sees, or how bright white is.
         assert!(said["viewer"].is_null(), "{said}");
+        assert!(said["brightness"].is_null(), "{said}");
         let people = user.fails(34, "verify t.iltm v");
         let unknown = ["viewer      not judged", "brightness  Not judged"];
         contains(&people, &unknown);

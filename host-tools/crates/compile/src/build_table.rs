@@ -123,14 +123,16 @@ pub fn build_table_from(
     let gain_only = iltm_solve::gain_only(&(&measurements).into(), &report)?;
     let viewer = ViewerError::predict(&measurements, &trials, &gain_only, &flood);
     let as_even = |viewer: ViewerError| viewer.uncompensated.relative <= viewer.gain_only.relative;
-    if report.compensation == Compensation::GainOnly && viewer.is_some_and(as_even) {
+    // Who asks for a white asks for another picture.
+    let free = table.white.is_none() && report.compensation == Compensation::GainOnly;
+    if free && viewer.is_some_and(as_even) {
         report.compensation = Compensation::Nothing;
     }
     let predicted = PredictedError::new(&report, viewer);
     progress.end();
     let mut inverse = match report.compensation {
         Compensation::GainOnly => gain_only,
-        Compensation::Nothing => crate::gain::even(gain_only),
+        Compensation::Nothing => crate::gain::even(gain_only, &report.left_out),
         Compensation::Operator => inverse,
     };
     progress.begin("compiling the table", 0);

@@ -2,7 +2,7 @@
 
 use iltm_capture::FineFlood;
 use iltm_runtime::{FrameSize, resample::interpolation::Axis};
-use iltm_solve::InverseTransport;
+use iltm_solve::{InverseTransport, LeftOut, WhyLeftOut};
 use nalgebra::DVector;
 
 /// Gains on a grid finer than the cells.
@@ -14,20 +14,19 @@ pub struct FineGains {
     pub channels: Vec<Vec<f64>>,
 }
 
-/// The same inverse with one gain for all live cells and channels, that of their mean light: a
-/// table that leaves pictures as they are.
-pub(crate) fn even(mut inverse: InverseTransport) -> InverseTransport {
-    let lit = |gain: &f64| *gain > 0.0;
+/// The same inverse with one gain for all channels and cells, that of their mean light: a table
+/// that leaves pictures as they are. Also where no camera pixel looks; not where there is no light.
+pub(crate) fn even(mut inverse: InverseTransport, left_out: &[LeftOut]) -> InverseTransport {
     let gains = inverse.channels.iter().flat_map(|channel| &channel.gain);
-    let (light, count) = gains
-        .filter(|gain| lit(gain))
-        .fold((0.0, 0.0), |(light, count), gain| {
-            (light + 1.0 / gain, count + 1.0)
-        });
-    let gains = inverse.channels.iter_mut();
-    let gains = gains.flat_map(|channel| &mut channel.gain);
-    for gain in gains.filter(|gain| lit(gain)) {
-        *gain = count / light;
+    let lit = gains.filter(|gain| **gain > 0.0);
+    let (light, count) = lit.fold((0.0, 0.0), |(light, count), gain| {
+        (light + 1.0 / gain, count + 1.0)
+    });
+    for channel in &mut inverse.channels {
+        channel.gain.fill(count / light);
+        for out in left_out.iter().filter(|out| out.why != WhyLeftOut::Unseen) {
+            channel.gain[out.cell] = 0.0;
+        }
     }
     inverse
 }

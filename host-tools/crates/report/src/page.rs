@@ -77,7 +77,7 @@ impl Report<'_> {
                 h1 { (words.title) }
                 p .lead { (words.scene) }
                 div .numbers {
-                    (headline(predicted.uncompensated, "projected as it is", ""))
+                    (headline(predicted.uncompensated, "projected as it is", mark(Compensation::Nothing)))
                     (headline(self.gains_alone(), "each pixel's brightness and colour corrected", mark(Compensation::GainOnly)))
                     (headline(predicted.compensated, "interreflections cancelled as well", mark(Compensation::Operator)))
                 }

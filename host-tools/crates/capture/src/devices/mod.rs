@@ -140,14 +140,21 @@ impl Devices {
                 "the projector is in focus: less blur than a tenth of a cell".to_owned()
             });
         }
-        let (listed, taken) = self.calibration;
-        if taken < listed {
-            words.push(format!(
-                "{taken} of {listed} calibration photographs were taken; the devices are measured \
-                 from these, or taken as declared"
-            ));
-        }
+        words.extend(self.uncalibrated());
         words
+    }
+
+    /// How many calibration photographs are missing, for people; `None` if none is.
+    #[must_use]
+    pub fn uncalibrated(&self) -> Option<String> {
+        let (listed, taken) = self.calibration;
+        (taken < listed).then(|| {
+            format!(
+                "{} of {listed} calibration photographs are missing: the devices are measured from \
+                 the others, or taken as declared; `iltm capture` goes on where it stopped",
+                listed - taken
+            )
+        })
     }
 
     fn projector_words(&self) -> Option<String> {

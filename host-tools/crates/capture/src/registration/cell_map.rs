@@ -36,27 +36,19 @@ impl Registration {
     }
 
     /// What a pixel covers of the cells along their width and their height, in cells: the median
-    /// over the cells that the camera sees beside both neighbours.
+    /// over the cells that the camera sees.
     ///
     /// A camera that looks from the side sees many pixels of the projector in one of its own along
     /// one axis, and few along the other.
-    #[must_use]
-    pub fn pixel_in_cells(&self, grid: Grid) -> [f64; 2] {
-        let (rows, cols) = (grid.rows(), grid.cols());
-        let step = |from: usize, to: usize| -> Option<[f64; 2]> {
-            let ([x0, y0], [x1, y1]) = (self.centre[from]?, self.centre[to]?);
-            Some([x1 - x0, y1 - y0])
-        };
-        let covered = |row: usize, col: usize| -> Option<[f64; 2]> {
-            let cell = row * cols + col;
-            let (right, down) = (step(cell, cell + 1)?, step(cell, cell + cols)?);
+    pub(crate) fn pixel_in_cells(&self, grid: Grid) -> [f64; 2] {
+        let covered = |cell: usize| -> Option<[f64; 2]> {
+            self.centre[cell]?;
+            let [[_, right], [_, down]] = self.steps(grid, cell);
             let area = (right[0] * down[1] - right[1] * down[0]).abs();
             let extent = |[x, y]: [f64; 2]| (x.abs() + y.abs()) / area;
             (area > 0.0).then(|| [extent(down), extent(right)])
         };
-        let cells = (0..rows.saturating_sub(1))
-            .flat_map(|row| (0..cols.saturating_sub(1)).map(move |col| (row, col)));
-        let covered: Vec<[f64; 2]> = cells.filter_map(|(row, col)| covered(row, col)).collect();
+        let covered: Vec<[f64; 2]> = (0..grid.cells()).filter_map(covered).collect();
         [0, 1].map(|axis: usize| {
             let all = covered.iter().map(|both| both[axis]).collect();
             median(all).unwrap_or_else(|| 1.0 / self.cell_side())

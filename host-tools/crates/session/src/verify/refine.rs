@@ -11,12 +11,13 @@
 //! against a step that was made without it; a step that would not have helped is not taken.
 
 use super::pixels::{at_pixels, seen, wanted};
-use super::{Readings, VerifyError};
+use super::{Cause, Readings, VerifyError, judge, reason};
 use iltm_capture::{CellPlanes, PixelReadings, PixelViews};
 use iltm_compile::{FineGains, Provenance, RefinedParts, Refinement, refined_table};
 use iltm_picture::Lattice;
 use iltm_runtime::{FrameSize, Grid, image::Table};
 use rayon::prelude::*;
+use std::path::Path;
 
 /// Images from which a step can be made and held against one that it was made without.
 const LEAST_IMAGES: usize = 3;
@@ -50,9 +51,10 @@ pub struct Refined {
 ///
 /// # Errors
 /// [`VerifyError::NotFine`] if the folder has no images and stripes of the projector's own pixels,
-/// [`VerifyError::Map`] if its stripes tell nothing, [`VerifyError::Refused`] if gates fail,
-/// [`VerifyError::Compile`] if the new gains cannot be stored.
+/// [`VerifyError::Map`] if its stripes tell nothing, [`VerifyError::Refused`] if gates fail or the
+/// photographs differ among themselves, those of [`judge`], [`VerifyError::Compile`] if the new gains cannot be stored.
 pub fn refine(
+    folder: &Path,
     image: &[u8],
     table: &Table<'_>,
     readings: &Readings,
@@ -69,6 +71,13 @@ pub fn refine(
         return Err(VerifyError::Refused {
             cause,
             what: gate.what.clone(),
+        });
+    }
+    let verdict = judge(folder, table, readings, None)?;
+    if verdict.cause == Some(Cause::Noise) {
+        return Err(VerifyError::Refused {
+            cause: Cause::Noise,
+            what: reason(&verdict),
         });
     }
     let own = OwnGains::new(table, pixels.factor);
