@@ -99,8 +99,12 @@ impl Report<'_> {
         }
     }
 
-    /// Error of gains alone: of the table's tier 0, which is what is said of it elsewhere.
+    /// Error of gains alone: of the table's tier 0, which is what is said of it elsewhere, but for a
+    /// table that changes nothing.
     fn gains_alone(&self) -> f64 {
+        if self.learned.report.compensation == Compensation::Nothing {
+            return self.learned.predicted.gain_only;
+        }
         let first = self.ladder.first();
         first.map_or(f64::NAN, |tier| tier.cost.total)
     }
