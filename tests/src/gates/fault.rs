@@ -27,7 +27,7 @@ impl StudiedFault {
             0.1,
             "part of the brightness evened out",
         ),
-        Self::new(CaptureFault::Tripod, 0.5, "of a cell's side"),
+        Self::new(CaptureFault::Tripod, 0.1, "of a cell's side"),
         Self::new(CaptureFault::Swapped, 0.0, "anywhere"),
         Self::new(CaptureFault::Dropped, 0.0, "anywhere"),
         Self::new(CaptureFault::Skipped, 0.0, "anywhere"),

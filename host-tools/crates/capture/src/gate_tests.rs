@@ -305,6 +305,35 @@ fn a_bump_between_white_and_the_patterns_is_named() {
 }
 
 #[test]
+fn a_bump_between_two_photographs_of_white_is_named_whatever_lies_around_it() {
+    let scene = TestCapture {
+        repeats: 3,
+        bernoulli: 10,
+        ..scene()
+    };
+    assert_eq!(
+        verdict(&with(&scene, |_| {}), GateName::Movement),
+        Verdict::Pass
+    );
+    for (right, size) in [(0.8, 0.75..0.85), (3.0, 2.8..3.2), (6.0, 5.6..6.4)] {
+        // White is first, third and fifth.
+        let folder = with(&scene, |shown| {
+            let moved = shown[4].shifted(right);
+            shown[4].light = moved;
+        });
+        let movement = gate(&folder, GateName::Movement);
+        assert!(movement.fails(), "{movement:?}");
+        let what = &movement.what;
+        let between = "between photos/002.png and photos/004.png, both of white";
+        assert!(what.contains(between), "{what}");
+        let (values, limit, from) = shown_of_photographs(&movement);
+        assert_eq!((limit, from), (Some(movement.limit), Some(4)));
+        assert_eq!(values.iter().map(|v| v.0).collect::<Vec<_>>(), [0, 2, 4]);
+        assert!(size.contains(&movement.number), "{right}: {movement:?}");
+    }
+}
+
+#[test]
 fn photographs_that_changed_places_at_random_are_no_shift_of_all() {
     let folder = with(&scene(), |shown| {
         let places = [30, 37, 50];

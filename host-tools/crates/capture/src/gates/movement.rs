@@ -33,30 +33,40 @@ fn limits(moved: &Moved) -> (f64, f64) {
     )
 }
 
-/// Judges how far white lies beside the stripes: a bump before the first patterns leaves too few
-/// photographs on one side for a step. A curve that nobody declared moves outlines a little: twice
-/// the limits count.
-fn beside(sequence: &Sequence, moved: &Moved) -> Option<Gate> {
-    let (shot, [x, y]) = moved.white?;
-    let (size, (warn, limit)) = (x.hypot(y), limits(moved));
-    let (warn, limit) = (2.0 * warn, 2.0 * limit);
-    let photo = &sequence.shots[shot];
+/// Judges how far white moved: a bump with few patterns on one side of it is no step in their shifts.
+/// A curve that nobody declared moves outlines of a sum a little: beside stripes, twice the limits
+/// count.
+fn white(sequence: &Sequence, moved: &Moved) -> Option<Gate> {
+    let white = moved.white.as_ref()?;
+    let size = white.off.iter().map(|off| off.1).fold(0.0, f64::max);
+    let sure = if white.step.is_some() { 1.0 } else { 2.0 };
+    let (warn, limit) = limits(moved);
+    let (warn, limit) = (sure * warn, sure * limit);
+    let photo = |at: usize| sequence.shots[white.off[at].0].photo.display();
+    let between = match white.step {
+        Some(step) => format!("{} and {}, both of white", photo(step - 1), photo(step)),
+        None => format!("white, {}, and the patterns", photo(0)),
+    };
     let what = format!(
         "camera, projector or scene moved by at least {size:.2} pixels (a cell is {:.0} wide) between \
-         white, {}, and the patterns",
+         {between}",
         moved.cell,
-        photo.photo.display()
     );
+    let index = |at: usize| sequence.shots[white.off[at].0].index;
+    let values = white.off.iter().enumerate();
     Some(Gate {
         number: size,
         limit,
         unit: "pixels",
         what,
         evidence: Evidence::Photographs {
-            what: "shift of white against the patterns, pixels",
-            values: vec![(photo.index, size)],
+            what: match white.step {
+                Some(_) => "shift of white against its first photograph, pixels",
+                None => "shift of white against the patterns, pixels",
+            },
+            values: values.map(|(at, off)| (index(at), off.1)).collect(),
             limit: Some(limit),
-            from: None,
+            from: white.step.map(index),
         },
         ..Gate::of_share(
             GateName::Movement,
@@ -81,7 +91,7 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
     let sure = if side < FEW { 3.0 * limit } else { sure };
     let (warn, limit) = (warn.max(sure), limit.max(sure));
     let verdict = Verdict::of(bump.size, warn, limit);
-    if let Some(white) = beside(sequence, moved).filter(|white| white.verdict > verdict) {
+    if let Some(white) = white(sequence, moved).filter(|white| white.verdict > verdict) {
         return white;
     }
     let photo = |at: usize| sequence.shots[moved.shifts[at].0].photo.display();

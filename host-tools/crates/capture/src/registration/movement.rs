@@ -5,7 +5,8 @@
 //! from the slopes of the prediction (Lucas and Kanade, *An iterative image
 //! registration technique*, 1981). Edges between lit and dark cells lie everywhere,
 //! so that hundreds of them vote. A step in the shifts is a bump. White has none of these
-//! edges, only the outline and the paint: it is predicted from stripes and their inverses.
+//! edges, only the outline and the paint, but it is photographed again and again: it must lie where
+//! its first photograph does. A single one is predicted from stripes and their inverses.
 
 use super::cell_map::{NO_CELL, Registration};
 use crate::format::sequence::Sequence;
@@ -29,9 +30,17 @@ pub(crate) struct Moved {
     pub(crate) cell: f64,
     /// The largest step in the shifts; `None` of too few.
     pub(crate) bump: Option<Bump>,
-    /// The photograph of white that lies farthest beside the stripes, and its shift in pixels of
-    /// the file; `None` where nothing tells.
-    pub(crate) white: Option<(usize, [f64; 2])>,
+    /// What white shows of it; `None` where nothing tells.
+    pub(crate) white: Option<MovedWhite>,
+}
+
+/// How far white moved.
+pub(crate) struct MovedWhite {
+    /// Photographs of white, and how far each lies beside the first of them, or a single one beside
+    /// the sum of stripes and their inverses, in pixels of the file.
+    pub(crate) off: Vec<(usize, f64)>,
+    /// The place in `off` before which the picture moved most; `None` of a single one.
+    pub(crate) step: Option<usize>,
 }
 
 /// Measures the shift of every photograph; `None` if too few pixels have a cell.
@@ -85,52 +94,98 @@ fn even_pairs(sequence: &Sequence, shifts: &mut [(usize, [f64; 2])]) {
     }
 }
 
-/// The photograph of white that lies farthest beside the sum of stripes and their inverses, and
-/// its shift in pixels of the file.
-fn white(sequence: &Sequence, sampled: &Sampled, binning: f64) -> Option<(usize, [f64; 2])> {
-    let pairs = sequence.code_pairs();
-    let both = pairs.iter().flat_map(|&(a, b)| [a, b]);
-    let stripes: Vec<usize> = both.map(|view| sequence.views[view].shots[0]).collect();
-    if stripes.is_empty() {
-        return None;
-    }
-    let sum = sampled.mean(&stripes);
+/// How far the photographs of white moved.
+fn white(sequence: &Sequence, sampled: &Sampled, binning: f64) -> Option<MovedWhite> {
     let whites = &sequence.views[0].shots;
-    let shifts = whites.iter().filter_map(|&shot| {
-        let shift = shift_of_sum(&sampled.shots[shot], &sum)?;
-        Some((shot, shift.map(|pixels| binning * pixels)))
-    });
-    shifts.max_by(|(_, a), (_, b)| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])))
+    let several = whites.len() > 1;
+    let reference = if several {
+        sampled.shots[whites[0]].clone()
+    } else {
+        let pairs = sequence.code_pairs();
+        let both = pairs.iter().flat_map(|&(a, b)| [a, b]);
+        let stripes: Vec<usize> = both.map(|view| sequence.views[view].shots[0]).collect();
+        if stripes.is_empty() {
+            return None;
+        }
+        sampled.mean(&stripes)
+    };
+    let mut shifts = Vec::with_capacity(whites.len());
+    for (at, &shot) in whites.iter().enumerate() {
+        let shift = match at {
+            0 if several => [0.0; 2],
+            _ => shift_of_same(&sampled.shots[shot], &reference)?,
+        };
+        shifts.push(shift.map(|pixels| binning * pixels));
+    }
+    let step = |at: &usize| {
+        let (one, other) = (shifts[at - 1], shifts[*at]);
+        (other[0] - one[0]).hypot(other[1] - one[1])
+    };
+    Some(MovedWhite {
+        step: (1..shifts.len()).max_by(|a, b| step(a).total_cmp(&step(b))),
+        off: (whites.iter().zip(&shifts))
+            .map(|(&shot, [x, y])| (shot, x.hypot(*y)))
+            .collect(),
+    })
 }
 
 /// How far a photograph is shifted right and down against another of the same light, in pixels,
-/// beyond what noise makes of it; `None` where the picture has no edges. Where light does not
-/// add up, the photograph is another curve of the sum: a parabola stands for it.
-fn shift_of_sum(photo: &[f32], sum: &[f32]) -> Option<[f64; 2]> {
-    let most = f64::from(sum.iter().copied().fold(0.0, f32::max));
+/// beyond what noise makes of it; `None` where the picture has no edges.
+///
+/// Slopes tell shifts below a pixel; a larger one is followed step by step, as far as half a
+/// square.
+fn shift_of_same(photo: &[f32], reference: &[f32]) -> Option<[f64; 2]> {
+    let far = SIDE as isize / 2 - 1;
+    let mut whole = [0; 2];
+    let mut shift = shift_beside(photo, reference, whole)?;
+    for _ in 0..2 * far {
+        let next = [0, 1].map(|axis: usize| {
+            let step = shift[axis].clamp(-1.0, 1.0).round() as isize;
+            (whole[axis] + step).clamp(-far, far)
+        });
+        if next == whole {
+            break;
+        }
+        whole = next;
+        shift = shift_beside(photo, reference, whole)?;
+    }
+    Some([0, 1].map(|axis: usize| whole[axis] as f64 + shift[axis]))
+}
+
+/// How far a photograph is shifted beyond `[right, down]` pixels. Where light does not add up, the
+/// photograph is another curve of the reference: a parabola stands for it.
+fn shift_beside(photo: &[f32], reference: &[f32], [right, down]: [isize; 2]) -> Option<[f64; 2]> {
+    let most = f64::from(reference.iter().copied().fold(0.0, f32::max));
     let mut normal = SMatrix::<f64, 5, 5>::zeros();
-    let mut right = SVector::<f64, 5>::zeros();
+    let mut both = SVector::<f64, 5>::zeros();
     let (mut square_sum, mut count) = (0.0, 0.0);
-    for square in 0..sum.len() / (SIDE * SIDE) {
+    for square in 0..reference.len() / (SIDE * SIDE) {
         for inner in 0..(SIDE - 2) * (SIDE - 2) {
             let (row, col) = (1 + inner / (SIDE - 2), 1 + inner % (SIDE - 2));
-            let at = square * SIDE * SIDE + row * SIDE + col;
-            let value = |at: usize| f64::from(sum[at]) / most;
-            let light = value(at);
-            let across = 0.5 * (value(at + 1) - value(at - 1));
-            let down = 0.5 * (value(at + SIDE) - value(at - SIDE));
-            let unknowns = SVector::from([light, across, down, light * light, 1.0]);
-            let seen = f64::from(photo[at]) / most;
+            let at = |row: usize, col: usize| square * SIDE * SIDE + row * SIDE + col;
+            let (shown_row, shown_col) = (
+                row.wrapping_add_signed(down),
+                col.wrapping_add_signed(right),
+            );
+            if shown_row >= SIDE || shown_col >= SIDE {
+                continue;
+            }
+            let value = |row: usize, col: usize| f64::from(reference[at(row, col)]) / most;
+            let light = value(row, col);
+            let across = 0.5 * (value(row, col + 1) - value(row, col - 1));
+            let along = 0.5 * (value(row + 1, col) - value(row - 1, col));
+            let unknowns = SVector::from([light, across, along, light * light, 1.0]);
+            let seen = f64::from(photo[at(shown_row, shown_col)]) / most;
             normal += unknowns * unknowns.transpose();
-            right += unknowns * seen;
+            both += unknowns * seen;
             square_sum += seen * seen;
             count += 1.0;
         }
     }
     let inverse = normal.try_inverse()?;
-    let found = inverse * right;
-    let variance = (square_sum - found.dot(&right)).max(0.0) / f64::max(count - 5.0, 1.0);
-    // Of the sum where it is half as bright as it gets: there lies the outline.
+    let found = inverse * both;
+    let variance = (square_sum - found.dot(&both)).max(0.0) / f64::max(count - 5.0, 1.0);
+    // Of the reference where it is half as bright as it gets: there lies the outline.
     let gain = found[0] + found[3];
     let shift = |axis: usize| {
         let own = NOISE * (variance * inverse[(axis, axis)]).sqrt();
