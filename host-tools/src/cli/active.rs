@@ -2,7 +2,7 @@
 
 use super::words::{CalledTable, in_use, table_name};
 use crate::device::{Client, DeviceError, Line};
-use iltm_runtime::link::Refusal;
+use iltm_runtime::link::{Refusal, Slots};
 use serde_json::{Value, json};
 use std::fmt;
 
@@ -69,17 +69,21 @@ impl fmt::Display for Lost {
     }
 }
 
+/// The slots of a device that may have restarted.
+pub(super) fn slots_now<L: Line>(client: &mut Client<L>) -> Result<Slots, DeviceError> {
+    match client.slots() {
+        Err(DeviceError::Refused {
+            refusal: Refusal::HelloFirst,
+            ..
+        }) => client.greet_again().and_then(|()| client.slots()),
+        other => other,
+    }
+}
+
 impl Active {
     /// Asks the device again.
     pub(super) fn ask<L: Line>(client: &mut Client<L>) -> Self {
-        let slots = match client.slots() {
-            Err(DeviceError::Refused {
-                refusal: Refusal::HelloFirst,
-                ..
-            }) => client.greet_again().and_then(|()| client.slots()),
-            other => other,
-        };
-        match slots {
+        match slots_now(client) {
             Ok(slots) => Self::Known {
                 table: in_use(&slots),
                 trial_ms: slots.trial_ms,

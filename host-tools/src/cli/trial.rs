@@ -1,12 +1,13 @@
 //! `iltm confirm` and `iltm rollback`
 
-use super::active::Active;
+use super::active::{Active, slots_now};
 use super::args::Decide;
 use super::connect::{Connection, connect};
 use super::failure::{Failure, Kind};
 use super::fit::{Fit, ask_fit, not_compensating};
 use super::output::Output;
 use super::words::{CalledTable, how_ended, in_use, other, unconfirmed};
+use crate::device::DeviceError;
 use iltm_runtime::link::{Slots, Status};
 use serde_json::json;
 
@@ -14,15 +15,12 @@ pub(super) fn confirm(arguments: &Decide, output: &Output) -> Result<(), Failure
     let mut connection = connect(&arguments.line, output)?;
     connection.authorise(arguments.key.as_deref())?;
     let slots = slots(&mut connection)?;
-    let table = in_use(&slots);
-    if slots.trial_ms == 0
-        && let Some(lost) = unconfirmed(&slots)
-    {
+    if let Some(lost) = lost(&slots) {
         return Err(ended(&mut connection, &slots, lost));
     }
-    let table = table.ok_or_else(|| no_table(&connection))?;
+    let table = in_use(&slots).ok_or_else(|| no_table(&connection))?;
     let fit = ask_fit(&mut connection.client);
-    let fit = fit.map_err(|error| connection.failed_with_table(&error))?;
+    let fit = fit.map_err(|error| not_confirmed(&mut connection, &error))?;
     if let Fit::PassThrough(status) = &fit {
         let mut failure = not_compensating(&connection.port, table, status, Some(&slots));
         failure.next_step = if slots.trial_ms > 0 {
@@ -41,11 +39,27 @@ pub(super) fn confirm(arguments: &Decide, output: &Output) -> Result<(), Failure
         )
     } else {
         let kept = connection.client.confirm(table.name.id);
-        kept.map_err(|error| connection.failed_with_table(&error))?;
+        kept.map_err(|error| not_confirmed(&mut connection, &error))?;
         format!("Table {table} is in use, confirmed.{}\n", fit.remark())
     };
     finish(connection, output, Some(table), fit.data(), &done);
     Ok(())
+}
+
+/// The table whose trial is over, though nobody confirmed it.
+fn lost(slots: &Slots) -> Option<CalledTable> {
+    unconfirmed(slots).filter(|_| slots.trial_ms == 0)
+}
+
+/// Of a confirmation that failed: the trial may have ended meanwhile, with its time or with a
+/// restart of the device.
+fn not_confirmed(connection: &mut Connection, error: &DeviceError) -> Failure {
+    if let Ok(slots) = slots_now(&mut connection.client)
+        && let Some(lost) = lost(&slots)
+    {
+        return ended(connection, &slots, lost);
+    }
+    connection.failed_with_table(error)
 }
 
 /// What nobody confirmed in time is gone: the table in use is another one.
@@ -118,7 +132,7 @@ pub(super) fn rollback(arguments: &Decide, output: &Output) -> Result<(), Failur
 }
 
 fn slots(connection: &mut Connection) -> Result<Slots, Failure> {
-    let slots = connection.client.slots();
+    let slots = slots_now(&mut connection.client);
     slots.map_err(|error| connection.failed_with_table(&error))
 }
 

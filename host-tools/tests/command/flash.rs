@@ -643,6 +643,32 @@ fn a_confirmation_that_comes_too_late_is_an_error() {
 }
 
 #[test]
+fn a_trial_that_is_lost_while_it_is_confirmed_has_to_be_flashed_again() {
+    let (user, device) = (user(), Device::new());
+    user.says(&device.at("flash a.iltm --confirm"));
+    let a = device.in_use();
+    user.says(&device.at("flash b.iltm"));
+    let b = device.in_use();
+    // Without frames the host goes on asking for half a second before it confirms.
+    gets(&device, None);
+    let heard = || device.look(|device| device.heard);
+    let before = heard();
+    let confirming = user.spawn(&device.at("confirm"));
+    let end = Instant::now() + Duration::from_secs(20);
+    while heard() < before + 30 {
+        assert!(Instant::now() < end, "nothing is asked");
+        thread::sleep(Duration::from_millis(5));
+    }
+    device.restart();
+    let ended = Ended::of(confirming);
+    assert_eq!(ended.code, 27, "{}", ended.said);
+    let gone = format!("{b} is not in use: the device has restarted");
+    let back = format!("the device went back to {a}");
+    let again = "Nothing was confirmed. Flash the table again";
+    contains(&ended.said, &[&gone, &back, again]);
+}
+
+#[test]
 fn tables_have_names_on_the_device() {
     let (user, device) = (user(), Device::new());
     user.write("foyer.iltm", named_table("foyer", 20_261_123));
@@ -694,7 +720,8 @@ fn a_device_with_a_key_wants_to_be_shown_the_right() {
     contains(&said, &["--key", "is in use."]);
     assert_eq!(device.writes(), sent, "nothing was sent");
     user.says("key new -o other.key");
-    user.fails(36, &device.at("flash 6.iltm --key other.key"));
+    let said = user.fails(36, &device.at("flash 6.iltm --key other.key"));
+    contains(&said, &["next: The key of --key is not the device's key"]);
     // A technician of this device flashes, confirms and rolls back, and signs nothing.
     user.says("key technician site.key -o anna.key --device 9");
     user.says("key technician site.key -o ben.key --device 10");

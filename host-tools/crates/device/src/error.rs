@@ -161,7 +161,7 @@ const fn right_next_step(cause: &NoRight) -> &'static str {
             "Give --key with the site's key, or with a technician's key that `iltm key technician` made."
         }
         NoRight::Signature => {
-            "Try again: the device's state may have changed meanwhile. If that does not help, --key names another key than the device's (`iltm key show FILE`, `iltm status`)."
+            "The key of --key is not the device's key: compare `iltm key show FILE` with `iltm status`. If they are the same, the device's state has changed meanwhile: try again."
         }
         NoRight::Certificate => {
             "Give a technician's key that was made with this device's key (`iltm status` shows its id)."
