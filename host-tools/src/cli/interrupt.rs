@@ -3,7 +3,8 @@
 //! A command that talks to a device, a camera or a screen calls [`catch`] and looks at
 //! [`stopped`], so that it can leave them as they should be. Any other command, and a second
 //! interrupt, ends the process at once: temporary files are removed, and the exit code is that
-//! of [`Kind::Interrupted`].
+//! of [`Kind::Interrupted`]. Two interrupts within [`ONE`] are one: `timeout` sends each twice,
+//! to the process and to its group.
 
 use super::failure::{Failure, Kind};
 use super::output::Output;
@@ -11,6 +12,10 @@ use iltm_picture::unfinished;
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
+use std::time::{Duration, Instant};
+
+/// A second interrupt sooner than this is the first one, sent again.
+const ONE: Duration = Duration::from_millis(200);
 
 /// Whether a command looks at [`STOPPED`].
 static CAUGHT: AtomicBool = AtomicBool::new(false);
@@ -22,9 +27,13 @@ static ENDING: AtomicBool = AtomicBool::new(false);
 pub(super) fn begin(output: &Output) {
     let output = output.clone();
     // Where the system has no such thing, ctrl-C does what it does anyway.
+    let mut first: Option<Instant> = None;
     let _ = ctrlc::set_handler(move || {
-        if CAUGHT.load(Ordering::SeqCst) && !STOPPED.swap(true, Ordering::SeqCst) {
-            return;
+        if CAUGHT.load(Ordering::SeqCst) {
+            STOPPED.store(true, Ordering::SeqCst);
+            if first.get_or_insert_with(Instant::now).elapsed() < ONE {
+                return;
+            }
         }
         ENDING.store(true, Ordering::SeqCst);
         unfinished::remove_all();

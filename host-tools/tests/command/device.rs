@@ -6,7 +6,7 @@ use iltm_runtime::link::{Event, Fault, TierReason};
 use iltm_tests::fake_device::{FakeDevice, FakePort, Order};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
-use std::process::{Child, ChildStdout};
+use std::process::{Child, ChildStdout, Command};
 use std::time::{Duration, Instant};
 
 /// Exit code and what people read of a command to a port, whose name is taken out.
@@ -145,8 +145,12 @@ impl Watching {
         panic!("200 lines without {words}");
     }
 
-    fn interrupted(mut self) {
+    fn interrupted(self) {
         interrupt(&self.child);
+        self.ends();
+    }
+
+    fn ends(mut self) {
         let ended = self.child.wait().expect("it ends");
         assert_eq!(ended.code(), Some(0), "ctrl-C is no failure");
     }
@@ -180,6 +184,18 @@ fn monitor_prints_a_line_for_everything_that_happens() {
     watching.port.order(Order::Log(vec![1, 2, 3]));
     watching.until("3 bytes of log");
     watching.interrupted();
+}
+
+#[test]
+fn an_interrupt_that_is_sent_twice_is_one() {
+    let mut watching = Watching::start("monitor");
+    watching.until("compensating");
+    // As `timeout` does: to the process, and at once to its group.
+    let id = watching.child.id();
+    let twice = format!("kill -INT {id}; sleep .01; kill -INT {id}");
+    let sent = Command::new("sh").args(["-c", &twice]).status();
+    assert!(sent.expect("every system has it").success());
+    watching.ends();
 }
 
 #[test]
