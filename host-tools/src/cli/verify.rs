@@ -177,11 +177,11 @@ fn verdict(
     };
     let message = format!("{}: {says}", arguments.table.display());
     let todo = verdict.cause.map_or("", Cause::next_step);
-    let next_step = format!(
-        "{} {todo} The page is {}.",
-        reason(&verdict),
-        page.display()
-    );
+    let mut next_step = format!("{todo} The page is {}.", page.display());
+    if output.is_json() {
+        // People have just read it.
+        next_step = format!("{} {next_step}", reason(&verdict));
+    }
     Err(Failure::new(kind, message, next_step).with_result(data))
 }
 
@@ -321,16 +321,22 @@ fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
     let bound = &verdict.bound;
     let known =
         |value: Option<f64>| value.map_or_else(|| "unknown".to_owned(), |v| format!("{v:.4}"));
+    let counted = |value: Option<f64>, counted: f64| match value {
+        Some(value) if value - counted > 5e-5 => {
+            format!("{value:.4}, of which at most {counted:.4} counts")
+        }
+        value => known(value),
+    };
     let why = match (bound.given, bound.expected) {
         (true, _) => "as asked for".to_owned(),
         (false, None) => "half of the error before: the table predicts none".to_owned(),
         (false, Some(expected)) => format!(
             "1.5 times the {expected:.4} expected: table {}, range and codes {}, noise {}, viewpoint \
-             {:.4}",
+             {}; it is their squares that add up",
             known(bound.predicted),
             known(bound.range),
-            known(bound.noise),
-            bound.viewpoint
+            counted(bound.noise, bound.counted[0]),
+            counted(Some(bound.viewpoint), bound.counted[1])
         ),
     };
     let _ = writeln!(text, "bound       {:.4} ({why})", bound.limit);

@@ -168,6 +168,16 @@ fn bad_photographs_pass_no_table_and_fail_none_and_the_cause_is_named() {
     // What is wrong on the wall stays wrong.
     let said = with_fault(&user, "vivid");
     assert_eq!(said["error"]["exit"], 31, "{said}");
+    let people = user.fails(31, "verify t.iltm v");
+    contains(&people, &["; it is their squares that add up)"]);
+    let why = people
+        .lines()
+        .find_map(|it| it.strip_prefix("verdict     FAILED: "));
+    assert_eq!(
+        people.matches(why.expect("a verdict")).count(),
+        1,
+        "{people}"
+    );
 }
 
 #[test]

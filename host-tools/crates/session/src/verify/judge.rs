@@ -60,6 +60,9 @@ pub struct Bound {
     /// do not share, since a camera elsewhere sees other parts of them; at most 1 %, beyond
     /// which it is a change of the scene.
     pub viewpoint: f64,
+    /// What counts of noise and of viewpoint in what is expected: no more than a part of the
+    /// promise; means over the images.
+    pub counted: [f64; 2],
     /// Error that the table promises on this projector: what it predicts and what range and
     /// codes leave. Where it predicts none, that of the limit without its margin.
     pub promise: f64,
@@ -429,11 +432,16 @@ fn bound_of(
         _ => unpredicted,
     };
     let added_of = |image: usize| noise_of(image).hypot(viewpoint);
-    let expected = mean(&|image| {
+    let counted_of = |image: usize| {
         let promise = promise_of(image);
-        let noise = noise_of(image).min(MOST_NOISE * promise);
-        let viewpoint = viewpoint.min(MOST_VIEWPOINT * promise);
-        promise.hypot(noise).hypot(viewpoint)
+        [
+            noise_of(image).min(MOST_NOISE * promise),
+            viewpoint.min(MOST_VIEWPOINT * promise),
+        ]
+    };
+    let expected = mean(&|image| {
+        let [noise, viewpoint] = counted_of(image);
+        promise_of(image).hypot(noise).hypot(viewpoint)
     });
     let expected = predicted.filter(|_| given.is_none()).map(|_| expected);
     let limit = MARGIN * expected.unwrap_or(unpredicted);
@@ -445,6 +453,7 @@ fn bound_of(
         range: modelled.then(|| mean(&range_of)),
         viewpoint,
         noise: noise.is_some().then(|| mean(&noise_of)),
+        counted: [0, 1].map(|part| mean(&|image| counted_of(image)[part])),
         promise: mean(&promise_of),
         added: mean(&added_of),
         expected,
@@ -704,6 +713,7 @@ mod tests {
                 range: None,
                 noise: Some(noise),
                 viewpoint,
+                counted: [noise, viewpoint],
                 promise: 0.01,
                 added: noise.hypot(viewpoint),
                 expected: None,
@@ -736,6 +746,7 @@ mod tests {
         };
         let noisy = one(1.0, 0.0);
         assert!(close(noisy.limit, 1.5 * 0.05_f64.hypot(0.075)));
+        assert!(close(noisy.counted[0], 0.075) && close(one(0.0, 1.0).counted[1], 0.125));
         assert!(close(noisy.doubt, 1.5 * 0.05_f64.hypot(1.0)));
         assert!(close(one(0.0, 1.0).limit, 1.5 * 0.05_f64.hypot(0.125)));
         // A bound that is asked for, or half of the error before, is the limit as it is.

@@ -273,6 +273,7 @@ mod tests {
             range: None,
             noise: None,
             viewpoint: 0.0,
+            counted: [0.0; 2],
             promise: 0.01,
             added: 0.0,
             expected: None,

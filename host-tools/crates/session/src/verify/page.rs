@@ -169,7 +169,10 @@ fn expectation(verdict: &TableVerdict) -> Vec<(&'static str, String)> {
             known(bound.noise, "not known: one photograph of white"),
         ),
         ("finding the cells again makes", percent(bound.viewpoint)),
-        ("expected in all", known(bound.expected, "nothing")),
+        (
+            "expected in all: squares add up",
+            known(bound.expected, "nothing"),
+        ),
     ];
     lines.push((
         "the most that passes",
