@@ -208,7 +208,11 @@ fn text(table: &Table<'_>) -> String {
     }
     tiers(table, &mut text);
     if !table.provenance().is_empty() {
-        let _ = writeln!(text, "\n{}", table.provenance().trim_end());
+        let stored = table.provenance().trim_end();
+        let _ = writeln!(
+            text,
+            "\nWhere the table comes from, as it is stored in it for programs (TOML):\n\n{stored}"
+        );
     }
     text
 }

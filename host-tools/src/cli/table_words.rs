@@ -95,7 +95,7 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
             };
             let _ = writeln!(
                 text,
-                "{:<12}{} of the picture is predicted to be off{before}{alone}",
+                "{:<12}predicted to be {} off the wanted light{before}{alone}",
                 Grade::of(error).word(),
                 percent(error),
             );
@@ -145,11 +145,14 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
             1e3 * top.instructions as f64 / CLOCK as f64
         );
     }
-    let file = crate::solve_page::quoted(path);
-    let _ = writeln!(
-        text,
-        "next        prove it on the wall: iltm verify {file} -o VERIFY"
-    );
+    // Of a device or a pipe, the table is wherever its reader has put it.
+    if path.is_file() && !path.starts_with("/dev") {
+        let file = crate::solve_page::quoted(path);
+        let _ = writeln!(
+            text,
+            "next        prove it on the wall: iltm verify {file} -o VERIFY"
+        );
+    }
     text
 }
 

@@ -3,7 +3,10 @@
 
 use super::user::{User, contains};
 use image::{GrayImage, Luma};
+use std::fs;
+use std::process::Command;
 use std::sync::OnceLock;
+use std::thread;
 
 /// With a table `b.iltm` of a projector of 320 x 200 pixels with a border of 20, learned
 /// from photographs of slides that had it.
@@ -46,6 +49,25 @@ fn a_border_stays_black_and_frames_of_the_size_inside_it_are_put_there() {
     }
     let inspected = user.json("inspect b.iltm");
     assert_eq!(inspected["projector"]["border"], 20);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_said_of_a_table_can_be_done_with_it() {
+    let user = bordered();
+    let next = "iltm verify b.iltm -o VERIFY";
+    let said = user.says("inspect b.iltm");
+    contains(&said, &[" % off the wanted light; ", next]);
+    // A pipe cannot be verified.
+    let pipe = user.path("pipe");
+    let made = Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("every system has it").success());
+    let table = user.read("b.iltm");
+    let writer = thread::spawn(move || fs::write(pipe, table));
+    let of_pipe = user.says("inspect pipe");
+    writer.join().expect("no panic").expect("a reader");
+    let without: Vec<&str> = said.lines().filter(|line| !line.contains(next)).collect();
+    assert_eq!(of_pipe.lines().collect::<Vec<_>>(), without);
 }
 
 #[test]
