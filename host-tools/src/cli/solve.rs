@@ -1,7 +1,7 @@
 //! `iltm solve`
 
 use super::args::Solve;
-use super::failure::{Failure, Kind};
+use super::failure::{Failure, Kind, cannot_write};
 use super::output::{Output, pictures, write_file, write_files};
 use super::progress::progress;
 use super::summary::{self, remarks, summary};
@@ -14,7 +14,7 @@ use crate::compile::sign::read_key;
 use crate::solve::{Method, SolveOptions};
 use crate::solve_page::{self, Content};
 use crate::video::{Fit, PlacedFrames, VideoError, sampled_frames};
-use iltm_picture::{LightPicture, Picture, progress::Progress};
+use iltm_picture::{LightPicture, Picture, progress::Progress, whole_file};
 use iltm_runtime::FrameSize;
 use serde_json::json;
 use std::fmt::Write;
@@ -117,23 +117,8 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
 
 /// Whether a file can be put in a place, before the work for it is done.
 pub(super) fn check_place(file: &Path) -> Result<(), Failure> {
-    let refuse = |why: String, next_step| {
-        let message = format!("{}: cannot be written: {why}", file.display());
-        Err(Failure::new(Kind::Write, message, next_step))
-    };
-    if file.is_dir() {
-        return refuse("it is a folder".to_owned(), "Name a file.");
-    }
-    match file.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            let why = format!("there is no folder {}", folder.display());
-            refuse(
-                why,
-                "Make the folder first, or choose another file with -o.",
-            )
-        }
-        _ => Ok(()),
-    }
+    let checked = whole_file::check_place(file).map(drop);
+    checked.map_err(|error| cannot_write(&error.path, &error.source))
 }
 
 /// Some frames of each of the user's files.

@@ -1,5 +1,6 @@
 //! Files that others wrote: nothing without an end is read.
 
+use crate::whole_file::followed;
 use std::fs::{self, File, FileType};
 use std::io::{self, Read};
 use std::path::Path;
@@ -7,16 +8,28 @@ use std::path::Path;
 /// Opens a regular file or a named pipe.
 ///
 /// # Errors
-/// What the operating system says; [`io::ErrorKind::InvalidInput`] for a device, which may give
+/// What the operating system says; [`io::ErrorKind::NotFound`] with the place that it points to
+/// for a symbolic link to nothing; [`io::ErrorKind::InvalidInput`] for a device, which may give
 /// bytes for ever or do something when it is opened.
 pub fn open(path: &Path) -> io::Result<File> {
-    let kind = fs::metadata(path)?.file_type();
+    let kind = fs::metadata(path).map_err(|error| no_target(path, error))?;
+    let kind = kind.file_type();
     // The operating system has its own words for a folder.
     if kind.is_file() || kind.is_dir() || is_pipe(kind) {
         return File::open(path);
     }
     let reason = "it is neither a regular file nor a pipe";
     Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
+}
+
+/// Where a symbolic link points to, if that is why there is nothing.
+fn no_target(path: &Path, error: io::Error) -> io::Error {
+    if error.kind() != io::ErrorKind::NotFound || !path.is_symlink() {
+        return error;
+    }
+    let target = followed(path);
+    let reason = format!("it is a link to {}, which is not there", target.display());
+    io::Error::new(io::ErrorKind::NotFound, reason)
 }
 
 /// Reads a regular file or a named pipe of `most` bytes at most.
@@ -65,6 +78,19 @@ mod tests {
         let error = read(&path, 3).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
         assert_eq!(error.to_string(), "it is longer than 3 bytes");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn of_a_link_to_nothing_it_is_said_where_it_points_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink("gone/file", &link).unwrap();
+        let error = open(&link).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::NotFound);
+        let target = folder.path().join("gone/file");
+        let says = format!("it is a link to {}, which is not there", target.display());
+        assert_eq!(error.to_string(), says);
     }
 
     #[cfg(target_os = "linux")]

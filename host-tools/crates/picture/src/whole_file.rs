@@ -65,26 +65,22 @@ impl WholeFile {
             path: path.to_owned(),
             source,
         };
-        let followed = followed(path);
-        match fs::metadata(&followed) {
-            Ok(there) if there.is_dir() => Err(failed(io::ErrorKind::IsADirectory.into())),
+        let place = check_place(path)?;
+        match fs::metadata(&place) {
             Ok(there) if !there.is_file() => {
-                let opened = OpenOptions::new().write(true).open(&followed);
+                let opened = OpenOptions::new().write(true).open(&place);
                 Ok(Self {
-                    path: followed,
+                    path: place,
                     target: Target::Device(opened.map_err(failed)?),
                 })
             }
             _ => {
-                let folder = match followed.parent() {
-                    Some(folder) if !folder.as_os_str().is_empty() => folder,
-                    _ => Path::new("."),
-                };
+                let folder = folder_of(&place);
                 // The temporary name that the error carries helps nobody.
                 let made = Listed::make(|| temporary(folder), NamedTempFile::path);
                 let (file, listed) = made.map_err(|error| failed(error.kind().into()))?;
                 Ok(Self {
-                    path: followed,
+                    path: place,
                     target: Target::Temporary(file, listed),
                 })
             }
@@ -116,6 +112,51 @@ impl WholeFile {
                 })
             }),
         }
+    }
+}
+
+/// Whether a file can be put in a place: it is no folder, and its folder is there. Returns the
+/// place that symbolic links lead to.
+///
+/// # Errors
+/// [`FileError`].
+pub fn check_place(path: &Path) -> Result<PathBuf, FileError> {
+    let failed = |kind, reason: String| FileError {
+        path: path.to_owned(),
+        source: io::Error::new(kind, reason),
+    };
+    match fs::metadata(path) {
+        Ok(there) if there.is_dir() => {
+            let reason = "it is a folder".to_owned();
+            return Err(failed(io::ErrorKind::IsADirectory, reason));
+        }
+        // A link to a pipe without a name leads to no place.
+        Ok(there) if !there.is_file() => return Ok(path.to_owned()),
+        _ => {}
+    }
+    let followed = followed(path);
+    let folder = folder_of(&followed);
+    match fs::metadata(folder) {
+        Ok(there) if there.is_dir() => return Ok(followed),
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            let path = path.to_owned();
+            return Err(FileError { path, source });
+        }
+        _ => {}
+    }
+    let link = if path.is_symlink() {
+        format!("it is a link to {}, and ", followed.display())
+    } else {
+        String::new()
+    };
+    let reason = format!("{link}there is no folder {}", folder.display());
+    Err(failed(io::ErrorKind::NotFound, reason))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
     }
 }
 
@@ -194,11 +235,43 @@ mod tests {
         assert!(kind.is_fifo());
     }
 
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_pipe_without_a_name_is_written_into() {
+        use std::io::Read;
+        use std::os::fd::AsRawFd;
+        let (mut reader, writer) = io::pipe().unwrap();
+        // What /dev/stdout leads to.
+        let path = format!("/proc/self/fd/{}", writer.as_raw_fd());
+        write(Path::new(&path), b"frames").unwrap();
+        drop(writer);
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).unwrap();
+        assert_eq!(bytes, b"frames");
+    }
+
     #[test]
     fn a_folder_in_the_place_of_a_file_is_refused_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let error = WholeFile::create(folder.path()).unwrap_err();
         assert_eq!(error.source.kind(), io::ErrorKind::IsADirectory);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn of_a_link_into_a_folder_that_is_not_there_both_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink("gone/file", &link).unwrap();
+        let error = WholeFile::create(&link).unwrap_err();
+        let gone = folder.path().join("gone");
+        let says = format!(
+            "{}: it is a link to {}, and there is no folder {}",
+            link.display(),
+            gone.join("file").display(),
+            gone.display()
+        );
+        assert_eq!(error.to_string(), says);
     }
 
     #[test]
