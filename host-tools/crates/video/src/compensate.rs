@@ -54,7 +54,8 @@ pub struct FrameTotals {
     pub size: FrameSize,
     /// How many frames there were.
     pub frames: u64,
-    /// Samples of all frames: three a pixel, or one where they are grey.
+    /// Samples of all frames, without those of bars and borders: three a pixel, or one where they
+    /// are grey.
     pub samples: u64,
     /// Samples that the projector would have had to show darker than black or
     /// brighter than white.
@@ -232,7 +233,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         Ok(FrameTotals {
             size,
             frames: 1,
-            samples: job.samples() as u64,
+            samples: job.counted(),
             clipped: clipped.total().into(),
             clipped_white: clipped.white.into(),
             cut_short: false,
@@ -284,6 +285,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
         Ok(EngineJob {
             size: placed.shown(),
             area,
+            picture: placed.on_area(),
             colours,
             tier: self.tier,
             encoding: self.settings.encoding,

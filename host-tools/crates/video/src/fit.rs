@@ -126,6 +126,20 @@ impl PlacedFrames {
         self.area
     }
 
+    /// Where on the cells the picture lies, columns and rows, each from and up to.
+    pub(super) fn on_area(&self) -> [[usize; 2]; 2] {
+        let part = |start: isize, given: usize, first: usize, count: usize| {
+            let within = |at: isize| at.clamp(0, count.cast_signed()).cast_unsigned();
+            let start = start - first.cast_signed();
+            [within(start), within(start + given.cast_signed())]
+        };
+        let PixelArea { left, top, size } = self.area;
+        [
+            part(self.left, self.given.width(), left, size.width()),
+            part(self.top, self.given.height(), top, size.height()),
+        ]
+    }
+
     /// Whether frames come out in the same size and at the same place; their cells may lie
     /// elsewhere.
     pub(super) fn moves_like(&self, other: &Self) -> bool {

@@ -219,7 +219,7 @@ impl Run<'_, '_> {
             let Some(clipped) = worked? else {
                 break;
             };
-            self.done.add(tier, took, job.samples(), clipped);
+            self.done.add(tier, took, job.counted(), clipped);
             self.progress.advance(1);
             if let Some(governor) = &mut governor {
                 let overruns = governor.overruns();
@@ -270,9 +270,9 @@ impl Run<'_, '_> {
 
 impl LiveSummary {
     /// Counts a frame.
-    fn add(&mut self, tier: u8, took: Duration, samples: usize, clipped: ClippedSamples) {
+    fn add(&mut self, tier: u8, took: Duration, samples: u64, clipped: ClippedSamples) {
         self.frames.frames += 1;
-        self.frames.samples += samples as u64;
+        self.frames.samples += samples;
         self.frames.clipped += u64::from(clipped.total());
         self.frames.clipped_white += u64::from(clipped.white);
         self.slowest = self.slowest.max(took);

@@ -42,6 +42,9 @@ pub(super) struct EngineJob {
     pub(super) size: FrameSize,
     /// Where in a frame the cells lie; what is outside becomes black.
     pub(super) area: PixelArea,
+    /// Where on the cells the picture lies, columns and rows, each from and up to; around it are
+    /// bars, in which nothing counts as clipped.
+    pub(super) picture: [[usize; 2]; 2],
     /// Colours of a pixel: as many as the table has channels, or three for a table
     /// of one, which is then used for each of them.
     pub(super) colours: usize,
@@ -53,6 +56,12 @@ impl EngineJob {
     /// Samples of a frame.
     pub(super) const fn samples(&self) -> usize {
         self.size.pixels() * self.colours
+    }
+
+    /// Those that can count as clipped.
+    pub(super) fn counted(&self) -> u64 {
+        let [columns, rows] = self.picture.map(|[from, to]| to - from);
+        (columns * rows * self.colours) as u64
     }
 }
 

@@ -11,7 +11,7 @@ use super::memory::{BandMemory, Memories, RowMemory};
 use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
-    pipeline::{FrameError, FullPipeline},
+    pipeline::{FrameError, FullPipeline, stages::drive_row},
     placement::PixelArea,
     units::{ClippedSamples, Light},
 };
@@ -47,6 +47,8 @@ struct RowStages<'t, 'a, S: Code, const C: usize> {
     curves: Curves<S>,
     /// Gains of every pixel: row by row, in a row channel by channel.
     gains: Vec<u16>,
+    /// Where on the cells the picture lies.
+    picture: [[usize; 2]; 2],
 }
 
 impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
@@ -64,6 +66,7 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
                 colours: job.colours,
                 curves: Curves::new(table, job.encoding),
                 gains: threads.install(|| expand_gains(&pipeline)),
+                picture: job.picture,
             },
             threads,
             arch: Arch::new(),
@@ -234,6 +237,9 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
         let PixelArea { left, size, .. } = stages.pipeline.area();
         let bordered = size.width() < width;
         let cells = stages.cells();
+        let [[from, to], [from_row, to_row]] = stages.picture;
+        let columns = from..to;
+        let fraction = u32::from(stages.pipeline.table().gain_fraction());
         let strips = self.light.chunks(STRIP * stages.row_len());
         let mut clipped = ClippedSamples::default();
         for (strip, light) in strips.enumerate() {
@@ -262,7 +268,20 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
                     &mut row,
                     drives,
                 );
-                clipped += of_row;
+                if !(from_row..to_row).contains(&y) {
+                    // A bar.
+                } else if columns.len() == size.width() {
+                    clipped += of_row;
+                } else {
+                    let columns = columns.clone();
+                    clipped += drive_row(
+                        &light[columns.clone()],
+                        &gain[columns.clone()],
+                        fraction,
+                        &row.spread[columns.clone()],
+                        &mut drives[columns],
+                    );
+                }
                 stages.curves.encode(channel, drives, codes);
             }
             self.band.pack(strip, &mut memory.conversion, codes);

@@ -250,3 +250,29 @@ fn bounces_onto_black_are_clipped_at_black() {
         assert!(totals.clipped_white <= ends(255));
     }
 }
+
+#[test]
+fn bars_count_neither_as_clipped_nor_as_samples() {
+    let mut table = MadeUp::of_all_kinds(grid(4, 6), 1, 4, 3);
+    table.projector = ProjectorPixels::new(size(48, 32), 4);
+    // Bars above and below, and beside; how many of their pixels are on the cells.
+    for ((width, height), counted) in [((48, 20), 40 * 20), ((20, 32), 20 * 24)] {
+        let frame = Picture::from_fn(size(width, height), |_, _| [255]);
+        let (made, totals) = framed(&table, Some(Fit::Letterbox), &frame).unwrap();
+        assert_eq!((totals.size, totals.samples), (size(48, 32), counted));
+        let start = |all: usize, part: u16| (all - usize::from(part)) / 2;
+        let (left, top) = (start(48, width).max(4), start(32, height).max(4));
+        let shown = size(width.min(40), height.min(24));
+        let Samples::Eight(codes) = cut(&made, left, top, shown).samples().clone() else {
+            panic!("a picture of bytes");
+        };
+        assert!(codes.iter().all(|code| *code > 0), "clipped in the picture");
+        assert_eq!(totals.clipped, totals.clipped_white);
+        // As a part of the picture, bars are clipped at black.
+        let placed = PlacedFrames::on(table.projector.unwrap(), frame.size(), Some(Fit::Letterbox));
+        let padded = placed.unwrap().picture(frame).unwrap();
+        let (same, totals) = framed(&table, None, &padded).unwrap();
+        assert_eq!(same, made);
+        assert!(totals.clipped > totals.clipped_white);
+    }
+}
