@@ -2,14 +2,16 @@
 
 use super::args::Check;
 use super::failure::{Failure, Kind};
-use super::output::{Output, write_file, write_files};
+use super::output::{Output, printable, write_file, write_files};
 use super::progress::progress;
 use super::summary::{gates, map_fault};
 use crate::capture::{self, CaptureOptions, Examined, Gate, MapSource, ProjectorMap, Verdict};
 use crate::report;
+use console::{Term, style};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
+use textwrap::Options;
 
 /// The page's name in the folder that `-o` gives.
 const PAGE_FILE: &str = "check.html";
@@ -75,10 +77,10 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
     }
     if failed.is_empty() {
         text += &passed(&remarks, &not_judged(&examined.gates));
-        output.result(&data, &text);
+        output.dressed_result(&data, &dressed(&text));
         return Ok(());
     }
-    output.findings(&text);
+    output.dressed_findings(&dressed(&text));
     let failure = refusal(&arguments.capture.display().to_string(), &failed);
     Err(failure.with_result(data))
 }
@@ -210,8 +212,68 @@ fn text(gates: &[Gate]) -> String {
         };
         let _ = writeln!(text, "{mark} {:<13} {number:<24} {}", gate.name, gate.what);
         if !gate.next_step.is_empty() {
-            let _ = writeln!(text, "{:44}-> {}", "", gate.next_step);
+            let _ = writeln!(text, "{}-> {}", " ".repeat(INDENT), gate.next_step);
         }
     }
     text
+}
+
+/// Column of what a gate has found: behind its mark and its name.
+const INDENT: usize = 19;
+
+/// The text as it is printed: in a terminal in its width, with colours where it has some.
+fn dressed(text: &str) -> String {
+    let text = printable(text);
+    let terminal = Term::stdout();
+    if terminal.is_term() {
+        wrapped(&text, terminal.size().1.into(), console::colors_enabled())
+    } else {
+        text.into_owned()
+    }
+}
+
+/// Lines of a width, and marks in the colour of their verdict.
+fn wrapped(text: &str, width: usize, colours: bool) -> String {
+    let indent = " ".repeat(INDENT);
+    let mut dressed = String::new();
+    for line in text.lines() {
+        let (mark, _) = line.split_at_checked(5).unwrap_or_default();
+        let coloured = match mark {
+            "ok   " => Some(style(mark).green()),
+            "warn " => Some(style(mark).yellow()),
+            "FAIL " => Some(style(mark).red().bold()),
+            _ => None,
+        };
+        let hangs = coloured.is_some() || mark == "-    " || line.starts_with(' ');
+        let indent = if hangs { &indent } else { "" };
+        let filled = textwrap::fill(line, Options::new(width).subsequent_indent(indent));
+        let _ = match coloured.zip(filled.strip_prefix(mark)) {
+            Some((mark, rest)) => writeln!(dressed, "{}{rest}", mark.force_styling(colours)),
+            None => writeln!(dressed, "{filled}"),
+        };
+    }
+    dressed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_terminal_gets_lines_of_its_width_and_marks_in_colours() {
+        let text = "FAIL order         2 (limit 0)              two photographs are exchanged\n\
+                    \x20                  -> Put them back in the order of the list.\n\
+                    passed as far as it was judged and no farther than that\n";
+        let plain = "FAIL order         2 (limit 0)\n\
+                     \x20                  two photographs are\n\
+                     \x20                  exchanged\n\
+                     \x20                  -> Put them back in\n\
+                     \x20                  the order of the\n\
+                     \x20                  list.\n\
+                     passed as far as it was judged and no\n\
+                     farther than that\n";
+        assert_eq!(wrapped(text, 40, false), plain);
+        let red = plain.replacen("FAIL ", "\x1b[31m\x1b[1mFAIL \x1b[0m", 1);
+        assert_eq!(wrapped(text, 40, true), red);
+    }
 }

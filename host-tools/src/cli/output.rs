@@ -55,18 +55,28 @@ impl Output {
 
     /// The result of a command: JSON for programs or text for people.
     pub(super) fn result(&self, data: &Value, text: &str) {
+        self.dressed_result(data, &printable(text));
+    }
+
+    /// The same of text that may hold colours: nothing in it is made [`printable`].
+    pub(super) fn dressed_result(&self, data: &Value, text: &str) {
         if self.json {
             self.write(&last(data.clone()));
         } else {
-            self.write(&printable(text));
+            self.write(text);
         }
     }
 
     /// The result of a command that fails by what it has found, for people; programs get it with
     /// the failure.
     pub(super) fn findings(&self, text: &str) {
+        self.dressed_findings(&printable(text));
+    }
+
+    /// The same of text that may hold colours.
+    pub(super) fn dressed_findings(&self, text: &str) {
         if !self.json {
-            self.write(&printable(text));
+            self.write(text);
         }
     }
 
