@@ -28,6 +28,9 @@ its say. There, every rendering uses the same random numbers, and light that bou
 is blurred within its panel: superposition holds exactly, no noise of the rendering
 is left, and only the camera adds its own.
 
+With --images, a session learns from so many parts of photographs in colour, or from them in
+grey, beside the Bernoulli patterns; none is judged by. --photos 0 leaves the patterns out.
+
 With --refine, the photographs of `iltm verify` are made in the same way, `iltm refine` feeds them
 back into the table, and the new table is judged; so many rounds.
 
@@ -396,12 +399,34 @@ def photograph_slides(renderer, folder, kind, seed=1):
         write(folder / "photos" / slide.name, np.round(np.clip(photo, 0, 1) * steps) / steps, 16)
 
 
+def write_stills(folder, count, colour, seed=1):
+    """Parts of photographs that `natural` has none of."""
+    from skimage import data
+
+    pictures = [data.coins(), data.moon(), data.immunohistochemistry(), data.hubble_deep_field(), data.retina(),
+                data.stereo_motorcycle()[0], data.gravel(), data.clock(), data.brick(), data.grass()]
+    random = np.random.default_rng(seed)
+    folder.mkdir()
+    for at in range(count):
+        picture = np.atleast_3d(pictures[at % len(pictures)] / 255.0) * np.ones(3)
+        picture = picture if colour else picture.mean(-1, keepdims=True)
+        sides = np.array(picture.shape[:2])
+        part = (sides * random.uniform(0.4, 0.9)).astype(int)
+        top, left = random.integers(0, sides - part)
+        write(folder / f"{at:03}.png", picture[top:top + part[0], left:left + part[1]], 8)
+
+
 def make_session(folder, kind, options):
     """Photographs of every slide of a folder that `iltm patterns` makes."""
     (width, height), camera, _ = SESSIONS[kind]
-    grid = [f"--rows={options.rows}", f"--cols={options.cols}"]
-    subprocess.run([options.iltm, "patterns", "-o", folder, "--projector", f"{width}x{height}", *grid,
-                    "--photos", str(options.photos), "--camera", "linear"], check=True)
+    given = [f"--rows={options.rows}", f"--cols={options.cols}", f"--photos={options.photos}"]
+    with tempfile.TemporaryDirectory() as scratch:
+        if options.images:
+            stills = pathlib.Path(scratch) / "stills"
+            write_stills(stills, options.images, kind == "colour")
+            given.append(f"--images={stills}")
+        subprocess.run([options.iltm, "patterns", "-o", folder, "--projector", f"{width}x{height}", *given,
+                        "--camera", "linear"], check=True)
     renderer = Renderer(camera[::-1], (height, width), kind == "colour", options.samples, True)
     photograph_slides(renderer, folder, kind)
     subprocess.run([options.iltm, "check", folder], check=True)
@@ -413,6 +438,7 @@ def main():
     parser.add_argument("--iltm", default="target/release/iltm")
     parser.add_argument("--session", choices=SESSIONS, help="photographs of a whole session, made here")
     parser.add_argument("--photos", type=int, default=60, help="Bernoulli photographs of a session")
+    parser.add_argument("--images", type=int, default=0, help="images of a session that is made")
     parser.add_argument("--rows", type=int, help="rows of cells of a session that is made")
     parser.add_argument("--cols", type=int, help="columns of them")
     parser.add_argument("--samples", type=int, default=512, help="paths a pixel; of a session's photographs, 192 do")

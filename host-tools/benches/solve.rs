@@ -77,6 +77,7 @@ fn measure(
     let channels: Vec<_> = light
         .iter()
         .map(|light| ObservedChannel {
+            patterns: &patterns,
             light,
             ambient: &nothing,
             noise: vec![noise; grid.cells()],
@@ -84,7 +85,6 @@ fn measure(
         .collect();
     let observed = Observed {
         grid,
-        patterns: &patterns,
         roles: &roles,
         live: &vec![true; grid.cells()],
         channels: channels.clone(),

@@ -3,7 +3,7 @@
 use super::failure::Kind;
 use super::named::Named;
 use super::simulate_chain::Chain;
-use crate::capture::{CameraSettings, GateName, MIN_BERNOULLI, MapFormat};
+use crate::capture::{CameraSettings, GateName, MapFormat};
 #[cfg(unix)]
 use crate::device::emulator::Board;
 use crate::scene::{CaptureFault, Effect, InjectedFault};
@@ -223,9 +223,13 @@ pub(super) struct Patterns {
     /// Columns of cells
     #[arg(long, value_name = "C")]
     pub(super) cols: u16,
-    /// Bernoulli patterns, beside white, black and the Gray code; at least 10
-    #[arg(long, value_name = "M", default_value_t = 150, value_parser = bernoulli)]
+    /// Bernoulli patterns, beside white, black and the Gray code; together with images at least 10
+    #[arg(long, value_name = "M", default_value_t = 150, value_parser = clap::value_parser!(u16).range(..=10_000))]
     pub(super) photos: u16,
+    /// Show this folder's pictures too, cut to the projector's aspect: they teach as Bernoulli
+    /// patterns do, beside them or with `--photos 0` instead
+    #[arg(long, value_name = "DIR")]
+    pub(super) images: Option<PathBuf>,
     /// Seed of the Bernoulli patterns
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(super) seed: u64,
@@ -788,17 +792,6 @@ fn milliseconds(text: &str) -> Result<Duration, String> {
 fn error_bound(text: &str) -> Result<f64, String> {
     let range = (Bound::Excluded(0.0), Bound::Included(1.0));
     number(text, range, "an error is a number above 0, at most 1")
-}
-
-/// Bernoulli patterns of a capture that a table is to be solved from.
-fn bernoulli(text: &str) -> Result<u16, String> {
-    const MOST: u16 = 10_000;
-    let found = text.parse().ok().filter(|count| *count <= MOST);
-    match found {
-        Some(count) if usize::from(count) >= MIN_BERNOULLI => Ok(count),
-        Some(_) => Err(format!("a solve needs at least {MIN_BERNOULLI}")),
-        None => Err(format!("a whole number from {MIN_BERNOULLI} to {MOST}")),
-    }
 }
 
 fn frame_size(text: &str) -> Result<FrameSize, String> {

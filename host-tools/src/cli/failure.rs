@@ -360,7 +360,14 @@ impl From<PatternsError> for Failure {
     fn from(error: PatternsError) -> Self {
         match error {
             PatternsError::Folder(error) => error.into(),
-            error => Self::new(Kind::Usage, &error, error.next_step()),
+            error => {
+                let kind = match error {
+                    PatternsError::Images { .. } => Kind::Read,
+                    PatternsError::Image(_) | PatternsError::NoImages { .. } => Kind::Frames,
+                    _ => Kind::Usage,
+                };
+                Self::new(kind, &error, error.next_step())
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use super::args::Patterns;
 use super::failure::Failure;
 use super::output::Output;
 use super::progress::progress;
+use crate::capture::MIN_BERNOULLI;
 use crate::session::{self, Layout, OrderOptions, PatternsError};
 use iltm_runtime::Grid;
 use serde_json::json;
@@ -14,8 +15,17 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     iltm_picture::check_free(out)?;
     let grid = Grid::new(arguments.rows, arguments.cols).map_err(PatternsError::from)?;
     let layout = Layout::new(grid, arguments.projector, arguments.border)?;
+    let images = match &arguments.images {
+        Some(folder) => session::stills(folder, layout.inner())?,
+        None => Vec::new(),
+    };
+    let given = usize::from(arguments.photos) + images.len();
+    if given < MIN_BERNOULLI {
+        return Err(PatternsError::TooFew { given }.into());
+    }
     let options = OrderOptions {
         bernoulli: arguments.photos.into(),
+        images,
         seed: arguments.seed,
         ramp: if arguments.no_calibration {
             0
@@ -38,6 +48,7 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
         "slides": made.slides,
         "calibration": made.calibration,
         "stripes": made.stripes,
+        "images": made.images,
         "seed": arguments.seed,
     });
     let text = format!(

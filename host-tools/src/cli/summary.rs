@@ -33,6 +33,7 @@ pub(super) fn summary(built: &BuiltTable) -> Value {
             "white": report.photographs.white,
             "gray_code": report.photographs.gray_code,
             "bernoulli": report.photographs.bernoulli,
+            "images": report.photographs.images,
         },
         "ignored_gates": ignored(built),
         "lambda": report.lambda,
@@ -204,8 +205,10 @@ pub(super) fn text(built: &BuiltTable) -> String {
     let white = repeats.get(Measurements::WHITE).copied().unwrap_or(1);
     let _ = writeln!(
         text,
-        "photographs {} white, {} Gray code, {} Bernoulli",
-        white, photographs.gray_code, photographs.bernoulli
+        "photographs {} white, {} Gray code, {}",
+        white,
+        photographs.gray_code,
+        photographs.content()
     );
     // The default one needs no mention.
     if report.method != Method::Joint {

@@ -8,6 +8,7 @@ mod compare;
 mod device;
 mod emulate;
 mod flash;
+mod images;
 #[cfg(target_os = "linux")]
 mod interruption;
 mod live;

@@ -57,6 +57,7 @@ impl StudiedSession {
         };
         let options = OrderOptions {
             bernoulli: BERNOULLI[dice.usize(..BERNOULLI.len())],
+            images: Vec::new(),
             seed,
             ramp: if dice.bool() {
                 0

@@ -100,13 +100,13 @@ impl Capture {
             unlit: self.noise,
         };
         let channel = |light| ObservedChannel {
+            patterns: &self.patterns,
             light,
             ambient: &self.ambient,
             noise: vec![noise; self.grid.cells()],
         };
         Observed {
             grid: self.grid,
-            patterns: &self.patterns,
             roles: &self.roles,
             live: &self.live,
             channels: self.light.iter().map(channel).collect(),

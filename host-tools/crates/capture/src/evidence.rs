@@ -3,6 +3,7 @@
 
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
+use crate::cells::images;
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 use crate::cells::noise::NoiseModel;
 use crate::devices::{CameraFit, ColourMixingMatrix, Devices, MeasuredDevices};
@@ -22,7 +23,6 @@ use crate::registration::{self, Registered};
 use iltm_picture::Declared;
 use iltm_picture::progress::Progress;
 use iltm_picture::statistics::quantile;
-use nalgebra::DMatrix;
 use std::path::Path;
 
 /// What the photographs of a sequence show.
@@ -118,6 +118,10 @@ impl CaptureEvidence {
         let registered = registration::register(sequence, linear, progress)?;
         let registration = &registered.registration;
         let pixels = CellPixels::choose(registration, &linear.saturated);
+        let mut images = match &sequence.images[..] {
+            [] => None,
+            images => Some(linear.others(folder, images.to_vec())?),
+        };
         let photographs = &mut linear.photographs;
         let contradicted = devices
             .devices
@@ -128,7 +132,7 @@ impl CaptureEvidence {
         let measure = || {
             CellEvidence::measure(
                 sequence,
-                photographs,
+                (photographs, images.as_mut()),
                 registration,
                 (&pixels, &linear.saturated),
                 &sampled,
@@ -164,16 +168,25 @@ impl CaptureEvidence {
     }
 
     /// What a solve needs of it; `None` if no cell was found.
+    ///
+    /// # Errors
+    /// Those of [`images::add`].
     pub(crate) fn into_measurements(
         self,
+        folder: &Path,
         sequence: &Sequence,
         settings: &Settings,
-    ) -> Option<Measurements> {
-        let cells = self.cells?;
+    ) -> Result<Option<Measurements>, CaptureError> {
+        let Some(cells) = self.cells else {
+            return Ok(None);
+        };
         let diagnostics = Diagnostics {
             file: self.files.0,
             bits: self.files.1,
-            photographs: sequence.brackets.iter().map(|b| b.shots.len()).sum(),
+            photographs: (sequence.brackets.iter().chain(&sequence.images))
+                .map(|b| b.shots.len())
+                .sum(),
+            images: sequence.images.len(),
             bernoulli: sequence.bernoulli().len(),
             bernoulli_taken: sequence.bernoulli().len(),
             method: self.registered.method,
@@ -185,11 +198,8 @@ impl CaptureEvidence {
             gates: Vec::new(),
         };
         let views = &sequence.views;
-        Some(Measurements {
+        let mut measurements = Measurements {
             grid: sequence.grid,
-            patterns: DMatrix::from_fn(sequence.grid.cells(), views.len(), |cell, view| {
-                f64::from(views[view].lit[cell])
-            }),
             roles: views.iter().map(|view| view.role).collect(),
             repeats: views.iter().map(|view| view.shots.len() as u32).collect(),
             channels: cells.channels,
@@ -203,7 +213,9 @@ impl CaptureEvidence {
             devices: self.devices,
             settings: settings.clone(),
             diagnostics,
-        })
+        };
+        images::add(folder, sequence, &mut measurements)?;
+        Ok(Some(measurements))
     }
 }
 

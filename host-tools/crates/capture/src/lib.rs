@@ -69,6 +69,7 @@ pub use format::sequence::{CaptureOptions, MIN_BERNOULLI};
 pub use format::settings::{
     CameraSettings, ProjectorSettings, SETTINGS_FILE, SceneSettings, Settings,
 };
+pub use format::still::read_still;
 pub use format::stripe_role::{STRIPES_FILE, StripeManifest, StripeRole, StripeShot, WAVE};
 pub use gate::{Evidence, Gate, GateName, Verdict};
 pub use linear_photograph::LinearPhotograph;
@@ -80,6 +81,7 @@ pub use registration::projector_map::{MapError, MapSource, ProjectorMap};
 pub use registration::{MIN_REGRESSION, PixelCount, RegistrationMethod};
 pub use remeasure::{CellPlanes, CellReadings, PixelReadings, Remeasured, remeasure};
 
+use cells::images;
 use evidence::CaptureEvidence;
 use format::sequence::{Selection, Sequence};
 use iltm_picture::progress::Progress;
@@ -157,11 +159,17 @@ pub fn examine(
             examined.gates.push(gates::files::refuse_format(&error));
         }
         found => {
-            let found = found?;
+            let mut found = found?;
             cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
             examined.gates.extend(gates::judge(&sequence, &found));
             examined.white = Some(found.white.clone());
-            examined.measurements = found.into_measurements(&sequence, &settings);
+            let of_patterns = found.order.take();
+            examined.measurements = found.into_measurements(folder, &sequence, &settings)?;
+            let of_images = examined.measurements.as_ref().and_then(images::order);
+            let order = (examined.gates.iter_mut()).find(|gate| gate.name == GateName::Order);
+            if let (Some(gate), Some(of_images)) = (order, of_images) {
+                *gate = gates::order::judge_all(&sequence, of_patterns, of_images);
+            }
         }
     }
     gates::settle(&mut examined.gates, cause);

@@ -48,7 +48,7 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
     let measured = scene.read();
     let channel = &measured.channels[0];
     assert_eq!(measured.roles[Measurements::WHITE], Role::White);
-    assert_eq!(measured.patterns.ncols(), 1 + 6 + 6 + 30);
+    assert_eq!(measured.channels[0].patterns.ncols(), 1 + 6 + 6 + 30);
     let mut chi = 0.0;
     let shown: Vec<_> = scene
         .patterns()
@@ -57,7 +57,7 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
         .collect();
     for (view, (role, pattern)) in shown.iter().enumerate() {
         assert_eq!(measured.roles[view], *role);
-        let lit: Vec<bool> = measured
+        let lit: Vec<bool> = channel
             .patterns
             .column(view)
             .iter()
@@ -91,8 +91,8 @@ fn observations_are_the_light_of_each_cells_pixels_up_to_the_cameras_noise() {
 fn observations_of_inner_cells_are_the_transport_times_the_pattern() {
     let scene = TestCapture::default();
     let measured = scene.read();
-    for view in 0..measured.patterns.ncols() {
-        let lit = measured.patterns.column(view);
+    for view in 0..measured.channels[0].patterns.ncols() {
+        let lit = measured.channels[0].patterns.column(view);
         for cell in [7, 8, 9, 10, 13, 14, 15, 16, 19, 20, 21, 22] {
             let truth = scene.bounced * lit.sum() + (scene.direct - scene.bounced) * lit[cell];
             let found = measured.channels[0].observations[(cell, view)];
@@ -207,7 +207,7 @@ fn repeated_white_and_black_are_averaged() {
     };
     let measured = scene.read();
     assert_eq!(measured.repeats[Measurements::WHITE], 4);
-    assert_eq!(measured.patterns.ncols(), 43);
+    assert_eq!(measured.channels[0].patterns.ncols(), 43);
     let ratio = measured.channels[0].noise[8] / TestCapture::default().read().channels[0].noise[8];
     assert!((ratio - 0.5).abs() < 0.1, "{ratio}");
 }
@@ -252,8 +252,8 @@ fn the_first_bernoulli_photographs_are_used_and_no_more_than_there_are() {
         (12, 30)
     );
     assert_eq!(
-        some.patterns,
-        all.patterns.columns(0, 13 + 12).clone_owned()
+        some.channels[0].patterns,
+        all.channels[0].patterns.columns(0, 13 + 12).clone_owned()
     );
     let error = with(31).unwrap_err().to_string();
     assert!(

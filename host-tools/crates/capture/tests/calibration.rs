@@ -293,7 +293,7 @@ fn a_bracket_sees_what_its_longest_exposure_clips() {
     let measured = read(folder.path(), &CaptureOptions::default(), &Silent).unwrap();
     assert!(measured.live.iter().all(|&live| live));
     assert_eq!(measured.diagnostics.photographs, 2 * 44);
-    assert_eq!(measured.patterns.ncols(), 43);
+    assert_eq!(measured.channels[0].patterns.ncols(), 43);
     assert!(measured.repeats.iter().all(|&repeats| repeats == 1));
     let single = TestCapture::default().read();
     let (a, b) = (
@@ -331,7 +331,7 @@ fn a_bernoulli_pattern_shown_twice_is_one_view_with_less_noise() {
     manifest.shots[44].photo = "photos/044.png".into();
     fs::write(folder.path().join(MANIFEST_FILE), manifest.to_csv()).unwrap();
     let measured = read(folder.path(), &CaptureOptions::default(), &Silent).unwrap();
-    assert_eq!(measured.patterns.ncols(), 43);
+    assert_eq!(measured.channels[0].patterns.ncols(), 43);
     assert_eq!(measured.repeats[42], 2);
     assert_eq!(measured.diagnostics.bernoulli, 30);
 }

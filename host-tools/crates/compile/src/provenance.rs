@@ -101,6 +101,14 @@ pub struct Photographs {
     pub gray_code: usize,
     /// Bernoulli patterns.
     pub bernoulli: usize,
+    /// Images; left out where there are none.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub images: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+const fn is_none(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Errors that a viewer is predicted to see of natural images, relative to the wanted light, pixel
@@ -186,6 +194,7 @@ impl Provenance {
                 white: report.photographs.white,
                 gray_code: report.photographs.gray_code,
                 bernoulli: report.photographs.bernoulli,
+                images: report.photographs.images,
             }),
             live_cells: report.live_cells,
             ambient_kept: false,

@@ -13,7 +13,7 @@
 
 use crate::FineGains;
 use crate::gain::fine_gains;
-use iltm_capture::{FineFlood, Measurements, PixelLight};
+use iltm_capture::{ChannelMeasurements, FineFlood, Measurements, PixelLight};
 use iltm_picture::{LightPicture, PictureError};
 use iltm_runtime::{FrameSize, Grid};
 use iltm_solve::{
@@ -268,21 +268,28 @@ impl<'s> Scene<'s> {
         let light = &measurements.pixel_light;
         let clear = CLEAR / measurements.registration.cell_side() as f32;
         let blur = measurements.devices.blur;
-        let patterns = &measurements.patterns;
-        let blurred = (blur > 0.0).then(|| iltm_solve::blur(self.grid, blur) * patterns);
-        let thrown_at = |site: &Site, view: usize| match &blurred {
-            Some(blurred) => Some(site.cells.of(blurred.column(view).as_slice())),
-            None => lit(
-                self.grid,
-                site.place,
-                clear,
-                patterns.column(view).as_slice(),
-            ),
-        };
+        let blurring = (blur > 0.0).then(|| iltm_solve::blur(self.grid, blur));
+        let first_image = measurements.roles.len() - measurements.diagnostics.images;
         let (mut varying, mut contrast) = (Mean::default(), Mean::default());
         let mut channels = Vec::new();
         for (channel, inverse) in self.inverses.iter().enumerate() {
-            let observed = &measurements.channels[channel].observations;
+            let ChannelMeasurements {
+                patterns,
+                observations: observed,
+                ..
+            } = &measurements.channels[channel];
+            let blurred = blurring.as_ref().map(|blur| blur * patterns);
+            let thrown_at = |site: &Site, view: usize| {
+                if let Some(blurred) = &blurred {
+                    return Some(site.cells.of(blurred.column(view).as_slice()));
+                }
+                let image = light.thrown[channel].get(view.wrapping_sub(first_image));
+                let thrown = image.map(|image| image[site.at]).filter(|v| v.is_finite());
+                thrown.map(f64::from).or_else(|| {
+                    let pattern = patterns.column(view);
+                    lit(self.grid, site.place, clear, pattern.as_slice())
+                })
+            };
             let mut sums = vec![[[Sums::default(); 2]; HALVINGS]; self.sites.len()];
             let mut held_out = vec![Vec::new(); self.sites.len()];
             let mut received = &inverse.operator * observed;

@@ -35,8 +35,11 @@ fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
     let diagnostics = &learned.measurements.diagnostics;
     let (counts, pixels) = (report.photographs, diagnostics.pixels);
     let photographs = format!(
-        "{} white, {} Gray code, {} Bernoulli, of which {} held out to choose and to judge",
-        counts.white, counts.gray_code, counts.bernoulli, counts.held_out
+        "{} white, {} Gray code, {}, of which {} held out to choose and to judge",
+        counts.white,
+        counts.gray_code,
+        counts.content(),
+        counts.held_out
     );
     let cells = match report.cells - report.live_cells {
         0 => format!("all {} of the {} grid", report.cells, learned.inverse.grid),

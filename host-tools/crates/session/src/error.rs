@@ -1,6 +1,6 @@
 //! Errors of making a folder of pictures to show, and of photographing them.
 
-use iltm_capture::CaptureError;
+use iltm_capture::{CaptureError, FileFormat, MIN_BERNOULLI};
 use iltm_picture::{FolderError, MAX_PIXELS};
 use iltm_runtime::{FrameSize, Grid, GridError};
 use std::io;
@@ -41,6 +41,31 @@ pub enum PatternsError {
         /// The grid.
         grid: Grid,
     },
+    /// There is no picture to be shown in a folder of images.
+    #[error("{}: no picture; images are {}", folder.display(), FileFormat::NAMES)]
+    NoImages {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A folder of images cannot be read.
+    #[error("{}: {source}", folder.display())]
+    Images {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// An image cannot be shown.
+    #[error(transparent)]
+    Image(#[from] CaptureError),
+    /// Fewer Bernoulli patterns and images than a solve needs.
+    #[error(
+        "{given} Bernoulli patterns and images together; a solve needs at least {MIN_BERNOULLI}"
+    )]
+    TooFew {
+        /// Asked for.
+        given: usize,
+    },
     /// The folder could not be made.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -49,7 +74,7 @@ pub enum PatternsError {
 impl PatternsError {
     /// What to do about it, one sentence.
     #[must_use]
-    pub const fn next_step(&self) -> &'static str {
+    pub fn next_step(&self) -> &'static str {
         match self {
             Self::Grid(_) => {
                 "Choose fewer rows and columns: 13 x 21 to 64 x 64 is what most walls call for."
@@ -60,6 +85,12 @@ impl PatternsError {
             }
             Self::Projector { .. } => "State the projector's own resolution, as 1920x1080.",
             Self::NotCells { .. } => "Draw one pixel of 8 bits a cell.",
+            Self::NoImages { .. } => "Name a folder that has pictures in it.",
+            Self::Images { .. } => "Check the folder's name and permissions.",
+            Self::Image(error) => error.next_step(),
+            Self::TooFew { .. } => {
+                "Ask for more with --photos, or name a folder with more --images."
+            }
             Self::Folder(_) => "Choose another folder, or move that one away.",
         }
     }

@@ -2,8 +2,8 @@
 
 use super::{Layout, PatternsError, Purpose, Slide};
 use iltm_capture::{
-    CALIBRATION_FILE, CalibrationManifest, CameraSettings, MANIFEST_FILE, Manifest, SETTINGS_FILE,
-    STRIPES_FILE, StripeManifest, numbered,
+    CALIBRATION_FILE, CalibrationManifest, CameraSettings, MANIFEST_FILE, Manifest, Role,
+    SETTINGS_FILE, STRIPES_FILE, StripeManifest, numbered,
 };
 use iltm_picture::{WholeFolder, progress::Progress};
 use rayon::prelude::*;
@@ -30,6 +30,8 @@ pub struct Made {
     pub calibration: usize,
     /// Those of them that are stripes finer than the cells.
     pub stripes: usize,
+    /// Those of them that are images.
+    pub images: usize,
 }
 
 /// File of the slide with this index, relative to the capture folder.
@@ -58,10 +60,10 @@ pub fn write(
     slides.par_iter().enumerate().try_for_each(|(at, slide)| {
         let index = at as u32;
         let pattern = match slide.purpose {
+            // The slide says it all.
+            Purpose::Scene(Role::Image) | Purpose::Stripes(_) => None,
             Purpose::Scene(_) => Some("patterns"),
             Purpose::Calibration(_) => Some("calibration"),
-            // The slide says it all.
-            Purpose::Stripes(_) => None,
         };
         if let Some(pattern) = pattern {
             folder.picture(numbered(pattern, index), &slide.picture)?;
@@ -75,6 +77,9 @@ pub fn write(
         slides: slides.len(),
         calibration: calibration.shots.len(),
         stripes: stripes.shots.len(),
+        images: (scene.shots.iter())
+            .filter(|shot| shot.role == Role::Image)
+            .count(),
     };
     folder.file(MANIFEST_FILE, scene.to_csv())?;
     folder.file(SETTINGS_FILE, filled(SETTINGS, layout, camera, made))?;
@@ -105,8 +110,14 @@ fn lists(slides: &[Slide]) -> (Manifest, CalibrationManifest, StripeManifest) {
         Purpose::Stripes(role) => Some((index, role)),
         Purpose::Scene(_) | Purpose::Calibration(_) => None,
     });
+    let mut scene = Manifest::numbered("patterns", scene);
+    for shot in &mut scene.shots {
+        if shot.role == Role::Image {
+            shot.pattern = slide_name(shot.index);
+        }
+    }
     (
-        Manifest::numbered("patterns", scene),
+        scene,
         CalibrationManifest::numbered("calibration", calibration),
         StripeManifest::numbered(SLIDES_FOLDER, stripes),
     )

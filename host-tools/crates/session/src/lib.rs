@@ -4,6 +4,7 @@
 //! ```text
 //! order    what is shown, in which order: white, black, ramps, probes, stripes, chance
 //! calibration_pictures   even light of many levels; a few lit cells, far from each other
+//! stills   a folder's pictures as images to show
 //! layout   one pixel a cell -> the projector's own pixels
 //! folder   the capture folder with its lists, pictures, settings and rules
 //!
@@ -28,6 +29,7 @@ mod plan;
 mod screen;
 mod shell;
 mod shoot;
+mod stills;
 #[cfg(all(test, unix))]
 mod tests;
 pub mod verify;
@@ -43,3 +45,4 @@ pub use order::{OrderOptions, Purpose, Slide, order};
 pub use plan::{Planned, State, planned, ranges, states};
 pub use screen::{CommandScreen, Screen, with_window};
 pub use shoot::{CaptureSession, SessionOptions, ShootEvent, Summary};
+pub use stills::stills;

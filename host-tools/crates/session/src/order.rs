@@ -22,8 +22,8 @@ pub enum Purpose {
 pub struct Slide {
     /// What for.
     pub purpose: Purpose,
-    /// One pixel a cell, 8 bits, grey or RGB; of fine stripes, one a pixel of the projector
-    /// inside its border.
+    /// One pixel a cell, 8 bits, grey or RGB; of fine stripes and images, one a pixel of the
+    /// projector inside its border.
     pub picture: Picture,
 }
 
@@ -32,6 +32,8 @@ pub struct Slide {
 pub struct OrderOptions {
     /// Bernoulli patterns.
     pub bernoulli: usize,
+    /// Images, one pixel a pixel of the projector inside its border, 8 bits.
+    pub images: Vec<Picture>,
     /// Seed of the Bernoulli patterns.
     pub seed: u64,
     /// Levels of the response ramp, in white and in each channel, 2 to 256; 0 for
@@ -49,6 +51,7 @@ impl Default for OrderOptions {
     fn default() -> Self {
         Self {
             bernoulli: 150,
+            images: Vec::new(),
             seed: 1,
             ramp: 9,
             stripes: true,
@@ -62,7 +65,7 @@ impl Default for OrderOptions {
 /// after the Gray code; white and black again every [`OrderOptions::repeat_every`] pictures and
 /// at the very end, which shows whether lamp, camera or scene changed meanwhile.
 ///
-/// Bernoulli patterns come last, so that a session that had to stop early still has
+/// Bernoulli patterns come last, and images behind them, so that a session that had to stop early still has
 /// all that a solve needs, but fewer of them.
 #[must_use]
 pub fn order(layout: &Layout, options: &OrderOptions) -> Vec<Slide> {
@@ -81,11 +84,15 @@ pub fn order(layout: &Layout, options: &OrderOptions) -> Vec<Slide> {
                 others.append(&mut stripes);
                 &mut others
             }
-            Role::Column { .. } | Role::Row { .. } => &mut others,
+            Role::Column { .. } | Role::Row { .. } | Role::Image => &mut others,
         };
         list.extend(slide(Purpose::Scene(role), binary(grid, &pattern.lit)));
     }
     others.append(&mut stripes);
+    others.extend(options.images.iter().map(|picture| Slide {
+        purpose: Purpose::Scene(Role::Image),
+        picture: picture.clone(),
+    }));
     let mut slides = flood.clone();
     let mut since = 0;
     for slide in others {

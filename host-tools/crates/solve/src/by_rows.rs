@@ -44,12 +44,12 @@ pub(super) fn direct(
     stop: Stop,
     progress: &dyn Progress,
 ) -> Solution {
-    let patterns = prepared.patterns.select_columns(chosen);
-    let right = haar.analyse_columns(&patterns).transpose();
     let mut end = Convergence::best();
     let (mut inverses, mut coefficients) = (Vec::new(), 0);
-    for (light, noise) in prepared.light.iter().zip(&prepared.noise) {
-        let light = light.select_columns(chosen);
+    for (channel, noise) in prepared.noise.iter().enumerate() {
+        let patterns = prepared.patterns[channel].select_columns(chosen);
+        let right = haar.analyse_columns(&patterns).transpose();
+        let light = prepared.light[channel].select_columns(chosen);
         // The noise that `T^-1` makes of the camera's, for which its diagonal is enough.
         let radii = radii(haar, chosen.len(), noise, |cell, noise| {
             let seen = light.row(cell);
@@ -78,11 +78,11 @@ pub(super) fn two_stage(
     stop: Stop,
     progress: &dyn Progress,
 ) -> Result<Solution, SolveError> {
-    let patterns = prepared.patterns.select_columns(chosen);
-    let problem = BasisPursuit::new(&haar.analyse_columns(&patterns));
     let mut end = Convergence::best();
     let (mut inverses, mut coefficients) = (Vec::new(), 0);
     for (channel, light) in prepared.light.iter().enumerate() {
+        let patterns = prepared.patterns[channel].select_columns(chosen);
+        let problem = BasisPursuit::new(&haar.analyse_columns(&patterns));
         let right = haar.analyse_columns(&light.select_columns(chosen));
         // A pattern lights half of the cells.
         let radii = radii(haar, chosen.len(), &prepared.noise[channel], |_, noise| {
@@ -119,13 +119,13 @@ fn radii(
 
 /// [`Method::BruteForce`] from the photographs `chosen`.
 pub(super) fn brute_force(prepared: &Prepared, chosen: &[usize]) -> Result<Solution, SolveError> {
-    let patterns = prepared.landed(chosen);
-    let lit: Vec<usize> = (0..patterns.nrows())
-        .filter(|cell| patterns.row(*cell).amax() > 0.0)
-        .collect();
-    let demultiplex = demultiplexer(&patterns.select_rows(&lit))?;
     let mut inverses = Vec::new();
     for (channel, light) in prepared.light.iter().enumerate() {
+        let patterns = prepared.landed(channel, chosen);
+        let lit: Vec<usize> = (0..patterns.nrows())
+            .filter(|cell| patterns.row(*cell).amax() > 0.0)
+            .collect();
+        let demultiplex = demultiplexer(&patterns.select_rows(&lit))?;
         let columns = product(&light.select_columns(chosen), &demultiplex);
         let mut transport = DMatrix::zeros(patterns.nrows(), patterns.nrows());
         for (column, cell) in columns.column_iter().zip(&lit) {

@@ -50,9 +50,9 @@ pub(super) fn gains(
 ) -> DVector<f64> {
     let light = &prepared.light[channel];
     let flood = match kind {
-        GainOnly::Flood => flood(prepared, light, chosen),
+        GainOnly::Flood => flood(prepared, channel, chosen),
         GainOnly::Fitted => {
-            let patterns = prepared.patterns.select_columns(chosen);
+            let patterns = prepared.patterns[channel].select_columns(chosen);
             let seen = light.select_columns(chosen);
             DVector::from_fn(light.nrows(), |cell, _| {
                 let shown = patterns.row(cell);
@@ -68,7 +68,8 @@ pub(super) fn gains(
 
 /// Light under white: from photographs of white, and from those of a pattern and
 /// its complement, whose sum shows the same with twice the variance.
-fn flood(prepared: &Prepared, light: &DMatrix<f64>, chosen: &[usize]) -> DVector<f64> {
+fn flood(prepared: &Prepared, channel: usize, chosen: &[usize]) -> DVector<f64> {
+    let light = &prepared.light[channel];
     let (mut sum, mut weight) = (DVector::zeros(light.nrows()), 0.0);
     for group in held_out::complements(prepared, chosen) {
         match group {
@@ -88,7 +89,7 @@ fn flood(prepared: &Prepared, light: &DMatrix<f64>, chosen: &[usize]) -> DVector
     // As much light as all photographs together imply.
     let projected: f64 = chosen
         .iter()
-        .map(|k| prepared.patterns.column(*k).max())
+        .map(|k| prepared.patterns[channel].column(*k).max())
         .sum();
     light.select_columns(chosen).column_sum() / projected.max(1.0)
 }

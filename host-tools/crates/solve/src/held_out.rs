@@ -37,8 +37,7 @@ impl Split {
     /// One or more splits; no photograph is held out twice.
     pub(super) fn all(prepared: &Prepared) -> Vec<Self> {
         let groups = groups(prepared);
-        let is_random =
-            |group: &&Vec<usize>| group.iter().any(|k| prepared.roles[*k] == Role::Bernoulli);
+        let is_random = |group: &&Vec<usize>| group.iter().any(|k| prepared.roles[*k].is_content());
         let random: Vec<&Vec<usize>> = groups.iter().filter(is_random).collect();
         if random.len() >= ENOUGH {
             let held_out = random.into_iter().skip(EVERY / 2).step_by(EVERY);
@@ -60,15 +59,29 @@ impl Split {
     }
 }
 
-/// Photographs of the same pattern or its complement, in the order they were
-/// taken. All-white ones are told by nothing else and stay together, apart only
+/// Photographs of the same pattern or its complement, or of the same picture, in the order
+/// they were taken. All-white ones are told by nothing else and stay together, apart only
 /// if there are no others.
 fn groups(prepared: &Prepared) -> Vec<Vec<usize>> {
     let mut known: HashMap<Vec<bool>, usize> = HashMap::new();
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut uniform = Vec::new();
-    for k in 0..prepared.roles.len() {
-        let lit = prepared.shown.column(k);
+    let same = |a: usize, b: usize| {
+        let mut channels = prepared.shown.iter();
+        channels.all(|shown| shown.column(a) == shown.column(b))
+    };
+    for (k, role) in prepared.roles.iter().enumerate() {
+        if *role == Role::Image {
+            let again = |group: &&mut Vec<usize>| {
+                prepared.roles[group[0]] == Role::Image && same(group[0], k)
+            };
+            match groups.iter_mut().find(again) {
+                Some(group) => group.push(k),
+                None => groups.push(vec![k]),
+            }
+            continue;
+        }
+        let lit = prepared.shown[0].column(k);
         let first = lit.iter().next().is_some_and(|share| *share > 0.5);
         let key: Vec<bool> = lit.iter().map(|share| (*share > 0.5) == first).collect();
         if !key.contains(&false) {
@@ -107,9 +120,10 @@ impl<'j> Judged<'j> {
     /// The same in camera units, for who judges more than cells.
     pub(super) fn trial(self, observed: &Observed<'_>, prepared: &Prepared) -> Trial {
         let all: Vec<usize> = (0..prepared.roles.len()).collect();
-        let thrown = |candidate: &Candidate| candidate.thrown(prepared, &all);
+        let candidates = self.candidates.iter().enumerate();
+        let thrown = candidates.map(|(channel, own)| own.thrown(prepared, channel, &all));
         Trial {
-            thrown: self.candidates.iter().map(thrown).collect(),
+            thrown: thrown.collect(),
             inverse: self.solution.in_camera_units(observed, prepared, None),
             held_out: self.split.held_out.clone(),
         }
@@ -126,7 +140,7 @@ pub(super) fn squared_misfit(
     let mut difference = 0.0;
     for (channel, light) in prepared.light.iter().enumerate() {
         let observed = light.select_columns(chosen);
-        let Some(predicted) = candidates[channel].light(prepared, chosen) else {
+        let Some(predicted) = candidates[channel].light(prepared, channel, chosen) else {
             return f64::INFINITY;
         };
         difference += (predicted - &observed).norm_squared();
@@ -151,7 +165,7 @@ pub(super) fn predict(prepared: &Prepared, judged: &[Judged<'_>]) -> Prediction 
         })
     };
     let compensated = wanted(prepared, judged, |judged, channel, _| {
-        judged.candidates[channel].light(prepared, &judged.split.held_out)
+        judged.candidates[channel].light(prepared, channel, &judged.split.held_out)
     });
     let candidates = GainOnly::ALL.map(|kind| (kind, of_gain(kind)));
     let [flood, fitted] = candidates;
@@ -186,8 +200,8 @@ fn wanted(
 ) -> Error {
     let mut pairs = Vec::new();
     for judged in judged {
-        let patterns = prepared.patterns.select_columns(&judged.split.held_out);
         for (channel, light) in prepared.light.iter().enumerate() {
+            let patterns = prepared.patterns[channel].select_columns(&judged.split.held_out);
             let Some(wanted) = wanted(judged, channel, &patterns) else {
                 return Error {
                     error: f64::INFINITY,
@@ -258,8 +272,7 @@ fn lit_alone(gain: &DVector<f64>, patterns: &DMatrix<f64>) -> DMatrix<f64> {
 /// white.
 pub(super) fn complements(prepared: &Prepared, chosen: &[usize]) -> Vec<(usize, Option<usize>)> {
     let lit = |k: usize| -> Vec<bool> {
-        prepared
-            .shown
+        prepared.shown[0]
             .column(k)
             .iter()
             .zip(&prepared.live)
@@ -267,8 +280,7 @@ pub(super) fn complements(prepared: &Prepared, chosen: &[usize]) -> Vec<(usize, 
             .collect()
     };
     let dark = |k: usize| -> Vec<bool> {
-        prepared
-            .shown
+        prepared.shown[0]
             .column(k)
             .iter()
             .zip(&prepared.live)
@@ -277,7 +289,8 @@ pub(super) fn complements(prepared: &Prepared, chosen: &[usize]) -> Vec<(usize, 
     };
     let mut found = Vec::new();
     let mut waiting: HashMap<Vec<bool>, Vec<usize>> = HashMap::new();
-    for &k in chosen {
+    let patterns = chosen.iter().filter(|k| prepared.roles[**k] != Role::Image);
+    for &k in patterns {
         let pattern = lit(k);
         if !pattern.contains(&false) {
             found.push((k, None));

@@ -206,7 +206,9 @@ impl<'p> Solver<'p> {
         let light = self.prepared.light.iter();
         Photographs {
             sources: channels.map(|c| self.prepared.sources(c, chosen)).collect(),
-            patterns: self.prepared.patterns.select_columns(chosen),
+            patterns: (self.prepared.patterns.iter())
+                .map(|patterns| patterns.select_columns(chosen))
+                .collect(),
             weights: self.prepared.weights.select_columns(chosen),
             light: light.map(|c| c.select_columns(chosen)).collect(),
         }
@@ -218,7 +220,7 @@ impl<'p> Solver<'p> {
         let light = photographs.sources.iter().zip(&self.scales);
         DataTerm::new(
             light.map(|(c, scale)| c * *scale).collect(),
-            vec![photographs.patterns.clone(); self.scales.len()],
+            photographs.patterns.clone(),
             &photographs.weights,
         )
     }
@@ -246,8 +248,8 @@ impl<'p> Solver<'p> {
         drop_dead_rows(&mut shared, &self.prepared.live);
         let channels = photographs.channels().zip(&self.scales);
         let channels = channels
-            .map(|((light, sources), scale)| Channel {
-                gain: photographs.fitted_gain(light, &(product(&shared, sources) * *scale)),
+            .map(|((channel, sources), scale)| Channel {
+                gain: photographs.fitted_gain(channel, &(product(&shared, sources) * *scale)),
                 scale: *scale,
                 deviation: None,
             })
@@ -272,8 +274,10 @@ impl<'p> Solver<'p> {
             let shared = self.found(photographs).shared;
             let fitted: Vec<f64> = photographs
                 .channels()
-                .map(|(light, sources)| {
-                    fitted_scale(light, &product(&shared, sources), &photographs.patterns)
+                .map(|(channel, sources)| {
+                    let light = &photographs.light[channel];
+                    let patterns = &photographs.patterns[channel];
+                    fitted_scale(light, &product(&shared, sources), patterns)
                 })
                 .collect();
             // Where the light tells nothing (no interreflection) nothing is told.
@@ -308,9 +312,9 @@ impl<'p> Solver<'p> {
         if found.channels.len() < 2 {
             return;
         }
-        for (channel, (light, sources)) in found.channels.iter_mut().zip(photographs.channels()) {
+        for (channel, (index, sources)) in found.channels.iter_mut().zip(photographs.channels()) {
             let own = &found.shared * channel.scale;
-            let target = &photographs.patterns + product(&own, sources);
+            let target = &photographs.patterns[index] + product(&own, sources);
             let data = DataTerm::new(vec![sources.clone()], vec![target], &photographs.weights);
             let floor = -&own;
             let mut consensus =
@@ -323,16 +327,17 @@ impl<'p> Solver<'p> {
             deviation.fill_diagonal(0.0);
             drop_dead_rows(&mut deviation, &self.prepared.live);
             let reflected = product(&(&own + &deviation), sources);
-            channel.gain = photographs.fitted_gain(light, &reflected);
+            channel.gain = photographs.fitted_gain(index, &reflected);
             channel.deviation = Some(deviation);
         }
     }
 }
 
-/// Photographs chosen for one solve, `N x m` each.
+/// Photographs chosen for one solve, `N x m` each, by channel.
 #[derive(Debug)]
 struct Photographs {
-    patterns: DMatrix<f64>,
+    patterns: Vec<DMatrix<f64>>,
+    /// Those of all channels.
     weights: DMatrix<f64>,
     light: Vec<DMatrix<f64>>,
     /// [`Prepared::sources`].
@@ -340,19 +345,20 @@ struct Photographs {
 }
 
 impl Photographs {
-    /// Light and sources of each channel.
-    fn channels(&self) -> impl Iterator<Item = (&DMatrix<f64>, &DMatrix<f64>)> {
-        self.light.iter().zip(&self.sources)
+    /// Number and sources of each channel.
+    fn channels(&self) -> impl Iterator<Item = (usize, &DMatrix<f64>)> {
+        self.sources.iter().enumerate()
     }
 
     /// Gains that explain a channel's light best, given the light that the
     /// operator takes away; zero for a cell without light.
-    fn fitted_gain(&self, light: &DMatrix<f64>, reflected: &DMatrix<f64>) -> DVector<f64> {
+    fn fitted_gain(&self, channel: usize, reflected: &DMatrix<f64>) -> DVector<f64> {
+        let (light, patterns) = (&self.light[channel], &self.patterns[channel]);
         DVector::from_fn(light.nrows(), |cell, _| {
             let (mut both, mut norm) = (0.0, 0.0);
             for (k, weight) in self.weights.row(cell).iter().enumerate() {
                 let seen = light[(cell, k)];
-                both += weight * seen * (reflected[(cell, k)] + self.patterns[(cell, k)]);
+                both += weight * seen * (reflected[(cell, k)] + patterns[(cell, k)]);
                 norm += weight * seen * seen;
             }
             if norm > 0.0 { both / norm } else { 0.0 }

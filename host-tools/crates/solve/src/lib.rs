@@ -369,7 +369,7 @@ fn uses(method: Method, role: Role) -> bool {
     match method {
         Method::Joint | Method::BruteForce => true,
         // As the paper does.
-        Method::Direct | Method::TwoStage => matches!(role, Role::White | Role::Bernoulli),
+        Method::Direct | Method::TwoStage => role == Role::White || role.is_content(),
     }
 }
 
@@ -429,11 +429,14 @@ fn check_prediction(prediction: &Prediction) -> Result<(), SolveError> {
 /// photograph of white, or if the inverse has no transport.
 fn recovery(prepared: &Prepared, haar: &Haar, candidates: &[Candidate]) -> Option<Recovery> {
     let white = *prepared.with_role(|role| role == Role::White).first()?;
-    let patterns = prepared
-        .patterns
-        .select_columns(&prepared.with_role(|role| uses(Method::Direct, role)));
+    // The theorem is one of random patterns, which are the same in all channels.
+    let chosen = prepared.with_role(|role| matches!(role, Role::White | Role::Bernoulli));
+    if chosen.len() == 1 {
+        return None;
+    }
+    let patterns = prepared.patterns[0].select_columns(&chosen);
     let inverses: Vec<&Inverse> = candidates.iter().map(|c| &c.inverse).collect();
-    let flood = prepared.patterns.column(white).into_owned();
+    let flood = prepared.patterns[0].column(white).into_owned();
     restricted_isometry::of_direct(&inverses, haar, &patterns, &flood)
 }
 
@@ -445,6 +448,7 @@ fn count(prepared: &Prepared, method: Method, splits: &[Split]) -> PhotographCou
             .with_role(|role| gray(role) && uses(method, role))
             .len(),
         bernoulli: prepared.with_role(|role| role == Role::Bernoulli).len(),
+        images: prepared.with_role(|role| role == Role::Image).len(),
         held_out: splits.iter().map(|split| split.held_out.len()).sum(),
     }
 }

@@ -6,7 +6,6 @@
 //! has none, and no gain would make any.
 
 use super::observed::{Observed, ObservedChannel};
-use iltm_capture::Role;
 use nalgebra::{DMatrix, DVector};
 
 /// A cell has to give back this much of a typical cell's own light: a step of an
@@ -36,9 +35,9 @@ pub enum WhyLeftOut {
 
 /// All cells that cannot be solved for, in order.
 ///
-/// `landed` is the light that falls on each cell, `N x m`: the patterns, blurred if
-/// the projector is.
-pub(super) fn left_out(observed: &Observed<'_>, landed: &DMatrix<f64>) -> Vec<LeftOut> {
+/// `landed` is the light that falls on each cell, by channel `N x m`: the patterns, blurred
+/// if the projector is.
+pub(super) fn left_out(observed: &Observed<'_>, landed: &[DMatrix<f64>]) -> Vec<LeftOut> {
     let cells = observed.grid.cells();
     let chosen = photographs(observed);
     let mut why: Vec<Option<WhyLeftOut>> = observed
@@ -46,7 +45,7 @@ pub(super) fn left_out(observed: &Observed<'_>, landed: &DMatrix<f64>) -> Vec<Le
         .iter()
         .map(|live| (!live).then_some(WhyLeftOut::Unseen))
         .collect();
-    for channel in &observed.channels {
+    for (channel, landed) in observed.channels.iter().zip(landed) {
         let total = total(channel, observed.live, &chosen);
         let own: Vec<Own> = (0..cells)
             .map(|cell| Own::new(landed, channel, cell, (&chosen, total.as_ref())))
@@ -76,7 +75,7 @@ fn photographs(observed: &Observed<'_>) -> Vec<usize> {
     let all = 0..observed.roles.len();
     let random: Vec<usize> = all
         .clone()
-        .filter(|k| observed.roles[*k] == Role::Bernoulli)
+        .filter(|k| observed.roles[*k].is_content())
         .collect();
     if random.len() >= RANDOM {
         random

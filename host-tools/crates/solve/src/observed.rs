@@ -13,9 +13,7 @@ use nalgebra::DMatrix;
 pub struct Observed<'a> {
     /// Cells of the projector.
     pub grid: Grid,
-    /// Projected light `L`, `N x m`, relative to the projector's white.
-    pub patterns: &'a DMatrix<f64>,
-    /// Role of each column of `patterns`, length `m`, none [`Role::Black`].
+    /// Role of each pattern, length `m`, none [`Role::Black`].
     pub roles: &'a [Role],
     /// Whether the cell was measured, length `N`.
     pub live: &'a [bool],
@@ -28,6 +26,8 @@ pub struct Observed<'a> {
 /// One colour channel of [`Observed`].
 #[derive(Clone, Debug)]
 pub struct ObservedChannel<'a> {
+    /// Projected light `L` of the channel, `N x m`, relative to the projector's white.
+    pub patterns: &'a DMatrix<f64>,
     /// Light of each cell `C`, `N x m`, camera units, ambient removed.
     pub light: &'a DMatrix<f64>,
     /// Light under black, length `N`, camera units.
@@ -50,11 +50,11 @@ impl<'a> From<&'a Measurements> for Observed<'a> {
         let channels = measurements.channels.iter();
         Self {
             grid: measurements.grid,
-            patterns: &measurements.patterns,
             roles: &measurements.roles,
             live: &measurements.live,
             channels: channels
                 .map(|channel| ObservedChannel {
+                    patterns: &channel.patterns,
                     light: &channel.observations,
                     ambient: &channel.ambient,
                     noise: (0..measurements.grid.cells())
@@ -74,7 +74,7 @@ fn cell_noise(
 ) -> CellNoise {
     let (mut sums, mut counts) = ([0.0; 2], [0_u32; 2]);
     for (view, repeats) in measurements.repeats.iter().enumerate() {
-        let lit = usize::from(is_lit(&measurements.patterns, cell, view));
+        let lit = usize::from(is_lit(&channel.patterns, cell, view));
         let deviation = channel.deviation(cell, view, measurements.pixels[cell], *repeats);
         sums[lit] += deviation * deviation;
         counts[lit] += 1;
@@ -83,7 +83,7 @@ fn cell_noise(
     CellNoise { lit, unlit }
 }
 
-/// Whether a pattern lights a cell.
-pub(super) fn is_lit(patterns: &DMatrix<f64>, cell: usize, view: usize) -> bool {
+/// Whether a pattern lights a cell, or a picture more than half.
+fn is_lit(patterns: &DMatrix<f64>, cell: usize, view: usize) -> bool {
     patterns[(cell, view)] > 0.5
 }

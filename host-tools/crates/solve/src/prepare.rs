@@ -4,7 +4,7 @@ use super::blur::blur;
 use super::error::SolveError;
 use super::forward::product;
 use super::observability::{self, LeftOut};
-use super::observed::{CellNoise, Observed, is_lit};
+use super::observed::{CellNoise, Observed};
 use iltm_capture::Role;
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -28,24 +28,24 @@ pub(super) struct Prepared {
     pub(super) live: Vec<bool>,
     /// The others.
     pub(super) left_out: Vec<LeftOut>,
-    /// What the projector showed, `N x m`.
-    pub(super) shown: DMatrix<f64>,
-    /// `L`, `N x m`, after the projector's blur; rows of cells that are not live
-    /// are zero.
-    pub(super) patterns: DMatrix<f64>,
+    /// What the projector showed in each channel, `N x m`.
+    pub(super) shown: Vec<DMatrix<f64>>,
+    /// `L` of each channel, `N x m`, after the projector's blur; rows of cells that are
+    /// not live are zero.
+    pub(super) patterns: Vec<DMatrix<f64>>,
     /// `C_c` with the mean flood light of all channels scaled to 1, `N x m`;
     /// rows of cells that are not live are zero.
     pub(super) light: Vec<DMatrix<f64>>,
     /// What cells that are not live throw on the others is explained by: the
-    /// light that falls on them, `N x m`, rows of live cells zero. `None` if all
-    /// are live.
+    /// light that falls on them in each channel, `N x m`, rows of live cells zero. `None` if
+    /// all are live.
     ///
     /// A cell at the border of a scene may be too small for the camera, or out of
     /// its sight, and still light the rest. Its light is not known, but what is
     /// projected there is, and its column of `K` is as sparse and non-negative as
     /// any other's. Light that it only passes on needs no column: eliminating it
     /// leaves an operator of the same kind between the live cells.
-    pub(super) unseen: Option<DMatrix<f64>>,
+    pub(super) unseen: Option<Vec<DMatrix<f64>>>,
     /// Standard deviation of an element of `light` by channel and cell.
     pub(super) noise: Vec<Vec<CellNoise>>,
     /// Weight of each squared residual, `N x m`, mean 1 in each row.
@@ -65,9 +65,12 @@ impl Prepared {
         check_sizes(observed)?;
         check_finite(observed)?;
         let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
+        let shown: Vec<DMatrix<f64>> = (observed.channels.iter())
+            .map(|channel| channel.patterns.clone())
+            .collect();
         let landed = match &blur {
-            Some(blur) => product(blur, observed.patterns),
-            None => observed.patterns.clone(),
+            Some(blur) => shown.iter().map(|shown| product(blur, shown)).collect(),
+            None => shown.clone(),
         };
         let left_out = observability::left_out(observed, &landed);
         let mut live = vec![true; observed.grid.cells()];
@@ -82,8 +85,11 @@ impl Prepared {
                 if live[cell] { matrix[(cell, k)] } else { 0.0 }
             })
         };
-        let patterns = keep(&landed);
-        let unseen = live.contains(&false).then(|| &landed - &patterns);
+        let patterns: Vec<DMatrix<f64>> = landed.iter().map(keep).collect();
+        let unseen = live.contains(&false).then(|| {
+            let pairs = landed.iter().zip(&patterns);
+            pairs.map(|(landed, patterns)| landed - patterns).collect()
+        });
         let mut light: Vec<_> = observed
             .channels
             .iter()
@@ -108,11 +114,11 @@ impl Prepared {
             })
             .collect();
         Ok(Self {
-            weights: weights(observed.patterns, &noise),
+            weights: weights(&shown, &noise),
             unseen,
             live,
             left_out,
-            shown: observed.patterns.clone(),
+            shown,
             patterns,
             light,
             noise,
@@ -135,16 +141,17 @@ impl Prepared {
     pub(super) fn sources(&self, channel: usize, chosen: &[usize]) -> DMatrix<f64> {
         let light = self.light[channel].select_columns(chosen);
         match &self.unseen {
-            Some(unseen) => light + unseen.select_columns(chosen),
+            Some(unseen) => light + unseen[channel].select_columns(chosen),
             None => light,
         }
     }
 
-    /// The light that falls on every cell, live or not, in the photographs `chosen`.
-    pub(super) fn landed(&self, chosen: &[usize]) -> DMatrix<f64> {
-        let patterns = self.patterns.select_columns(chosen);
+    /// The light of one channel that falls on every cell, live or not, in the photographs
+    /// `chosen`.
+    pub(super) fn landed(&self, channel: usize, chosen: &[usize]) -> DMatrix<f64> {
+        let patterns = self.patterns[channel].select_columns(chosen);
         match &self.unseen {
-            Some(unseen) => patterns + unseen.select_columns(chosen),
+            Some(unseen) => patterns + unseen[channel].select_columns(chosen),
             None => patterns,
         }
     }
@@ -161,21 +168,28 @@ impl Prepared {
 
 /// Light is noisy: photographs in which a cell is dark say more about what it
 /// gets from others. Every pattern that does not light a cell counts as many
-/// times as its noise variance is smaller than that of those which do.
-fn weights(patterns: &DMatrix<f64>, noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
-    let (cells, photographs) = patterns.shape();
+/// times as its noise variance is smaller than that of those which do. A picture lies between:
+/// the variance of light grows with it.
+fn weights(shown: &[DMatrix<f64>], noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
+    let (cells, photographs) = shown[0].shape();
+    let share = 1.0 / shown.len() as f64;
     let mut weights = DMatrix::from_element(cells, photographs, 1.0);
     for (cell, mut row) in weights.row_iter_mut().enumerate() {
         let variance = |of: fn(&CellNoise) -> f64| -> f64 {
             noise.iter().map(|channel| of(&channel[cell]).powi(2)).sum()
         };
-        let ratio = variance(|noise| noise.lit) / variance(|noise| noise.unlit);
-        if ratio.is_nan() {
+        let (lit, unlit) = (variance(|noise| noise.lit), variance(|noise| noise.unlit));
+        if (lit / unlit).is_nan() {
             continue;
         }
         for (photograph, weight) in row.iter_mut().enumerate() {
-            if !is_lit(patterns, cell, photograph) {
-                *weight = ratio.clamp(1.0, MOST_WEIGHT);
+            let light: f64 = shown
+                .iter()
+                .map(|shown| share * shown[(cell, photograph)])
+                .sum();
+            if light < 1.0 {
+                let own = unlit + light.max(0.0) * (lit - unlit);
+                *weight = (lit / own).clamp(1.0, MOST_WEIGHT);
             }
         }
         let mean = row.mean();
@@ -186,9 +200,9 @@ fn weights(patterns: &DMatrix<f64>, noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
 
 /// Mean light of all channels where the projector shows white: total light over
 /// total projected share.
-fn flood_level(light: &[DMatrix<f64>], patterns: &DMatrix<f64>) -> f64 {
-    let total: f64 = light.iter().map(DMatrix::sum).sum();
-    total / light.len() as f64 / patterns.sum()
+fn flood_level(light: &[DMatrix<f64>], patterns: &[DMatrix<f64>]) -> f64 {
+    let total = |of: &[DMatrix<f64>]| of.iter().map(DMatrix::sum).sum::<f64>();
+    total(light) / total(patterns)
 }
 
 fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {
@@ -205,7 +219,6 @@ fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {
             given_cols: given.1,
         })
     };
-    check("patterns", observed.patterns.shape(), (cells, photographs))?;
     check("live cells", (observed.live.len(), 1), (cells, 1))?;
     if !matches!(observed.channels.len(), 1 | 3) {
         return Err(SolveError::Channels {
@@ -213,6 +226,7 @@ fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {
         });
     }
     for channel in &observed.channels {
+        check("patterns", channel.patterns.shape(), (cells, photographs))?;
         check("observations", channel.light.shape(), (cells, photographs))?;
         check(
             "ambient light values",
@@ -237,7 +251,6 @@ fn check_finite(observed: &Observed<'_>) -> Result<(), SolveError> {
             channel,
         }),
     };
-    check("pattern", 0, observed.patterns)?;
     if !(0.0..=MOST_BLUR).contains(&observed.blur) {
         return Err(SolveError::Option {
             option: "the projector's blur",
@@ -246,6 +259,7 @@ fn check_finite(observed: &Observed<'_>) -> Result<(), SolveError> {
         });
     }
     for (index, channel) in observed.channels.iter().enumerate() {
+        check("pattern", index, channel.patterns)?;
         check("light", index, channel.light)?;
         let cells = channel.ambient.len();
         check(

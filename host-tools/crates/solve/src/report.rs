@@ -58,9 +58,29 @@ pub struct PhotographCounts {
     pub gray_code: usize,
     /// Bernoulli patterns.
     pub bernoulli: usize,
-    /// How many of the Bernoulli photographs were held out to choose `lambda`
-    /// and to predict the error; the final solve uses them too.
+    /// Images.
+    pub images: usize,
+    /// How many of the Bernoulli patterns' and the images' photographs were held out to choose
+    /// `lambda` and to predict the error; the final solve uses them too.
     pub held_out: usize,
+}
+
+impl PhotographCounts {
+    /// How many there are.
+    #[must_use]
+    pub const fn all(&self) -> usize {
+        self.white + self.gray_code + self.bernoulli + self.images
+    }
+
+    /// Bernoulli patterns and images in words.
+    #[must_use]
+    pub fn content(&self) -> String {
+        match (self.bernoulli, self.images) {
+            (bernoulli, 0) => format!("{bernoulli} Bernoulli"),
+            (0, images) => format!("{images} images"),
+            (bernoulli, images) => format!("{bernoulli} Bernoulli, {images} images"),
+        }
+    }
 }
 
 /// One weight of the l1 term and what it led to.

@@ -115,19 +115,29 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Light in the photographs `chosen`.
-    pub(super) fn light(&self, prepared: &Prepared, chosen: &[usize]) -> Option<DMatrix<f64>> {
-        let mut projected = prepared.patterns.select_columns(chosen);
-        if let Some(thrown) = self.thrown(prepared, chosen) {
+    /// Light of one channel in the photographs `chosen`.
+    pub(super) fn light(
+        &self,
+        prepared: &Prepared,
+        channel: usize,
+        chosen: &[usize],
+    ) -> Option<DMatrix<f64>> {
+        let mut projected = prepared.patterns[channel].select_columns(chosen);
+        if let Some(thrown) = self.thrown(prepared, channel, chosen) {
             projected += thrown;
         }
         self.inverse.light(&projected)
     }
 
     /// What cells that are not live throw on the others in the photographs `chosen`.
-    pub(super) fn thrown(&self, prepared: &Prepared, chosen: &[usize]) -> Option<DMatrix<f64>> {
+    pub(super) fn thrown(
+        &self,
+        prepared: &Prepared,
+        channel: usize,
+        chosen: &[usize],
+    ) -> Option<DMatrix<f64>> {
         let (thrown, unseen) = (self.thrown.as_ref()?, prepared.unseen.as_ref()?);
-        Some(product(thrown, &unseen.select_columns(chosen)))
+        Some(product(thrown, &unseen[channel].select_columns(chosen)))
     }
 }
 

@@ -48,13 +48,13 @@ impl Capture {
 
     fn observed(&self) -> Observed<'_> {
         let channel = |light| ObservedChannel {
+            patterns: &self.patterns,
             light,
             ambient: &self.ambient,
             noise: vec![self.noise; self.grid.cells()],
         };
         Observed {
             grid: self.grid,
-            patterns: &self.patterns,
             roles: &self.roles,
             live: &self.live,
             channels: self.light.iter().map(channel).collect(),

@@ -46,6 +46,18 @@ impl Drift {
         self.gains.get(channel).map_or(1.0, |gains| gains[shot])
     }
 
+    /// Both of a photograph that was taken between the shots, by its index.
+    pub(crate) fn between(&self, sequence: &Sequence, channel: usize, index: u32) -> (f64, f64) {
+        let at = |of: &[Vec<f64>]| {
+            of.get(channel).map_or(1.0, |values| {
+                let times = sequence.shots.iter().map(|shot| f64::from(shot.index));
+                let points: Vec<(f64, f64)> = times.zip(values.iter().copied()).collect();
+                between(&points, f64::from(index))
+            })
+        };
+        (at(&self.gains), at(&self.darks))
+    }
+
     /// What the mean of black is to be multiplied by before it is subtracted.
     pub(crate) fn dark(&self, channel: usize, shot: usize) -> f64 {
         self.darks.get(channel).map_or(1.0, |darks| darks[shot])

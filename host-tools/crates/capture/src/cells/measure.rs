@@ -20,6 +20,16 @@ pub(crate) struct CellLight {
     pub(crate) channels: Vec<DMatrix<f64>>,
     samples: NoiseSamples,
     pub(crate) pixels: PixelSamples,
+    /// By photograph of an image.
+    pub(crate) images: Vec<ImageLight>,
+}
+
+/// Light in the photograph of an image, before black is subtracted.
+pub(crate) struct ImageLight {
+    /// By channel and cell.
+    pub(crate) cells: Vec<Vec<f64>>,
+    /// By channel and sampled pixel.
+    pub(crate) pixels: Vec<Vec<f32>>,
 }
 
 /// Averages every photograph over the pixels of each cell.
@@ -55,6 +65,7 @@ pub(crate) fn observe(
         channels,
         samples,
         pixels,
+        images: Vec::new(),
     })
 }
 
@@ -73,11 +84,12 @@ pub(crate) fn average(
     drift: &Drift,
 ) -> Observed {
     let source = NoiseSamples::source(sequence);
-    let samples = &light.samples;
+    let (samples, images) = (&light.samples, &light.images);
     let counts = cells.counts();
     let of_channel = |(channel, light): (usize, &DMatrix<f64>)| {
         let ambient = black(sequence, light);
-        let mut observations = DMatrix::zeros(light.nrows(), sequence.views.len());
+        let views = sequence.views.len();
+        let mut observations = DMatrix::zeros(light.nrows(), views + images.len());
         for (view, mut mean) in sequence.views.iter().zip(observations.column_iter_mut()) {
             let share = 1.0 / view.shots.len() as f64;
             for &shot in &view.shots {
@@ -90,10 +102,23 @@ pub(crate) fn average(
                 }
             }
         }
+        for (at, (bracket, image)) in sequence.images.iter().zip(images).enumerate() {
+            let (gain, dark) = drift.between(sequence, channel, bracket.shots[0].index);
+            let mut column = observations.column_mut(views + at);
+            for ((mean, light), ambient) in
+                column.iter_mut().zip(&image.cells[channel]).zip(&ambient)
+            {
+                *mean = (light - dark * ambient) / gain;
+            }
+        }
+        let patterns = DMatrix::from_fn(light.nrows(), views, |cell, view| {
+            f64::from(sequence.views[view].lit[cell])
+        });
         let gains = |shot: usize| drift.gain(channel, shot);
         let noise_model = samples.fit(sequence, source, channel, gains);
         let noise = white_noise(sequence, &observations, &ambient, &counts, noise_model);
         ChannelMeasurements {
+            patterns,
             observations,
             ambient,
             noise,

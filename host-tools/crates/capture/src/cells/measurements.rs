@@ -19,17 +19,15 @@ use nalgebra::DMatrix;
 ///
 /// `N` is the number of cells and `m` the number of views: patterns other than
 /// black, whose photographs are already subtracted. The first view is always
-/// white, then come the Gray code and the Bernoulli patterns.
+/// white, then come the Gray code, the Bernoulli patterns and the images.
 #[derive(Clone, Debug)]
 pub struct Measurements {
     /// Cells of the projector.
     pub grid: Grid,
-    /// Projected light `L`, `N x m`, 0 or 1 (relative to the projector's white).
-    pub patterns: DMatrix<f64>,
-    /// Role of each column of `patterns`, length `m`; the first is
+    /// Role of each view, length `m`; the first is
     /// [`Role::White`], none is [`Role::Black`].
     pub roles: Vec<Role>,
-    /// Photographs averaged for each column of `patterns`, length `m`: more than
+    /// Photographs averaged for each view, length `m`: more than
     /// one where a pattern was photographed again. A bracket counts as one.
     pub repeats: Vec<u32>,
     /// One entry (grey) or three (red, green, blue).
@@ -61,7 +59,7 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Column of the white pattern in [`Measurements::patterns`] and in every
+    /// Column of the white pattern in every [`ChannelMeasurements::patterns`] and
     /// [`ChannelMeasurements::observations`].
     pub const WHITE: usize = 0;
 }
@@ -69,6 +67,8 @@ impl Measurements {
 /// One colour channel of [`Measurements`].
 #[derive(Clone, Debug)]
 pub struct ChannelMeasurements {
+    /// Projected light `L`, `N x m`, relative to the projector's white: 0 or 1, but for images.
+    pub patterns: DMatrix<f64>,
     /// Observed light `C`, `N x m`, in camera units (1 is the photograph's full
     /// scale, at the longest exposure if there are several), mean over the cell's pixels, ambient removed.
     pub observations: DMatrix<f64>,
@@ -104,6 +104,8 @@ pub struct Diagnostics {
     pub bits: u8,
     /// Photographs used, of every role.
     pub photographs: usize,
+    /// Photographs of images used.
+    pub images: usize,
     /// Bernoulli photographs used.
     pub bernoulli: usize,
     /// Bernoulli photographs in the capture.

@@ -10,12 +10,14 @@
 //! | whether light adds up, and why not | `superposition`, `nonlinearity` |
 //! | between the cells and within one | `cell_interpolation`, `fine_flood`, `wiener_filter` |
 //! | pixel by pixel, some of them | `pixel_light` |
+//! | what pictures that are no patterns throw on cells and pixels | `images` |
 //! | what each pixel sees of a grid | `pixel_views` |
 
 mod cell_interpolation;
 pub(crate) mod cell_pixels;
 pub(crate) mod drift;
 pub(crate) mod fine_flood;
+pub(crate) mod images;
 mod leave_one_out;
 pub(crate) mod mains_banding;
 mod measure;
@@ -37,6 +39,7 @@ use cell_pixels::CellPixels;
 use drift::{Drift, Steadiness};
 use iltm_picture::progress::Progress;
 use mains_banding::MainsBanding;
+use measure::ImageLight;
 use measurements::ChannelMeasurements;
 use nalgebra::DMatrix;
 use noise::NoiseSource;
@@ -68,7 +71,7 @@ impl CellEvidence {
     /// A photograph's own error.
     pub(crate) fn measure(
         sequence: &Sequence,
-        photographs: &mut Photographs<'_>,
+        (photographs, images): (&mut Photographs<'_>, Option<&mut Photographs<'_>>),
         registration: &Registration,
         (pixels, saturated): (&CellPixels, &[bool]),
         sampled: &Sampled,
@@ -76,7 +79,22 @@ impl CellEvidence {
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
         progress.begin("measuring cells", sequence.shots.len() as u64);
-        let light = measure::observe(sequence, photographs, pixels, sampled, progress)?;
+        let mut light = measure::observe(sequence, photographs, pixels, sampled, progress)?;
+        if let Some(images) = images {
+            let all: Vec<usize> = (0..sequence.images.len()).collect();
+            images.for_batches(&all, progress, |photos| {
+                light.images.extend(photos.iter().map(|(_, photo)| {
+                    ImageLight {
+                        cells: photo
+                            .planes
+                            .iter()
+                            .map(|plane| pixels.mean(plane))
+                            .collect(),
+                        pixels: light.pixels.taken(photo),
+                    }
+                }));
+            })?;
+        }
         progress.end();
         let live = &pixels.live;
         let bands = |steadiness: &Steadiness, light: &[DMatrix<f64>]| {
@@ -103,7 +121,8 @@ impl CellEvidence {
         let find = || nonlinearity::find(sequence, live, &light.channels, sampled);
         let nonlinearity = off.then(find);
         let banding = bands(&steadiness, &light.channels);
-        let pixel_light = (light.pixels).average(sequence, &steadiness.drift, saturated);
+        let (samples, images) = (light.pixels, &light.images);
+        let pixel_light = samples.average(sequence, images, &steadiness.drift, saturated);
         Ok(Self {
             nonlinearity,
             sums,

@@ -2,7 +2,9 @@
 //! means over cells.
 
 use super::drift::Drift;
+use super::measure::ImageLight;
 use super::measurements::Measurements;
+use crate::format::bracket::Bracket;
 use crate::format::sequence::Sequence;
 use crate::photographs::photo::Photo;
 use crate::photographs::sampled::SIDE;
@@ -19,6 +21,9 @@ pub struct PixelLight {
     pub sound: Vec<bool>,
     /// Light by channel and view, black subtracted, camera units.
     pub channels: Vec<Vec<Vec<f32>>>,
+    /// What the projector throws there, relative to its white, by channel and image: the last
+    /// views. NaN where a pixel sees no part of the projection, or the image has one pixel a cell.
+    pub thrown: Vec<Vec<Vec<f32>>>,
 }
 
 impl PixelLight {
@@ -43,14 +48,21 @@ impl PixelSamples {
 
     /// Takes what is needed of a photograph.
     pub(crate) fn keep(&mut self, shot: usize, photo: &Photo) {
-        let values = |plane: &Vec<f32>| self.pixels.iter().map(|&p| plane[p as usize]).collect();
-        self.shots[shot] = photo.planes.iter().map(values).collect();
+        self.shots[shot] = self.taken(photo);
     }
 
-    /// Divides slow changes out, subtracts black and averages the photographs of each view.
+    /// What is needed of a photograph, by channel.
+    pub(crate) fn taken(&self, photo: &Photo) -> Vec<Vec<f32>> {
+        let values = |plane: &Vec<f32>| self.pixels.iter().map(|&p| plane[p as usize]).collect();
+        photo.planes.iter().map(values).collect()
+    }
+
+    /// Divides slow changes out, subtracts black and averages the photographs of each view;
+    /// `images` are the photographs of images.
     pub(crate) fn average(
         self,
         sequence: &Sequence,
+        images: &[ImageLight],
         drift: &Drift,
         saturated: &[bool],
     ) -> PixelLight {
@@ -75,11 +87,20 @@ impl PixelSamples {
                 }
                 mean
             };
-            let views = sequence.views.iter();
-            views.map(|view| of_view(&view.shots)).collect()
+            let of_image = |(bracket, image): (&Bracket, &ImageLight)| {
+                let (gain, dark) = drift.between(sequence, channel, bracket.shots[0].index);
+                let light = image.pixels[channel].iter().zip(&black);
+                light
+                    .map(|(light, black)| (light - dark as f32 * black) / gain as f32)
+                    .collect()
+            };
+            let views = sequence.views.iter().map(|view| of_view(&view.shots));
+            let images = sequence.images.iter().zip(images).map(of_image);
+            views.chain(images).collect()
         };
         PixelLight {
             channels: (0..channels).map(of_channel).collect(),
+            thrown: vec![Vec::new(); channels],
             sound: self
                 .pixels
                 .iter()

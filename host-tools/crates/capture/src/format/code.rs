@@ -98,7 +98,7 @@ pub(crate) fn lit_by_role(role: Role, codes: [Code; 2], row: usize, col: usize) 
         Role::Black => Some(false),
         Role::Column { bit, inverse } => codes[0].lit(col, bit, inverse),
         Role::Row { bit, inverse } => codes[1].lit(row, bit, inverse),
-        Role::Bernoulli => None,
+        Role::Bernoulli | Role::Image => None,
     }
 }
 

@@ -131,14 +131,14 @@ pub enum CaptureError {
         /// What to ask for.
         next_step: &'static str,
     },
-    /// Too few Bernoulli photographs to learn an inverse from.
-    #[error("{}: {used} Bernoulli photographs used, a solve needs at least {needed}: \
+    /// Too few Bernoulli photographs and images to learn an inverse from.
+    #[error("{}: {used} Bernoulli photographs and images used, a solve needs at least {needed}: \
         the Gray code's stripes alone cannot tell which cell of a row or column the light came from",
         path.display())]
     TooFewPhotographs {
         /// The `capture.csv`.
         path: PathBuf,
-        /// Bernoulli photographs used.
+        /// Bernoulli photographs and images used.
         used: usize,
         /// Least number.
         needed: usize,
@@ -214,7 +214,7 @@ impl CaptureError {
                 "Photograph the missing Gray code patterns, or check the roles in capture.csv."
             }
             Self::TooFewPhotographs { .. } => {
-                "Photograph more Bernoulli patterns, or ask for more; 40 are a good start."
+                "Photograph more Bernoulli patterns or images, or ask for more; 40 are a good start."
             }
             Self::NoLight { .. } => {
                 "Check that the projector lit the scene, and that white and black are not exchanged."

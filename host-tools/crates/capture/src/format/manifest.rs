@@ -47,7 +47,7 @@ pub(super) const LINE: &str = "Write the header and every line as index,role,pat
 impl ListedRole for Role {
     const FILE: &'static str = MANIFEST_FILE;
     const NEXT_STEP: &'static str = "Use white, black, column-B, column-B-inverse, row-B, \
-         row-B-inverse or bernoulli, B being a bit from 0.";
+         row-B-inverse, bernoulli or image, B being a bit from 0.";
 
     fn from_name(name: &str) -> Option<Self> {
         Self::from_name(name)

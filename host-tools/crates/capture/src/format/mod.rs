@@ -27,4 +27,5 @@ pub(crate) mod reference;
 pub(crate) mod role;
 pub(crate) mod sequence;
 pub(crate) mod settings;
+pub(crate) mod still;
 pub(crate) mod stripe_role;

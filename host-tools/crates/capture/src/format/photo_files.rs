@@ -8,7 +8,6 @@ use super::bracket::Bracket;
 use super::error::CaptureError;
 use super::manifest::{Shot, ShotOf};
 use super::picture_file::{FileFormat, MAX_PIXELS};
-use super::role::Role;
 use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fs::File;
@@ -112,18 +111,19 @@ pub(crate) struct PhotoFiles {
     pub(crate) copies: Vec<(PathBuf, PathBuf)>,
 }
 
-/// Names in each shot of the brackets the file that stands for its photograph; shots
+/// Names in each shot of both lists' brackets the file that stands for its photograph; shots
 /// without one are taken out.
 ///
 /// # Errors
 /// [`CaptureError::Ambiguous`].
 pub(super) fn find_all(
     folder: &Path,
-    brackets: &mut Vec<Bracket>,
+    mut lists: [&mut Vec<Bracket>; 2],
 ) -> Result<PhotoFiles, CaptureError> {
     let mut missing = Vec::new();
-    let listed = brackets.iter().map(|bracket| bracket.shots.len()).sum();
-    for bracket in &mut *brackets {
+    let brackets = lists.iter().flat_map(|brackets| brackets.iter());
+    let listed = brackets.map(|bracket| bracket.shots.len()).sum();
+    for bracket in lists.iter_mut().flat_map(|brackets| brackets.iter_mut()) {
         for at in (0..bracket.shots.len()).rev() {
             if let Some(found) = find_photo(folder, &bracket.shots[at].photo)? {
                 bracket.shots[at].photo = found;
@@ -133,9 +133,13 @@ pub(super) fn find_all(
             }
         }
     }
-    brackets.retain(|bracket| !bracket.shots.is_empty());
+    for brackets in &mut lists {
+        brackets.retain(|bracket| !bracket.shots.is_empty());
+    }
     missing.sort_by_key(|shot| shot.index);
-    let shots: Vec<&Shot> = brackets.iter().flat_map(|bracket| &bracket.shots).collect();
+    let brackets = lists.iter().flat_map(|brackets| brackets.iter());
+    let mut shots: Vec<&Shot> = brackets.flat_map(|bracket| &bracket.shots).collect();
+    shots.sort_by_key(|shot| shot.index);
     Ok(PhotoFiles {
         listed,
         copies: if missing.is_empty() {
@@ -190,7 +194,7 @@ fn copies(folder: &Path, shots: &[&Shot]) -> Vec<(PathBuf, PathBuf)> {
 /// Whether two shots show the same pattern.
 fn alike(folder: &Path, a: &Shot, b: &Shot) -> bool {
     let of = |shot: &Shot| hash(&folder.join(&shot.pattern));
-    (a.role == b.role && a.role != Role::Bernoulli) || of(a) == of(b)
+    (a.role == b.role && !a.role.is_content()) || of(a) == of(b)
 }
 
 /// A hash of a regular file's bytes.

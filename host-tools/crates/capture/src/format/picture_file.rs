@@ -96,7 +96,7 @@ impl FileFormat {
 }
 
 /// What to do about a picture that cannot be read.
-pub(super) const EXPORT: &str = "Copy or export the picture again: photographs as PNG, TIFF, \
+pub(crate) const EXPORT: &str = "Copy or export the picture again: photographs as PNG, TIFF, \
      JPEG, OpenEXR, PGM or PPM, patterns as PNG with 8 bit.";
 
 /// A picture file and who named it.
@@ -409,6 +409,17 @@ pub(crate) enum Samples {
     Sixteen(Vec<u16>),
     /// Finite; 1 is full scale.
     Float(Vec<f32>),
+}
+
+impl Samples {
+    /// Codes for a projector; `None` of floating point numbers, which are none.
+    pub(crate) fn codes(self) -> Option<iltm_picture::Samples> {
+        match self {
+            Self::Eight(codes) => Some(iltm_picture::Samples::Eight(codes)),
+            Self::Sixteen(codes) => Some(iltm_picture::Samples::Sixteen(codes)),
+            Self::Float(_) => None,
+        }
+    }
 }
 
 /// The samples of a picture so many pixels wide whose alpha, if any, is full everywhere;

@@ -27,7 +27,7 @@ impl CodeAxis {
 ///
 /// [`fmt::Display`] writes and [`Role::from_name`] reads the name that stands in
 /// `capture.csv`: `white`, `black`, `column-B`, `column-B-inverse`, `row-B`,
-/// `row-B-inverse`, `bernoulli`.
+/// `row-B-inverse`, `bernoulli`, `image`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum Role {
     /// Every cell lit: the flood photograph.
@@ -50,6 +50,8 @@ pub enum Role {
     },
     /// Independent random cells, each lit with probability one half.
     Bernoulli,
+    /// Any picture, grey or in colour, of the grid's size or the projector's.
+    Image,
 }
 
 impl Role {
@@ -70,6 +72,7 @@ impl Role {
             "white" => return Some(Self::White),
             "black" => return Some(Self::Black),
             "bernoulli" => return Some(Self::Bernoulli),
+            "image" => return Some(Self::Image),
             _ => {}
         }
         let (axis, rest) = name.split_once('-')?;
@@ -95,8 +98,14 @@ impl Role {
         match self {
             Self::Column { bit, inverse } => Some((CodeAxis::Column, bit, inverse)),
             Self::Row { bit, inverse } => Some((CodeAxis::Row, bit, inverse)),
-            Self::White | Self::Black | Self::Bernoulli => None,
+            Self::White | Self::Black | Self::Bernoulli | Self::Image => None,
         }
+    }
+
+    /// Whether it tells each cell's light from that of the others: a random pattern or a picture.
+    #[must_use]
+    pub const fn is_content(self) -> bool {
+        matches!(self, Self::Bernoulli | Self::Image)
     }
 
     /// The same stripes with lit and dark exchanged; `None` for a role that is
@@ -114,6 +123,7 @@ impl fmt::Display for Role {
             return f.write_str(match self {
                 Self::White => "white",
                 Self::Black => "black",
+                Self::Image => "image",
                 _ => "bernoulli",
             });
         };
@@ -128,7 +138,7 @@ mod tests {
 
     #[test]
     fn every_role_is_read_back_from_its_name() {
-        let mut roles = vec![Role::White, Role::Black, Role::Bernoulli];
+        let mut roles = vec![Role::White, Role::Black, Role::Bernoulli, Role::Image];
         for bit in 0..Role::MAX_BITS {
             for inverse in [false, true] {
                 roles.push(Role::Column { bit, inverse });

@@ -39,7 +39,7 @@ pub struct CaptureOptions {
     /// Use only this many Bernoulli photographs, the first ones, beside all
     /// others; `None` for all.
     pub bernoulli: Option<usize>,
-    /// Fewer Bernoulli photographs than this are refused.
+    /// Fewer Bernoulli photographs and images together than this are refused.
     pub min_bernoulli: usize,
     /// Of stripes finer than a table or the camera can have, without Bernoulli
     /// patterns, the finest are left out, so that a cell is a block of the patterns'.
@@ -81,6 +81,9 @@ pub(crate) struct Sequence {
     pub(crate) longest: Option<f64>,
     /// The first photograph of each bracket.
     pub(crate) shots: Vec<Shot>,
+    /// Photographs of images, in the order they were taken. Gates look at patterns, which are in
+    /// `brackets`.
+    pub(crate) images: Vec<Bracket>,
     /// Photographs of black, as indices into `shots`, at least one.
     pub(crate) black: Vec<usize>,
     /// The white view, then the Gray code, then the Bernoulli patterns.
@@ -101,6 +104,7 @@ pub(crate) struct Sequence {
 #[derive(Clone, Debug)]
 pub(crate) struct Selection {
     pub(crate) brackets: Vec<Bracket>,
+    images: Vec<Bracket>,
     /// The longest exposure, if exposures are given.
     longest: Option<f64>,
     /// [`CaptureOptions::coarsen`], if there is nothing that forbids it.
@@ -121,6 +125,9 @@ impl Selection {
         let manifest = folder.join(MANIFEST_FILE);
         check_levels(shots, &manifest)?;
         let longest = bracket::longest(shots, &manifest)?;
+        let (images, shots): (Vec<Shot>, Vec<Shot>) =
+            (shots.iter().cloned()).partition(|shot| shot.role == Role::Image);
+        let (images, shots) = (Bracket::of_each(&images, longest), &shots[..]);
         // Stripes may be looked at by fewer bits; a Bernoulli pattern is what it is.
         let coarsen = options.coarsen && shots.iter().all(|shot| shot.role != Role::Bernoulli);
         let brackets = match longest {
@@ -129,9 +136,10 @@ impl Selection {
             }
             None => Bracket::of_each(shots, None),
         };
-        let brackets = chosen(brackets, options, &manifest)?;
+        let brackets = chosen(brackets, images.len(), options, &manifest)?;
         Ok(Self {
             brackets,
+            images,
             longest,
             coarsen,
         })
@@ -143,7 +151,7 @@ impl Selection {
     /// # Errors
     /// [`CaptureError::Ambiguous`] if several files could be meant.
     pub(crate) fn find_photographs(&mut self, folder: &Path) -> Result<PhotoFiles, CaptureError> {
-        find_all(folder, &mut self.brackets)
+        find_all(folder, [&mut self.brackets, &mut self.images])
     }
 }
 
@@ -156,6 +164,7 @@ impl Sequence {
         let manifest = folder.join(MANIFEST_FILE);
         let Selection {
             mut brackets,
+            images,
             longest,
             coarsen,
         } = chosen;
@@ -217,6 +226,7 @@ impl Sequence {
             brackets,
             longest,
             shots,
+            images,
             black,
             views,
             codes,
@@ -334,6 +344,7 @@ fn check_levels(shots: &[Shot], manifest: &Path) -> Result<(), CaptureError> {
 /// The brackets to use: all but the Bernoulli ones beyond the number asked for.
 fn chosen(
     brackets: Vec<Bracket>,
+    images: usize,
     options: &CaptureOptions,
     manifest: &Path,
 ) -> Result<Vec<Bracket>, CaptureError> {
@@ -351,10 +362,10 @@ fn chosen(
             next_step: "Ask for fewer, or leave --photos away.",
         });
     }
-    if used < options.min_bernoulli {
+    if used + images < options.min_bernoulli {
         return Err(CaptureError::TooFewPhotographs {
             path: path(),
-            used,
+            used: used + images,
             needed: options.min_bernoulli,
         });
     }

@@ -24,7 +24,7 @@ pub(crate) mod files;
 mod flicker;
 mod movement;
 mod noise;
-mod order;
+pub(crate) mod order;
 mod response;
 mod saturation;
 mod superposition;
@@ -43,7 +43,7 @@ pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
     let mut gates = vec![
         files::judge_format(file, bits, found.response_stated),
         saturation::judge(&found.clipped, &pixels.left_out, live),
-        order::judge(sequence, found.order.as_ref()),
+        order::judge(&sequence.shots, found.order.as_ref()),
         coverage::judge(sequence, &pixels.live, &counts, &pixels.left_out),
     ];
     if let Some(cells) = &found.cells {

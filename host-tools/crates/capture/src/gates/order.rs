@@ -1,11 +1,29 @@
 //! Gate `order`: every photograph shows the pattern of its line.
 
+use crate::format::bracket::Bracket;
+use crate::format::manifest::Shot;
 use crate::format::sequence::Sequence;
 use crate::gate::{Evidence, Gate, GateName, Verdict, listed};
 use crate::photographs::order::{Order, Wrong};
 
-/// Judges what was found.
-pub(super) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
+/// Judges what was found of patterns and of images.
+pub(crate) fn judge_all(sequence: &Sequence, patterns: Option<Order>, images: Order) -> Gate {
+    let first = |image: &Bracket| image.shots[0].clone();
+    let of_images: Vec<Shot> = sequence.images.iter().map(first).collect();
+    let Some(patterns) = patterns else {
+        let judged = judge(&of_images, Some(&images));
+        return if judged.fails() {
+            judged
+        } else {
+            judge(&[], None)
+        };
+    };
+    let shots = [&sequence.shots[..], &of_images].concat();
+    judge(&shots, Some(&patterns.and(images)))
+}
+
+/// Judges what was found of these shots.
+pub(super) fn judge(shots: &[Shot], order: Option<&Order>) -> Gate {
     let name = GateName::Order;
     let Some(order) = order else {
         let why = "too few photographs, or too few pixels that follow any cell, to tell which \
@@ -24,13 +42,13 @@ pub(super) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
         evidence: Evidence::Photographs {
             what: "distance to the own pattern (0: the same, 0.5: another random one)",
             values: shown
-                .map(|(shot, distance)| (sequence.shots[shot].index, *distance))
+                .map(|(shot, distance)| (shots[shot].index, *distance))
                 .collect(),
             limit: Some(order.none),
             from: None,
         },
     };
-    let photo = |shot: usize| sequence.shots[shot].photo.display();
+    let photo = |shot: usize| shots[shot].photo.display();
     match order.wrong.as_slice() {
         [] => {
             let what = format!(
@@ -52,7 +70,7 @@ pub(super) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
             )
         }
         wrong => {
-            let (what, next_step) = shifted(sequence, wrong).unwrap_or_else(|| {
+            let (what, next_step) = shifted(shots, wrong).unwrap_or_else(|| {
                 let one = |wrong: &Wrong| match wrong.shows {
                     Some(other) => format!("{} shows that of {}", photo(wrong.shot), photo(other)),
                     None => format!("{} shows none", photo(wrong.shot)),
@@ -75,7 +93,7 @@ pub(super) fn judge(sequence: &Sequence, order: Option<&Order>) -> Gate {
 
 /// The sentence and next step if all wrong photographs show the same number of
 /// patterns later or earlier.
-fn shifted(sequence: &Sequence, wrong: &[Wrong]) -> Option<(String, &'static str)> {
+fn shifted(shots: &[Shot], wrong: &[Wrong]) -> Option<(String, &'static str)> {
     let mut counts = std::collections::BTreeMap::new();
     for wrong in wrong {
         if let Some(other) = wrong.shows {
@@ -91,7 +109,7 @@ fn shifted(sequence: &Sequence, wrong: &[Wrong]) -> Option<(String, &'static str
     let first = wrong
         .iter()
         .find(|w| w.shows == w.shot.checked_add_signed(shift))?;
-    let photo = sequence.shots[first.shot].photo.display();
+    let photo = shots[first.shot].photo.display();
     let (what, next_step) = if shift > 0 {
         (
             format!(

@@ -79,6 +79,20 @@ pub(crate) struct Order {
     pub(crate) none: f64,
 }
 
+impl Order {
+    /// The same of these photographs and of others behind them.
+    pub(crate) fn and(mut self, others: Self) -> Self {
+        let before = self.distances.len();
+        self.wrong
+            .extend(others.wrong.into_iter().map(|wrong| Wrong {
+                shot: before + wrong.shot,
+                shows: wrong.shows.map(|shows| before + shows),
+            }));
+        self.distances.extend(others.distances);
+        self
+    }
+}
+
 /// Compares every photograph with every pattern; `None` if there are too few, or too
 /// few pixels that follow any cell.
 pub(crate) fn find(sequence: &Sequence, sampled: &Sampled) -> Option<Order> {

@@ -95,7 +95,7 @@ pub(crate) fn patterns(
     seed: u64,
 ) -> Vec<(Role, Pattern)> {
     let wanted = |role: Role| match role {
-        Role::Black => false,
+        Role::Black | Role::Image => false,
         Role::White | Role::Bernoulli => true,
         Role::Column { .. } | Role::Row { .. } => method == Method::Joint,
     };
@@ -113,13 +113,13 @@ pub(crate) fn solved(
     (light, noise): (&DMatrix<f64>, Vec<CellNoise>),
 ) -> Result<(InverseTransport, SolveReport), SolveError> {
     let roles: Vec<Role> = shown.iter().map(|(role, _)| *role).collect();
-    let ambient = vec![0.0; grid.cells()];
+    let (patterns, ambient) = (columns(shown), vec![0.0; grid.cells()]);
     let observed = Observed {
         grid,
-        patterns: &columns(shown),
         roles: &roles,
         live,
         channels: vec![ObservedChannel {
+            patterns: &patterns,
             light,
             ambient: &ambient,
             noise,

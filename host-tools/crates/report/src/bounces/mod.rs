@@ -162,11 +162,14 @@ fn solved(
     progress: &dyn Progress,
 ) -> Result<(InverseTransport, SolveReport), SolveError> {
     let mut observed = Observed::from(measurements);
-    let landed: DMatrix<f64>;
+    let landed: Vec<DMatrix<f64>>;
     if observed.blur > 0.0 {
         let blur = iltm_solve::blur(observed.grid, observed.blur);
-        landed = blur * observed.patterns;
-        observed.patterns = &landed;
+        let channels = observed.channels.iter();
+        landed = channels.map(|channel| &blur * channel.patterns).collect();
+        for (channel, landed) in observed.channels.iter_mut().zip(&landed) {
+            channel.patterns = landed;
+        }
         observed.blur = 0.0;
     }
     iltm_solve::solve_observed(&observed, options, progress)

@@ -120,10 +120,10 @@ fn bounces_of_a_known_scene_are_found_from_its_photographs() {
     light.apply(|light| *light += 1e-4 * normal(&mut random));
     let observed = Observed {
         grid: scene.grid,
-        patterns: &patterns,
         roles: &roles,
         live: &live,
         channels: vec![iltm_solve::ObservedChannel {
+            patterns: &patterns,
             light: &light,
             ambient: &dark,
             noise: vec![noise; cells],

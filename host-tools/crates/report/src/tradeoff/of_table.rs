@@ -13,7 +13,7 @@ pub(super) fn of_table(
     progress: &dyn Progress,
 ) -> Result<Tradeoff, TradeoffError> {
     let provenance = Provenance::read(table.provenance());
-    let count = |of: Photographs| (of.white + of.gray_code + of.bernoulli) as u64;
+    let count = |of: Photographs| (of.white + of.gray_code + of.bernoulli + of.images) as u64;
     let common = Common {
         sweep: Sweep::Table,
         setting: "the table".to_owned(),

@@ -27,7 +27,7 @@ impl Common {
             sweep,
             setting,
             method: Some(report.method.to_string()),
-            photographs: Some((counts.white + counts.gray_code + counts.bernoulli) as u64),
+            photographs: Some(counts.all() as u64),
             seconds: Some(seconds.prepare + seconds.choose + seconds.solve + seconds.finish),
         }
     }

@@ -1,0 +1,404 @@
+//! Images: pictures of any content beside the patterns. What the projector throws on each cell,
+//! and on some pixels of the camera, follows from the picture's codes and the projector's response.
+
+use super::measurements::Measurements;
+use crate::format::error::CaptureError;
+use crate::format::picture_file::{EXPORT, Opened, Source};
+use crate::format::role::Role;
+use crate::format::sequence::Sequence;
+use crate::photographs::order::{Order, Wrong};
+use iltm_picture::statistics::median;
+use iltm_picture::{LightPicture, Picture};
+use iltm_runtime::resample::area::AreaAverage;
+use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, units::Light};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use std::path::Path;
+
+/// Another image explains a photograph if it leaves less than this of what the own one leaves.
+const CLEARLY: f64 = 0.5;
+
+/// A photograph of which its image leaves more than this, of the light's variance, and so many times
+/// what images usually leave, shows none.
+const UNEXPLAINED: (f64, f64) = (0.5, 4.0);
+
+/// Fewer images are compared with too few others to say what is usual.
+const LEAST_IMAGES: usize = 4;
+
+/// What a camera without colours sees of red, green and blue, where nothing tells: luminance of
+/// ITU-R BT.709.
+const GREY: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+/// Smallest eigenvalue of the images' colours, of the largest, from which they tell channels apart.
+const LEAST_COLOUR: f64 = 1e-4;
+
+/// Places along a side of what a camera pixel sees at which a picture is looked at.
+const LOOKS: usize = 3;
+
+/// Adds the images of a sequence to the patterns: their photographs are observed already.
+///
+/// # Errors
+/// A picture's own error; [`CaptureError::Picture`] if it has neither a pixel a cell nor one a
+/// pixel of the projector.
+pub(crate) fn add(
+    folder: &Path,
+    sequence: &Sequence,
+    measurements: &mut Measurements,
+) -> Result<(), CaptureError> {
+    let images = &sequence.images;
+    if images.is_empty() {
+        return Ok(());
+    }
+    let grid = measurements.grid;
+    let projector = measurements.settings.projector.pixels();
+    let places = measurements.places();
+    let pixel = measurements.registration.pixel_in_cells(grid);
+    let mut all = Vec::with_capacity(images.len());
+    for image in images {
+        let shot = &image.shots[0];
+        let path = folder.join(&shot.pattern);
+        let source = Source {
+            path: &path,
+            what: "pattern",
+            line: shot.line,
+        };
+        let picture = read(source, grid, projector)?;
+        let light = LightPicture::decode(&picture, measurements.devices.projector.clone());
+        let size = light.size();
+        let look = |plane: &[f32], place: &Option<[f32; 2]>| match place {
+            // An edge between cells lies anywhere in a pixel.
+            Some(place) if size != FrameSize::of_grid(grid) => {
+                seen_at(plane, size, (*place, pixel), grid)
+            }
+            _ => f32::NAN,
+        };
+        let planes = light.planes().iter().map(|plane| Thrown {
+            cells: DVector::from_vec(cell_means(plane, size, grid)),
+            pixels: places.iter().map(|place| look(plane, place)).collect(),
+        });
+        all.push(planes.collect::<Vec<Thrown>>());
+    }
+    let shares = shares(measurements, &all);
+    let first = measurements.roles.len();
+    for (channel, shares) in measurements.channels.iter_mut().zip(&shares) {
+        let patterns = std::mem::replace(&mut channel.patterns, DMatrix::zeros(0, 0));
+        channel.patterns = patterns.resize_horizontally(first + images.len(), 0.0);
+        for (at, planes) in all.iter().enumerate() {
+            let mut column = channel.patterns.column_mut(first + at);
+            for (plane, share) in planes.iter().zip(shares_of(*shares, planes.len())) {
+                column.axpy(share, &plane.cells, 1.0);
+            }
+        }
+    }
+    for (thrown, shares) in measurements.pixel_light.thrown.iter_mut().zip(&shares) {
+        let of_image = |planes: &Vec<Thrown>| {
+            let mut pixels = vec![0.0; places.len()];
+            for (plane, share) in planes.iter().zip(shares_of(*shares, planes.len())) {
+                for (sum, light) in pixels.iter_mut().zip(&plane.pixels) {
+                    *sum += share as f32 * light;
+                }
+            }
+            pixels
+        };
+        thrown.extend(all.iter().map(of_image));
+    }
+    measurements
+        .roles
+        .extend(images.iter().map(|_| Role::Image));
+    measurements.repeats.extend(images.iter().map(|_| 1));
+    Ok(())
+}
+
+/// What one channel of an image throws.
+struct Thrown {
+    /// On each cell.
+    cells: DVector<f64>,
+    /// On each sampled pixel of the camera.
+    pixels: Vec<f32>,
+}
+
+/// A grey image throws the same in all channels.
+fn shares_of(shares: [f64; 3], planes: usize) -> [f64; 3] {
+    match planes {
+        1 => [1.0, 0.0, 0.0],
+        _ => shares,
+    }
+}
+
+/// How much each of the projector's channels counts in each channel of the measurements, in all 1:
+/// the channel alone where the measurements are the projector's, as they were measured where there is
+/// a ramp; else by the images themselves, as a camera without colours needs it.
+fn shares(measurements: &Measurements, images: &[Vec<Thrown>]) -> Vec<[f64; 3]> {
+    let alone = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let channels = measurements.channels.len();
+    if channels == 3 && measurements.devices.unmixed {
+        return alone.to_vec();
+    }
+    if channels == 3
+        && let Some(mixing) = measurements.devices.mixing()
+    {
+        let of_row = |row: [f64; 3]| row.map(|share| share / row.iter().sum::<f64>());
+        return mixing.matrix.map(of_row).to_vec();
+    }
+    let found = |channel: usize| found_shares(measurements, channel, images);
+    (0..channels)
+        .map(|channel| found(channel).unwrap_or(if channels == 3 { alone[channel] } else { GREY }))
+        .collect()
+}
+
+/// The same of one channel by what differs between a cell and those beside it, to which light
+/// that bounces adds little. `None` where images have no colours that tell channels apart.
+fn found_shares(
+    measurements: &Measurements,
+    channel: usize,
+    images: &[Vec<Thrown>],
+) -> Option<[f64; 3]> {
+    let (rows, cols) = (measurements.grid.rows(), measurements.grid.cols());
+    let observed = &measurements.channels[channel].observations;
+    let first = measurements.roles.len();
+    let white = observed.column(Measurements::WHITE);
+    let usable = |cell: usize| measurements.live[cell] && white[cell] > 0.0;
+    let (mut normal, mut right) = (SMatrix::<f64, 3, 3>::zeros(), SVector::<f64, 3>::zeros());
+    for (at, planes) in images.iter().enumerate() {
+        let [red, green, blue] = planes.as_slice() else {
+            continue;
+        };
+        let light = |cell: usize| observed[(cell, first + at)] / white[cell];
+        for cell in (0..rows * cols).filter(|cell| usable(*cell)) {
+            let beside = [
+                (cell % cols + 1 < cols, cell + 1),
+                (cell / cols + 1 < rows, cell + cols),
+            ];
+            for (_, other) in beside.into_iter().filter(|(in_grid, _)| *in_grid) {
+                if usable(other) {
+                    let step = |plane: &Thrown| plane.cells[cell] - plane.cells[other];
+                    let steps = SVector::from([step(red), step(green), step(blue)]);
+                    normal += steps * steps.transpose();
+                    right += steps * (light(cell) - light(other));
+                }
+            }
+        }
+    }
+    let values = normal.symmetric_eigenvalues();
+    if values.min() < LEAST_COLOUR * values.max() {
+        return None;
+    }
+    let found = normal.try_inverse()? * right;
+    let sum: f64 = found.iter().map(|share| share.max(0.0)).sum();
+    (sum > 0.0).then(|| [0, 1, 2].map(|k: usize| found[k].max(0.0) / sum))
+}
+
+/// Which image each photograph of one shows: by what is left of the cells' light beside what the image
+/// throws there, white's light times the image's, and even light. `None` of fewer than four.
+pub(crate) fn order(measurements: &Measurements) -> Option<Order> {
+    let count = measurements.diagnostics.images;
+    let first = measurements.roles.len() - count;
+    if count < LEAST_IMAGES {
+        return None;
+    }
+    let live = (0..measurements.grid.cells()).filter(|cell| measurements.live[*cell]);
+    let live: Vec<usize> = live.collect();
+    let mut seen = vec![Vec::new(); count];
+    let mut thrown = seen.clone();
+    for channel in &measurements.channels {
+        let white = channel.observations.column(Measurements::WHITE);
+        for at in 0..count {
+            let (light, image) = (
+                channel.observations.column(first + at),
+                channel.patterns.column(first + at),
+            );
+            seen[at].extend(live.iter().map(|cell| light[*cell]));
+            thrown[at].extend(live.iter().map(|cell| white[*cell] * image[*cell]));
+        }
+    }
+    let [seen, thrown] = [seen, thrown].map(|all| {
+        let without_mean = |values: Vec<f64>| {
+            let mut values = DVector::from_vec(values);
+            values.add_scalar_mut(-values.mean());
+            values
+        };
+        all.into_iter().map(without_mean).collect::<Vec<_>>()
+    });
+    let left = |photo: usize, image: usize| {
+        let (photo, image) = (&seen[photo], &thrown[image]);
+        let both = photo.dot(image);
+        // An even image explains nothing, and even light needs no explanation.
+        let along = both.max(0.0) * both / image.norm_squared().max(f64::MIN_POSITIVE);
+        1.0 - along / photo.norm_squared().max(f64::MIN_POSITIVE)
+    };
+    let own: Vec<f64> = (0..count).map(|at| left(at, at)).collect();
+    let usual = median(own.clone()).unwrap_or(0.0);
+    let none = UNEXPLAINED.0.max(UNEXPLAINED.1 * usual);
+    let wrong = (0..count).filter_map(|shot| {
+        let (shows, least) = (0..count)
+            .map(|image| (image, left(shot, image)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        if least < CLEARLY * own[shot] && least < none {
+            let shows = Some(shows);
+            return Some(Wrong { shot, shows });
+        }
+        (own[shot] > none).then_some(Wrong { shot, shows: None })
+    });
+    Some(Order {
+        wrong: wrong.collect(),
+        // Half of the variance is as far as two random patterns are.
+        distances: own.iter().map(|left| 0.5 * left).collect(),
+        none: 0.5 * none,
+    })
+}
+
+/// Reads a picture of one pixel a cell, or of the projector's size, of which the border is cut
+/// away; where that size is not stated, of any that has a pixel a cell or more.
+fn read(
+    source: Source<'_>,
+    grid: Grid,
+    projector: Option<ProjectorPixels>,
+) -> Result<Picture, CaptureError> {
+    let refuse = |reason: String, next_step| CaptureError::Picture {
+        path: source.path.to_owned(),
+        reason,
+        next_step,
+    };
+    let opened = Opened::open(source)?;
+    let (width, height) = opened.size();
+    let samples = opened.decode()?.codes();
+    let samples = samples.ok_or_else(|| {
+        refuse(
+            "it holds floating point numbers and no codes".to_owned(),
+            EXPORT,
+        )
+    })?;
+    let side = |side: u32| u16::try_from(side).unwrap_or(0);
+    let picture = FrameSize::new(side(width), side(height))
+        .and_then(|size| Picture::new(size, samples))
+        .filter(|picture| AreaAverage::new(grid, picture.size()).is_some());
+    let fits = match (picture, projector) {
+        (Some(picture), _) if picture.size() == FrameSize::of_grid(grid) => Some(picture),
+        (Some(picture), Some(projector)) if picture.size() == projector.size() => picture
+            .without_border(projector.border())
+            .filter(|inner| AreaAverage::new(grid, inner.size()).is_some()),
+        (picture, None) => picture,
+        _ => None,
+    };
+    fits.ok_or_else(|| {
+        let sizes = projector.map_or_else(
+            || format!("an image has {} x {} or more", grid.cols(), grid.rows()),
+            |projector| {
+                format!(
+                    "an image has {} x {}, as the projector has, or {} x {}, one a cell",
+                    projector.size().width(),
+                    projector.size().height(),
+                    grid.cols(),
+                    grid.rows()
+                )
+            },
+        );
+        refuse(
+            format!("it has {width} x {height} pixels; {sizes}"),
+            "Name the picture as it was sent to the projector.",
+        )
+    })
+}
+
+/// Mean light over each cell, by the device's own rule.
+fn cell_means(plane: &[f32], size: FrameSize, grid: Grid) -> Vec<f64> {
+    let mut sums = vec![0_u64; grid.cells()];
+    let Some(average) = AreaAverage::new(grid, size) else {
+        return vec![0.0; grid.cells()];
+    };
+    for (y, row) in plane.chunks_exact(size.width()).enumerate() {
+        let light: Vec<Light> = row.iter().map(|v| Light::saturating_from_num(*v)).collect();
+        average.add_row(y, &light, &mut sums);
+    }
+    let mean = |sum: &u64| average.mean(*sum).to_num();
+    sums.iter().map(mean).collect()
+}
+
+/// Light of a picture that a camera pixel sees: the mean over `pixel`, in cells, around a place.
+fn seen_at(
+    plane: &[f32],
+    size: FrameSize,
+    ([across, down], pixel): ([f32; 2], [f64; 2]),
+    grid: Grid,
+) -> f32 {
+    let sides = [(size.width(), grid.cols()), (size.height(), grid.rows())];
+    let along = |axis: usize, at: f32| {
+        let (pixels, cells) = sides[axis];
+        std::array::from_fn::<_, LOOKS, _>(|k| {
+            let step = (k as f32 + 0.5) / LOOKS as f32 - 0.5;
+            let at = (at + step * pixel[axis] as f32) * pixels as f32 / cells as f32 - 0.5;
+            let at = at.clamp(0.0, (pixels - 1) as f32);
+            let before = at as usize;
+            (before, (before + 1).min(pixels - 1), at - before as f32)
+        })
+    };
+    let (columns, rows) = (along(0, across), along(1, down));
+    let mut sum = 0.0;
+    for (top, bottom, v) in rows {
+        for (left, right, u) in columns {
+            let value = |y: usize, x: usize| plane[y * size.width() + x];
+            let of_row = |y: usize| (1.0 - u) * value(y, left) + u * value(y, right);
+            sum += (1.0 - v) * of_row(top) + v * of_row(bottom);
+        }
+    }
+    sum / (LOOKS * LOOKS) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_of_cells_and_pixels_is_the_mean_over_them() {
+        let grid = Grid::new(2, 3).unwrap();
+        // Cells of two and a half pixels by two.
+        let size = FrameSize::new(8, 4).unwrap();
+        let ramp = |x: usize, y: usize| (x as f32 + 0.5) / 16.0 + (y as f32 + 0.5) / 16.0;
+        let plane: Vec<f32> = (0..32).map(|at| ramp(at % 8, at / 8)).collect();
+        for (cell, mean) in cell_means(&plane, size, grid).into_iter().enumerate() {
+            let (row, col) = (cell / 3, cell % 3);
+            let centre = (8.0 * (col as f64 + 0.5) / 3.0) / 16.0 + (2.0 * row as f64 + 1.0) / 16.0;
+            // A border within a pixel gives each side the pixel's mean.
+            assert!((mean - centre).abs() < 0.02, "{cell}: {mean} {centre}");
+        }
+        for place in [[0.9, 1.1], [1.7, 0.6], [2.2, 1.5]] {
+            let seen = seen_at(&plane, size, (place, [0.3, 0.2]), grid);
+            let there = place[0] * 8.0 / 3.0 / 16.0 + place[1] * 2.0 / 16.0;
+            assert!((seen - there).abs() < 1e-5, "{place:?}: {seen} {there}");
+        }
+        let cells: Vec<f32> = (0..6).map(|cell| cell as f32 / 8.0).collect();
+        let means = cell_means(&cells, FrameSize::of_grid(grid), grid);
+        assert!((0..6).all(|cell| (means[cell] - f64::from(cells[cell])).abs() < 1e-4));
+    }
+
+    #[test]
+    fn a_picture_is_taken_in_the_projectors_size_or_the_grids() {
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Grid::new(2, 3).unwrap();
+        let projector = ProjectorPixels::new(FrameSize::new(14, 10).unwrap(), 1);
+        let path = folder.path().join("p.png");
+        let read_of = |width: u32, height: u32, projector| {
+            image::RgbImage::new(width, height).save(&path).unwrap();
+            let what = "pattern";
+            let source = Source {
+                path: &path,
+                what,
+                line: 2,
+            };
+            read(source, grid, projector)
+                .map(|picture| (picture.size().width(), picture.size().height()))
+        };
+        assert_eq!(read_of(14, 10, projector).unwrap(), (12, 8));
+        assert_eq!(read_of(3, 2, projector).unwrap(), (3, 2));
+        assert_eq!(read_of(9, 7, None).unwrap(), (9, 7));
+        for (projector, says) in [
+            (
+                projector,
+                "it has 2 x 9 pixels; an image has 14 x 10, as the projector has, or 3 x 2",
+            ),
+            (None, "it has 2 x 9 pixels; an image has 3 x 2 or more"),
+        ] {
+            let error = read_of(2, 9, projector).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+}

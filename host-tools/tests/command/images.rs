@@ -1,0 +1,169 @@
+//! Sessions with pictures of any content: `iltm patterns --images` and what follows.
+
+use super::simulate::CORNER;
+use super::user::{User, contains};
+use std::fs;
+
+/// The small scene with more cells and a larger camera, its walls of this colour.
+fn scene(albedo: &str) -> String {
+    let mut scene = CORNER.to_owned();
+    for (from, to) in [
+        (
+            "rows = 4\ncols = 6",
+            "rows = 8\ncols = 12\nresponse = \"srgb\"",
+        ),
+        ("width = 60\nheight = 44", "width = 160\nheight = 116"),
+        ("albedo = 0.8", albedo),
+    ] {
+        assert!(scene.contains(from), "{from}");
+        scene = scene.replace(from, to);
+    }
+    scene
+}
+
+const COLOURED: &str = "albedo = [0.85, 0.7, 0.5]";
+
+/// A picture of a few soft lights of different colours, other ones for each number.
+fn picture(number: u64) -> Vec<u8> {
+    let (width, height) = (120, 67);
+    let mut dice = fastrand::Rng::with_seed(number);
+    let mut one = |most: f64| most * dice.f64();
+    let lights: Vec<[f64; 6]> = (0..6)
+        .map(|_| {
+            [
+                one(120.0),
+                one(67.0),
+                6.0 + one(30.0),
+                one(255.0),
+                one(255.0),
+                one(255.0),
+            ]
+        })
+        .collect();
+    let mut bytes = format!("P6\n{width} {height}\n255\n").into_bytes();
+    for at in 0..width * height {
+        let (x, y) = (f64::from(at % width), f64::from(at / width));
+        for channel in 0..3 {
+            let light = lights.iter().map(|light| {
+                let far = (x - light[0]).hypot(y - light[1]) / light[2];
+                light[3 + channel] * (-far * far).exp()
+            });
+            bytes.push(light.sum::<f64>().min(255.0) as u8);
+        }
+    }
+    bytes
+}
+
+/// With a folder of pictures and the photographs of a session that shows some.
+fn photographed(scene: &str, images: u64, session: &str) -> User {
+    let user = User::new();
+    user.write("scene.toml", scene);
+    fs::create_dir(user.path("stills")).expect("a folder");
+    for number in 0..images {
+        user.write(&format!("stills/{number}.ppm"), picture(number));
+    }
+    let line = "patterns -o c --rows 8 --cols 12 --projector 192x128";
+    user.says(&format!("{line} {session}"));
+    user.says("simulate scene.toml --photograph c");
+    user
+}
+
+/// Tables of stills in colour and of random patterns are equally good, and say the same of a
+/// picture that neither has seen.
+fn stills_teach(scene: &str, session: &str) {
+    let user = photographed(scene, 40, &format!("--photos 0 --images stills {session}"));
+    let said = user.says("solve c -o stills.iltm --verbose");
+    contains(&said, &["14 Gray code, 40 images"]);
+    fs::remove_dir_all(user.path("c")).expect("a folder");
+    let line = "patterns -o c --rows 8 --cols 12 --projector 192x128 --photos 40";
+    user.says(&format!("{line} {session}"));
+    user.says("simulate scene.toml --photograph c");
+    user.says("solve c -o random.iltm");
+    let [stills, random] = ["stills", "random"].map(|table| {
+        let inspected = user.json(&format!("inspect {table}.iltm"));
+        let error = &inspected["provenance"]["predicted_error"]["compensated"];
+        error.as_f64().unwrap_or_else(|| panic!("{inspected}"))
+    });
+    assert!(stills < 1.5 * random, "{stills} {random}");
+    let wanted = image::load_from_memory(&picture(1000)).expect("a picture");
+    wanted.save(user.path("wanted.png")).expect("written");
+    let made = ["stills", "random"].map(|table| {
+        let out = format!("{table}.png");
+        user.says(&format!(
+            "compensate {table}.iltm wanted.png -o {out} --fit stretch"
+        ));
+        user.picture(&out).into_rgb8().into_raw()
+    });
+    let pairs = made[0].iter().zip(&made[1]);
+    let square = pairs.map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+    let off = (square.sum::<f64>() / made[0].len() as f64).sqrt();
+    assert!(off < 3.0, "{off}");
+}
+
+#[test]
+fn stills_teach_a_table_as_random_patterns_do() {
+    stills_teach(&scene(COLOURED), "");
+}
+
+#[test]
+fn stills_in_colour_teach_a_camera_that_sees_none() {
+    stills_teach(&scene("albedo = 0.8"), "--no-calibration");
+}
+
+#[test]
+fn photographs_of_stills_in_the_wrong_places_are_named() {
+    let user = photographed(
+        &scene(COLOURED),
+        12,
+        "--photos 20 --images stills --no-calibration --no-dense",
+    );
+    user.says("check c");
+    let list = user.text("c/capture.csv");
+    let photos: Vec<String> = (list.lines().filter(|line| line.contains(",image,")))
+        .map(|line| line.rsplit(',').next().expect("four columns").to_owned())
+        .collect();
+    assert_eq!(photos.len(), 12);
+    let place = |photo: &String| user.path(&format!("c/{photo}"));
+    fs::rename(place(&photos[3]), user.path("a.png")).expect("renamed");
+    fs::rename(place(&photos[9]), place(&photos[3])).expect("renamed");
+    fs::rename(user.path("a.png"), place(&photos[9])).expect("renamed");
+    let refused = user.run("check c");
+    assert_eq!(refused.code, 5, "{}", refused.out);
+    let exchanged = format!("{} and {} are exchanged", photos[3], photos[9]);
+    contains(&refused.out, &[&exchanged]);
+}
+
+#[test]
+fn folders_without_stills_and_pictures_of_other_sizes_are_refused() {
+    let user = User::new();
+    let line = "patterns -o c --rows 8 --cols 12 --projector 192x128 --photos 0 --images stills";
+    let gone = user.run(line);
+    fs::create_dir(user.path("stills")).expect("a folder");
+    user.write("stills/notes.txt", "no picture");
+    let none = user.run(line);
+    user.write("stills/1.ppm", picture(1));
+    let few = user.run(line);
+    user.write("stills/2.ppm", "P6 no more than this");
+    let broken = user.run(line);
+    insta::assert_snapshot!(
+        [gone, none, few, broken]
+            .map(|refused| refused.with_code())
+            .concat()
+    );
+    assert_eq!(user.names(""), ["stills"]);
+    // A picture that was scaled after it was shown.
+    let user = photographed(
+        &scene(COLOURED),
+        12,
+        "--photos 0 --images stills --no-calibration --no-dense",
+    );
+    let list = user.text("c/capture.csv");
+    let line = (list.lines().find(|line| line.contains(",image,"))).expect("an image");
+    let slide = line.split(',').nth(2).expect("four columns");
+    user.write(&format!("c/{slide}"), picture(1));
+    let refused = user.run("check c");
+    contains(
+        &refused.said,
+        &[slide, "it has 120 x 67 pixels; an image has 192 x 128"],
+    );
+}
