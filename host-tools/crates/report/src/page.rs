@@ -132,7 +132,8 @@ impl Report<'_> {
                     }
                     p {
                         (self.learned.measurements.diagnostics.photographs) " photographs, under white and black, "
-                        (counts.gray_code) " under stripes (Gray code) and " (counts.bernoulli) " under random patterns, "
+                        (counts.gray_code) " under stripes (Gray code), "
+                        @if counts.bernoulli > 0 { (counts.bernoulli) " under random patterns, " }
                         @if counts.images > 0 { (counts.images) " under images, " }
                         "are what the scene's inverse light transport was learned from: what to project so that, "
                         "after all bounces, the wall shows the wanted image."

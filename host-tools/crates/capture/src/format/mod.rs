@@ -6,6 +6,7 @@
 //! | `stripes.csv` | the same of stripes finer than the cells | `stripe_role` |
 //! | `capture.toml` | what photographs cannot say about themselves | `settings` |
 //! | `patterns/*.png` | which cells are lit | `pattern`, `pattern_set`, `code` |
+//! | a folder of stills | pictures of any size, as images to show | `still` |
 //! | `photos/*` | PNG, TIFF, JPEG, `OpenEXR` or netpbm | `photo_files`, `picture_file` |
 //! | `reference_T.npy` | the transport itself, where it is known | `reference` |
 //!
