@@ -37,7 +37,8 @@ const STAND_INS: [(&str, &str); 7] = [
 ];
 
 /// Writes what it is given, if that is a Y4M file, or else a film, in the aspect that it is
-/// asked for; of a picture the first frame. To its last argument, which may be a pipe.
+/// asked for; of a picture the first frame, of numbered ones forty others. To its last argument,
+/// which may be a pipe.
 const FFMPEG: &str = "films=${0%/*}
 for made; do [ \"$last\" = -i ] && input=$made; last=$made; done
 case \"$input\" in
@@ -47,6 +48,7 @@ case \"$input\" in
 esac
 case \"$made\" in
 -) exec cat \"$film\";;
+*%02d.png) exec cp \"$films/frames/\"*.png \"${made%/*}\";;
 *.png) exec cp \"$films/still.png\" \"$made\";;
 *) exec cp \"$film\" \"$made\";;
 esac";
@@ -120,6 +122,7 @@ impl Follower {
         fs::write(programs.join("film.y4m"), video(3, (320, 180))).expect("written");
         fs::write(programs.join("wide.y4m"), video(3, (320, 200))).expect("written");
         still(&programs.join("still.png"), (320, 200));
+        frames(&programs.join("frames"));
         Self {
             place,
             clone,
@@ -390,6 +393,17 @@ pub(crate) fn video(frames: u8, (width, height): (usize, usize)) -> Vec<u8> {
         video.extend(std::iter::repeat_n(128, width * height / 2));
     }
     video
+}
+
+/// Forty pictures that differ from each other.
+fn frames(folder: &Path) {
+    fs::create_dir(folder).expect("made");
+    let mut dice = fastrand::Rng::with_seed(1);
+    for number in 0..40 {
+        let picture = image::GrayImage::from_fn(16, 10, |_, _| image::Luma([dice.u8(..)]));
+        let path = folder.join(format!("{number:02}.png"));
+        picture.save(path).expect("written");
+    }
 }
 
 /// A grey picture of this size.

@@ -262,7 +262,7 @@ fn the_first_bernoulli_photographs_are_used_and_no_more_than_there_are() {
     );
     let error = with(9).unwrap_err().to_string();
     assert!(
-        error.contains("9 Bernoulli photographs used, a solve needs at least 10"),
+        error.contains("9 Bernoulli photographs and images used, a solve needs at least 10"),
         "{error}"
     );
 }
