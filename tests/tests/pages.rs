@@ -182,7 +182,7 @@ fn roles_and_settings_on_the_page_of_captures_are_those_that_are_read() {
             .collect()
     };
     let (roles, calibration) = (names("capture.csv"), names("calibration.csv"));
-    assert_eq!((roles.len(), calibration.len()), (7, 5));
+    assert_eq!((roles.len(), calibration.len()), (8, 5));
     for name in roles {
         assert!(Role::from_name(&name).is_some(), "{name}");
     }
