@@ -111,6 +111,38 @@ fn stills_in_colour_teach_a_camera_that_sees_none() {
 }
 
 #[test]
+fn stills_that_are_much_alike_end_in_a_table_that_says_how_good_it_is() {
+    let user = User::new();
+    user.write("scene.toml", scene("albedo = 0.8"));
+    fs::create_dir(user.path("stills")).expect("a folder");
+    let still = image::load_from_memory(&picture(1)).expect("a picture");
+    for number in 1..=24 {
+        // A fade, and even pictures, of which a camera without colours sees a share of each.
+        let mut still = still.to_rgb8();
+        for pixel in still.pixels_mut() {
+            for (channel, code) in pixel.0.iter_mut().enumerate() {
+                *code = match number % 2 {
+                    0 => (u32::from(*code) * number / 24) as u8,
+                    _ => (40 + 37 * (number as usize * (channel + 2) % 6)) as u8,
+                };
+            }
+        }
+        let path = user.path(&format!("stills/{number}.png"));
+        still.save(path).expect("written");
+    }
+    let line = "--photos 0 --images stills --no-calibration --no-dense";
+    user.says(&format!(
+        "patterns -o c --rows 8 --cols 12 --projector 192x128 {line}"
+    ));
+    user.says("simulate scene.toml --photograph c");
+    user.says("check c");
+    let table = user.json("solve c -o t.iltm");
+    let error = table["predicted_error"]["compensated"].as_f64();
+    let before = table["predicted_error"]["uncompensated"].as_f64();
+    assert!(error > Some(0.0) && error < before, "{table}");
+}
+
+#[test]
 fn photographs_of_stills_in_the_wrong_places_are_named() {
     let user = photographed(
         &scene(COLOURED),

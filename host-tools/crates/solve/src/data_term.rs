@@ -31,6 +31,10 @@ use nalgebra::{DMatrix, DVector};
 /// Eigenvalues below this part of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
+/// Least natural size of `rho`, of the largest eigenvalue: a third of what photographs of random
+/// patterns and of natural images have.
+const LEAST_SCALE: f64 = 1e-4;
+
 /// Photographs of one solve with what does not depend on `rho`.
 #[derive(Debug)]
 pub(super) struct DataTerm {
@@ -128,13 +132,15 @@ impl DataTerm {
     }
 
     /// Median of the non-zero eigenvalues for a weight of 1: the natural size of
-    /// `rho`.
+    /// `rho`. Pictures that are much alike leave most of them to the noise; a `rho` so
+    /// small lets gains grow beyond all numbers.
     pub(super) fn scale(&self) -> f64 {
         let mut values: Vec<f64> = self.values.iter().copied().collect();
         values.sort_by(f64::total_cmp);
-        values
-            .get(values.len() / 2)
-            .map_or(1.0, |value| value / self.weight)
+        let (middle, largest) = (values.get(values.len() / 2), values.last());
+        middle.zip(largest).map_or(1.0, |(middle, largest)| {
+            middle.max(LEAST_SCALE * largest) / self.weight
+        })
     }
 
     /// Square of the norm of the gains that ignore all interreflection: what an

@@ -37,7 +37,8 @@ impl Split {
     /// One or more splits; no photograph is held out twice.
     pub(super) fn all(prepared: &Prepared) -> Vec<Self> {
         let groups = groups(prepared);
-        let is_random = |group: &&Vec<usize>| group.iter().any(|k| prepared.roles[*k].is_content());
+        let is_random =
+            |group: &&Vec<usize>| group.iter().any(|k| prepared.roles[*k] == Role::Bernoulli);
         let random: Vec<&Vec<usize>> = groups.iter().filter(is_random).collect();
         if random.len() >= ENOUGH {
             let held_out = random.into_iter().skip(EVERY / 2).step_by(EVERY);

@@ -6,6 +6,7 @@
 //! has none, and no gain would make any.
 
 use super::observed::{Observed, ObservedChannel};
+use iltm_capture::Role;
 use nalgebra::{DMatrix, DVector};
 
 /// A cell has to give back this much of a typical cell's own light: a step of an
@@ -75,7 +76,7 @@ fn photographs(observed: &Observed<'_>) -> Vec<usize> {
     let all = 0..observed.roles.len();
     let random: Vec<usize> = all
         .clone()
-        .filter(|k| observed.roles[*k].is_content())
+        .filter(|k| observed.roles[*k] == Role::Bernoulli)
         .collect();
     if random.len() >= RANDOM {
         random

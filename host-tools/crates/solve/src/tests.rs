@@ -362,6 +362,49 @@ fn a_flat_scene_gets_gains_alone_and_they_are_its_own() {
     }
 }
 
+/// White, then pictures: all light of `offset` with the rest of one drawing at random.
+fn pictures(scene: &Corner, size: (u16, u16), count: usize, offset: f64) -> Capture {
+    let mut capture = Capture::new(scene, size, count);
+    for k in 1..=count {
+        capture.roles[k] = Role::Image;
+    }
+    let mut random = super::test_scene::Random(3);
+    for lit in capture.patterns.columns_mut(1, count).iter_mut() {
+        *lit = offset + (1.0 - offset) * random.uniform();
+    }
+    capture.light = vec![scene.photograph(&capture.patterns)];
+    capture
+}
+
+#[test]
+fn a_bright_picture_is_not_white() {
+    let scene = Corner::new(6, 1, textured);
+    let mut capture = pictures(&scene, (6, 1), 40, 0.55);
+    add_noise(&mut capture.light[0], 1e-2);
+    let (_, report) = capture.solved();
+    let found = gain_only(&capture.observed(), &report).unwrap();
+    for (found, wanted) in found.channels[0].gain.iter().zip(scene.gain.iter()) {
+        // One photograph of white, with noise of 1 %.
+        assert!((found / wanted - 1.0).abs() < 0.03, "{found} {wanted}");
+    }
+}
+
+#[test]
+fn pictures_are_all_held_out_in_turn_and_equal_ones_together() {
+    let scene = corner(6, 8);
+    let mut capture = pictures(&scene, (6, 8), 20, 0.0);
+    let (_, report) = capture.solved();
+    assert_eq!(report.photographs.held_out, 20);
+    let again = capture.patterns.columns(1, 10).into_owned();
+    capture.patterns.columns_mut(11, 10).copy_from(&again);
+    capture.light = vec![scene.photograph(&capture.patterns)];
+    add_noise(&mut capture.light[0], 1e-3);
+    let (_, twice) = capture.solved();
+    assert_eq!(twice.photographs.held_out, 20);
+    // Ten pictures tell less of 48 cells than twenty, and the prediction says so.
+    assert!(twice.prediction.compensated > 1.5 * report.prediction.compensated);
+}
+
 #[test]
 fn a_few_photographs_are_all_held_out_in_turn() {
     let scene = corner(6, 8);

@@ -11,7 +11,7 @@ use iltm_picture::statistics::median;
 use iltm_picture::{LightPicture, Picture};
 use iltm_runtime::resample::area::AreaAverage;
 use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, units::Light};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::path::Path;
 
 /// Another image explains a photograph if it leaves less than this of what the own one leaves.
@@ -145,46 +145,74 @@ fn shares(measurements: &Measurements, images: &[Vec<Thrown>]) -> Vec<[f64; 3]> 
         .collect()
 }
 
-/// The same of one channel by what differs between a cell and those beside it, to which light
-/// that bounces adds little. `None` where images have no colours that tell channels apart.
+/// The same of one channel: by what differs between a cell and those beside it, to which light
+/// that bounces adds little, or where images are even, by all of their light. `None` where they
+/// have no colours that tell channels apart.
 fn found_shares(
     measurements: &Measurements,
     channel: usize,
     images: &[Vec<Thrown>],
 ) -> Option<[f64; 3]> {
-    let (rows, cols) = (measurements.grid.rows(), measurements.grid.cols());
+    let grid = measurements.grid;
     let observed = &measurements.channels[channel].observations;
     let first = measurements.roles.len();
     let white = observed.column(Measurements::WHITE);
-    let usable = |cell: usize| measurements.live[cell] && white[cell] > 0.0;
-    let (mut normal, mut right) = (SMatrix::<f64, 3, 3>::zeros(), SVector::<f64, 3>::zeros());
+    let usable = |cell: &usize| measurements.live[*cell] && white[*cell] > 0.0;
+    let cells: Vec<usize> = (0..grid.cells()).filter(usable).collect();
+    let (mut steps, mut levels) = (ShareFit::default(), ShareFit::default());
     for (at, planes) in images.iter().enumerate() {
         let [red, green, blue] = planes.as_slice() else {
             continue;
         };
-        let light = |cell: usize| observed[(cell, first + at)] / white[cell];
-        for cell in (0..rows * cols).filter(|cell| usable(*cell)) {
+        let light = observed.column(first + at);
+        let thrown = |cell: usize| {
+            let of = |plane: &Thrown| plane.cells[cell];
+            Vector3::new(of(red), of(green), of(blue))
+        };
+        let (mut all_thrown, mut all_light) = (Vector3::zeros(), 0.0);
+        for &cell in &cells {
+            all_thrown += thrown(cell) * white[cell];
+            all_light += light[cell];
             let beside = [
-                (cell % cols + 1 < cols, cell + 1),
-                (cell / cols + 1 < rows, cell + cols),
+                (cell % grid.cols() + 1 < grid.cols(), cell + 1),
+                (cell / grid.cols() + 1 < grid.rows(), cell + grid.cols()),
             ];
-            for (_, other) in beside.into_iter().filter(|(in_grid, _)| *in_grid) {
-                if usable(other) {
-                    let step = |plane: &Thrown| plane.cells[cell] - plane.cells[other];
-                    let steps = SVector::from([step(red), step(green), step(blue)]);
-                    normal += steps * steps.transpose();
-                    right += steps * (light(cell) - light(other));
+            for (within, other) in beside {
+                if within && usable(&other) {
+                    // Dark cells are noisy.
+                    let weight = white[cell].min(white[other]);
+                    let step = light[cell] / white[cell] - light[other] / white[other];
+                    steps.add((thrown(cell) - thrown(other)) * weight, step * weight);
                 }
             }
         }
+        levels.add(all_thrown, all_light);
     }
-    let values = normal.symmetric_eigenvalues();
-    if values.min() < LEAST_COLOUR * values.max() {
-        return None;
+    steps.shares().or_else(|| levels.shares())
+}
+
+/// Least squares of the shares.
+#[derive(Default)]
+struct ShareFit {
+    normal: Matrix3<f64>,
+    right: Vector3<f64>,
+}
+
+impl ShareFit {
+    fn add(&mut self, thrown: Vector3<f64>, light: f64) {
+        self.normal += thrown * thrown.transpose();
+        self.right += thrown * light;
     }
-    let found = normal.try_inverse()? * right;
-    let sum: f64 = found.iter().map(|share| share.max(0.0)).sum();
-    (sum > 0.0).then(|| [0, 1, 2].map(|k: usize| found[k].max(0.0) / sum))
+
+    /// None is negative, and all together are 1.
+    fn shares(&self) -> Option<[f64; 3]> {
+        let values = self.normal.symmetric_eigenvalues();
+        // Written so that no colour at all is none as well.
+        let told = values.min() > LEAST_COLOUR * values.max();
+        let found = told.then(|| self.normal.try_inverse()).flatten()? * self.right;
+        let sum: f64 = found.iter().map(|share| share.max(0.0)).sum();
+        (sum > 0.0).then(|| [0, 1, 2].map(|k: usize| found[k].max(0.0) / sum))
+    }
 }
 
 /// Which image each photograph of one shows: by what is left of the cells' light beside what the image
