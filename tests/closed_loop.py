@@ -432,6 +432,18 @@ def make_session(folder, kind, options):
     subprocess.run([options.iltm, "check", folder], check=True)
 
 
+def without_code(capture, folder):
+    """The same session without photographs of the Gray code and of stripes."""
+    folder.mkdir()
+    for part in capture.iterdir():
+        if part.name not in ("capture.csv", "stripes.csv"):
+            (folder / part.name).symlink_to(part.resolve())
+    lines = (capture / "capture.csv").read_text().splitlines(keepends=True)
+    kept = [line for line in lines if not line.split(",")[1].startswith(("column-", "row-"))]
+    (folder / "capture.csv").write_text("".join(kept))
+    return folder
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("capture", type=pathlib.Path, help="the folder; with --session it is made if there is none")
@@ -439,6 +451,8 @@ def main():
     parser.add_argument("--session", choices=SESSIONS, help="photographs of a whole session, made here")
     parser.add_argument("--photos", type=int, default=60, help="Bernoulli photographs of a session")
     parser.add_argument("--images", type=int, default=0, help="images of a session that is made")
+    parser.add_argument("--no-code", action="store_true",
+                        help="learn from white, black and pictures alone, without Gray code and stripes")
     parser.add_argument("--rows", type=int, help="rows of cells of a session that is made")
     parser.add_argument("--cols", type=int, help="columns of them")
     parser.add_argument("--samples", type=int, default=512, help="paths a pixel; of a session's photographs, 192 do")
@@ -458,7 +472,8 @@ def main():
         scratch = pathlib.Path(scratch)
         table = options.table or scratch / "table.iltm"
         if not options.table:
-            subprocess.run([options.iltm, "solve", options.capture, "-o", table, *shlex.split(options.solve)], check=True)
+            learned = without_code(options.capture, scratch / "capture") if options.no_code else options.capture
+            subprocess.run([options.iltm, "solve", learned, "-o", table, *shlex.split(options.solve)], check=True)
 
         def compensate(image, arguments):
             write(scratch / "wanted.png", image)

@@ -117,6 +117,7 @@ fn words(map: &ProjectorMap) -> String {
     let from = match map.source {
         MapSource::Waves => "from fine stripes".to_owned(),
         MapSource::Code => "from the Gray code".to_owned(),
+        MapSource::Images => "from the photographs of images".to_owned(),
         MapSource::Cells => "from the cells alone, since there are no finer stripes".to_owned(),
     };
     format!(

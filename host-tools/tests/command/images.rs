@@ -23,7 +23,8 @@ fn scene(albedo: &str) -> String {
 
 const COLOURED: &str = "albedo = [0.85, 0.7, 0.5]";
 
-/// A picture of a few soft lights of different colours, other ones for each number.
+/// A picture of a few lights of different colours, half of them soft and half with an edge, other ones
+/// for each number.
 fn picture(number: u64) -> Vec<u8> {
     let (width, height) = (120, 67);
     let mut dice = fastrand::Rng::with_seed(number);
@@ -44,9 +45,15 @@ fn picture(number: u64) -> Vec<u8> {
     for at in 0..width * height {
         let (x, y) = (f64::from(at % width), f64::from(at / width));
         for channel in 0..3 {
-            let light = lights.iter().map(|light| {
+            let light = lights.iter().enumerate().map(|(at, light)| {
                 let far = (x - light[0]).hypot(y - light[1]) / light[2];
-                light[3 + channel] * (-far * far).exp()
+                let sharp = if far < 1.0 { 0.5 } else { 0.0 };
+                let shape = if at % 2 == 0 {
+                    sharp
+                } else {
+                    (-far * far).exp()
+                };
+                light[3 + channel] * shape
             });
             bytes.push(light.sum::<f64>().min(255.0) as u8);
         }
@@ -198,4 +205,113 @@ fn folders_without_stills_and_pictures_of_other_sizes_are_refused() {
         &refused.said,
         &[slide, "it has 120 x 67 pixels; an image has 192 x 128"],
     );
+}
+
+/// Takes the lines of these roles out of a session's list.
+fn without(user: &User, roles: &[&str]) {
+    let list = user.text("c/capture.csv");
+    let kept = list.lines().filter(|line| {
+        let role = line.split(',').nth(1).unwrap_or_default();
+        !roles.iter().any(|wanted| role.starts_with(wanted))
+    });
+    let kept: Vec<&str> = kept.collect();
+    user.write("c/capture.csv", kept.join("\n") + "\n");
+}
+
+/// Where each camera pixel looks, by the capture's map.
+fn map(user: &User) -> Vec<[f32; 2]> {
+    user.says("check c --map map.exr");
+    let map = image::open(user.path("map.exr"))
+        .expect("a map")
+        .into_rgb32f();
+    map.pixels().map(|pixel| [pixel[0], pixel[1]]).collect()
+}
+
+#[test]
+fn stills_alone_say_where_each_pixel_looks() {
+    let user = photographed(&scene(COLOURED), 40, "--photos 0 --images stills");
+    let error = |user: &User| {
+        let table = user.json("solve c -o t.iltm");
+        table["predicted_error"]["compensated"]
+            .as_f64()
+            .expect("a prediction")
+    };
+    let (by_stripes, all) = (map(&user), error(&user));
+    without(&user, &["column", "row"]);
+    fs::remove_file(user.path("c/stripes.csv")).expect("removed");
+    let said = user.says("check c --map map.npy");
+    contains(
+        &said,
+        &[
+            "from the photographs of images",
+            "photographs show their patterns",
+        ],
+    );
+    let by_stills = map(&user);
+    let known = |at: &[f32; 2]| !at[0].is_nan();
+    let pairs = by_stripes.iter().zip(&by_stills);
+    let both = pairs.filter(|(a, b)| known(a) && known(b));
+    let mut off: Vec<f32> = both
+        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .collect();
+    let wanted = by_stripes.iter().filter(|at| known(at)).count();
+    off.sort_by(f32::total_cmp);
+    let (middle, most) = (off[off.len() / 2], off[off.len() * 95 / 100]);
+    // Half of the lights have no edges, and a camera pixel sees more than one of the projector's.
+    assert!(off.len() * 100 > 80 * wanted, "{} of {wanted}", off.len());
+    assert!(middle < 0.5 && most < 3.0, "{middle} {most}");
+    assert!(error(&user) < 1.5 * all);
+}
+
+#[test]
+fn few_pictures_without_a_gray_code_are_refused() {
+    let user = photographed(
+        &scene(COLOURED),
+        19,
+        "--photos 40 --images stills --no-calibration --no-dense",
+    );
+    without(&user, &["column", "row"]);
+    let said = user.fails(4, "check c");
+    contains(
+        &said,
+        &[
+            "there is no Gray code of the columns",
+            "20 images are needed",
+        ],
+    );
+}
+
+#[test]
+fn stills_without_a_gray_code_in_the_wrong_places_are_named() {
+    let user = photographed(
+        &scene(COLOURED),
+        24,
+        "--photos 0 --images stills --no-calibration --no-dense",
+    );
+    without(&user, &["column", "row"]);
+    user.says("check c");
+    let list = user.text("c/capture.csv");
+    let lines: Vec<&str> = list
+        .lines()
+        .filter(|line| line.contains(",image,"))
+        .collect();
+    let photo = |at: usize| {
+        user.path("c")
+            .join(lines[at].rsplit(',').next().expect("a photograph"))
+    };
+    fs::rename(photo(3), user.path("a.png")).expect("renamed");
+    fs::rename(photo(9), photo(3)).expect("renamed");
+    fs::rename(user.path("a.png"), photo(9)).expect("renamed");
+    contains(&user.run("check c").out, &["are exchanged"]);
+}
+
+#[test]
+fn stills_tell_the_projectors_response_where_nothing_states_it() {
+    for (response, says) in [("1.8", "gamma 1.80"), ("\"srgb\"", "srgb")] {
+        let scene =
+            scene(COLOURED).replace("response = \"srgb\"", &format!("response = {response}"));
+        let user = photographed(&scene, 30, "--photos 0 --images stills --no-calibration");
+        let table = user.json("solve c -o t.iltm");
+        assert_eq!(table["devices"]["projector_response"][0], says);
+    }
 }

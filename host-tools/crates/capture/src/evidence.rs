@@ -3,7 +3,7 @@
 
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
-use crate::cells::images;
+use crate::cells::images::{self, KnownImages};
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 use crate::cells::noise::NoiseModel;
 use crate::devices::{CameraFit, ColourMixingMatrix, Devices, MeasuredDevices};
@@ -19,7 +19,7 @@ use crate::photographs::sampled::Sampled;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::registration::movement::{self, Moved};
 use crate::registration::projector_map::{self, MapError, ProjectorMap};
-use crate::registration::{self, Registered};
+use crate::registration::{self, Registered, image_tracking};
 use iltm_picture::Declared;
 use iltm_picture::progress::Progress;
 use iltm_picture::statistics::quantile;
@@ -110,18 +110,22 @@ impl CaptureEvidence {
     ) -> Result<Self, CaptureError> {
         // In the camera's own channels, where a ceiling is one value.
         let clipped = clipping::find(sequence, linear, progress)?;
-        let devices = MeasuredDevices::measure(folder, sequence, settings, linear, progress)?;
+        let mut devices = MeasuredDevices::measure(folder, sequence, settings, linear, progress)?;
         if let Some(inverse) = mixing.and_then(ColourMixingMatrix::inverse) {
             linear.unmix(inverse, sequence, progress)?;
         }
         let sampled = Sampled::take(&mut linear.photographs, sequence.shots.len(), progress)?;
-        let registered = registration::register(sequence, linear, progress)?;
-        let registration = &registered.registration;
-        let pixels = CellPixels::choose(registration, &linear.saturated);
         let mut images = match &sequence.images[..] {
             [] => None,
             images => Some(linear.others(folder, images.to_vec())?),
         };
+        let projector = &settings.projector;
+        let response = devices.devices.projector.clone();
+        let known = &KnownImages::new(folder, sequence, projector.pixels(), response);
+        let shown = images.as_mut().map(|images| (known, images));
+        let mut registered = registration::register(sequence, linear, shown, progress)?;
+        let registration = &registered.registration;
+        let pixels = CellPixels::choose(registration, &linear.saturated);
         let photographs = &mut linear.photographs;
         let contradicted = devices
             .devices
@@ -142,8 +146,24 @@ impl CaptureEvidence {
         };
         let found = pixels.live.contains(&true);
         let cells = found.then(measure).transpose()?;
-        let projector = &settings.projector;
         let map = projector_map::find(folder, sequence, projector, linear, registration, progress)?;
+        let map = match (map, registered.map.take(), &mut images) {
+            (Some(found), _, _) => Some(found),
+            (None, Some(found), _) => Some(Ok(found)),
+            (None, None, Some(images)) => {
+                let images = (known, images);
+                image_tracking::map(sequence.grid, linear, images, registration, progress)?.map(Ok)
+            }
+            (None, None, None) => None,
+        };
+        if let (true, Some(Ok(map)), Some(images)) =
+            (devices.projector_unknown(), &map, &mut images)
+        {
+            let found = image_tracking::response(map, linear, (known, images), progress)?;
+            if let Some(response) = found {
+                devices.take_response(response);
+            }
+        }
         let format = &linear.photographs.format;
         let files = (format.file, format.bits);
         let white = WhitePhotograph::new(linear, registration);

@@ -62,6 +62,9 @@ fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
         RegistrationMethod::GrayCode { photographs } => {
             format!("Gray code only, of {photographs} photographs")
         }
+        RegistrationMethod::Images { photographs } => {
+            format!("{photographs} photographs of images")
+        }
     };
     let exposure = format!(
         "white reaches {} of full scale",

@@ -2,16 +2,20 @@
 //! and on some pixels of the camera, follows from the picture's codes and the projector's response.
 
 use super::measurements::Measurements;
+use crate::format::bracket::Bracket;
 use crate::format::error::CaptureError;
 use crate::format::picture_file::{EXPORT, Opened, Source};
 use crate::format::role::Role;
 use crate::format::sequence::Sequence;
+use crate::photographs::channel_sum;
 use crate::photographs::order::{Order, Wrong};
+use crate::registration::projector_map::MapSource;
 use iltm_picture::statistics::median;
-use iltm_picture::{LightPicture, Picture};
+use iltm_picture::{LightPicture, Picture, ProjectorResponse};
 use iltm_runtime::resample::area::AreaAverage;
 use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, units::Light};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Another image explains a photograph if it leaves less than this of what the own one leaves.
@@ -31,8 +35,88 @@ const GREY: [f64; 3] = [0.2126, 0.7152, 0.0722];
 /// Smallest eigenvalue of the images' colours, of the largest, from which they tell channels apart.
 const LEAST_COLOUR: f64 = 1e-4;
 
+/// Pixels of a cell whose places are looked at.
+const MOST_AVERAGED: usize = 64;
+
 /// Places along a side of what a camera pixel sees at which a picture is looked at.
 const LOOKS: usize = 3;
+
+/// The images of a sequence: what was shown, and how the projector's light follows it.
+pub(crate) struct KnownImages<'i> {
+    folder: &'i Path,
+    images: &'i [Bracket],
+    grid: Grid,
+    projector: Option<ProjectorPixels>,
+    response: ProjectorResponse,
+}
+
+impl<'i> KnownImages<'i> {
+    /// `projector` are its pixels, where they are stated.
+    pub(crate) fn new(
+        folder: &'i Path,
+        sequence: &'i Sequence,
+        projector: Option<ProjectorPixels>,
+        response: ProjectorResponse,
+    ) -> Self {
+        Self {
+            folder,
+            images: &sequence.images,
+            grid: sequence.grid,
+            projector,
+            response,
+        }
+    }
+
+    /// The same images as a projector of this response throws them.
+    pub(crate) const fn with_response(&self, response: ProjectorResponse) -> Self {
+        Self { response, ..*self }
+    }
+
+    pub(crate) const fn len(&self) -> usize {
+        self.images.len()
+    }
+
+    /// Light of an image, without the border.
+    ///
+    /// # Errors
+    /// A picture's own error; [`CaptureError::Picture`] if it has neither a pixel a cell nor one a
+    /// pixel of the projector.
+    pub(crate) fn light(&self, at: usize) -> Result<LightPicture, CaptureError> {
+        let shot = &self.images[at].shots[0];
+        let source = Source {
+            path: &self.folder.join(&shot.pattern),
+            what: "pattern",
+            line: shot.line,
+        };
+        let picture = read(source, self.grid, self.projector)?;
+        Ok(LightPicture::decode(&picture, self.response.clone()))
+    }
+
+    /// Mean light of an image over each cell, by channel.
+    ///
+    /// # Errors
+    /// As [`KnownImages::light`].
+    pub(crate) fn cell_means(&self, at: usize) -> Result<Vec<Vec<f64>>, CaptureError> {
+        let light = self.light(at)?;
+        let planes = light.planes().iter();
+        Ok(planes
+            .map(|plane| cell_means(plane, light.size(), self.grid))
+            .collect())
+    }
+
+    /// The projector's pixels that images have: as stated, or those of the first one; `None` without
+    /// images.
+    ///
+    /// # Errors
+    /// As [`KnownImages::light`].
+    pub(crate) fn pixels(&self) -> Result<Option<ProjectorPixels>, CaptureError> {
+        if self.images.is_empty() {
+            return Ok(None);
+        }
+        let own = || Ok(ProjectorPixels::whole(self.light(0)?.size()));
+        self.projector.map_or_else(own, Ok).map(Some)
+    }
+}
 
 /// Adds the images of a sequence to the patterns: their photographs are observed already.
 ///
@@ -50,19 +134,14 @@ pub(crate) fn add(
     }
     let grid = measurements.grid;
     let projector = measurements.settings.projector.pixels();
+    let response = measurements.devices.projector.clone();
+    let known = KnownImages::new(folder, sequence, projector, response);
     let places = measurements.places();
     let pixel = measurements.registration.pixel_in_cells(grid);
+    let averaged = averaged(measurements);
     let mut all = Vec::with_capacity(images.len());
-    for image in images {
-        let shot = &image.shots[0];
-        let path = folder.join(&shot.pattern);
-        let source = Source {
-            path: &path,
-            what: "pattern",
-            line: shot.line,
-        };
-        let picture = read(source, grid, projector)?;
-        let light = LightPicture::decode(&picture, measurements.devices.projector.clone());
+    for at in 0..images.len() {
+        let light = known.light(at)?;
         let size = light.size();
         let look = |plane: &[f32], place: &Option<[f32; 2]>| match place {
             // An edge between cells lies anywhere in a pixel.
@@ -71,8 +150,20 @@ pub(crate) fn add(
             }
             _ => f32::NAN,
         };
-        let planes = light.planes().iter().map(|plane| Thrown {
-            cells: DVector::from_vec(cell_means(plane, size, grid)),
+        let on_cells = |plane: &[f32]| {
+            let mut means = cell_means(plane, size, grid);
+            for (mean, pixels) in means.iter_mut().zip(&averaged) {
+                let seen = |(place, share): &([f32; 2], f32)| {
+                    share * seen_at(plane, size, (*place, pixel), grid)
+                };
+                if !pixels.is_empty() {
+                    *mean = f64::from(pixels.iter().map(seen).sum::<f32>());
+                }
+            }
+            means
+        };
+        let planes = light.planes().par_iter().map(|plane| Thrown {
+            cells: DVector::from_vec(on_cells(plane)),
             pixels: places.iter().map(|place| look(plane, place)).collect(),
         });
         all.push(planes.collect::<Vec<Thrown>>());
@@ -106,6 +197,40 @@ pub(crate) fn add(
         .extend(images.iter().map(|_| Role::Image));
     measurements.repeats.extend(images.iter().map(|_| 1));
     Ok(())
+}
+
+/// Places, in cells, of the pixels that a cell's light is the mean of, and how much each of them counts
+/// in it, in all 1; nothing of a cell where they are not known finely.
+///
+/// An image is not even within a cell: what is observed of it is what its pixels see.
+fn averaged(measurements: &Measurements) -> Vec<Vec<([f32; 2], f32)>> {
+    let grid = measurements.grid;
+    let mut of_cells = vec![Vec::new(); grid.cells()];
+    let Some(Ok(map)) = &measurements.map else {
+        return of_cells;
+    };
+    if !matches!(map.source, MapSource::Waves | MapSource::Images) {
+        return of_cells;
+    }
+    let flood = channel_sum(&measurements.flood);
+    let cells = measurements.registration.cell_of_pixel.iter();
+    for (pixel, cell) in cells.enumerate() {
+        let place = map.in_cells(map.position[pixel], grid);
+        let known = !place[0].is_nan() && flood[pixel] > 0.0;
+        if let Some(pixels) = of_cells.get_mut(*cell as usize).filter(|_| known) {
+            pixels.push((place, flood[pixel]));
+        }
+    }
+    for pixels in &mut of_cells {
+        let step = pixels.len().div_ceil(MOST_AVERAGED).max(1);
+        let mut kept: Vec<_> = pixels.iter().copied().step_by(step).collect();
+        let sum: f32 = kept.iter().map(|(_, light)| light).sum();
+        for (_, light) in &mut kept {
+            *light /= sum;
+        }
+        *pixels = kept;
+    }
+    of_cells
 }
 
 /// What one channel of an image throws.

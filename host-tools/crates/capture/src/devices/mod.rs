@@ -49,6 +49,9 @@ pub struct Devices {
     pub projector: ProjectorResponse,
     /// What `capture.toml` says of it.
     pub declared_projector: Declared,
+    /// The projector's response by photographs of images, where neither `capture.toml` nor a ramp
+    /// tells it.
+    pub by_images: Option<Response>,
     /// The projector's ramp, if it was photographed.
     pub ramp: Option<Ramp>,
     /// Whether photographs were turned into the projector's primaries: then all
@@ -73,6 +76,7 @@ impl Devices {
             camera_fit: None,
             projector: projector.unwrap_or(Response::Srgb).into(),
             declared_projector: settings.projector.response,
+            by_images: None,
             ramp: None,
             unmixed: false,
             blur: settings.projector.blur.unwrap_or(0.0),
@@ -158,6 +162,12 @@ impl Devices {
     }
 
     fn projector_words(&self) -> Option<String> {
+        if let Some(response) = self.by_images {
+            let response = DeviceResponse::from(response);
+            return Some(format!(
+                "nothing states the projector's response: the images fit {response} best"
+            ));
+        }
         let measured = self.ramp.as_ref()?.response.as_ref()?;
         let channels: Vec<String> = measured
             .channels()
@@ -231,6 +241,22 @@ impl MeasuredDevices {
         }
         let probe = photos.probe;
         Ok(Self { devices, probe })
+    }
+
+    /// Whether nothing tells the projector's response.
+    pub(crate) fn projector_unknown(&self) -> bool {
+        let measured = self
+            .devices
+            .ramp
+            .as_ref()
+            .and_then(|ramp| ramp.response.as_ref());
+        self.devices.declared_projector == Declared::Unsaid && measured.is_none()
+    }
+
+    /// Takes the projector's response that images tell.
+    pub(crate) fn take_response(&mut self, response: Response) {
+        self.devices.projector = response.into();
+        self.devices.by_images = Some(response);
     }
 
     /// The devices with the projector's blur as the probe says, unless it is `declared`.

@@ -10,6 +10,7 @@ use super::photo_files::{PhotoFiles, find_all};
 use super::picture_file::Source;
 use super::role::{CodeAxis, Role};
 use crate::gate::GateName;
+use crate::registration::image_matching::MIN_MATCHED;
 use iltm_runtime::Grid;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -182,14 +183,25 @@ impl Sequence {
             let (axis, cells) = sides[k];
             Code::find(&stripes(axis, &shots, &patterns), given[k], cells)
         });
-        let missing = |k: usize| codes[k].bits - given[k];
-        if let (Some(k), false) = ((0..2).find(|&k| missing(k) > 0), coarsen) {
+        // Images tell cells as well. Random patterns would, too, but without stripes they say half as
+        // much of light over large distances, and the prediction does not notice.
+        let matched = given == [0; 2] && images.len() >= MIN_MATCHED;
+        let missing = |k: usize| if matched { 0 } else { codes[k].bits - given[k] };
+        // Blocks stand for missing fine stripes, not for no stripes at all.
+        let refused = |k: &usize| missing(*k) > 0 && (given[*k] == 0 || !coarsen);
+        if let Some(k) = (0..2).find(refused) {
             let ((axis, cells), needed, given) = (sides[k], codes[k].bits, given[k]);
             return Err(CaptureError::GrayCode {
                 path: manifest,
-                reason: format!(
-                    "the Gray code has {given} {axis} bits, but {cells} {axis}s need {needed}"
-                ),
+                reason: match given {
+                    0 => format!(
+                        "there is no Gray code of the {axis}s; without any, {MIN_MATCHED} images are \
+                         needed"
+                    ),
+                    _ => format!(
+                        "the Gray code has {given} {axis} bits, but {cells} {axis}s need {needed}"
+                    ),
+                },
             });
         }
         for (shot, pattern) in shots.iter().zip(&patterns) {

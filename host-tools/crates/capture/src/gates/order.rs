@@ -12,7 +12,9 @@ pub(crate) fn judge_all(sequence: &Sequence, patterns: Option<Order>, images: Or
     let of_images: Vec<Shot> = sequence.images.iter().map(first).collect();
     let Some(patterns) = patterns else {
         let judged = judge(&of_images, Some(&images));
-        return if judged.fails() {
+        // White alone shows no pattern.
+        let images_alone = sequence.views.len() == 1;
+        return if judged.fails() || images_alone {
             judged
         } else {
             judge(&[], None)

@@ -16,6 +16,9 @@ use std::path::Path;
 /// projector lights it: below, it only sees light from elsewhere.
 const LIT_SHARE: f32 = 0.05;
 
+/// Flood light, of full scale, that an 8-bit camera could just tell from black.
+const LEAST_LIGHT: f32 = 1.0 / 255.0;
+
 /// Share by which patterns and their inverses may be off white's light and still tell it.
 const MOST_APART: f64 = 0.03;
 
@@ -172,6 +175,23 @@ impl<'a> LinearPhotographs<'a> {
         let pixels: Vec<f32> = white.iter().zip(&black).map(|(w, b)| w - b).collect();
         let bright = quantile(&mut pixels.clone(), 0.95).unwrap_or(0.0);
         FloodLight { pixels, bright }
+    }
+
+    /// The same.
+    ///
+    /// # Errors
+    /// [`CaptureError::NoLight`] if white and black are the same.
+    pub(crate) fn enough_flood_light(
+        &self,
+        sequence: &Sequence,
+    ) -> Result<FloodLight, CaptureError> {
+        let flood = self.flood_light();
+        if flood.bright < LEAST_LIGHT {
+            return Err(CaptureError::NoLight {
+                path: self.photographs.path(sequence.white().shots[0]),
+            });
+        }
+        Ok(flood)
     }
 
     /// White minus black, one plane a channel.

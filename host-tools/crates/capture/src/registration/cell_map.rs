@@ -1,5 +1,7 @@
 //! Cell map: which camera pixel belongs to which cell, and where the cells are.
 
+use super::projector_map::ProjectorMap;
+use crate::photographs::photo::PhotoFormat;
 use iltm_picture::statistics::median;
 use iltm_runtime::Grid;
 
@@ -27,6 +29,18 @@ pub struct Registration {
 }
 
 impl Registration {
+    /// A registration by a first guess alone.
+    pub(super) fn of_guess(guess: &CellLabels, grid: Grid, format: &PhotoFormat) -> Self {
+        let camera = (format.width, format.height);
+        Self {
+            camera,
+            binning: format.binning,
+            cell_of_pixel: guess.cell.clone(),
+            seen_cell: guess.cell.clone(),
+            centre: centres(grid, camera, &guess.cell),
+        }
+    }
+
     /// Side of a cell in registered pixels, of the mean area of those that are seen.
     #[must_use]
     pub fn cell_side(&self) -> f64 {
@@ -66,6 +80,42 @@ impl Registration {
             && [pixel, pixel - 1, pixel + 1, pixel - width, pixel + width]
                 .into_iter()
                 .all(lit)
+    }
+}
+
+/// A first guess of the cell that lights each camera pixel.
+#[derive(Clone, Debug)]
+pub(crate) struct CellLabels {
+    /// Cell of each pixel, or [`NO_CELL`].
+    pub(crate) cell: Vec<u32>,
+    /// How sure that is. Of a Gray code it is the smallest difference between a
+    /// bit's pattern and its inverse over all bits, relative to the pixel's flood
+    /// light: 1 where nothing but the pixel's own cell lights it, about 0 where the
+    /// bit is a guess. Of images it is the share of the pixel's light that its cell
+    /// explains.
+    pub(crate) margin: Vec<f32>,
+    /// Flood light of each pixel, summed over the channels, black removed.
+    pub(crate) light: Vec<f32>,
+    /// Camera pixels that the projector lights.
+    pub(crate) lit: usize,
+}
+
+impl CellLabels {
+    /// Takes the cells of a map's places, where it has any.
+    pub(super) fn by_map(mut self, map: Option<&ProjectorMap>, grid: Grid) -> Self {
+        let Some(map) = map else {
+            return self;
+        };
+        let place = |place: &[f32; 2]| {
+            let [col, row] = map.in_cells(*place, grid);
+            let inside = (0.0..grid.cols() as f32).contains(&col)
+                && (0.0..grid.rows() as f32).contains(&row);
+            inside.then(|| row as u32 * grid.cols() as u32 + col as u32)
+        };
+        for (cell, at) in self.cell.iter_mut().zip(&map.position) {
+            *cell = place(at).unwrap_or(NO_CELL);
+        }
+        self
     }
 }
 

@@ -4,7 +4,7 @@
 //! bit, so [`registration`](super::registration) corrects it where there are
 //! enough Bernoulli photographs.
 
-use super::cell_map::NO_CELL;
+use super::cell_map::{CellLabels, NO_CELL};
 use crate::format::code::binary;
 use crate::format::error::CaptureError;
 use crate::format::role::CodeAxis;
@@ -12,24 +12,6 @@ use crate::format::sequence::Sequence;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::{Photographs, channel_sum};
 use iltm_picture::progress::Progress;
-
-/// Flood light, of full scale, that an 8-bit camera could just tell from black.
-const LEAST_LIGHT: f32 = 1.0 / 255.0;
-
-/// The Gray code as every camera pixel sees it.
-#[derive(Clone, Debug)]
-pub(crate) struct GrayLabels {
-    /// Cell of each pixel, or [`NO_CELL`].
-    pub(crate) cell: Vec<u32>,
-    /// Smallest difference between a bit's pattern and its inverse over all
-    /// bits, relative to the pixel's flood light: 1 where nothing but the
-    /// pixel's own cell lights it, about 0 where the bit is a guess.
-    pub(crate) margin: Vec<f32>,
-    /// Flood light of each pixel, summed over the channels, black removed.
-    pub(crate) light: Vec<f32>,
-    /// Camera pixels that the projector lights.
-    pub(crate) lit: usize,
-}
 
 /// Decodes the Gray code.
 ///
@@ -44,13 +26,8 @@ pub(crate) fn decode(
     sequence: &Sequence,
     linear: &mut LinearPhotographs<'_>,
     progress: &dyn Progress,
-) -> Result<GrayLabels, CaptureError> {
-    let flood = linear.flood_light();
-    if flood.bright < LEAST_LIGHT {
-        return Err(CaptureError::NoLight {
-            path: linear.photographs.path(sequence.white().shots[0]),
-        });
-    }
+) -> Result<CellLabels, CaptureError> {
+    let flood = linear.enough_flood_light(sequence)?;
     let lit = flood.lit();
     let middle = linear.middle();
     let photographs = &mut linear.photographs;
@@ -83,7 +60,7 @@ pub(crate) fn decode(
             cell[pixel] = (row * cols + col) as u32;
         }
     }
-    Ok(GrayLabels {
+    Ok(CellLabels {
         cell,
         margin,
         light: flood.pixels,

@@ -1,6 +1,7 @@
 //! Registration: which camera pixels belong to which cell.
 //!
-//! The Gray code gives a first guess. Then each pixel's series over all
+//! The Gray code gives a first guess, or, where there is none, known pictures do
+//! ([`image_matching`]). Then each pixel's series over all
 //! photographs is regressed on the 3 x 3 cells around its guess, a constant
 //! (ambient light) and the lit share of the pattern (light from far cells). The
 //! weights say which cell lights the pixel directly. Last, pixels that see two
@@ -9,21 +10,26 @@
 
 pub(crate) mod cell_map;
 pub(crate) mod gray_code;
+pub(crate) mod image_matching;
+pub(crate) mod image_tracking;
 mod local_planes;
 pub(crate) mod map_file;
 mod mixed_pixels;
 pub(crate) mod movement;
 pub(crate) mod projector_map;
 mod regression;
+mod sites;
 
+use crate::cells::images::KnownImages;
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
+use crate::photographs::Photographs;
 use crate::photographs::linearise::LinearPhotographs;
-use cell_map::{Candidate, NO_CELL, Registration};
-use gray_code::GrayLabels;
+use cell_map::{Candidate, CellLabels, NO_CELL, Registration};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use mixed_pixels::MIXED;
+use projector_map::ProjectorMap;
 use regression::regress;
 
 /// Photographs, other than black, from which a regression with eleven unknowns
@@ -52,6 +58,11 @@ pub enum RegistrationMethod {
         /// Photographs other than black.
         photographs: usize,
     },
+    /// Images alone, likewise.
+    Images {
+        /// Photographs of images.
+        photographs: usize,
+    },
 }
 
 /// How many camera pixels took which way.
@@ -59,9 +70,9 @@ pub enum RegistrationMethod {
 pub struct PixelCount {
     /// Lit by the projector, directly or not.
     pub lit: usize,
-    /// With a valid Gray code.
+    /// With a first guess of their cell.
     pub coded: usize,
-    /// Moved to another cell than the Gray code's by the regression.
+    /// Moved to another cell than the first guess by the regression.
     pub moved: usize,
     /// Left out because they see two cells.
     pub mixed: usize,
@@ -77,59 +88,85 @@ pub(crate) struct Registered {
     pub(crate) registration: Registration,
     pub(crate) method: RegistrationMethod,
     pub(crate) count: PixelCount,
+    /// The map of the images that cells were told by.
+    pub(crate) map: Option<ProjectorMap>,
 }
 
-/// Decodes the Gray code and registers the camera pixels, by regression if there are
-/// enough photographs.
+/// Guesses the cell of each camera pixel by the Gray code, or by known pictures where there is none,
+/// and registers the pixels, by regression if there are enough photographs of patterns.
 ///
 /// # Errors
 /// A photograph's own error.
 pub(crate) fn register(
     sequence: &Sequence,
     linear: &mut LinearPhotographs<'_>,
+    mut images: Option<(&KnownImages<'_>, &mut Photographs<'_>)>,
     progress: &dyn Progress,
 ) -> Result<Registered, CaptureError> {
     let grid = sequence.grid;
     let coded = &sequence.views[sequence.coded()];
     let coded: usize = coded.iter().map(|view| view.shots.len()).sum();
-    progress.begin("decoding the Gray code", coded as u64);
-    let gray = &gray_code::decode(sequence, linear, progress)?;
-    progress.end();
+    let taken = sequence.views.iter().map(|view| view.shots.len()).sum();
+    let mut map = None;
+    let guess = if coded > 0 {
+        progress.begin("decoding the Gray code", coded as u64);
+        let guess = gray_code::decode(sequence, linear, progress)?;
+        progress.end();
+        guess
+    } else {
+        let again = images
+            .as_mut()
+            .map(|(known, images)| (*known, &mut **images));
+        let guess = image_matching::label(sequence, linear, again, progress)?;
+        match &mut images {
+            Some((known, images)) if taken < MIN_REGRESSION => {
+                let first = Registration::of_guess(&guess, grid, &linear.photographs.format);
+                map = image_tracking::map(grid, linear, (known, images), &first, progress)?;
+                guess.by_map(map.as_ref(), grid)
+            }
+            _ => guess,
+        }
+    };
     let photographs = &mut linear.photographs;
     // Nobody knows how many rounds over the photographs it will take.
     progress.begin("registering camera pixels", 0);
     let camera = (photographs.format.width, photographs.format.height);
     let mut candidates: Vec<Candidate> = (0..)
-        .zip(&gray.cell)
+        .zip(&guess.cell)
         .filter(|(_, cell)| **cell != NO_CELL)
         .map(|(pixel, cell)| Candidate::new(pixel, *cell))
         .collect();
     let mut count = PixelCount {
-        lit: gray.lit,
+        lit: guess.lit,
         coded: candidates.len(),
         ..PixelCount::default()
     };
-    let taken = sequence.views.iter().map(|view| view.shots.len()).sum();
     let method = if taken < MIN_REGRESSION {
-        candidates.retain(|c| gray.margin[c.pixel as usize] > LEAST_MARGIN);
+        candidates.retain(|c| guess.margin[c.pixel as usize] > LEAST_MARGIN);
         mixed_pixels::drop_unlit(&mut candidates, grid, camera);
-        judge_by_gray_code(&mut candidates, gray, grid, camera);
-        RegistrationMethod::GrayCode { photographs: taken }
+        judge_by_guess(&mut candidates, &guess, grid, camera);
+        if coded > 0 {
+            RegistrationMethod::GrayCode { photographs: taken }
+        } else {
+            RegistrationMethod::Images {
+                photographs: sequence.images.len(),
+            }
+        }
     } else {
         regress(sequence, photographs, &mut candidates, progress)?;
-        candidates.retain(|c| c.weights[4] > LEAST_OWN * gray.light[c.pixel as usize]);
+        candidates.retain(|c| c.weights[4] > LEAST_OWN * guess.light[c.pixel as usize]);
         mixed_pixels::drop_unlit(&mut candidates, grid, camera);
-        mixed_pixels::drop_indirect(&mut candidates, &gray.light);
+        mixed_pixels::drop_indirect(&mut candidates, &guess.light);
         mixed_pixels::judge(&mut candidates, grid, camera);
         RegistrationMethod::Regression { photographs: taken }
     };
     progress.end();
     count.weak = count.coded - candidates.len();
-    let mut cell_of_pixel = vec![NO_CELL; gray.cell.len()];
+    let mut cell_of_pixel = vec![NO_CELL; guess.cell.len()];
     let mut seen_cell = cell_of_pixel.clone();
     for seen in &candidates {
         seen_cell[seen.pixel as usize] = seen.cell;
-        count.moved += usize::from(seen.cell != gray.cell[seen.pixel as usize]);
+        count.moved += usize::from(seen.cell != guess.cell[seen.pixel as usize]);
     }
     for kept in purest(&mut candidates) {
         cell_of_pixel[kept.pixel as usize] = kept.cell;
@@ -147,14 +184,15 @@ pub(crate) fn register(
         },
         method,
         count,
+        map,
     })
 }
 
 /// Without a regression: a pixel counts as mixed when one of its four
 /// neighbours has another cell.
-fn judge_by_gray_code(
+fn judge_by_guess(
     candidates: &mut [Candidate],
-    gray: &GrayLabels,
+    guess: &CellLabels,
     grid: Grid,
     camera: (usize, usize),
 ) {
@@ -165,7 +203,7 @@ fn judge_by_gray_code(
         let (x, y) = (pixel % width, pixel / width);
         let same = |x: Option<usize>, y: Option<usize>| match (x, y) {
             (Some(x), Some(y)) if x < width && y < height => {
-                gray.cell[y * width + x] == candidate.cell
+                guess.cell[y * width + x] == candidate.cell
             }
             _ => false,
         };
@@ -173,7 +211,7 @@ fn judge_by_gray_code(
             && same(Some(x + reach), Some(y))
             && same(Some(x), y.checked_sub(reach))
             && same(Some(x), Some(y + reach));
-        let margin = gray.margin[pixel].min(1.0);
+        let margin = guess.margin[pixel].min(1.0);
         // Any order that puts inner pixels first and surer ones before others.
         candidate.mixed = (1.0 - margin) * MIXED * 0.99 + if inner { 0.0 } else { MIXED };
     }

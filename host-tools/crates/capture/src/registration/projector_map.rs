@@ -4,7 +4,8 @@
 //! |---|---|
 //! | waves of `stripes.csv` (phase shifting, four steps) | a fraction of a pixel |
 //! | Gray code finer than the cells | the finest stripe that the camera tells apart |
-//! | neither | about a part of a cell: linear between the cells' centres |
+//! | images of the projector's own pixels | what their noise and contrast allow |
+//! | none of these | about a part of a cell: linear between the cells' centres |
 //!
 //! The cell of each pixel is known. The bits beyond it halve the cell until less than half a wave
 //! is left, and the phase of the waves says where within the wave. The steps' second harmonic,
@@ -72,6 +73,8 @@ pub enum MapSource {
     Waves,
     /// Gray code finer than the cells.
     Code,
+    /// Known images ([`image_tracking`](super::image_tracking)).
+    Images,
     /// The cells alone.
     Cells,
 }
