@@ -315,3 +315,31 @@ fn stills_tell_the_projectors_response_where_nothing_states_it() {
         assert_eq!(table["devices"]["projector_response"][0], says);
     }
 }
+
+#[test]
+fn photographs_of_other_pictures_teach_nothing() {
+    let user = photographed(
+        &scene(COLOURED),
+        24,
+        "--photos 0 --images stills --no-calibration --no-dense",
+    );
+    without(&user, &["column", "row"]);
+    // Each still's photograph is named as that of the one before it.
+    let list = user.text("c/capture.csv");
+    let (images, others): (Vec<&str>, Vec<&str>) =
+        list.lines().partition(|line| line.contains(",image,"));
+    let next = images.iter().cycle().skip(7);
+    let shifted = images.iter().zip(next).map(|(line, next)| {
+        let (shown, _) = line.rsplit_once(',').expect("four columns");
+        let (_, photo) = next.rsplit_once(',').expect("four columns");
+        format!("{shown},{photo}\n")
+    });
+    let shifted: String = shifted.collect();
+    user.write("c/capture.csv", others.join("\n") + "\n" + &shifted);
+    let refused = user.run("check c");
+    assert_eq!(refused.code, 5, "{}", refused.out);
+    contains(
+        &refused.out,
+        &["photographs show another pattern than their line says"],
+    );
+}

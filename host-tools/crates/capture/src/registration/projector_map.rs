@@ -73,7 +73,7 @@ pub enum MapSource {
     Waves,
     /// Gray code finer than the cells.
     Code,
-    /// Known images ([`image_tracking`](super::image_tracking)).
+    /// Known images, by the light of each pixel over all of them.
     Images,
     /// The cells alone.
     Cells,
