@@ -444,6 +444,18 @@ def without_code(capture, folder):
     return folder
 
 
+def compare_places(options, learned, scratch):
+    """How far the places that images say are from those that stripes say."""
+    maps = []
+    for at, capture in enumerate((options.capture, learned)):
+        subprocess.run([options.iltm, "check", capture, "--map", scratch / f"{at}.npy"], check=True, capture_output=True)
+        maps.append(np.load(scratch / f"{at}.npy"))
+    off = np.hypot(*np.moveaxis(maps[1] - maps[0], -1, 0))
+    known = np.isfinite(off)
+    print(f"places by images are off those by stripes by {np.median(off[known]):.3f} projector pixels (median), "
+          f"{np.percentile(off[known], 95):.3f} (95 %); known are {known.sum()} of {np.isfinite(maps[0][..., 0]).sum()}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("capture", type=pathlib.Path, help="the folder; with --session it is made if there is none")
@@ -473,6 +485,8 @@ def main():
         table = options.table or scratch / "table.iltm"
         if not options.table:
             learned = without_code(options.capture, scratch / "capture") if options.no_code else options.capture
+            if options.no_code:
+                compare_places(options, learned, scratch)
             subprocess.run([options.iltm, "solve", learned, "-o", table, *shlex.split(options.solve)], check=True)
 
         def compensate(image, arguments):
