@@ -125,7 +125,10 @@ fn kept_pixels_lie_inside_their_cells() {
     assert!(measured.live.iter().all(|&live| live));
     assert!(matches!(
         measured.diagnostics.method,
-        RegistrationMethod::Regression { photographs: 43 }
+        RegistrationMethod::Regression {
+            photographs: 43,
+            is_coded: true
+        }
     ));
     // The limits are 0.15 and 0.45; the rest is the camera's noise.
     let (other, dark) = impurity(&scene, registration);

@@ -56,8 +56,12 @@ fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
         grouped(pixels.weak as u64)
     );
     let registration = match diagnostics.method {
-        RegistrationMethod::Regression { photographs } => {
-            format!("Gray code, then regression on {photographs} photographs")
+        RegistrationMethod::Regression {
+            photographs,
+            is_coded,
+        } => {
+            let first = if is_coded { "Gray code" } else { "Images" };
+            format!("{first}, then regression on {photographs} photographs")
         }
         RegistrationMethod::GrayCode { photographs } => {
             format!("Gray code only, of {photographs} photographs")

@@ -16,7 +16,7 @@ use iltm_runtime::resample::area::AreaAverage;
 use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, units::Light};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Another image explains a photograph if it leaves less than this of what the own one leaves.
 const CLEARLY: f64 = 0.5;
@@ -82,13 +82,8 @@ impl<'i> KnownImages<'i> {
     /// A picture's own error; [`CaptureError::Picture`] if it has neither a pixel a cell nor one a
     /// pixel of the projector.
     pub(crate) fn light(&self, at: usize) -> Result<LightPicture, CaptureError> {
-        let shot = &self.images[at].shots[0];
-        let source = Source {
-            path: &self.folder.join(&shot.pattern),
-            what: "pattern",
-            line: shot.line,
-        };
-        let picture = read(source, self.grid, self.projector)?;
+        let path = self.path(at);
+        let picture = read(self.source(at, &path), self.grid, self.projector)?;
         Ok(LightPicture::decode(&picture, self.response.clone()))
     }
 
@@ -105,16 +100,35 @@ impl<'i> KnownImages<'i> {
     }
 
     /// The projector's pixels that images have: as stated, or those of the first one; `None` without
-    /// images.
+    /// images, or if one of them has a pixel a cell: such pixels are even.
     ///
     /// # Errors
     /// As [`KnownImages::light`].
     pub(crate) fn pixels(&self) -> Result<Option<ProjectorPixels>, CaptureError> {
+        let (cols, rows) = (self.grid.cols() as u32, self.grid.rows() as u32);
+        for at in 0..self.len() {
+            let path = self.path(at);
+            if Opened::open(self.source(at, &path))?.size() == (cols, rows) {
+                return Ok(None);
+            }
+        }
         if self.images.is_empty() {
             return Ok(None);
         }
         let own = || Ok(ProjectorPixels::whole(self.light(0)?.size()));
         self.projector.map_or_else(own, Ok).map(Some)
+    }
+
+    fn path(&self, at: usize) -> PathBuf {
+        self.folder.join(&self.images[at].shots[0].pattern)
+    }
+
+    fn source<'p>(&self, at: usize, path: &'p Path) -> Source<'p> {
+        Source {
+            path,
+            what: "pattern",
+            line: self.images[at].shots[0].line,
+        }
     }
 }
 
@@ -143,15 +157,17 @@ pub(crate) fn add(
     for at in 0..images.len() {
         let light = known.light(at)?;
         let size = light.size();
+        let of_cells = size == FrameSize::of_grid(grid);
         let look = |plane: &[f32], place: &Option<[f32; 2]>| match place {
             // An edge between cells lies anywhere in a pixel.
-            Some(place) if size != FrameSize::of_grid(grid) => {
-                seen_at(plane, size, (*place, pixel), grid)
-            }
+            Some(place) if !of_cells => seen_at(plane, size, (*place, pixel), grid),
             _ => f32::NAN,
         };
         let on_cells = |plane: &[f32]| {
             let mut means = cell_means(plane, size, grid);
+            if of_cells {
+                return means;
+            }
             for (mean, pixels) in means.iter_mut().zip(&averaged) {
                 let seen = |(place, share): &([f32; 2], f32)| {
                     share * seen_at(plane, size, (*place, pixel), grid)

@@ -10,7 +10,6 @@ use super::photo_files::{PhotoFiles, find_all};
 use super::picture_file::Source;
 use super::role::{CodeAxis, Role};
 use crate::gate::GateName;
-use crate::registration::image_matching::MIN_MATCHED;
 use iltm_runtime::Grid;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -22,6 +21,10 @@ use std::path::Path;
 /// patterns tell a cell's light from that of the others in its column or row;
 /// and a solve keeps some of them back to choose its sparsity with.
 pub const MIN_BERNOULLI: usize = 10;
+
+/// Images from which on a capture needs no Gray code: a camera pixel's light in them tells its cell
+/// from all others.
+pub(crate) const MIN_MATCHED: usize = 20;
 
 /// Cells from which on two equal Bernoulli patterns are the same one shown again:
 /// by chance, one in 16 million pairs is. On fewer cells chance draws patterns
@@ -183,8 +186,8 @@ impl Sequence {
             let (axis, cells) = sides[k];
             Code::find(&stripes(axis, &shots, &patterns), given[k], cells)
         });
-        // Images tell cells as well. Random patterns would, too, but without stripes they say half as
-        // much of light over large distances, and the prediction does not notice.
+        // Images tell cells as well. Random patterns would, too, but without stripes they say little of
+        // light over large distances, and the prediction does not notice.
         let matched = given == [0; 2] && images.len() >= MIN_MATCHED;
         let missing = |k: usize| if matched { 0 } else { codes[k].bits - given[k] };
         // Blocks stand for missing fine stripes, not for no stripes at all.
@@ -263,6 +266,11 @@ impl Sequence {
     /// Places of the Gray code in `views`.
     pub(crate) fn coded(&self) -> Range<usize> {
         1..self.bernoulli_from
+    }
+
+    /// Whether a Gray code tells the cells: none is needed of a single one.
+    pub(crate) fn is_coded(&self) -> bool {
+        !self.coded().is_empty() || self.codes.iter().all(|code| code.bits == 0)
     }
 
     /// Places in `views` of each Gray code pattern that has an inverse, and of

@@ -17,9 +17,6 @@ use iltm_runtime::Grid;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Images from which on a pixel's light tells its cell from all others.
-pub(crate) const MIN_MATCHED: usize = 20;
-
 /// Pixels of a cell that are compared with all cells.
 const SITES_A_CELL: usize = 6;
 
@@ -59,7 +56,7 @@ impl RelativeLight {
 pub(crate) fn label(
     sequence: &Sequence,
     linear: &mut LinearPhotographs<'_>,
-    images: Option<(&KnownImages<'_>, &mut Photographs<'_>)>,
+    (images, of_images): (&KnownImages<'_>, &mut Photographs<'_>),
     progress: &dyn Progress,
 ) -> Result<CellLabels, CaptureError> {
     let flood = linear.enough_flood_light(sequence)?;
@@ -76,7 +73,7 @@ pub(crate) fn label(
     let pixels: Vec<usize> = sites.pixel.iter().flatten().copied().collect();
     let relative = RelativeLight::new(linear);
     let views = &sequence.views[sequence.bernoulli()];
-    let shown = images.as_ref().map_or(0, |(images, _)| images.len());
+    let shown = images.len();
     let mut seen = DMatrix::<f32>::zeros(views.len() + shown, pixels.len());
     let taken: usize = views.iter().map(|view| view.shots.len()).sum();
     progress.begin("matching pixels and pictures", (taken + shown) as u64);
@@ -94,19 +91,17 @@ pub(crate) fn label(
     let mut planes: Vec<Vec<Vec<f64>>> = (views.iter())
         .map(|view| vec![view.lit.iter().map(|lit| f64::from(*lit)).collect()])
         .collect();
-    if let Some((images, photographs)) = images {
-        let all: Vec<usize> = (0..shown).collect();
-        photographs.for_batches(&all, progress, |photos| {
-            for (at, photo) in photos {
-                for (site, pixel) in pixels.iter().enumerate() {
-                    seen[(views.len() + at, site)] = relative.of(photo, *pixel);
-                }
+    let all: Vec<usize> = (0..shown).collect();
+    of_images.for_batches(&all, progress, |photos| {
+        for (at, photo) in photos {
+            for (site, pixel) in pixels.iter().enumerate() {
+                seen[(views.len() + at, site)] = relative.of(photo, *pixel);
             }
-        })?;
-        let means: Vec<_> = all.par_iter().map(|at| images.cell_means(*at)).collect();
-        for means in means {
-            planes.push(means?);
         }
+    })?;
+    let means: Vec<_> = all.par_iter().map(|at| images.cell_means(*at)).collect();
+    for means in means {
+        planes.push(means?);
     }
     let matched = Matcher::new(&planes, grid).matches(&seen);
     progress.end();

@@ -3,17 +3,18 @@
 //!
 //! The cell of each pixel is known. From its middle on the place is found coarse to fine: at images
 //! averaged over fewer and fewer pixels, the pixel's light is fitted by that of the place, its slopes
-//! (the step of Lucas and Kanade), a constant and the image's brightness, which stands for light that
-//! bounces. A pixel whose place explains little of its light starts again on the plane through its
+//! (the step of Lucas and Kanade), a constant, and the image's brightness and the light around the place,
+//! which stand for light that bounces. A pixel whose place explains little of its light starts again on the plane through its
 //! neighbours' places. What the fit leaves says how sure a place is.
 
 use super::cell_map::{NO_CELL, Registration};
-use super::image_matching::{MIN_MATCHED, RelativeLight};
+use super::image_matching::RelativeLight;
 use super::local_planes;
 use super::projector_map::{MapSource, ProjectorMap};
 use super::sites::Sites;
 use crate::cells::images::KnownImages;
 use crate::format::error::CaptureError;
+use crate::format::sequence::MIN_MATCHED;
 use crate::photographs::Photographs;
 use crate::photographs::linearise::LinearPhotographs;
 use iltm_picture::progress::Progress;
@@ -30,7 +31,7 @@ const STEPS: usize = 3;
 /// Longest step, in pixels of the averaged picture.
 const LONGEST_STEP: f32 = 1.5;
 
-/// Standard error of a place, in cells, up to which it is one.
+/// Standard error of a place, in cells and at least a projector pixel, up to which it is one.
 const MOST_UNCERTAIN: f32 = 0.25;
 
 /// How many times what places usually leave unexplained a good one leaves at most, and share of the
@@ -195,8 +196,8 @@ impl Usual {
     }
 }
 
-/// Finds the place of each pixel whose cell is known; `None` with too few images, or images that are
-/// no finer than the cells.
+/// Finds the place of each pixel whose cell is known; `None` with too few images, or one that is no
+/// finer than the cells.
 ///
 /// # Errors
 /// A picture's or a photograph's own error.
@@ -219,8 +220,7 @@ pub(crate) fn map(
     let camera = registration.camera;
     let covered = registration.pixel_in_cells(grid);
     // Projector pixels that a camera's covers.
-    let pixel = covered[0].max(0.0) * cell[0] as f64;
-    let pixel = (pixel * covered[1] * cell[1] as f64).sqrt();
+    let pixel = (covered[0] * cell[0] as f64 * covered[1] * cell[1] as f64).sqrt();
     // Of a camera that sees no cell it is none.
     if !pixel.is_finite() {
         return Ok(None);
@@ -277,7 +277,7 @@ pub(crate) fn map(
                 &tracked,
                 projector,
                 registration,
-                (cell[0].max(cell[1]) as f32).max(4.0),
+                cell[0].max(cell[1]) as f32,
             )));
         }
         let found = spread(&sites, &tracked);
@@ -288,11 +288,7 @@ pub(crate) fn map(
 
 /// The largest power of two that is not larger, at least 1.
 fn power_of_two(size: f64) -> usize {
-    let mut power = 1;
-    while 2.0 * power as f64 <= size {
-        power *= 2;
-    }
-    power
+    1 << (size as usize).max(1).ilog2()
 }
 
 /// Moves pixels whose place explains little of their light, or lies beside the plane of the others
@@ -527,11 +523,11 @@ pub(crate) fn response(
     let tried: Vec<Response> = std::iter::once(Response::Srgb)
         .chain(powers.map(Response::Gamma))
         .collect();
+    let relative = RelativeLight::new(linear);
     let mut left = Vec::with_capacity(tried.len());
     for response in &tried {
         let mut tracked = tracked.clone();
         let assumed = images.with_response((*response).into());
-        let relative = RelativeLight::new(linear);
         step(
             &mut tracked,
             (&assumed, photographs),
@@ -574,28 +570,11 @@ fn finished(
     let pixels = registration.seen_cell.len();
     let mut position = vec![None; pixels];
     let mut own = vec![f32::NAN; pixels];
-    if let Ok(f) = std::env::var("DBG") {
-        let t: Vec<String> = tracked
-            .iter()
-            .map(|t| {
-                format!(
-                    "{} {} {} {} {} {}",
-                    t.pixel,
-                    t.explained,
-                    t.direct,
-                    t.error[0] * whole[0],
-                    t.place[0] * whole[0] - 0.5,
-                    t.place[1] * whole[1] - 0.5
-                )
-            })
-            .collect();
-        std::fs::write(f, t.join("\n")).unwrap();
-    }
     let usual = Usual::of(tracked);
     for found in tracked {
         let error = (found.error[0] * whole[0]).hypot(found.error[1] * whole[1]);
         let inside = found.place.iter().all(|at| (0.0..=1.0).contains(at));
-        let sure = error < MOST_UNCERTAIN * cell;
+        let sure = error < (MOST_UNCERTAIN * cell).max(1.0);
         if inside && sure && usual.is_own(found) {
             let at = [0, 1].map(|axis: usize| found.place[axis] * whole[axis] + shift);
             position[found.pixel] = Some(at);

@@ -17,7 +17,7 @@ const LEAST: f64 = 20.0;
 
 /// The plane of a window, from its middle: constant, slopes across and down, for x and for y; and
 /// the mean square that it leaves, of both directions together.
-type Plane = (Matrix3x2<f64>, f64);
+pub(super) type Plane = (Matrix3x2<f64>, f64);
 
 /// Puts each known position on its plane; returns the root mean square that the plane leaves,
 /// of both directions together, `None` where there is no window with enough positions.
@@ -35,11 +35,15 @@ pub(crate) fn settle(
     let planes: Vec<Option<Plane>> = pixels
         .clone()
         .into_par_iter()
-        .map(|pixel| plane(|across, down| known[neighbour(pixel, across, down)?]))
+        .map(|pixel| {
+            known[pixel]?;
+            let known = |across, down| known[neighbour(pixel, across, down)?];
+            plane(REACH, LEAST, known)
+        })
         .collect();
     let best = |pixel: usize| {
         known[pixel]?;
-        let windows = window().filter_map(|(across, down)| {
+        let windows = window(REACH).filter_map(|(across, down)| {
             let plane = planes[neighbour(pixel, across, down)?].as_ref()?;
             Some((plane, across, down))
         });
@@ -58,21 +62,25 @@ pub(crate) fn settle(
 }
 
 /// All places of a window, seen from its middle.
-fn window() -> impl Iterator<Item = (isize, isize)> {
-    (-REACH..=REACH).flat_map(|down| (-REACH..=REACH).map(move |across| (across, down)))
+fn window(reach: isize) -> impl Iterator<Item = (isize, isize)> {
+    (-reach..=reach).flat_map(move |down| (-reach..=reach).map(move |across| (across, down)))
 }
 
-/// The plane of a window whose positions are given by their place in it; `None` if too few are
-/// known.
-fn plane(position: impl Fn(isize, isize) -> Option<[f32; 2]>) -> Option<Plane> {
+/// The plane of a window, so many pixels on each side, whose positions are given by their place in
+/// it; `None` if fewer than `least` are known.
+pub(super) fn plane(
+    reach: isize,
+    least: f64,
+    position: impl Fn(isize, isize) -> Option<[f32; 2]>,
+) -> Option<Plane> {
     let (mut normal, mut right) = (Matrix3::zeros(), Matrix3x2::zeros());
     let mut squares = 0.0;
     // Differences to one of them, so that squares lose no digits.
-    let origin = position(0, 0)?.map(f64::from);
-    for (across, down) in window() {
-        let Some(at) = position(across, down) else {
-            continue;
-        };
+    let mut known = window(reach)
+        .filter_map(|at| Some((at, position(at.0, at.1)?)))
+        .peekable();
+    let origin = known.peek()?.1.map(f64::from);
+    for ((across, down), at) in known {
         let place = nalgebra::Vector3::new(1.0, across as f64, down as f64);
         let at =
             nalgebra::RowVector2::new(f64::from(at[0]) - origin[0], f64::from(at[1]) - origin[1]);
@@ -81,7 +89,7 @@ fn plane(position: impl Fn(isize, isize) -> Option<[f32; 2]>) -> Option<Plane> {
         squares += at.norm_squared();
     }
     let count: f64 = normal[(0, 0)];
-    if count < LEAST {
+    if count < least {
         return None;
     }
     let mut plane = normal.try_inverse()? * right;

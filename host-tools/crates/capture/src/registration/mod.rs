@@ -47,10 +47,12 @@ const LEAST_MARGIN: f32 = 0.2;
 /// How pixels were registered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RegistrationMethod {
-    /// Gray code, then regression on this many photographs.
+    /// Gray code, or images where there is none, then regression on this many photographs.
     Regression {
         /// Photographs other than black.
         photographs: usize,
+        /// Whether a Gray code was the first guess.
+        is_coded: bool,
     },
     /// Gray code only, without the pixels at the borders of cells, because there
     /// were fewer than [`MIN_REGRESSION`] photographs.
@@ -100,7 +102,7 @@ pub(crate) struct Registered {
 pub(crate) fn register(
     sequence: &Sequence,
     linear: &mut LinearPhotographs<'_>,
-    mut images: Option<(&KnownImages<'_>, &mut Photographs<'_>)>,
+    images: Option<(&KnownImages<'_>, &mut Photographs<'_>)>,
     progress: &dyn Progress,
 ) -> Result<Registered, CaptureError> {
     let grid = sequence.grid;
@@ -108,23 +110,21 @@ pub(crate) fn register(
     let coded: usize = coded.iter().map(|view| view.shots.len()).sum();
     let taken = sequence.views.iter().map(|view| view.shots.len()).sum();
     let mut map = None;
-    let guess = if coded > 0 {
-        progress.begin("decoding the Gray code", coded as u64);
-        let guess = gray_code::decode(sequence, linear, progress)?;
-        progress.end();
-        guess
-    } else {
-        let again = images
-            .as_mut()
-            .map(|(known, images)| (*known, &mut **images));
-        let guess = image_matching::label(sequence, linear, again, progress)?;
-        match &mut images {
-            Some((known, images)) if taken < MIN_REGRESSION => {
+    let is_coded = sequence.is_coded();
+    let guess = match images {
+        Some((known, images)) if !is_coded => {
+            let guess = image_matching::label(sequence, linear, (known, images), progress)?;
+            if taken < MIN_REGRESSION {
                 let first = Registration::of_guess(&guess, grid, &linear.photographs.format);
                 map = image_tracking::map(grid, linear, (known, images), &first, progress)?;
-                guess.by_map(map.as_ref(), grid)
             }
-            _ => guess,
+            guess.by_map(map.as_ref(), grid)
+        }
+        _ => {
+            progress.begin("decoding the Gray code", coded as u64);
+            let guess = gray_code::decode(sequence, linear, progress)?;
+            progress.end();
+            guess
         }
     };
     let photographs = &mut linear.photographs;
@@ -145,7 +145,7 @@ pub(crate) fn register(
         candidates.retain(|c| guess.margin[c.pixel as usize] > LEAST_MARGIN);
         mixed_pixels::drop_unlit(&mut candidates, grid, camera);
         judge_by_guess(&mut candidates, &guess, grid, camera);
-        if coded > 0 {
+        if is_coded {
             RegistrationMethod::GrayCode { photographs: taken }
         } else {
             RegistrationMethod::Images {
@@ -158,7 +158,10 @@ pub(crate) fn register(
         mixed_pixels::drop_unlit(&mut candidates, grid, camera);
         mixed_pixels::drop_indirect(&mut candidates, &guess.light);
         mixed_pixels::judge(&mut candidates, grid, camera);
-        RegistrationMethod::Regression { photographs: taken }
+        RegistrationMethod::Regression {
+            photographs: taken,
+            is_coded,
+        }
     };
     progress.end();
     count.weak = count.coded - candidates.len();

@@ -1,12 +1,12 @@
 //! Sites: pixels of a camera on a coarser raster, each with its place in the projector's picture.
 
+use super::local_planes;
 use iltm_picture::statistics::median;
-use nalgebra::{Matrix3, Matrix3x2, RowVector2, Vector3};
 use rayon::prelude::*;
 
 /// Squares on each side through which a plane is laid, and good ones that it needs.
-const PLANE_REACH: usize = 3;
-const LEAST_OF_PLANE: f32 = 8.0;
+const PLANE_REACH: isize = 3;
+const LEAST_OF_PLANE: f64 = 8.0;
 
 /// Pixels of a camera on a coarser raster: of each square one that the projector lights.
 pub(super) struct Sites {
@@ -74,26 +74,15 @@ impl Sites {
         good: &[bool],
         square: usize,
     ) -> Option<[f32; 2]> {
-        let (across, down) = self.size;
-        let (x, y) = (square % across, square / across);
-        let (mut normal, mut right) = (Matrix3::zeros(), Matrix3x2::zeros());
-        for row in y.saturating_sub(PLANE_REACH)..(y + PLANE_REACH + 1).min(down) {
-            for column in x.saturating_sub(PLANE_REACH)..(x + PLANE_REACH + 1).min(across) {
-                let other = row * across + column;
-                if other != square
-                    && good[other]
-                    && let Some(at) = place[other]
-                {
-                    let step = |to: usize, from: usize| to as f32 - from as f32;
-                    let way = Vector3::new(1.0, step(column, x), step(row, y));
-                    normal += way * way.transpose();
-                    right += way * RowVector2::from(at);
-                }
-            }
-        }
-        let enough = normal[(0, 0)] >= LEAST_OF_PLANE;
-        let plane = enough.then(|| normal.try_inverse()).flatten()? * right;
-        Some([plane[(0, 0)], plane[(0, 1)]])
+        let (width, height) = self.size;
+        let known = |across: isize, down: isize| {
+            let x = (square % width).checked_add_signed(across)?;
+            let y = (square / width).checked_add_signed(down)?;
+            let other = (x < width && y < height).then_some(y * width + x)?;
+            place[other].filter(|_| other != square && good[other])
+        };
+        let (plane, _) = local_planes::plane(PLANE_REACH, LEAST_OF_PLANE, known)?;
+        Some([plane[(0, 0)] as f32, plane[(0, 1)] as f32])
     }
 
     /// Puts places that are not good, or farther than `most` from the plane of those around them,
