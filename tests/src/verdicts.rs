@@ -1,18 +1,19 @@
 //! Verdicts of `iltm verify` against the truth: a table is learned from simulated photographs,
 //! verified with others that have a fault on purpose, and what is really on the wall is known.
 
-use crate::simulated::{self, cell_means, simulation};
+use crate::simulated::{self, cell_means, host_tools, simulation};
 use iltm::build_table::BuiltTable;
-use iltm::capture::Settings;
+use iltm::capture::{CameraSettings, Settings};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::{CaptureFault, Effect, Forced, InjectedFault, VirtualCamera, fill_capture};
-use iltm::session::Layout;
+use iltm::session::{self, Layout, OrderOptions};
 use iltm::verify::{Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, judge, write};
 use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::DMatrix;
+use std::cell::OnceCell;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,10 +22,14 @@ use tempfile::TempDir;
 /// Random patterns that tables are learned from.
 const BERNOULLI: usize = 80;
 
-/// A table that was learned, and the scene that it is for.
+/// Projector pixels along a cell's side.
+const CELL: u16 = 20;
+
+/// A scene, and a table learned for it from a session with fine stripes.
 pub struct VerdictRig {
     scene: Scene,
-    learned: BuiltTable,
+    layout: Layout,
+    learned: OnceCell<BuiltTable>,
     place: TempDir,
 }
 
@@ -52,8 +57,11 @@ pub struct VerdictSession {
     pub case: VerdictCase,
     /// What `verify` says.
     pub verdict: Result<TableVerdict, VerifyError>,
-    /// Error that is on the wall.
+    /// Error that is on the wall, by cells.
     pub truth: f64,
+    /// The same at camera pixels, of what all images share: photographed without noise and faults.
+    /// `None` if these do not tell.
+    pub fixed: Option<f64>,
 }
 
 impl VerdictSession {
@@ -63,8 +71,12 @@ impl VerdictSession {
         match &self.verdict {
             Ok(verdict) => {
                 let passed = verdict.outcome == Outcome::Passed;
+                let limit = at_pixels(verdict).map(|(_, limit)| limit);
+                let beyond = limit
+                    .zip(self.fixed)
+                    .is_some_and(|(most, wall)| wall > most);
                 self.case.right.contains(&verdict.outcome)
-                    && !(passed && self.truth > verdict.bound.limit)
+                    && !(passed && (self.truth > verdict.bound.limit || beyond))
             }
             Err(_) => self.case.right.contains(&Outcome::Inconclusive),
         }
@@ -73,43 +85,96 @@ impl VerdictSession {
     /// A line of a table.
     pub fn line(&self) -> String {
         let percent = |value: f64| format!("{:.2} %", 100.0 * value);
+        let known = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), percent);
         let mut line = format!("| {} | {} |", self.case.name, percent(self.truth));
         match &self.verdict {
             Ok(verdict) => {
                 let cause = verdict.cause.map_or("", Cause::name);
                 let (bound, name) = (&verdict.bound, verdict.outcome.name());
+                let pixels = at_pixels(verdict);
                 let _ = write!(
                     line,
-                    " {} | {} | {} | {} | {name} | {cause} |",
+                    " {} | {} | {} | {} | {} | {} | {name} | {cause} |",
                     percent(verdict.error[1]),
                     percent(bound.limit),
-                    percent(bound.promise),
                     percent(bound.added),
+                    known(self.fixed),
+                    known(pixels.map(|(fixed, _)| fixed)),
+                    known(pixels.map(|(_, limit)| limit)),
                 );
             }
             Err(error) => {
-                let _ = write!(line, " - | - | - | - | no verdict | {error} |");
+                let fixed = known(self.fixed);
+                let _ = write!(
+                    line,
+                    " - | - | - | {fixed} | - | - | no verdict | {error} |"
+                );
             }
         }
         line
     }
 }
 
+/// The error at pixels that all images share, and the most of it that passes.
+fn at_pixels(verdict: &TableVerdict) -> Option<(f64, f64)> {
+    let pixels = verdict.pixels.as_ref()?;
+    Some((pixels.fixed?.error, pixels.bound?.limit))
+}
+
 /// The head of a table of [`VerdictSession::line`].
-pub const HEAD: &str = "| session | error on the wall | measured | most that passes | promised | photographs add | outcome | cause |\n|---|---|---|---|---|---|---|---|";
+pub const HEAD: &str = "| session | cells: on the wall | measured | most that passes | photographs add | pixels: on the wall | measured | most that passes | outcome | cause |\n|---|---|---|---|---|---|---|---|---|---|";
+
+/// The mural that a scene has, with less contrast of its detail: what a quarter of its height does
+/// not show fades by `part`. Its file, in `folder`.
+#[must_use]
+pub fn faded_mural(folder: &Path, part: f64) -> PathBuf {
+    let own = image::open(host_tools().join("scenes/mural.png")).expect("part of the repository");
+    let own = own.into_rgb32f();
+    let blurred = image::imageops::blur(&own, own.height() as f32 / 32.0);
+    let faded = image::Rgb32FImage::from_fn(own.width(), own.height(), |x, y| {
+        let mut pixel = *own.get_pixel(x, y);
+        for (value, mean) in pixel.0.iter_mut().zip(blurred.get_pixel(x, y).0) {
+            *value -= part as f32 * (*value - mean);
+        }
+        pixel
+    });
+    let path = folder.join(format!("faded-{part}.png"));
+    let faded = image::DynamicImage::ImageRgb32F(faded).into_rgb8();
+    faded.save(&path).expect("written");
+    path
+}
 
 impl VerdictRig {
-    /// Learns a table.
+    /// For this scene.
     pub fn new(scene: Scene) -> Self {
-        let place = tempfile::tempdir().expect("a folder");
-        let capture = place.path().join("capture");
-        simulated::photograph(&scene, BERNOULLI, 3, &capture);
-        let learned = simulated::learned(&capture);
+        let grid = simulation(&scene, Forced::default()).grid();
+        let [width, height] = [grid.cols(), grid.rows()].map(|side| side as u16 * CELL);
+        let size = FrameSize::new(width, height).expect("sides above zero");
         Self {
             scene,
-            learned,
-            place,
+            layout: Layout::new(grid, size, 0).expect("cells fit"),
+            learned: OnceCell::new(),
+            place: tempfile::tempdir().expect("a folder"),
         }
+    }
+
+    /// The table, learned when it is first asked for.
+    fn learned(&self) -> &BuiltTable {
+        self.learned.get_or_init(|| {
+            let capture = self.place.path().join("capture");
+            let options = OrderOptions {
+                bernoulli: BERNOULLI,
+                ..OrderOptions::default()
+            };
+            let slides = session::order(&self.layout, &options);
+            let camera = CameraSettings {
+                response: self.scene.camera.response.into(),
+                ..CameraSettings::default()
+            };
+            session::write(&slides, &self.layout, &camera, &capture, &Silent).expect("written");
+            fill(&self.scene, &capture, (Forced::default(), 3, &[]));
+            simulated::learned(&capture)
+        })
     }
 
     /// A session without fault that must pass.
@@ -145,46 +210,47 @@ impl VerdictRig {
 
     /// Takes the photographs of a session and judges them.
     pub fn judge(&self, case: VerdictCase) -> VerdictSession {
-        let table = Table::check(&self.learned.compiled.image).expect("a table");
+        let table = Table::check(&self.learned().compiled.image).expect("a table");
         let folder = self.place.path().join("verify");
         let _ = fs::remove_dir_all(&folder);
-        let size = FrameSize::new(320, 240).expect("sides above zero");
-        let layout = Layout::new(table.grid(), size, 0).expect("cells fit");
         let settings = Settings {
-            camera: self.learned.measurements.settings.camera.clone(),
+            camera: self.learned().measurements.settings.camera.clone(),
             ..Settings::default()
         };
-        write(
-            &table,
-            &layout,
-            (&settings, Slides::Both { fine: false }),
-            &folder,
-            &Silent,
-        )
-        .expect("written");
-        let simulation = simulation(&case.scene, Forced::default());
-        let camera = VirtualCamera::new(&case.scene, &simulation, case.seed).expect("light");
-        let camera = camera.with_faults(&case.faults);
-        let session = fill_capture::UnfilledCapture::read(&folder, simulation.grid());
-        let session = session.expect("a folder to fill");
-        session.take_missing(&camera, &Silent).expect("taken");
+        let slides = (&settings, Slides::Both { fine: true });
+        write(&table, &self.layout, slides, &folder, &Silent).expect("written");
+        let photographs = (Forced::default(), case.seed, &case.faults[..]);
+        fill(&case.scene, &folder, photographs);
         if let Some(quality) = case.jpeg {
             as_jpeg(&folder.join("photos"), quality);
         }
-        let readings = Readings::read(&folder, &table, &Silent);
+        let judged = || {
+            judge(
+                &folder,
+                &table,
+                &Readings::read(&folder, &table, &Silent)?,
+                None,
+            )
+        };
+        let verdict = judged();
         let truth = self.truth(&case, &folder);
-        let verdict = readings.and_then(|readings| judge(&folder, &table, &readings, None));
+        fs::remove_dir_all(folder.join("photos")).expect("removed");
+        fs::create_dir(folder.join("photos")).expect("made");
+        let quiet = Forced::default().with(Effect::Noise, false);
+        fill(&case.scene, &folder, (quiet, case.seed, &[]));
+        let fixed = judged().ok().and_then(|quiet| quiet.pixels?.fixed);
         VerdictSession {
             case,
             verdict,
             truth,
+            fixed: fixed.map(|fixed| fixed.error),
         }
     }
 
     /// Mean error of the compensated images on the wall, without noise and faults of the
     /// camera, in the cells where they were when the table was learned.
     fn truth(&self, case: &VerdictCase, folder: &Path) -> f64 {
-        let table = Table::check(&self.learned.compiled.image).expect("a table");
+        let table = Table::check(&self.learned().compiled.image).expect("a table");
         let images = iltm::verify::test_images(&table).expect("images");
         let curves = iltm::verify::ProjectorCurves::new(&table);
         // The wall as it is now, from where the camera stood then.
@@ -220,9 +286,9 @@ impl VerdictRig {
         let exposed = simulation
             .expose_projected(&projected, &lamp)
             .expect("light");
-        let live: Vec<bool> = self.learned.measurements.live.repeat(channels);
+        let live: Vec<bool> = self.learned().measurements.live.repeat(channels);
         let srgb = |_, code: u8| iltm::picture::Response::Srgb.light(f64::from(code) / 255.0);
-        let registration = &self.learned.measurements.registration;
+        let registration = &self.learned().measurements.registration;
         let errors = images.iter().enumerate().map(|(k, image)| {
             let planes = simulation.photograph(&exposed, k);
             let seen: Vec<f64> = (planes.iter())
@@ -233,6 +299,16 @@ impl VerdictRig {
         });
         errors.sum::<f64>() / images.len() as f64
     }
+}
+
+/// Takes the photographs of a folder, with these effects, noise of this seed and faults.
+fn fill(scene: &Scene, folder: &Path, (forced, seed, faults): (Forced, u64, &[InjectedFault])) {
+    let simulation = simulation(scene, forced);
+    let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
+    let camera = camera.with_faults(faults);
+    let session = fill_capture::UnfilledCapture::read(folder, simulation.grid());
+    let session = session.expect("a folder to fill");
+    session.take_missing(&camera, &Silent).expect("taken");
 }
 
 /// Turns the photographs of a folder into JPEG files.

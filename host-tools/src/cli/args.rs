@@ -653,7 +653,8 @@ pub(super) struct Verify {
     /// in the order of the numbers in them: what each shows is known by the card before it
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub(super) photographs: Option<PathBuf>,
-    /// Largest error that passes; by default 1.5 times what is to be expected
+    /// Largest error that passes, of cells and of what all images share at pixels; by default 1.5
+    /// times what is to be expected of either
     #[arg(long, value_name = "ERROR", value_parser = error_bound, conflicts_with = "output")]
     pub(super) bound: Option<f64>,
     /// Folder for the page and the maps; by default `verdict` in FOLDER

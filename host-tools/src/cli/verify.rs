@@ -12,7 +12,8 @@ use crate::compile::Provenance;
 use crate::session::Layout;
 use crate::verify::{
     Cause, Handover, ImageVerdict, Outcome, Readings, Recognised, Slides, TableVerdict, TestImage,
-    brightness_words, html, judge, pictures, reason, recognise, test_images, write,
+    brightness_words, fixed_words, html, judge, pictures, reason, recognise, shift_words,
+    test_images, write,
 };
 use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
@@ -171,8 +172,16 @@ fn verdict(
         let says = "these photographs cannot tell whether it keeps its promise";
         (Kind::Inconclusive, says.to_owned())
     } else {
-        let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
-        let says = format!("it does not keep its promise: error {error}, at most {limit} passes");
+        let at_pixels = verdict
+            .pixels
+            .as_ref()
+            .filter(|_| matches!(verdict.cause, Some(Cause::Nudged | Cause::Texture)));
+        let by_cells = || {
+            let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
+            format!("error {error}, at most {limit} passes")
+        };
+        let what = at_pixels.and_then(fixed_words).unwrap_or_else(by_cells);
+        let says = format!("it does not keep its promise: {what}");
         (Kind::Verdict, says)
     };
     let message = format!("{}: {says}", arguments.table.display());
@@ -287,6 +296,12 @@ fn data(
             "before": pixels.error[0],
             "after": pixels.error[1],
             "noise": pixels.noise,
+            "fixed": pixels.fixed.map(|fixed| fixed.error),
+            "shift": pixels.fixed.and_then(|fixed| fixed.shift),
+            "promise": pixels.bound.map(|bound| bound.promise),
+            "predicted": pixels.bound.map(|bound| bound.predicted),
+            "ambient": pixels.bound.map(|bound| bound.ambient),
+            "limit": pixels.bound.map(|bound| bound.limit),
             "pixels": pixels.errors.len(),
             "images": pixels.images.iter().map(|[before, after]| json!({
                 "before": before,
@@ -354,6 +369,17 @@ fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
             percent(before),
             pixels.errors.len()
         );
+        let fixed = fixed_words(pixels).unwrap_or_else(|| {
+            "not held against a limit: the table predicts no error at pixels".to_owned()
+        });
+        let _ = writeln!(text, "fixed       {fixed}");
+        if let Some(shift) = pixels.fixed.and_then(|fixed| fixed.shift) {
+            let _ = writeln!(
+                text,
+                "nudge       the picture lies {} of where it lay when the table was made",
+                shift_words(shift)
+            );
+        }
     }
     match &verdict.drift.white {
         None => {

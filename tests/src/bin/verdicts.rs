@@ -6,7 +6,7 @@
 use iltm::scene::description::Scene;
 use iltm::verify::Outcome;
 use iltm_tests::simulated::scene;
-use iltm_tests::verdicts::{HEAD, VerdictRig, study};
+use iltm_tests::verdicts::{HEAD, VerdictRig, faded_mural, study};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -74,6 +74,32 @@ fn main() {
             &[Outcome::Failed][..],
         ),
     ];
+    // Cells of 20 x 20 pixels, and a camera that has more.
+    let projector = "look_at = [0.0, 0.0, -0.5]\nfield_of_view = 23.0";
+    let panels = |nudge: f64| {
+        let distance = 0.4_f64.hypot(9.5);
+        let pixel = 2.0 * distance * 11.5_f64.to_radians().tan() / 480.0;
+        let nudged = projector.replace("[0.0", &format!("[{}", nudge * pixel));
+        let camera = "width = 216\nheight = 150";
+        let pairs = [(camera, "width = 648\nheight = 450"), (projector, &nudged)];
+        scene("m-panels-painted", &pairs)
+    };
+    let place = tempfile::tempdir().expect("a folder");
+    let corner = |faded: f64| {
+        let mural = faded_mural(place.path(), faded);
+        let mural = mural.to_str().expect("letters");
+        let pairs = [
+            ("width = 240\nheight = 180", "width = 640\nheight = 480"),
+            ("full_well = 12000.0", "full_well = 60000.0"),
+            ("bits = 8\nresponse = \"srgb\"", "bits = 12"),
+            ("mural.png", mural),
+        ];
+        scene("painted-corner", &pairs)
+    };
+    let rigs = rigs.into_iter().chain([
+        ("painted panels", panels(0.0), Vec::new()),
+        ("painted corner", corner(0.0), Vec::new()),
+    ]);
     let mut wrong = 0;
     for (name, scene, gammas) in rigs {
         let chosen = |case: &str| {
@@ -86,7 +112,28 @@ fn main() {
         } else {
             &[]
         };
-        let mut cases = study(&rig, &gammas, others);
+        let any = &[Outcome::Passed, Outcome::Inconclusive, Outcome::Failed];
+        let mut cases = match name {
+            "painted panels" | "painted corner" => {
+                let good = |seed: u64| rig.good(&format!("good, seed {seed}"), seed);
+                (1..=6).map(good).collect()
+            }
+            _ => study(&rig, &gammas, others),
+        };
+        if name == "painted panels" {
+            for pixels in [0.1, 0.25, 0.5, 1.0, 2.0, 5.0] {
+                let right = if pixels < 1.0 { &any[..] } else { &any[2..] };
+                let what = format!("projector nudged by {pixels} pixels");
+                cases.push(rig.changed(&what, panels(pixels), right));
+            }
+        }
+        if name == "painted corner" {
+            for part in [0.05, 0.1, 0.15, 0.2, 0.3] {
+                let right = if part < 0.2 { &any[..] } else { &any[2..] };
+                let what = format!("detail of the mural faded by {:.0} %", 100.0 * part);
+                cases.push(rig.changed(&what, corner(part), right));
+            }
+        }
         if name == "installation" {
             for quality in [100, 95, 90, 80, 60] {
                 let mut case = rig.good(&format!("good, JPEG of quality {quality}"), 4);

@@ -224,3 +224,30 @@ fn what_passes_is_on_the_wall_and_no_fault_of_photographs_or_wall_passes() {
         assert!(session.is_right(), "{session:?}");
     }
 }
+
+/// What happens within cells, which their mean light does not tell.
+#[test]
+fn a_picture_beside_its_place_does_not_pass_and_is_named() {
+    let painted = |right: f64| {
+        let pixel = 2.0 * 0.4_f64.hypot(9.5) * 11.5_f64.to_radians().tan() / 480.0;
+        let to = format!(
+            "look_at = [{}, 0.0, -0.5]\nfield_of_view = 23.0",
+            right * pixel
+        );
+        let projector = "look_at = [0.0, 0.0, -0.5]\nfield_of_view = 23.0";
+        let camera = ("width = 216\nheight = 150", "width = 540\nheight = 375");
+        simulated::scene("m-panels-painted", &[camera, (projector, &to)])
+    };
+    let rig = VerdictRig::new(painted(0.0));
+    let good = rig.judge(rig.good("no fault", 1));
+    assert!(good.is_right(), "{good:?}");
+    let nudged = rig.judge(rig.changed("nudged", painted(1.0), &[Outcome::Failed]));
+    assert!(nudged.is_right(), "{}", nudged.line());
+    let verdict = nudged.verdict.unwrap();
+    assert_eq!(verdict.cause, Some(Cause::Nudged));
+    let [right, down] = verdict.pixels.unwrap().fixed.unwrap().shift.unwrap();
+    assert!(
+        (right - 1.0).abs() < 0.3 && down.abs() < 0.3,
+        "{right} {down}"
+    );
+}

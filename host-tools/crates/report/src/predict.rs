@@ -72,10 +72,7 @@ impl Projection {
         if !of_one_scene {
             return None;
         }
-        let gains = match table.channels() {
-            1 => gains::<1>(table, size)?,
-            _ => gains::<3>(table, size)?,
-        };
+        let gains = pixel_gains(table, size)?;
         let channel = |(index, gain): (usize, Vec<f32>)| {
             let ambient = &inverse.channels[index].ambient;
             let relative: Vec<f64> = ambient.iter().map(|light| light / white).collect();
@@ -168,7 +165,16 @@ impl Channel {
     }
 }
 
-/// The gain of each pixel, as the pipeline has it; one plane a channel.
+/// The gain of each pixel in frames of `size`, as the pipeline has it: drive per reference light,
+/// one plane a channel. `None` if the frame is smaller than the grid.
+#[must_use]
+pub fn pixel_gains(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f32>>> {
+    match table.channels() {
+        1 => gains::<1>(table, size),
+        _ => gains::<3>(table, size),
+    }
+}
+
 fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f32>>> {
     let pipeline = FullPipeline::<C>::new(table, size).ok()?;
     let unit = f32::from(table.gain_fraction()).exp2();

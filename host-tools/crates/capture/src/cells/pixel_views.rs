@@ -5,12 +5,13 @@ use crate::registration::cell_map::Registration;
 use crate::registration::projector_map::ProjectorMap;
 use iltm_runtime::Grid;
 
-/// A camera pixel, and the place that it sees in samples from the left and upper edge.
+/// A camera pixel, and the place that it sees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PixelView {
     /// Its index in the registered photographs.
     pub pixel: u32,
-    place: [f32; 2],
+    /// The middle of what it sees, in samples from the left and upper edge.
+    pub place: [f32; 2],
 }
 
 /// Which samples of a grid camera pixels see.

@@ -6,7 +6,7 @@
 //! known: the table's own predicted error, what the projector's range and its 8-bit codes
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
-use super::outcome::decide;
+use super::outcome::{decide, decide_by_pixels};
 use super::readings::Shown;
 use super::{Cause, ChainFault, Expected, Outcome, PixelVerdict, Readings, VerifyError};
 use iltm_capture::{CellPlanes, Gate};
@@ -268,6 +268,13 @@ pub fn judge(
     if chain.is_some() {
         (outcome, cause) = (Outcome::Failed, Some(Cause::Chain));
     }
+    // Photographs that cannot tell by cells tell less by pixels.
+    let pixels = (outcome != Outcome::Inconclusive)
+        .then(|| PixelVerdict::new(table, readings, &bound))
+        .flatten();
+    if let Some(pixels) = &pixels {
+        (outcome, cause) = decide_by_pixels(pixels, (outcome, cause));
+    }
     Ok(TableVerdict {
         curve,
         chain,
@@ -277,10 +284,7 @@ pub fn judge(
         gates: readings.revisited.gates.clone(),
         error,
         bound,
-        // Photographs that cannot tell by cells tell less by pixels.
-        pixels: (outcome != Outcome::Inconclusive)
-            .then(|| PixelVerdict::new(table, readings))
-            .flatten(),
+        pixels,
         drift,
         brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),

@@ -5,7 +5,7 @@
 //! larger than everything that the photographs' own faults explain. Between the two, nobody
 //! knows.
 
-use super::{Bound, Curve, Drift};
+use super::{Bound, Curve, Drift, PixelVerdict};
 use iltm_capture::{CellReadings, Gate, GateName, Nonlinearity};
 use strum::IntoStaticStr;
 
@@ -54,6 +54,11 @@ pub enum Cause {
     Chain,
     /// White is another than when the table was made: projector, scene, or another table.
     Scene,
+    /// The picture lies elsewhere on the wall than when the table was made.
+    Nudged,
+    /// White is as it was from cell to cell, and not within the cells: paint, dirt, or a screen that
+    /// hangs otherwise.
+    Texture,
     /// The colours of white are others than when the table was made.
     Colour,
     /// White is as it was, and the images are not: the projector's response, or a bad table.
@@ -85,25 +90,6 @@ impl Cause {
     #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
-    }
-
-    /// Whether it lies in the photographs and not on the wall.
-    #[must_use]
-    pub const fn of_photographs(self) -> bool {
-        matches!(
-            self,
-            Self::Moved
-                | Self::Order
-                | Self::Clipped
-                | Self::Flicker
-                | Self::Drift
-                | Self::AutoExposure
-                | Self::CameraResponse
-                | Self::Response
-                | Self::Superposition
-                | Self::Noise
-                | Self::Viewpoint
-        )
     }
 
     /// Whether photographs with it cannot even be told from each other.
@@ -158,6 +144,15 @@ impl Cause {
             Self::Chain => {
                 "Set player, device and projector so that exactly one of them compensates, and no \
                  one after it scales, shifts or mirrors the picture; then photograph again."
+            }
+            Self::Nudged => {
+                "Put the projector back, or its lens shift, keystone and zoom, until the picture lies \
+                 where it lay, and verify again; or take a new capture and solve it."
+            }
+            Self::Texture => {
+                "Look at the page's map of the pixels' errors for what has changed on the wall. If it \
+                 stays, take a new capture and solve it, or let `iltm refine` feed these photographs \
+                 back."
             }
             Self::Scene | Self::Colour | Self::ProjectorResponse | Self::Unknown => {
                 "Put the projector back as it was when the table was made and verify again; if it is \
@@ -239,6 +234,31 @@ pub(super) fn decide(
     }
 }
 
+/// What follows from an error at pixels where cells have said this.
+pub(super) fn decide_by_pixels(
+    pixels: &PixelVerdict,
+    (outcome, cause): (Outcome, Option<Cause>),
+) -> (Outcome, Option<Cause>) {
+    let (Some(fixed), Some(bound)) = (&pixels.fixed, &pixels.bound) else {
+        return (outcome, cause);
+    };
+    if fixed.error <= bound.limit {
+        return (outcome, cause);
+    }
+    match (outcome, cause) {
+        (Outcome::Passed, _) | (Outcome::Failed, Some(Cause::Scene | Cause::ProjectorResponse))
+            if fixed.shift.is_some() =>
+        {
+            (Outcome::Failed, Some(Cause::Nudged))
+        }
+        (Outcome::Passed, _) if fixed.error > bound.doubt => {
+            (Outcome::Failed, Some(Cause::Texture))
+        }
+        (Outcome::Passed, _) => (Outcome::Inconclusive, Some(Cause::Texture)),
+        found => found,
+    }
+}
+
 /// Part of which the levels of white's colours may differ.
 const SAME_COLOUR: f64 = 0.03;
 
@@ -262,7 +282,51 @@ fn changed(bound: &Bound, drift: &Drift) -> Cause {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verify::WhiteChange;
+    use crate::verify::{FixedPattern, PixelBound, WhiteChange};
+
+    #[test]
+    fn what_all_images_share_decides_where_cells_pass_and_names_what_they_found() {
+        let decide = |error: f64, shift, found| {
+            let pixels = PixelVerdict {
+                images: Vec::new(),
+                error: [0.3, 0.05],
+                noise: 0.0,
+                errors: Vec::new(),
+                white: Vec::new(),
+                fixed: Some(FixedPattern { error, shift }),
+                bound: Some(PixelBound {
+                    predicted: 0.02,
+                    ambient: 0.0,
+                    promise: 0.02,
+                    limit: 0.03,
+                    doubt: 0.032,
+                }),
+            };
+            decide_by_pixels(&pixels, found)
+        };
+        let passed = (Outcome::Passed, None);
+        let shift = Some([0.5, 0.0]);
+        assert_eq!(decide(0.0299, shift, passed), passed);
+        let unsure = (Outcome::Inconclusive, Some(Cause::Texture));
+        assert_eq!(decide(0.0301, None, passed), unsure);
+        let failed = |cause| (Outcome::Failed, Some(cause));
+        assert_eq!(decide(0.0301, shift, passed), failed(Cause::Nudged));
+        assert_eq!(decide(0.0321, None, passed), failed(Cause::Texture));
+        assert_eq!(decide(0.0321, shift, passed), failed(Cause::Nudged));
+        assert_eq!(
+            decide(0.1, shift, failed(Cause::Scene)),
+            failed(Cause::Nudged)
+        );
+        for found in [failed(Cause::Scene), failed(Cause::Colour)] {
+            assert_eq!(decide(0.1, None, found), found);
+        }
+        assert_eq!(
+            decide(0.02, shift, failed(Cause::Scene)),
+            failed(Cause::Scene)
+        );
+        let noisy = (Outcome::Inconclusive, Some(Cause::Noise));
+        assert_eq!(decide(0.1, shift, noisy), noisy);
+    }
 
     #[test]
     fn what_changed_is_the_scene_then_a_colour_then_the_response() {

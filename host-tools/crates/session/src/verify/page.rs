@@ -208,13 +208,37 @@ fn good(verdict: &TableVerdict) -> String {
     };
     let viewer = verdict.pixels.as_ref().map_or_else(String::new, |pixels| {
         let seen = plain(pixels.error[1]);
-        format!(" A viewer sees {seen} of the light off, images finer than the cells.")
+        let fixed = fixed_words(pixels).map_or_else(String::new, |fixed| format!(", {fixed}"));
+        format!(" A viewer sees {seen} of the light off, images finer than the cells{fixed}.")
     });
     format!(
         "By the mean light of cells the error is {}, {:.1} times smaller than without the \
          table.{viewer} {of}.",
         plain(after),
         before / after.max(1e-9)
+    )
+}
+
+/// The part of what a viewer sees that is held against a limit, in words; `None` if none is.
+#[must_use]
+pub fn fixed_words(pixels: &PixelVerdict) -> Option<String> {
+    let (fixed, bound) = (pixels.fixed?, pixels.bound?);
+    Some(format!(
+        "{} at the same pixels in every image, of which at most {} passes",
+        plain(fixed.error),
+        plain(bound.limit)
+    ))
+}
+
+/// How far right and down a picture lies, in words.
+#[must_use]
+pub fn shift_words([right, down]: [f64; 2]) -> String {
+    format!(
+        "{:.1} pixels of the projector to the {} and {:.1} {}",
+        right.abs(),
+        if right < 0.0 { "left" } else { "right" },
+        down.abs(),
+        if down < 0.0 { "up" } else { "down" }
     )
 }
 
@@ -243,6 +267,26 @@ pub fn reason(verdict: &TableVerdict) -> String {
     let why = match verdict.cause {
         None => return good(verdict),
         Some(Cause::Noise) => apart("Photographs of the same picture differ among themselves by"),
+        Some(Cause::Nudged) => {
+            let pixels = verdict.pixels.as_ref();
+            let shift = pixels.and_then(|pixels| pixels.fixed?.shift);
+            let fixed = pixels.and_then(fixed_words).unwrap_or_default();
+            format!(
+                "The picture lies {} of where it lay when the table was made, and the wall's own detail \
+                 is compensated beside it: {fixed}.",
+                shift_words(shift.unwrap_or_default())
+            )
+        }
+        Some(Cause::Texture) => {
+            let fixed = verdict.pixels.as_ref().and_then(fixed_words);
+            let so_far = if verdict.outcome == Outcome::Failed {
+                "Something within the cells is not as it was when the table was made"
+            } else {
+                "Something within the cells is not as it was when the table was made, or the table \
+                 errs more there than it predicts"
+            };
+            format!("{so_far}: {}.", fixed.unwrap_or_default())
+        }
         Some(Cause::Viewpoint) => apart(
             "From where the camera stands, white differs from what the table expects from cell to \
              cell by",
@@ -351,6 +395,10 @@ fn viewer(judged: &PixelVerdict, files: &[PictureFile]) -> Markup {
             " pixels of the camera: " b { (percent(after)) } " of the light is off, "
             (percent(before)) " as the wall is. The camera's noise, "
             (percent(judged.noise)) " in one photograph, is taken out."
+            @if let Some(fixed) = fixed_words(judged) {
+                " " (capitalised(&fixed)) ": a wrong gain or a changed wall spoils every image alike, "
+                "and what is wrong in one image alone is noise, focus or the file format."
+            }
         }
         div .three {
             figure { (img_named(files, "fine-wanted", "Wanted")) figcaption { "Wanted" } }

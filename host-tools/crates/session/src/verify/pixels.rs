@@ -6,11 +6,14 @@
 //! light as it is. The camera's noise is known and taken out of the error, but not of PSNR, SSIM
 //! and Delta E.
 
-use super::Readings;
+use super::fixed_pattern::FixedPattern;
+use super::judge::MARGIN;
 use super::readings::FineShown;
+use super::{Bound, Expected, Readings};
 use iltm_capture::PixelReadings;
 use iltm_compile::Provenance;
-use iltm_picture::{LightPicture, PictureError};
+use iltm_picture::{Lattice, LightPicture, PictureError};
+use iltm_report::{pixel_gains, tier_costs};
 use iltm_runtime::{FrameSize, image::Table};
 
 /// What a viewer sees, pixel by pixel.
@@ -28,12 +31,63 @@ pub struct PixelVerdict {
     pub errors: Vec<f32>,
     /// Camera units of reference white, by image.
     pub white: Vec<f64>,
+    /// The part of the error that all images share; `None` with a single image.
+    pub fixed: Option<FixedPattern>,
+    /// What that part is held against; `None` if the table predicts no error at pixels.
+    pub bound: Option<PixelBound>,
+}
+
+/// What the error at pixels that all images share is held against.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct PixelBound {
+    /// Error at pixels that the table predicts of itself at its top tier, or that its refinement
+    /// confirmed.
+    pub predicted: f64,
+    /// Error that ambient light leaves in all images alike: a table takes it away by cell.
+    pub ambient: f64,
+    /// Both: root of the sum of squares.
+    pub promise: f64,
+    /// The largest that passes.
+    pub limit: f64,
+    /// The largest that the table's prediction and another place of the camera explain: what is
+    /// beyond it is a change of the wall.
+    pub doubt: f64,
+}
+
+/// How many times the promise the error of a good table is at most: in the scenes that come with the
+/// tools it is up to 1.4 times what tables predict at pixels.
+const DOUBT: f64 = 2.0;
+
+impl PixelBound {
+    /// That of a table whose cells are held against `cells`.
+    fn new(table: &Table<'_>, fine: &[FineShown], cells: &Bound) -> Option<Self> {
+        let provenance = Provenance::read(table.provenance());
+        let predicted = provenance.predicted_error?;
+        // Without figures at pixels it is one of cells.
+        predicted.figures?;
+        let refined = provenance.refined.last().map(|round| round.after);
+        let own = refined.map_or(predicted.compensated, |r| r.min(predicted.compensated));
+        let predicted = tier_costs(table).last()?.left_out.hypot(own);
+        let ambient = ambient_detail(table, fine);
+        let promise = predicted.hypot(ambient);
+        let limit = if cells.given {
+            cells.limit
+        } else {
+            MARGIN * promise
+        };
+        Some(Self {
+            predicted,
+            ambient,
+            promise,
+            limit,
+            doubt: limit.max(DOUBT * promise.hypot(cells.viewpoint)),
+        })
+    }
 }
 
 impl PixelVerdict {
     /// Judges the photographs; `None` without fine images, or if no pixel can be judged.
-    #[must_use]
-    pub fn new(table: &Table<'_>, readings: &Readings) -> Option<Self> {
+    pub(super) fn new(table: &Table<'_>, readings: &Readings, cells: &Bound) -> Option<Self> {
         let pixels = readings.revisited.pixels.as_ref()?.as_ref().ok()?;
         let mut images = Vec::new();
         let mut squares = [0.0_f64; 2];
@@ -65,6 +119,8 @@ impl PixelVerdict {
         }
         let count = images.len() as f64;
         (!images.is_empty()).then(|| Self {
+            fixed: FixedPattern::new(table, pixels, (&readings.fine, &white)),
+            bound: PixelBound::new(table, &readings.fine, cells),
             error: squares.map(|square| (square / count).sqrt()),
             noise: (noises / count).sqrt(),
             errors: errors
@@ -98,26 +154,86 @@ fn add_errors(errors: &mut [f32], seen: &[Vec<f32>], wanted: &[Vec<f32>], scale:
     }
 }
 
+/// Error that ambient light leaves, relative to the images' wanted light.
+///
+/// A table knows it by cell, `a`, and paint within a cell reflects it as it reflects all light. What is
+/// taken away is `U a`, and what is there is `U (g a) / g`.
+fn ambient_detail(table: &Table<'_>, fine: &[FineShown]) -> f64 {
+    let size = fine.first().map(|shown| shown.wanted.size());
+    let found = size.and_then(|size| {
+        let lattice = Lattice::new(table.grid(), size)?;
+        Some((lattice, pixel_gains(table, size)?))
+    });
+    let Some((lattice, gains)) = found else {
+        return 0.0;
+    };
+    let expected = Expected::new(table);
+    let (mut off, mut wanted) = (0.0, 0.0);
+    let channels = expected.gain().iter().zip(expected.ambient());
+    for (channel, ((cell_gain, ambient), gains)) in channels.zip(&gains).enumerate() {
+        let driven: Vec<f64> = cell_gain.iter().zip(ambient).map(|(g, a)| g * a).collect();
+        let there = lattice.expand(&driven).into_iter().zip(gains);
+        let light = there.zip(lattice.expand(ambient));
+        for (at, ((driven, gain), taken)) in light.enumerate() {
+            if *gain > 0.0 {
+                off += f64::from(driven / gain - taken).powi(2);
+                let light = |shown: &FineShown| f64::from(shown.wanted.planes()[channel][at]);
+                wanted += fine.iter().map(|shown| light(shown).powi(2)).sum::<f64>();
+            }
+        }
+    }
+    (off * fine.len() as f64 / wanted.max(f64::MIN_POSITIVE)).sqrt()
+}
+
 /// Light of a photograph that counts, by channel and pixel, camera units.
 pub(super) fn seen(table: &Table<'_>, pixels: &PixelReadings, picture: usize) -> Vec<Vec<f32>> {
-    let light = &pixels.pictures[picture];
+    let channels = 0..pixels.pictures[picture].len();
+    channels
+        .map(|channel| counted_light(table, pixels, (picture, channel)))
+        .collect()
+}
+
+/// The same of one channel.
+pub(super) fn counted_light(
+    table: &Table<'_>,
+    pixels: &PixelReadings,
+    (picture, channel): (usize, usize),
+) -> Vec<f32> {
+    let light = &pixels.pictures[picture][channel];
     if !Provenance::read(table.provenance()).ambient_kept {
         return light.clone();
     }
-    let planes = light.iter().zip(&pixels.black);
-    planes
-        .map(|(light, black)| light.iter().zip(black).map(|(l, b)| l - b).collect())
-        .collect()
+    let pairs = light.iter().zip(&pixels.black[channel]);
+    pairs.map(|(light, black)| light - black).collect()
 }
 
 /// Wanted light at each pixel, by channel.
 pub(super) fn wanted(pixels: &PixelReadings, shown: &FineShown) -> Vec<Vec<f32>> {
-    let planes = shown.wanted.planes().iter();
-    planes.map(|plane| at_pixels(pixels, plane)).collect()
+    let channels = 0..shown.wanted.planes().len();
+    channels
+        .map(|channel| wanted_light(pixels, shown, channel))
+        .collect()
+}
+
+/// The same of one channel.
+pub(super) fn wanted_light(pixels: &PixelReadings, shown: &FineShown, channel: usize) -> Vec<f32> {
+    at_pixels(pixels, &shown.wanted.planes()[channel])
+}
+
+/// Whether a pixel sees a sample that the projector's range cut.
+pub(super) fn cut_at_pixels(
+    pixels: &PixelReadings,
+    shown: &FineShown,
+    channel: usize,
+) -> Vec<bool> {
+    let cut = shown.cut(channel).into_iter();
+    let cut: Vec<f32> = cut.map(|cut| f32::from(u8::from(cut))).collect();
+    let seen = at_pixels(pixels, &cut).into_iter();
+    seen.map(|cut| cut > 0.0).collect()
 }
 
 /// Mean of what each pixel sees of a plane of the projector's pixels.
-pub(super) fn at_pixels(pixels: &PixelReadings, plane: &[f32]) -> Vec<f32> {
+fn at_pixels(pixels: &PixelReadings, plane: &[f32]) -> Vec<f32> {
     let views = &pixels.views;
     let seen = |view| {
         let seen = views.seen(view);

@@ -45,8 +45,20 @@ pub struct FineShown {
     pub image: u8,
     /// The light that was wanted, relative to reference white; without the projector's border.
     pub wanted: LightPicture,
-    /// Whether the projector's range cut a sample of the compensated picture, by channel.
-    pub cut: Vec<Vec<bool>>,
+    /// The same, compensated: codes for the projector.
+    pub compensated: Picture,
+}
+
+impl FineShown {
+    /// Whether the projector's range may have cut each sample of the compensated picture.
+    pub(super) fn cut(&self, channel: usize) -> Vec<bool> {
+        let Samples::Eight(samples) = self.compensated.samples() else {
+            unreachable!("`read_of_size` takes 8 bits only");
+        };
+        let channels = self.compensated.channels();
+        let codes = samples.iter().skip(channel).step_by(channels);
+        codes.map(|code| [0, u8::MAX].contains(code)).collect()
+    }
 }
 
 /// Everything that the photographs of a verification folder say.
@@ -326,10 +338,10 @@ fn fine_pictures(
         let wanted = read_of_size(folder, &fine_file(*image), table, layout.inner())?;
         let mut made = wanted.clone();
         compensator.picture(&mut made)?;
-        let cut = cut(&made);
-        for (shot, expected) in shots.iter().zip([plain(&wanted, &curves), made]) {
+        let expected = [&plain(&wanted, &curves), &made];
+        for (shot, expected) in shots.iter().zip(expected) {
             let given = read_of_size(folder, &shot.pattern, table, size)?;
-            if layout.framed(&expected).as_ref() != Some(&given) {
+            if layout.framed(expected).as_ref() != Some(&given) {
                 return Err(VerifyError::OtherTable {
                     path: folder.join(&shot.pattern),
                     image: *image,
@@ -339,23 +351,10 @@ fn fine_pictures(
         Ok(FineShown {
             image: *image,
             wanted: LightPicture::decode(&wanted, Response::Srgb),
-            cut,
+            compensated: made,
         })
     };
     pairs.iter().map(of_pair).collect()
-}
-
-/// Which samples of a compensated picture the projector's range may have cut, by channel.
-fn cut(picture: &Picture) -> Vec<Vec<bool>> {
-    let Samples::Eight(samples) = picture.samples() else {
-        unreachable!("`read_of_size` takes 8 bits only");
-    };
-    let channels = picture.channels();
-    let of_channel = |channel: usize| {
-        let codes = samples.iter().skip(channel).step_by(channels);
-        codes.map(|code| [0, u8::MAX].contains(code)).collect()
-    };
-    (0..channels).map(of_channel).collect()
 }
 
 /// A picture of one pixel a cell, 8 bits, as many channels as the table.

@@ -10,7 +10,7 @@
 //! scale by scale and place by place, whose signal is the product of both). Then each image is held
 //! against a step that was made without it; a step that would not have helped is not taken.
 
-use super::pixels::{at_pixels, seen, wanted};
+use super::pixels::{counted_light, cut_at_pixels, wanted_light};
 use super::{Cause, Readings, VerifyError, judge, reason};
 use iltm_capture::{CellPlanes, PixelReadings, PixelViews};
 use iltm_compile::{FineGains, Provenance, RefinedParts, Refinement, refined_table};
@@ -153,15 +153,15 @@ pub fn refine(
 }
 
 /// Gains as a table has them, drive per reference light.
-struct OwnGains {
+pub(super) struct OwnGains {
     cells: CellPlanes,
-    fine: FineGains,
+    pub(super) fine: FineGains,
 }
 
 impl OwnGains {
     /// Those of `table`, as fine as it has them or with `factor` samples along a cell's sides if
     /// these are more.
-    fn new(table: &Table<'_>, factor: [usize; 2]) -> Self {
+    pub(super) fn new(table: &Table<'_>, factor: [usize; 2]) -> Self {
         let grid = table.grid();
         let unit = f64::from(table.gain_fraction()).exp2();
         let channels = 0..usize::from(table.channels());
@@ -273,21 +273,20 @@ impl Seen {
     fn new(table: &Table<'_>, readings: &Readings, pixels: &PixelReadings) -> Self {
         let mut images: Vec<Vec<Residual>> = Vec::new();
         for (at, shown) in readings.fine.iter().enumerate() {
-            let channels = wanted(pixels, shown).into_iter().zip(&shown.cut);
-            let channels = channels.zip(seen(table, pixels, 2 * at + 1));
-            let of_channel = |((mut wanted, cut), seen): ((Vec<f32>, &Vec<bool>), Vec<f32>)| {
-                let cut: Vec<f32> = cut.iter().map(|cut| f32::from(u8::from(*cut))).collect();
-                for (wanted, cut) in wanted.iter_mut().zip(at_pixels(pixels, &cut)) {
-                    if cut > 0.0 {
+            let of_channel = |channel: usize| {
+                let mut wanted = wanted_light(pixels, shown, channel);
+                let cut = cut_at_pixels(pixels, shown, channel);
+                for (wanted, cut) in wanted.iter_mut().zip(cut) {
+                    if cut {
                         *wanted = 0.0;
                     }
                 }
                 Residual {
                     wanted,
-                    missing: seen,
+                    missing: counted_light(table, pixels, (2 * at + 1, channel)),
                 }
             };
-            images.push(channels.map(of_channel).collect());
+            images.push((0..table.channels().into()).map(of_channel).collect());
         }
         // Camera units of reference white.
         let (mut product, mut wanted) = (0.0, 0.0);
