@@ -30,6 +30,8 @@ pub struct VerdictRig {
     scene: Scene,
     layout: Layout,
     learned: OnceCell<BuiltTable>,
+    /// What all images share in the scene as it was, photographed without noise.
+    own_fixed: OnceCell<Option<f64>>,
     place: TempDir,
 }
 
@@ -40,6 +42,8 @@ pub struct VerdictCase {
     pub name: String,
     /// The scene as the verification finds it.
     pub scene: Scene,
+    /// Whether that is another than the table was learned in.
+    pub is_changed: bool,
     /// What goes wrong with the photographs.
     pub faults: Vec<InjectedFault>,
     /// Of the noise.
@@ -154,6 +158,7 @@ impl VerdictRig {
             scene,
             layout: Layout::new(grid, size, 0).expect("cells fit"),
             learned: OnceCell::new(),
+            own_fixed: OnceCell::new(),
             place: tempfile::tempdir().expect("a folder"),
         }
     }
@@ -182,6 +187,7 @@ impl VerdictRig {
         VerdictCase {
             name: name.to_owned(),
             scene: self.scene.clone(),
+            is_changed: false,
             faults: Vec::new(),
             seed,
             jpeg: None,
@@ -203,6 +209,7 @@ impl VerdictRig {
     pub fn changed(&self, name: &str, scene: Scene, right: &[Outcome]) -> VerdictCase {
         VerdictCase {
             scene,
+            is_changed: true,
             right: right.to_vec(),
             ..self.good(name, 11)
         }
@@ -234,16 +241,23 @@ impl VerdictRig {
         };
         let verdict = judged();
         let truth = self.truth(&case, &folder);
-        fs::remove_dir_all(folder.join("photos")).expect("removed");
-        fs::create_dir(folder.join("photos")).expect("made");
-        let quiet = Forced::default().with(Effect::Noise, false);
-        fill(&case.scene, &folder, (quiet, case.seed, &[]));
-        let fixed = judged().ok().and_then(|quiet| quiet.pixels?.fixed);
+        let quiet = || {
+            fs::remove_dir_all(folder.join("photos")).expect("removed");
+            fs::create_dir(folder.join("photos")).expect("made");
+            let forced = Forced::default().with(Effect::Noise, false);
+            fill(&case.scene, &folder, (forced, case.seed, &[]));
+            Some(judged().ok()?.pixels?.fixed?.error)
+        };
+        let fixed = if case.is_changed {
+            quiet()
+        } else {
+            *self.own_fixed.get_or_init(quiet)
+        };
         VerdictSession {
             case,
             verdict,
             truth,
-            fixed: fixed.map(|fixed| fixed.error),
+            fixed,
         }
     }
 

@@ -172,10 +172,8 @@ fn verdict(
         let says = "these photographs cannot tell whether it keeps its promise";
         (Kind::Inconclusive, says.to_owned())
     } else {
-        let at_pixels = verdict
-            .pixels
-            .as_ref()
-            .filter(|_| matches!(verdict.cause, Some(Cause::Nudged | Cause::Texture)));
+        let at_pixels = verdict.pixels.as_ref();
+        let at_pixels = at_pixels.filter(|_| verdict.fails_within_cells());
         let by_cells = || {
             let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
             format!("error {error}, at most {limit} passes")

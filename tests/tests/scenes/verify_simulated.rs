@@ -235,7 +235,7 @@ fn a_picture_beside_its_place_does_not_pass_and_is_named() {
             right * pixel
         );
         let projector = "look_at = [0.0, 0.0, -0.5]\nfield_of_view = 23.0";
-        let camera = ("width = 216\nheight = 150", "width = 540\nheight = 375");
+        let camera = ("width = 216\nheight = 150", "width = 432\nheight = 300");
         simulated::scene("m-panels-painted", &[camera, (projector, &to)])
     };
     let rig = VerdictRig::new(painted(0.0));

@@ -210,6 +210,14 @@ pub struct TableVerdict {
     pub cells: (usize, usize),
 }
 
+impl TableVerdict {
+    /// Whether it is the error within the cells that keeps the table from passing.
+    #[must_use]
+    pub const fn fails_within_cells(&self) -> bool {
+        matches!(self.cause, Some(Cause::Nudged | Cause::Texture))
+    }
+}
+
 /// Judges a table by the photographs of its folder; `bound` is the largest error that
 /// passes, by default 1.5 times what is to be expected.
 ///

@@ -49,7 +49,16 @@ pub fn html(
 }
 
 fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
-    let [before, after] = verdict.error;
+    let [mut before, mut after] = verdict.error;
+    let mut limit = verdict.bound.limit;
+    let mut of = "with the table, by the mean light of cells";
+    let by_cells = verdict.outcome == Outcome::Failed && !verdict.fails_within_cells();
+    let pixels = verdict.pixels.as_ref().filter(|_| !by_cells);
+    let judged = pixels.and_then(|pixels| Some((pixels, pixels.fixed?, pixels.bound?)));
+    if let Some((pixels, fixed, bound)) = judged {
+        [before, after, limit] = [pixels.error[0], fixed.error, bound.limit];
+        of = "with the table, at the same pixels in every image";
+    }
     let colour = match verdict.outcome {
         Outcome::Passed => "best",
         Outcome::Failed => "bad",
@@ -62,8 +71,8 @@ fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
         @if let Some(cause) = verdict.cause { p { b { "Next: " } (cause.next_step()) } }
         div .numbers {
             div .number { b { (percent(before)) } span { @if verdict.wanted { "error without the table, expected" } @else { "error of the wall as it is" } } }
-            div .number.(colour) { b { (percent(after)) } span { "with the table, by the mean light of cells" } }
-            div .number { b { (percent(verdict.bound.limit)) } span { "the most that passes" } }
+            div .number.(colour) { b { (percent(after)) } span { (of) } }
+            div .number { b { (percent(limit)) } span { "the most that passes" } }
         }
         p { (brightness_words(verdict)) }
     } }
@@ -242,6 +251,27 @@ pub fn shift_words([right, down]: [f64; 2]) -> String {
     )
 }
 
+/// What is wrong within the cells.
+fn within_cells(verdict: &TableVerdict) -> String {
+    let pixels = verdict.pixels.as_ref();
+    let fixed = pixels.and_then(fixed_words).unwrap_or_default();
+    let shift = pixels.and_then(|pixels| pixels.fixed?.shift);
+    let what = match (verdict.cause, shift, verdict.outcome) {
+        (Some(Cause::Nudged), Some(shift), _) => format!(
+            "The picture lies {} of where it lay when the table was made, and the wall's own detail is \
+             compensated beside it",
+            shift_words(shift)
+        ),
+        (_, _, Outcome::Failed) => {
+            "Something within the cells is not as it was when the table was made".to_owned()
+        }
+        _ => "Something within the cells is not as it was when the table was made, or the table errs \
+              more there than it predicts"
+            .to_owned(),
+    };
+    format!("{what}: {fixed}.")
+}
+
 /// Why it passed or not, a sentence or two.
 #[must_use]
 pub fn reason(verdict: &TableVerdict) -> String {
@@ -267,26 +297,7 @@ pub fn reason(verdict: &TableVerdict) -> String {
     let why = match verdict.cause {
         None => return good(verdict),
         Some(Cause::Noise) => apart("Photographs of the same picture differ among themselves by"),
-        Some(Cause::Nudged) => {
-            let pixels = verdict.pixels.as_ref();
-            let shift = pixels.and_then(|pixels| pixels.fixed?.shift);
-            let fixed = pixels.and_then(fixed_words).unwrap_or_default();
-            format!(
-                "The picture lies {} of where it lay when the table was made, and the wall's own detail \
-                 is compensated beside it: {fixed}.",
-                shift_words(shift.unwrap_or_default())
-            )
-        }
-        Some(Cause::Texture) => {
-            let fixed = verdict.pixels.as_ref().and_then(fixed_words);
-            let so_far = if verdict.outcome == Outcome::Failed {
-                "Something within the cells is not as it was when the table was made"
-            } else {
-                "Something within the cells is not as it was when the table was made, or the table \
-                 errs more there than it predicts"
-            };
-            format!("{so_far}: {}.", fixed.unwrap_or_default())
-        }
+        Some(Cause::Nudged | Cause::Texture) => within_cells(verdict),
         Some(Cause::Viewpoint) => apart(
             "From where the camera stands, white differs from what the table expects from cell to \
              cell by",
