@@ -276,7 +276,7 @@ mod tests {
         let size = FrameSize::new(96, 64).unwrap();
         // Two pixels of the projector a sample, a camera pixel each.
         let places: Vec<[f64; 2]> = (0..192 * 128)
-            .map(|at| [at % 192, at / 192].map(|place| (f64::from(place) + 0.5) / 2.0))
+            .map(|at| [at % 192, at / 192].map(|place| 0.5 * f64::from(place) + 0.25))
             .collect();
         let sample = |at: usize| [at % 96, at / 96].map(|place| place as f64 + 0.5);
         let own = (0..size.pixels()).map(|at| {
