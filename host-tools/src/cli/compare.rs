@@ -96,7 +96,7 @@ fn of_light(
     ];
     let truth = &light.truth;
     let text = format!(
-        "{} cells, {} lit and seen{}; the transport is {}\n\nways to photograph\n{}\nways to invert, given the transport\n{}\n",
+        "{} cells, {} lit and seen{}; the transport is {}\nerrors are of the mean light of cells; `iltm verify` measures what a viewer sees at pixels\n\nways to photograph\n{}\nways to invert, given the transport\n{}\n",
         truth.grid,
         truth.live_cells(),
         if light.colour { ", green channel" } else { "" },

@@ -297,8 +297,6 @@ fn data(
             "fixed": pixels.fixed.map(|fixed| fixed.error),
             "shift": pixels.fixed.and_then(|fixed| fixed.shift),
             "promise": pixels.bound.map(|bound| bound.promise),
-            "predicted": pixels.bound.map(|bound| bound.predicted),
-            "ambient": pixels.bound.map(|bound| bound.ambient),
             "limit": pixels.bound.map(|bound| bound.limit),
             "pixels": pixels.errors.len(),
             "images": pixels.images.iter().map(|[before, after]| json!({

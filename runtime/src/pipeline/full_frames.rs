@@ -89,11 +89,9 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
                 store(line, channel, channels, memory.values);
             }
             if self.table().ambient().is_some()
-                && self.ambient_row(y, channel, &mut memory.row)
+                && self.ambient_row(y, channel, &mut memory.row, memory.values)
                 && let Some(line) = memory.ambient.chunks_exact_mut(width).nth(y)
             {
-                let values = memory.values.iter_mut().zip(memory.row.spread.iter());
-                values.for_each(|(value, ambient)| *value = *ambient as u16);
                 store(line, channel, channels, memory.values);
             }
         }

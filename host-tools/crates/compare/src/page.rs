@@ -47,6 +47,7 @@ impl BenchmarkPage<'_> {
                         "; every method gets the same light, with this camera\u{2019}s noise, and is judged by the same images."
                         @if self.light.colour { " Of the three channels it is the green one." }
                     }
+                    p { "All of them know cells only, so errors are those of the mean light of a cell. What a viewer sees at pixels is more; " code { "iltm solve" } " predicts it, and " code { "iltm verify" } " measures it." }
                 }
                 (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))
                 (self.group("Ways to invert, or to do without an inverse", "Each is given the transport itself.", self.inverted))

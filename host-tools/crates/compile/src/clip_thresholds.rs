@@ -79,15 +79,11 @@ impl ClipThresholds {
             let own = &inverse.channels[index];
             let gain = fine.map_or_else(|| own.gain.clone(), |fine| fine.channels[index].clone());
             let operator = inverse.channel(index).operator;
-            let bounced = &operator * DVector::from_column_slice(&own.ambient);
-            let (bounced, ambient) = (
-                lattice.expand(bounced.as_slice()),
-                lattice.expand(&own.ambient),
-            );
-            let offset = gain.iter().zip(&ambient).zip(&bounced);
-            let offset = offset.map(|((gain, a), ka)| gain * f64::from(*a) - f64::from(*ka));
+            let ambient = DVector::from_column_slice(&own.ambient);
+            let driven = DVector::from_column_slice(&own.gain).component_mul(&ambient);
+            let offset = lattice.expand((driven - &operator * ambient).as_slice());
             Channel {
-                offset: offset.collect(),
+                offset: offset.into_iter().map(f64::from).collect(),
                 gain,
                 operator,
             }

@@ -166,14 +166,14 @@ struct Site {
 }
 
 /// The scene as an inverse describes it, at the pixels that are judged.
-struct Scene<'s> {
+struct Scene {
     grid: Grid,
     sites: Vec<Site>,
     /// All pixels that were measured.
     pixels: usize,
     inverses: Vec<Inverse>,
-    /// Ambient light by channel and cell.
-    ambient: Vec<&'s [f64]>,
+    /// Drives that make as much light as there is ambient light, by channel and cell.
+    ambient: Vec<Vec<f64>>,
     /// `g` by channel and site.
     gains: Vec<Vec<f64>>,
     /// Square of how far they change over as much as a place is off, relative to themselves.
@@ -198,8 +198,8 @@ struct SiteFit {
     halves: [Option<[[f64; 2]; 2]>; HALVINGS],
 }
 
-impl<'s> Scene<'s> {
-    fn new(measurements: &Measurements, inverse: &'s InverseTransport, flood: &FineFlood) -> Self {
+impl Scene {
+    fn new(measurements: &Measurements, inverse: &InverseTransport, flood: &FineFlood) -> Self {
         let grid = measurements.grid;
         let places = measurements.places();
         let fine = fine_gains(inverse, flood);
@@ -243,7 +243,10 @@ impl<'s> Scene<'s> {
             ambient: inverse
                 .channels
                 .iter()
-                .map(|channel| &channel.ambient[..])
+                .map(|channel| {
+                    let cells = channel.gain.iter().zip(&channel.ambient);
+                    cells.map(|(gain, ambient)| gain * ambient).collect()
+                })
                 .collect(),
             pixels: places.len(),
             sites,
@@ -441,9 +444,9 @@ impl<'s> Scene<'s> {
                 let received = &inverse.operator * light.column(0);
                 let bounced = self.bounced(channel, received.as_slice());
                 let seen = |(at, bounced): (usize, f64)| {
-                    let gain = self.gains[channel][at];
-                    let direct = drive(channel, at).0 * wanted[at] / gain.max(f64::MIN_POSITIVE);
-                    let ambient = self.sites[at].cells.of(self.ambient[channel]);
+                    let gain = self.gains[channel][at].max(f64::MIN_POSITIVE);
+                    let direct = drive(channel, at).0 * wanted[at] / gain;
+                    let ambient = self.sites[at].cells.of(&self.ambient[channel]) / gain;
                     if as_it_is {
                         return bounced + direct + ambient;
                     }

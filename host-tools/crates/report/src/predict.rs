@@ -19,6 +19,7 @@ use iltm_runtime::{
     FrameSize,
     image::Table,
     pipeline::{FullPipeline, RowBuffers},
+    units::Light,
 };
 use iltm_solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
@@ -72,21 +73,17 @@ impl Projection {
         if !of_one_scene {
             return None;
         }
-        let gains = pixel_gains(table, size)?;
-        let channel = |(index, gain): (usize, Vec<f32>)| {
-            let ambient = &inverse.channels[index].ambient;
-            let relative: Vec<f64> = ambient.iter().map(|light| light / white).collect();
-            Channel {
-                gain,
-                operator: inverse.channel(index).operator * white,
-                ambient: lattice.expand(&relative),
-            }
+        let pixels = PixelPlanes::of(table, size)?;
+        let planes = pixels.gain.into_iter().zip(pixels.ambient);
+        let channel = |(index, (gain, ambient))| Channel {
+            gain,
+            operator: inverse.channel(index).operator * white,
+            ambient,
         };
-        let channels = gains.into_iter().enumerate().map(channel).collect();
         Some(Self {
             size,
             lattice,
-            channels,
+            channels: planes.enumerate().map(channel).collect(),
         })
     }
 
@@ -165,34 +162,55 @@ impl Channel {
     }
 }
 
+/// Gain and ambient light of each pixel as the pipeline has them, one plane a channel.
+struct PixelPlanes {
+    /// Drive per reference light.
+    gain: Vec<Vec<f32>>,
+    /// Relative to reference white.
+    ambient: Vec<Vec<f32>>,
+}
+
+impl PixelPlanes {
+    /// Those of frames of `size`; `None` if that is smaller than the grid.
+    fn of(table: &Table<'_>, size: FrameSize) -> Option<Self> {
+        match table.channels() {
+            1 => Self::of_channels::<1>(table, size),
+            _ => Self::of_channels::<3>(table, size),
+        }
+    }
+
+    fn of_channels<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Self> {
+        let pipeline = FullPipeline::<C>::new(table, size).ok()?;
+        let unit = f32::from(table.gain_fraction()).exp2();
+        let mut line = vec![0; pipeline.line_len()];
+        let mut spread = vec![0; size.width()];
+        let mut values = vec![0; size.width()];
+        let planes = || vec![Vec::with_capacity(size.pixels()); C];
+        let (mut gain, mut ambient) = (planes(), planes());
+        for (channel, (gain, ambient)) in gain.iter_mut().zip(&mut ambient).enumerate() {
+            for y in 0..size.height() {
+                let mut row = RowBuffers {
+                    line: &mut line,
+                    spread: &mut spread,
+                };
+                pipeline.gain_row(y, channel, &mut row, &mut values);
+                gain.extend(values.iter().map(|gain| f32::from(*gain) / unit));
+                if !pipeline.ambient_row(y, channel, &mut row, &mut values) {
+                    values.fill(0);
+                }
+                let light = |bits: &u16| Light::from_bits(*bits).to_num::<f32>();
+                ambient.extend(values.iter().map(light));
+            }
+        }
+        Some(Self { gain, ambient })
+    }
+}
+
 /// The gain of each pixel in frames of `size`, as the pipeline has it: drive per reference light,
 /// one plane a channel. `None` if the frame is smaller than the grid.
 #[must_use]
 pub fn pixel_gains(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f32>>> {
-    match table.channels() {
-        1 => gains::<1>(table, size),
-        _ => gains::<3>(table, size),
-    }
-}
-
-fn gains<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f32>>> {
-    let pipeline = FullPipeline::<C>::new(table, size).ok()?;
-    let unit = f32::from(table.gain_fraction()).exp2();
-    let mut line = vec![0; pipeline.line_len()];
-    let mut spread = vec![0; size.width()];
-    let mut gains = vec![0; size.width()];
-    let mut planes = vec![Vec::with_capacity(size.pixels()); C];
-    for (channel, plane) in planes.iter_mut().enumerate() {
-        for y in 0..size.height() {
-            let mut row = RowBuffers {
-                line: &mut line,
-                spread: &mut spread,
-            };
-            pipeline.gain_row(y, channel, &mut row, &mut gains);
-            plane.extend(gains.iter().map(|gain| f32::from(*gain) / unit));
-        }
-    }
-    Some(planes)
+    PixelPlanes::of(table, size).map(|planes| planes.gain)
 }
 
 #[cfg(test)]

@@ -93,11 +93,6 @@ impl<'t, 'a> Expected<'t, 'a> {
         if least.is_finite() { least } else { 1.0 }
     }
 
-    /// `g` of the cells by channel, drive per reference light; 0 where a cell took no part.
-    pub(super) const fn gain(&self) -> &CellPlanes {
-        &self.gain
-    }
-
     /// Light under black, relative to reference white.
     #[must_use]
     pub const fn ambient(&self) -> &CellPlanes {

@@ -295,8 +295,6 @@ mod tests {
                 white: Vec::new(),
                 fixed: Some(FixedPattern { error, shift }),
                 bound: Some(PixelBound {
-                    predicted: 0.02,
-                    ambient: 0.0,
                     promise: 0.02,
                     limit: 0.03,
                     doubt: 0.032,

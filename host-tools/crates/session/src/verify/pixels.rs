@@ -9,11 +9,11 @@
 use super::fixed_pattern::FixedPattern;
 use super::judge::MARGIN;
 use super::readings::FineShown;
-use super::{Bound, Expected, Readings};
+use super::{Bound, Readings};
 use iltm_capture::PixelReadings;
 use iltm_compile::Provenance;
-use iltm_picture::{Lattice, LightPicture, PictureError};
-use iltm_report::{pixel_gains, tier_costs};
+use iltm_picture::{LightPicture, PictureError};
+use iltm_report::tier_costs;
 use iltm_runtime::{FrameSize, image::Table};
 
 /// What a viewer sees, pixel by pixel.
@@ -42,10 +42,6 @@ pub struct PixelVerdict {
 pub struct PixelBound {
     /// Error at pixels that the table predicts of itself at its top tier, or that its refinement
     /// confirmed.
-    pub predicted: f64,
-    /// Error that ambient light leaves in all images alike: a table takes it away by cell.
-    pub ambient: f64,
-    /// Both: root of the sum of squares.
     pub promise: f64,
     /// The largest that passes.
     pub limit: f64,
@@ -60,24 +56,20 @@ const DOUBT: f64 = 2.0;
 
 impl PixelBound {
     /// That of a table whose cells are held against `cells`.
-    fn new(table: &Table<'_>, fine: &[FineShown], cells: &Bound) -> Option<Self> {
+    fn new(table: &Table<'_>, cells: &Bound) -> Option<Self> {
         let provenance = Provenance::read(table.provenance());
         let predicted = provenance.predicted_error?;
         // Without figures at pixels it is one of cells.
         predicted.figures?;
         let refined = provenance.refined.last().map(|round| round.after);
         let own = refined.map_or(predicted.compensated, |r| r.min(predicted.compensated));
-        let predicted = tier_costs(table).last()?.left_out.hypot(own);
-        let ambient = ambient_detail(table, fine);
-        let promise = predicted.hypot(ambient);
+        let promise = tier_costs(table).last()?.left_out.hypot(own);
         let limit = if cells.given {
             cells.limit
         } else {
             MARGIN * promise
         };
         Some(Self {
-            predicted,
-            ambient,
             promise,
             limit,
             doubt: limit.max(DOUBT * promise.hypot(cells.viewpoint)),
@@ -120,7 +112,7 @@ impl PixelVerdict {
         let count = images.len() as f64;
         (!images.is_empty()).then(|| Self {
             fixed: FixedPattern::new(table, pixels, (&readings.fine, &white)),
-            bound: PixelBound::new(table, &readings.fine, cells),
+            bound: PixelBound::new(table, cells),
             error: squares.map(|square| (square / count).sqrt()),
             noise: (noises / count).sqrt(),
             errors: errors
@@ -152,37 +144,6 @@ fn add_errors(errors: &mut [f32], seen: &[Vec<f32>], wanted: &[Vec<f32>], scale:
             *error += share * off * off;
         }
     }
-}
-
-/// Error that ambient light leaves, relative to the images' wanted light.
-///
-/// A table knows it by cell, `a`, and paint within a cell reflects it as it reflects all light. What is
-/// taken away is `U a`, and what is there is `U (g a) / g`.
-fn ambient_detail(table: &Table<'_>, fine: &[FineShown]) -> f64 {
-    let size = fine.first().map(|shown| shown.wanted.size());
-    let found = size.and_then(|size| {
-        let lattice = Lattice::new(table.grid(), size)?;
-        Some((lattice, pixel_gains(table, size)?))
-    });
-    let Some((lattice, gains)) = found else {
-        return 0.0;
-    };
-    let expected = Expected::new(table);
-    let (mut off, mut wanted) = (0.0, 0.0);
-    let channels = expected.gain().iter().zip(expected.ambient());
-    for (channel, ((cell_gain, ambient), gains)) in channels.zip(&gains).enumerate() {
-        let driven: Vec<f64> = cell_gain.iter().zip(ambient).map(|(g, a)| g * a).collect();
-        let there = lattice.expand(&driven).into_iter().zip(gains);
-        let light = there.zip(lattice.expand(ambient));
-        for (at, ((driven, gain), taken)) in light.enumerate() {
-            if *gain > 0.0 {
-                off += f64::from(driven / gain - taken).powi(2);
-                let light = |shown: &FineShown| f64::from(shown.wanted.planes()[channel][at]);
-                wanted += fine.iter().map(|shown| light(shown).powi(2)).sum::<f64>();
-            }
-        }
-    }
-    (off * fine.len() as f64 / wanted.max(f64::MIN_POSITIVE)).sqrt()
 }
 
 /// Light of a photograph that counts, by channel and pixel, camera units.

@@ -11,7 +11,10 @@ use super::memory::{BandMemory, Memories, RowMemory};
 use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
-    pipeline::{FrameError, FullPipeline, stages::drive_row},
+    pipeline::{
+        FrameError, FullPipeline,
+        stages::{drive_row, subtract_ambient},
+    },
     placement::PixelArea,
     units::{ClippedSamples, Light},
 };
@@ -47,6 +50,8 @@ struct RowStages<'t, 'a, S: Code, const C: usize> {
     curves: Curves<S>,
     /// Gains of every pixel: row by row, in a row channel by channel.
     gains: Vec<u16>,
+    /// Ambient light of every pixel in the same way; nothing in a dark room.
+    ambient: Vec<Light>,
     /// Where on the cells the picture lies.
     picture: [[usize; 2]; 2],
 }
@@ -59,13 +64,15 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     ) -> Result<Self, FrameError> {
         let pipeline = FullPipeline::within(table, job.size, job.area)?;
         let (cells, pixels) = (table.grid().cells(), job.size.pixels());
+        let gains = threads.install(|| expand_gains(&pipeline));
         Ok(Self {
             stages: RowStages {
                 pipeline,
                 width: job.size.width(),
                 colours: job.colours,
                 curves: Curves::new(table, job.encoding),
-                gains: threads.install(|| expand_gains(&pipeline)),
+                ambient: threads.install(|| expand_ambient(&pipeline, &gains)),
+                gains,
                 picture: job.picture,
             },
             threads,
@@ -165,6 +172,13 @@ impl<S: Code, const C: usize> RowStages<'_, '_, S, C> {
         y.checked_sub(area.top).filter(|y| *y < area.size.height())
     }
 
+    /// Row `y` of one channel of a value that every pixel has.
+    #[inline(always)]
+    fn row_of_channel<'v, T>(&self, values: &'v [T], y: usize, channel: usize) -> &'v [T] {
+        let width = self.pipeline.frame().width();
+        &values[(y * C + channel) * width..][..width]
+    }
+
     /// Cells of the grid.
     fn cells(&self) -> usize {
         self.pipeline.table().grid().cells()
@@ -206,9 +220,13 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
                 let codes = &codes[left..][..size.width()];
                 let light = &mut light[left..][..size.width()];
                 let (colour, channel) = (line % colours, line % colours % C);
-                let (mut row, _) = memory.row.split();
                 stages.curves.decode(codes, light);
-                stages.pipeline.remove_ambient(y, channel, light, &mut row);
+                if !stages.ambient.is_empty() {
+                    let ambient = stages.row_of_channel(&stages.ambient, y, channel);
+                    for (light, ambient) in light.iter_mut().zip(ambient) {
+                        *light = subtract_ambient(*light, *ambient);
+                    }
+                }
                 let sums = &mut memory.sums[colour * cells..][..cells];
                 stages.pipeline.average_row(y, light, sums);
             }
@@ -258,7 +276,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
                 let codes = &mut codes[left..][..size.width()];
                 let light = &light[left..][..size.width()];
                 let (colour, channel) = (line % colours, line % colours % C);
-                let gain = &stages.gains[(y * C + channel) * size.width()..][..size.width()];
+                let gain = stages.row_of_channel(&stages.gains, y, channel);
                 let (mut row, drives) = memory.row.split();
                 let of_row = stages.pipeline.finish_row(
                     y,
@@ -303,4 +321,26 @@ fn expand_gains<const C: usize>(pipeline: &FullPipeline<'_, '_, C>) -> Vec<u16> 
         },
     );
     gains
+}
+
+/// Ambient light of every pixel in the same way; nothing in a dark room.
+fn expand_ambient<const C: usize>(pipeline: &FullPipeline<'_, '_, C>, gains: &[u16]) -> Vec<Light> {
+    if pipeline.table().ambient_row(0, 0).is_none() {
+        return Vec::new();
+    }
+    let (size, line) = (pipeline.frame(), pipeline.line_len());
+    let mut ambient = vec![Light::ZERO; gains.len()];
+    let rows = ambient.par_chunks_mut(size.width()).enumerate();
+    rows.zip(gains.par_chunks(size.width())).for_each_init(
+        || (RowMemory::new(line, size.width()), vec![0; size.width()]),
+        |(memory, values), ((index, ambient), gains)| {
+            let (mut row, _) = memory.split();
+            values.copy_from_slice(gains);
+            pipeline.ambient_row(index / C, index % C, &mut row, values);
+            for (ambient, bits) in ambient.iter_mut().zip(values) {
+                *ambient = Light::from_bits(*bits);
+            }
+        },
+    );
+    ambient
 }

@@ -98,3 +98,40 @@ fn a_frame_of_one_pixel_a_cell_is_what_the_full_resolution_way_makes_of_it() {
     };
     assert_eq!(large.samples(), &Samples::Eight(doubled(samples)));
 }
+
+#[test]
+fn ambient_light_follows_the_paint_within_cells_and_goes_up_to_what_the_projector_misses() {
+    // Ambient light and the projector's fall on a wall of dark and bright paint, pixel by
+    // pixel; the projector misses a column and a corner of the cells.
+    let grid = grid(4, 6);
+    let missed = |row: usize, col: usize| col == 2 || (row == 0 && col == 5);
+    let mut table = MadeUp::new(grid, 1);
+    let frame = size(24, 16);
+    let gain = |x: usize| if x.is_multiple_of(2) { 1 } else { 3 } << table.gain_fraction;
+    let light = |x: usize| if x.is_multiple_of(2) { 3_000 } else { 1_000 };
+    let (mut gains, mut ambient) = (Vec::new(), Vec::new());
+    for cell in 0..grid.cells() {
+        let reached = !missed(cell / 6, cell % 6);
+        gains.push(if reached { 2 << table.gain_fraction } else { 0 });
+        ambient.push(if reached { 1_500 } else { 7_777 });
+    }
+    let fine = (0..frame.pixels()).map(|at| gain(at % 24)).collect();
+    table.fine_gains = Some((16, 24, fine));
+    (table.gains, table.ambient) = (gains, Some(ambient));
+    let codes = |more: u32| {
+        let code = |at| ((light(at % 24) + more) * 65_535 + 16_384) >> 15;
+        let codes = (0..frame.pixels()).map(|at| code(at) as u16);
+        Picture::new(frame, Samples::Sixteen(codes.collect())).unwrap()
+    };
+    for more in [0, 100] {
+        let (result, _) = compensated(&table, settings(Encoding::Linear), &codes(more)).unwrap();
+        let Samples::Sixteen(result) = result.samples() else {
+            panic!("a picture of 16 bits");
+        };
+        for (at, code) in result.iter().enumerate() {
+            let wanted = more * u32::from(gain(at % 24) >> table.gain_fraction);
+            let reached = (u32::from(*code) << 15) / 65_535;
+            assert!(reached.abs_diff(wanted) <= 2, "{at}: {reached} of {wanted}");
+        }
+    }
+}

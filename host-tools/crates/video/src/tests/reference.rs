@@ -101,13 +101,6 @@ fn reference(table: &MadeUp, channel: usize, frame: FrameSize, light: &[f64]) ->
         own.map(|value| f64::from(*value) / unit).collect()
     };
     let (up_rows, up_cols) = up(rows, cols);
-    let mut light = light.to_vec();
-    if let Some(ambient) = &table.ambient {
-        let ambient = resample(&own(ambient, UNIT), &up_rows, &up_cols);
-        for (light, ambient) in light.iter_mut().zip(ambient) {
-            *light = (*light - ambient).max(0.0);
-        }
-    }
     let gain_unit = f64::from(table.gain_fraction).exp2();
     let fine = table.fine_gains.as_ref().filter(|(rows, cols, _)| {
         usize::from(*rows) <= frame.height() && usize::from(*cols) <= frame.width()
@@ -119,6 +112,15 @@ fn reference(table: &MadeUp, channel: usize, frame: FrameSize, light: &[f64]) ->
         }
         None => resample(&own(&table.gains, gain_unit), &up_rows, &up_cols),
     };
+    let mut light = light.to_vec();
+    if let Some(ambient) = &table.ambient {
+        let driven = own(&table.gains, gain_unit).into_iter();
+        let driven = driven.zip(own(ambient, UNIT)).map(|(gain, a)| gain * a);
+        let driven = resample(&driven.collect::<Vec<_>>(), &up_rows, &up_cols);
+        for ((light, driven), gain) in light.iter_mut().zip(driven).zip(&gains) {
+            *light = (*light - (driven / gain).min(1.0)).max(0.0);
+        }
+    }
     let down = (average(rows, frame.height()), average(cols, frame.width()));
     let cells = resample(&light, &down.0, &down.1);
     let corrections = resample(&operate(table, channel, &cells), &up_rows, &up_cols);
