@@ -91,8 +91,8 @@ pub enum VerifyError {
         /// Channels of the table.
         channels: u8,
     },
-    /// The folder was made with another table.
-    #[error("{}: it is not what this table makes of test image {image}: the folder was made with another table", path.display())]
+    /// The folder was made with another table, or by another version of the tools.
+    #[error("{}: it is not what this table makes of test image {image}: the folder was made with another table, or by another version of iltm", path.display())]
     OtherTable {
         /// The compensated picture.
         path: PathBuf,
