@@ -12,7 +12,7 @@
 )]
 
 use super::FrameError;
-use super::stages::{Workspace, correct, drive_row};
+use super::stages::{Workspace, correct, drive, drive_row};
 use crate::FrameSize;
 use crate::features::Stage;
 use crate::haar::ShortSlice;
@@ -24,12 +24,6 @@ use crate::units::{ClippedSamples, Drive, Light};
 
 /// Fraction bits that gains have beyond their own while they are interpolated.
 const GAIN_GUARD_BITS: u32 = 12;
-
-/// The largest drive of ambient light, with guard bits.
-const MOST_DRIVEN: u64 = (u16::MAX as u64) << GAIN_GUARD_BITS;
-
-/// Marks a cell without gain among drives of ambient light.
-const UNREACHED: i32 = -1;
 
 /// Half of the last place that is kept of an interpolated gain.
 const GAIN_HALF: i32 = 1 << (GAIN_GUARD_BITS - 1);
@@ -181,7 +175,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     ///
     /// A table has it by cell, `a`, and paint within a cell reflects it as it reflects all
     /// light: it is `(U g a)(x) / g(x)`. A cell that the projector does not reach has no
-    /// gain, so the cells beside it count in its place.
+    /// gain, so the cell above or below counts in its place.
     ///
     /// It depends on the frame's size alone, as gains do.
     pub fn ambient_row(
@@ -194,49 +188,41 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         let [rows, cols] = self.cells;
         let place = rows.place(y);
         let fraction = u32::from(self.table.gain_fraction());
-        let (Some(before), Some(after)) = (
-            self.driven_ambient(place.before, channel),
-            self.driven_ambient(place.after, channel),
-        ) else {
-            return false;
-        };
         let count = self.table.grid().cols();
-        for (slot, (before, after)) in row.line.iter_mut().zip(before.zip(after)) {
-            *slot = match (before, after) {
-                (Some(before), Some(after)) => blend(before, after, place.fraction),
-                (known, None) | (None, known) => known.unwrap_or(UNREACHED),
-            };
-        }
         let line = row.line.get_mut(..count).unwrap_or_default();
-        fill_unreached(line);
+        line.fill(-1);
+        // The first row meets nothing, and the second one the first.
+        for at in [place.before, place.after] {
+            let Some(cells) = self.driven_ambient(at, channel) else {
+                return false;
+            };
+            for (slot, driven) in line.iter_mut().zip(cells) {
+                let above = if *slot < 0 { driven } else { *slot };
+                let below = if driven < 0 { above } else { driven };
+                *slot = blend(above, below, place.fraction);
+            }
+        }
         cols.expand(line, row.spread);
         for (value, driven) in values.iter_mut().zip(row.spread.iter()) {
             // A step is rounded, so a row that falls to no light may end below it.
-            let driven = u64::from(driven.max(&0).unsigned_abs());
-            let scaled = driven.wrapping_shl(fraction) >> GAIN_GUARD_BITS;
+            let driven = (*driven >> GAIN_GUARD_BITS).max(0) as u32;
             let gain = u32::from(*value);
-            let scaled = scaled.min(u64::from(u32::MAX)) as u32;
-            let light = scaled.saturating_add(gain / 2).checked_div(gain);
-            let most = u32::from(Light::ONE.to_bits());
-            *value = light.unwrap_or(0).min(most) as u16;
+            let light = driven.wrapping_shl(fraction).checked_div(gain);
+            *value = light.unwrap_or(0).min(u32::from(u16::MAX)) as u16;
         }
         true
     }
 
     /// Drives that make as much light as there is ambient light along a row of cells, with
-    /// guard bits; `None` for cells that the projector does not reach.
-    fn driven_ambient(
-        &self,
-        row: usize,
-        channel: usize,
-    ) -> Option<impl Iterator<Item = Option<i32>>> {
+    /// guard bits; below zero for cells that the projector does not reach.
+    fn driven_ambient(&self, row: usize, channel: usize) -> Option<impl Iterator<Item = i32>> {
         let fraction = u32::from(self.table.gain_fraction());
         let ambient = self.table.ambient_row(row, channel)?;
         let gains = self.table.gain_row(row, channel);
         Some(gains.zip(ambient).map(move |(gain, ambient)| {
-            let product = u64::from(gain) * u64::from(ambient.to_bits());
-            let driven = (product << GAIN_GUARD_BITS).wrapping_shr(fraction);
-            (gain > 0).then_some(driven.min(MOST_DRIVEN) as i32)
+            let driven = drive(ambient, gain, fraction, 0).min(i32::from(u16::MAX));
+            let own = if gain == 0 { -1 } else { driven };
+            own << GAIN_GUARD_BITS
         }))
     }
 
@@ -348,24 +334,6 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.correct_row(y, corrections, row);
         let fraction = u32::from(self.table.gain_fraction());
         drive_row(light, gain, fraction, row.spread, drives)
-    }
-}
-
-/// Gives cells that the projector does not reach the mean of their neighbours that it does.
-fn fill_unreached(line: &mut [i32]) {
-    let mut left = UNREACHED;
-    let mut rest = line;
-    while let Some((value, after)) = rest.split_first_mut() {
-        let right = after.first().copied().unwrap_or(UNREACHED);
-        let own = *value;
-        if own < 0 {
-            *value = match (left >= 0, right >= 0) {
-                (true, true) => i32::midpoint(left, right),
-                _ => left.max(right).max(0),
-            };
-        }
-        left = own;
-        rest = after;
     }
 }
 
