@@ -174,8 +174,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
     /// [gains](Self::gain_row); `false` and nothing done in a dark room.
     ///
     /// A table has it by cell, `a`, and paint within a cell reflects it as it reflects all
-    /// light: it is `(U g a)(x) / g(x)`. A cell that the projector does not reach has no
-    /// gain, so the cell above or below counts in its place.
+    /// light: it is `(U g a)(x) / g(x)`. For cells of gain 0 a table has `g a` itself.
     ///
     /// It depends on the frame's size alone, as gains do.
     pub fn ambient_row(
@@ -190,40 +189,30 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         let fraction = u32::from(self.table.gain_fraction());
         let count = self.table.grid().cols();
         let line = row.line.get_mut(..count).unwrap_or_default();
-        line.fill(-1);
-        // The first row meets nothing, and the second one the first.
-        for at in [place.before, place.after] {
-            let Some(cells) = self.driven_ambient(at, channel) else {
+        // All of the first row, then its share of the second one.
+        for (at, share) in [(place.before, 1 << 31), (place.after, place.fraction)] {
+            let Some(ambient) = self.table.ambient_row(at, channel) else {
                 return false;
             };
-            for (slot, driven) in line.iter_mut().zip(cells) {
-                let above = if *slot < 0 { driven } else { *slot };
-                let below = if driven < 0 { above } else { driven };
-                *slot = blend(above, below, place.fraction);
+            let cells = self.table.gain_row(at, channel).zip(ambient);
+            for (slot, (gain, ambient)) in line.iter_mut().zip(cells) {
+                let driven = match gain {
+                    0 => ambient.to_bits().into(),
+                    _ => drive(ambient, gain, fraction, 0).min(u16::MAX.into()),
+                };
+                *slot = blend(*slot, driven << GAIN_GUARD_BITS, share);
             }
         }
         cols.expand(line, row.spread);
         for (value, driven) in values.iter_mut().zip(row.spread.iter()) {
             // A step is rounded, so a row that falls to no light may end below it.
-            let driven = (*driven >> GAIN_GUARD_BITS).max(0) as u32;
+            let driven = (driven.wrapping_add(GAIN_HALF) >> GAIN_GUARD_BITS).max(0) as u32;
             let gain = u32::from(*value);
-            let light = driven.wrapping_shl(fraction).checked_div(gain);
+            let light = driven.wrapping_shl(fraction).wrapping_add(gain / 2);
+            let light = light.checked_div(gain);
             *value = light.unwrap_or(0).min(u32::from(u16::MAX)) as u16;
         }
         true
-    }
-
-    /// Drives that make as much light as there is ambient light along a row of cells, with
-    /// guard bits; below zero for cells that the projector does not reach.
-    fn driven_ambient(&self, row: usize, channel: usize) -> Option<impl Iterator<Item = i32>> {
-        let fraction = u32::from(self.table.gain_fraction());
-        let ambient = self.table.ambient_row(row, channel)?;
-        let gains = self.table.gain_row(row, channel);
-        Some(gains.zip(ambient).map(move |(gain, ambient)| {
-            let driven = drive(ambient, gain, fraction, 0).min(i32::from(u16::MAX));
-            let own = if gain == 0 { -1 } else { driven };
-            own << GAIN_GUARD_BITS
-        }))
     }
 
     /// Adds up the light of a frame by cells: `add` adds the light of a row of pixels,

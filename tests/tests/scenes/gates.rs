@@ -15,7 +15,7 @@ use std::path::Path;
 fn random_good_sessions_pass_and_every_fault_is_found() {
     let study = Study {
         first: 5_000,
-        good: 4,
+        good: 8,
         faulty: 1,
         faults: StudiedFault::ALL.to_vec(),
         threads: 2,
@@ -34,8 +34,11 @@ fn faults_that_look_like_others_are_found() {
     for (seed, kind) in [
         (52, CaptureFault::Tripod),
         (30, CaptureFault::Flicker),
+        (14, CaptureFault::Gamma),
         (52, CaptureFault::Gamma),
+        (59, CaptureFault::Gamma),
         (10_005, CaptureFault::Gamma),
+        (10_035, CaptureFault::Gamma),
         (62, CaptureFault::Vivid),
         (112, CaptureFault::AutoExposure),
         (103, CaptureFault::Skipped),

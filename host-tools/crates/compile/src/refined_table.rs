@@ -59,12 +59,12 @@ pub fn refined_table(image: &[u8], parts: &RefinedParts) -> Result<Vec<u8>, Comp
     refined.replace(SectionKind::Meta, Some(meta.emit().to_vec()));
     let fine = gains.fine_section(parts.fine.size);
     refined.replace(SectionKind::FineGain, fine);
-    refined.replace(SectionKind::Gain, Some(halfwords(gains.cells)));
     if let Some(ambient) = &parts.ambient {
         let channels: Vec<&[f64]> = ambient.iter().map(Vec::as_slice).collect();
-        let stored = stored_ambient(&channels, 1.0).map(halfwords);
+        let stored = stored_ambient(&channels, (&gains, meta.grid), 1.0).map(halfwords);
         refined.replace(SectionKind::Ambient, stored);
     }
+    refined.replace(SectionKind::Gain, Some(halfwords(gains.cells)));
     refined.replace(SectionKind::Provenance, Some(text.into_bytes()));
     let refined = refined.finish();
     Table::check(&refined).map_err(CompileError::Image)?;

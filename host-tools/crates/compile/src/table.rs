@@ -9,7 +9,7 @@ use super::response;
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm_picture::ProjectorResponse;
 use iltm_runtime::{
-    FrameSize,
+    FrameSize, Grid,
     haar::Basis,
     image::{
         ImageError, Label, Meta, Table, TierInfo,
@@ -215,7 +215,7 @@ pub fn compile(
     image.section(SectionKind::Meta, 0, head.emit().to_vec());
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));
     image.section(SectionKind::Gain, 0, halfwords(gains.cells.iter().copied()));
-    if let Some(ambient) = ambient(inverse, white) {
+    if let Some(ambient) = ambient(inverse, &gains, white) {
         image.section(SectionKind::Ambient, 0, halfwords(ambient));
     }
     if let Some(knots) = response::knots(&options.projector, inverse.channels.len()) {
@@ -444,19 +444,45 @@ impl Gains {
 }
 
 /// Ambient light as the image stores it; `None` if every cell rounds to none.
-fn ambient(inverse: &InverseTransport, white: f64) -> Option<Vec<u16>> {
+fn ambient(inverse: &InverseTransport, gains: &Gains, white: f64) -> Option<Vec<u16>> {
     let channels = inverse.channels.iter();
     let channels: Vec<&[f64]> = channels.map(|c| c.ambient.as_slice()).collect();
-    stored_ambient(&channels, white)
+    stored_ambient(&channels, (gains, inverse.grid), white)
 }
 
 /// Ambient light relative to `white` as the image stores it; `None` if every cell rounds to none.
-pub(crate) fn stored_ambient(channels: &[&[f64]], white: f64) -> Option<Vec<u16>> {
+///
+/// Cells that the projector does not reach have no gain. Stored is the drive, not the light, that the
+/// cells beside them have on average, because pixels of those cells are interpolated towards it.
+pub(crate) fn stored_ambient(
+    channels: &[&[f64]],
+    (gains, grid): (&Gains, Grid),
+    white: f64,
+) -> Option<Vec<u16>> {
+    let one = Light::ONE.to_bits();
     let bits = |light: f64| {
-        let bits = (light / white * f64::from(Light::ONE.to_bits())).round();
-        (bits as u16).min(Light::ONE.to_bits())
+        let bits = (light / white * f64::from(one)).round();
+        (bits as u16).min(one)
     };
-    let stored = interleave(channels, bits);
+    let mut stored = interleave(channels, bits);
+    let own = stored.clone();
+    let unit = f64::from(gains.fraction).exp2();
+    let (rows, cols) = (grid.rows(), grid.cols());
+    let unreached = stored.iter_mut().zip(&gains.cells).enumerate();
+    for (at, (value, _)) in unreached.filter(|(_, (_, gain))| **gain == 0) {
+        let (cell, channel) = (at / channels.len(), at % channels.len());
+        let (row, col) = (cell / cols, cell % cols);
+        let above = row.checked_sub(1).map(|row| (row, col));
+        let left = col.checked_sub(1).map(|col| (row, col));
+        let below = (row + 1 < rows).then_some((row + 1, col));
+        let right = (col + 1 < cols).then_some((row, col + 1));
+        let beside = [above, left, below, right].into_iter().flatten();
+        let beside = beside.map(|(row, col)| (row * cols + col) * channels.len() + channel);
+        let reached = beside.filter(|at| gains.cells[*at] > 0);
+        let drives = reached.map(|at| f64::from(gains.cells[at]) / unit * f64::from(own[at]));
+        let (sum, count) = drives.fold((0.0, 0.0), |(sum, count), d| (sum + d, count + 1.0));
+        *value = ((sum / f64::max(count, 1.0)).round() as u16).min(one);
+    }
     stored.iter().any(|bits| *bits > 0).then_some(stored)
 }
 
@@ -465,4 +491,35 @@ fn interleave(channels: &[&[f64]], store: impl Fn(f64) -> u16) -> Vec<u16> {
     let cells = channels.first().map_or(0, |channel| channel.len());
     let at = |cell: usize| channels.iter().map(move |channel| channel[cell]);
     (0..cells).flat_map(at).map(store).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_that_the_projector_does_not_reach_have_the_drive_of_those_beside_them() {
+        // Gains 1, 2, 0 above and 0, 4, 0 below, in two channels, the second half as bright.
+        let grid = Grid::new(2, 3).unwrap();
+        let gains = Gains {
+            fraction: 12,
+            cells: [1, 2, 0, 0, 4, 0]
+                .into_iter()
+                .flat_map(|gain| [gain << 12; 2])
+                .collect(),
+            fine: None,
+        };
+        let light = [0.2, 0.1, 0.7, 0.7, 0.1, 0.7];
+        let half = light.map(|light| light / 2.0);
+        let stored = stored_ambient(&[&light, &half], (&gains, grid), 1.0).unwrap();
+        let expected = [0.2, 0.1, 0.2, 0.3, 0.1, 0.4];
+        for (cell, light) in expected.into_iter().enumerate() {
+            for (channel, light) in [light, light / 2.0].into_iter().enumerate() {
+                let bits = f64::from(stored[2 * cell + channel]);
+                let off = (bits / f64::from(Light::ONE.to_bits()) - light).abs();
+                assert!(off < 2e-4, "{cell} {channel}: {bits}");
+            }
+        }
+        assert!(stored_ambient(&[&[0.0; 6]], (&gains, grid), 1.0).is_none());
+    }
 }

@@ -176,9 +176,9 @@ pub fn microseconds_at(table: &Table<'_>, pixels: Grid) -> Result<Vec<f64>, Fram
 }
 
 /// What the runtime's [`FullMemory`] borrows.
-struct FrameMemory {
-    gains: Vec<Halfword>,
-    ambient: Vec<Halfword>,
+pub(crate) struct FrameMemory {
+    pub(crate) gains: Vec<Halfword>,
+    pub(crate) ambient: Vec<Halfword>,
     sums: Vec<u64>,
     corrections: Vec<i32>,
     columns: Vec<u32>,
@@ -189,7 +189,7 @@ struct FrameMemory {
 
 impl FrameMemory {
     /// Enough for frames of `size`.
-    fn new(table: &Table<'_>, size: FrameSize) -> Self {
+    pub(crate) fn new(table: &Table<'_>, size: FrameSize) -> Self {
         let channels = usize::from(table.channels());
         let (samples, width) = (size.pixels() * channels, size.width());
         let cells = table.grid().cells() * channels;
@@ -206,7 +206,7 @@ impl FrameMemory {
         }
     }
 
-    fn lent(&mut self) -> FullMemory<'_> {
+    pub(crate) fn lent(&mut self) -> FullMemory<'_> {
         FullMemory {
             gains: &mut self.gains,
             ambient: &mut self.ambient,

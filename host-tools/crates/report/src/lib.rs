@@ -39,7 +39,7 @@ pub use comparison::Comparison;
 pub use example::{Example, TreatedImage, Treatment, Wanted};
 pub use ladder::{TierCost, TimedTier, ladder, microseconds, microseconds_at, tier_costs};
 pub use page::{Command, Words};
-pub use predict::{Projection, pixel_gains};
+pub use predict::Projection;
 
 use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{

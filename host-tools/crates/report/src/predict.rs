@@ -14,12 +14,13 @@
 //! and nothing that the photographs did not show. How wrong the learned
 //! transport itself is, only photographs can say: `SolveReport::prediction`.
 
+use crate::ladder::FrameMemory;
 use iltm_picture::{Lattice, LightPicture};
 use iltm_runtime::{
     FrameSize,
     image::Table,
-    pipeline::{FullPipeline, RowBuffers},
-    units::Light,
+    pipeline::prepare_pixels,
+    units::{Halfword, Light},
 };
 use iltm_solve::InverseTransport;
 use nalgebra::{DMatrix, DVector};
@@ -173,44 +174,24 @@ struct PixelPlanes {
 impl PixelPlanes {
     /// Those of frames of `size`; `None` if that is smaller than the grid.
     fn of(table: &Table<'_>, size: FrameSize) -> Option<Self> {
-        match table.channels() {
-            1 => Self::of_channels::<1>(table, size),
-            _ => Self::of_channels::<3>(table, size),
+        let mut memory = FrameMemory::new(table, size);
+        for row in 0..size.height() {
+            prepare_pixels(table, size, row, &mut memory.lent()).ok()?;
         }
+        let channels = usize::from(table.channels());
+        let planes = |values: &[Halfword], unit: f32| {
+            let plane = |channel| {
+                let own = values.iter().skip(channel).step_by(channels);
+                own.map(|bits| f32::from(u16::from_le_bytes(*bits)) / unit)
+                    .collect()
+            };
+            (0..channels).map(plane).collect()
+        };
+        Some(Self {
+            gain: planes(&memory.gains, f32::from(table.gain_fraction()).exp2()),
+            ambient: planes(&memory.ambient, f32::from(Light::ONE.to_bits())),
+        })
     }
-
-    fn of_channels<const C: usize>(table: &Table<'_>, size: FrameSize) -> Option<Self> {
-        let pipeline = FullPipeline::<C>::new(table, size).ok()?;
-        let unit = f32::from(table.gain_fraction()).exp2();
-        let mut line = vec![0; pipeline.line_len()];
-        let mut spread = vec![0; size.width()];
-        let mut values = vec![0; size.width()];
-        let planes = || vec![Vec::with_capacity(size.pixels()); C];
-        let (mut gain, mut ambient) = (planes(), planes());
-        for (channel, (gain, ambient)) in gain.iter_mut().zip(&mut ambient).enumerate() {
-            for y in 0..size.height() {
-                let mut row = RowBuffers {
-                    line: &mut line,
-                    spread: &mut spread,
-                };
-                pipeline.gain_row(y, channel, &mut row, &mut values);
-                gain.extend(values.iter().map(|gain| f32::from(*gain) / unit));
-                if !pipeline.ambient_row(y, channel, &mut row, &mut values) {
-                    values.fill(0);
-                }
-                let light = |bits: &u16| Light::from_bits(*bits).to_num::<f32>();
-                ambient.extend(values.iter().map(light));
-            }
-        }
-        Some(Self { gain, ambient })
-    }
-}
-
-/// The gain of each pixel in frames of `size`, as the pipeline has it: drive per reference light,
-/// one plane a channel. `None` if the frame is smaller than the grid.
-#[must_use]
-pub fn pixel_gains(table: &Table<'_>, size: FrameSize) -> Option<Vec<Vec<f32>>> {
-    PixelPlanes::of(table, size).map(|planes| planes.gain)
 }
 
 #[cfg(test)]

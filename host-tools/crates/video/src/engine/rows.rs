@@ -12,7 +12,7 @@ use super::{EngineJob, OperatorMemory};
 use iltm_runtime::{
     image::Table,
     pipeline::{
-        FrameError, FullPipeline,
+        FrameError, FullPipeline, RowBuffers,
         stages::{drive_row, subtract_ambient},
     },
     placement::PixelArea,
@@ -51,7 +51,7 @@ struct RowStages<'t, 'a, S: Code, const C: usize> {
     /// Gains of every pixel: row by row, in a row channel by channel.
     gains: Vec<u16>,
     /// Ambient light of every pixel in the same way; nothing in a dark room.
-    ambient: Vec<Light>,
+    ambient: Vec<u16>,
     /// Where on the cells the picture lies.
     picture: [[usize; 2]; 2],
 }
@@ -64,15 +64,15 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     ) -> Result<Self, FrameError> {
         let pipeline = FullPipeline::within(table, job.size, job.area)?;
         let (cells, pixels) = (table.grid().cells(), job.size.pixels());
-        let gains = threads.install(|| expand_gains(&pipeline));
+        let (gains, ambient) = threads.install(|| expand(&pipeline));
         Ok(Self {
             stages: RowStages {
                 pipeline,
                 width: job.size.width(),
                 colours: job.colours,
                 curves: Curves::new(table, job.encoding),
-                ambient: threads.install(|| expand_ambient(&pipeline, &gains)),
                 gains,
+                ambient,
                 picture: job.picture,
             },
             threads,
@@ -224,7 +224,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for ReadBand<'_, '_, '_, B, C> {
                 if !stages.ambient.is_empty() {
                     let ambient = stages.row_of_channel(&stages.ambient, y, channel);
                     for (light, ambient) in light.iter_mut().zip(ambient) {
-                        *light = subtract_ambient(*light, *ambient);
+                        *light = subtract_ambient(*light, Light::from_bits(*ambient));
                     }
                 }
                 let sums = &mut memory.sums[colour * cells..][..cells];
@@ -308,39 +308,33 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
     }
 }
 
-/// Gains of every pixel: row by row, in a row channel by channel.
-fn expand_gains<const C: usize>(pipeline: &FullPipeline<'_, '_, C>) -> Vec<u16> {
-    let (size, line) = (pipeline.frame(), pipeline.line_len());
-    let mut gains = vec![0; C * size.pixels()];
-    let rows = gains.par_chunks_mut(size.width()).enumerate();
-    rows.for_each_init(
-        || RowMemory::new(line, size.width()),
-        |memory, (index, gains)| {
-            let (mut row, _) = memory.split();
-            pipeline.gain_row(index / C, index % C, &mut row, gains);
-        },
-    );
-    gains
+/// Gains and ambient light of every pixel: row by row, in a row channel by channel. In a dark room
+/// there is no ambient light.
+fn expand<const C: usize>(pipeline: &FullPipeline<'_, '_, C>) -> (Vec<u16>, Vec<u16>) {
+    let mut gains = vec![0; C * pipeline.frame().pixels()];
+    each_row(pipeline, &mut gains, |y, channel, row, gains| {
+        pipeline.gain_row(y, channel, row, gains);
+    });
+    let is_lit = pipeline.table().ambient_row(0, 0).is_some();
+    let mut ambient = if is_lit { gains.clone() } else { Vec::new() };
+    each_row(pipeline, &mut ambient, |y, channel, row, ambient| {
+        pipeline.ambient_row(y, channel, row, ambient);
+    });
+    (gains, ambient)
 }
 
-/// Ambient light of every pixel in the same way; nothing in a dark room.
-fn expand_ambient<const C: usize>(pipeline: &FullPipeline<'_, '_, C>, gains: &[u16]) -> Vec<Light> {
-    if pipeline.table().ambient_row(0, 0).is_none() {
-        return Vec::new();
-    }
-    let (size, line) = (pipeline.frame(), pipeline.line_len());
-    let mut ambient = vec![Light::ZERO; gains.len()];
-    let rows = ambient.par_chunks_mut(size.width()).enumerate();
-    rows.zip(gains.par_chunks(size.width())).for_each_init(
-        || (RowMemory::new(line, size.width()), vec![0; size.width()]),
-        |(memory, values), ((index, ambient), gains)| {
+/// Gives every row of every channel to `fill`.
+fn each_row<const C: usize>(
+    pipeline: &FullPipeline<'_, '_, C>,
+    values: &mut [u16],
+    fill: impl Fn(usize, usize, &mut RowBuffers<'_>, &mut [u16]) + Sync,
+) {
+    let (width, line) = (pipeline.frame().width(), pipeline.line_len());
+    values.par_chunks_mut(width).enumerate().for_each_init(
+        || RowMemory::new(line, width),
+        |memory, (index, values)| {
             let (mut row, _) = memory.split();
-            values.copy_from_slice(gains);
-            pipeline.ambient_row(index / C, index % C, &mut row, values);
-            for (ambient, bits) in ambient.iter_mut().zip(values) {
-                *ambient = Light::from_bits(*bits);
-            }
+            fill(index / C, index % C, &mut row, values);
         },
     );
-    ambient
 }

@@ -102,18 +102,19 @@ fn a_frame_of_one_pixel_a_cell_is_what_the_full_resolution_way_makes_of_it() {
 #[test]
 fn ambient_light_follows_the_paint_within_cells_and_goes_up_to_what_the_projector_misses() {
     // Ambient light and the projector's fall on a wall of dark and bright paint, pixel by
-    // pixel; the projector misses a row of the cells.
+    // pixel; the projector misses a column and a corner of the cells, where
+    // the table has drives.
     let grid = grid(4, 6);
-    let missed = |row: usize| row == 2;
+    let missed = |row: usize, col: usize| col == 2 || (row == 0 && col == 5);
     let mut table = MadeUp::new(grid, 1);
     let frame = size(24, 16);
     let gain = |x: usize| if x.is_multiple_of(2) { 1 } else { 3 } << table.gain_fraction;
     let light = |x: usize| if x.is_multiple_of(2) { 3_000 } else { 1_000 };
     let (mut gains, mut ambient) = (Vec::new(), Vec::new());
     for cell in 0..grid.cells() {
-        let reached = !missed(cell / 6);
+        let reached = !missed(cell / 6, cell % 6);
         gains.push(if reached { 2 << table.gain_fraction } else { 0 });
-        ambient.push(if reached { 1_500 } else { 7_777 });
+        ambient.push(if reached { 1_500 } else { 3_000 });
     }
     let fine = (0..frame.pixels()).map(|at| gain(at % 24)).collect();
     table.fine_gains = Some((16, 24, fine));
