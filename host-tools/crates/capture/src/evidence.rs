@@ -18,7 +18,7 @@ use crate::photographs::order::{self, Order};
 use crate::photographs::sampled::Sampled;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::registration::movement::{self, Moved};
-use crate::registration::projector_map::{self, MapError, ProjectorMap};
+use crate::registration::projector_map::{MapError, ProjectorMap};
 use crate::registration::{self, Registered, image_tracking};
 use iltm_picture::Declared;
 use iltm_picture::progress::Progress;
@@ -123,7 +123,8 @@ impl CaptureEvidence {
         let response = devices.devices.projector.clone();
         let known = &KnownImages::new(folder, sequence, projector.pixels(), response);
         let shown = images.as_mut().map(|images| (known, images));
-        let mut registered = registration::register(sequence, linear, shown, progress)?;
+        let code = (sequence, projector);
+        let mut registered = registration::register(folder, code, linear, shown, progress)?;
         let registration = &registered.registration;
         let pixels = CellPixels::choose(registration, &linear.saturated);
         let photographs = &mut linear.photographs;
@@ -146,15 +147,12 @@ impl CaptureEvidence {
         };
         let found = pixels.live.contains(&true);
         let cells = found.then(measure).transpose()?;
-        let map = projector_map::find(folder, sequence, projector, linear, registration, progress)?;
-        let map = match (map, registered.map.take(), &mut images) {
-            (Some(found), _, _) => Some(found),
-            (None, Some(found), _) => Some(Ok(found)),
-            (None, None, Some(images)) => {
+        let map = match (registered.map.take(), &mut images) {
+            (None, Some(images)) => {
                 let images = (known, images);
                 image_tracking::map(sequence.grid, linear, images, registration, progress)?.map(Ok)
             }
-            (None, None, None) => None,
+            (map, _) => map,
         };
         if let (true, Some(Ok(map)), Some(images)) =
             (devices.projector_unknown(), &map, &mut images)

@@ -29,15 +29,15 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// A registration by a first guess alone.
-    pub(super) fn of_guess(guess: &CellLabels, grid: Grid, format: &PhotoFormat) -> Self {
+    /// All pixels of which the cell is known, whether they see others or not.
+    pub(super) fn of_labels(cell: Vec<u32>, grid: Grid, format: &PhotoFormat) -> Self {
         let camera = (format.width, format.height);
         Self {
             camera,
             binning: format.binning,
-            cell_of_pixel: guess.cell.clone(),
-            seen_cell: guess.cell.clone(),
-            centre: centres(grid, camera, &guess.cell),
+            centre: centres(grid, camera, &cell),
+            cell_of_pixel: cell.clone(),
+            seen_cell: cell,
         }
     }
 

@@ -67,9 +67,14 @@ pub(crate) fn drop_unlit(candidates: &mut Vec<Candidate>, grid: Grid, camera: (u
 
 /// Removes candidates that get their cell's light from other surfaces only, as beyond
 /// the border of the projection beside a crease: much darker than the cell's other
-/// pixels, and not for a dark paint, which darkens light from everywhere alike. `light`
-/// is the flood light of each camera pixel.
-pub(crate) fn drop_indirect(candidates: &mut Vec<Candidate>, light: &[f32]) {
+/// pixels, and not for a dark paint, which darkens light from everywhere alike, unless the pixel's
+/// place is known: beside a crease a surface that the projector grazes is as dark. `light` is the
+/// flood light of each camera pixel.
+pub(crate) fn drop_indirect(
+    candidates: &mut Vec<Candidate>,
+    light: &[f32],
+    is_placed: impl Fn(u32) -> bool,
+) {
     let seen = |candidate: &Candidate| {
         let nearest = candidate.nearest();
         (nearest, nearest / light[candidate.pixel as usize])
@@ -93,7 +98,7 @@ pub(crate) fn drop_indirect(candidates: &mut Vec<Candidate>, light: &[f32]) {
     candidates.retain(|candidate| {
         let (nearest, share) = seen(candidate);
         let (bright, direct) = usual[&candidate.cell];
-        nearest >= OUTSIDE * bright || share >= INDIRECT * direct
+        nearest >= OUTSIDE * bright || share >= INDIRECT * direct || is_placed(candidate.pixel)
     });
 }
 
@@ -246,16 +251,21 @@ mod tests {
         for (at, candidate) in candidates.iter_mut().enumerate() {
             candidate.pixel = at as u32;
         }
-        drop_indirect(&mut candidates, &light);
-        let kept: Vec<u32> = candidates.iter().map(|candidate| candidate.pixel).collect();
-        assert_eq!(kept, [0, 1, 2, 3, 4, 5, 7]);
+        let kept = |is_placed: fn(u32) -> bool| -> Vec<u32> {
+            let mut candidates = candidates.clone();
+            drop_indirect(&mut candidates, &light, is_placed);
+            candidates.iter().map(|candidate| candidate.pixel).collect()
+        };
+        assert_eq!(kept(|_| false), [0, 1, 2, 3, 4, 5, 7]);
+        // Stripes are seen where it is grazed by the projector's own light.
+        assert_eq!(kept(|pixel| pixel == 6), [0, 1, 2, 3, 4, 5, 6, 7]);
     }
 
     #[test]
     fn a_cell_that_is_seen_by_other_surfaces_only_keeps_its_pixels() {
         let (candidate, light) = pixel(0.03, 0.015, 0.04);
         let mut candidates = vec![candidate; 3];
-        drop_indirect(&mut candidates, &[light]);
+        drop_indirect(&mut candidates, &[light], |_| false);
         assert_eq!(candidates.len(), 3);
     }
 }

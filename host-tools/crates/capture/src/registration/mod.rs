@@ -23,14 +23,16 @@ mod sites;
 use crate::cells::images::KnownImages;
 use crate::format::error::CaptureError;
 use crate::format::sequence::Sequence;
+use crate::format::settings::ProjectorSettings;
 use crate::photographs::Photographs;
 use crate::photographs::linearise::LinearPhotographs;
 use cell_map::{Candidate, CellLabels, NO_CELL, Registration};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use mixed_pixels::MIXED;
-use projector_map::ProjectorMap;
+use projector_map::{MapError, ProjectorMap};
 use regression::regress;
+use std::path::Path;
 
 /// Photographs, other than black, from which a regression with eleven unknowns
 /// tells neighbouring cells apart better than the Gray code does.
@@ -43,6 +45,10 @@ const LEAST_OWN: f32 = 0.15;
 
 /// Smallest Gray code margin that is believed without a regression.
 const LEAST_MARGIN: f32 = 0.2;
+
+/// Uncertainty of a pixel's place, in pixels of the projector, below which stripes were seen
+/// there: they are on surfaces that the projector lights, and light from elsewhere blurs them.
+const PLACED: f32 = 0.5;
 
 /// How pixels were registered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -90,8 +96,8 @@ pub(crate) struct Registered {
     pub(crate) registration: Registration,
     pub(crate) method: RegistrationMethod,
     pub(crate) count: PixelCount,
-    /// The map of the images that cells were told by.
-    pub(crate) map: Option<ProjectorMap>,
+    /// The map of stripes finer than the cells, or of the images that cells were told by.
+    pub(crate) map: Option<Result<ProjectorMap, MapError>>,
 }
 
 /// Guesses the cell of each camera pixel by the Gray code, or by known pictures where there is none,
@@ -100,7 +106,8 @@ pub(crate) struct Registered {
 /// # Errors
 /// A photograph's own error.
 pub(crate) fn register(
-    sequence: &Sequence,
+    folder: &Path,
+    (sequence, projector): (&Sequence, &ProjectorSettings),
     linear: &mut LinearPhotographs<'_>,
     images: Option<(&KnownImages<'_>, &mut Photographs<'_>)>,
     progress: &dyn Progress,
@@ -115,10 +122,12 @@ pub(crate) fn register(
         Some((known, images)) if !is_coded => {
             let guess = image_matching::label(sequence, linear, (known, images), progress)?;
             if taken < MIN_REGRESSION {
-                let first = Registration::of_guess(&guess, grid, &linear.photographs.format);
-                map = image_tracking::map(grid, linear, (known, images), &first, progress)?;
+                let format = &linear.photographs.format;
+                let first = Registration::of_labels(guess.cell.clone(), grid, format);
+                let found = image_tracking::map(grid, linear, (known, images), &first, progress)?;
+                map = found.map(Ok);
             }
-            guess.by_map(map.as_ref(), grid)
+            guess.by_map(map.as_ref().and_then(|map| map.as_ref().ok()), grid)
         }
         _ => {
             progress.begin("decoding the Gray code", coded as u64);
@@ -127,10 +136,10 @@ pub(crate) fn register(
             guess
         }
     };
-    let photographs = &mut linear.photographs;
+    let format = linear.photographs.format.clone();
     // Nobody knows how many rounds over the photographs it will take.
     progress.begin("registering camera pixels", 0);
-    let camera = (photographs.format.width, photographs.format.height);
+    let camera = (format.width, format.height);
     let mut candidates: Vec<Candidate> = (0..)
         .zip(&guess.cell)
         .filter(|(_, cell)| **cell != NO_CELL)
@@ -141,9 +150,30 @@ pub(crate) fn register(
         coded: candidates.len(),
         ..PixelCount::default()
     };
-    let method = if taken < MIN_REGRESSION {
+    let is_regression = taken >= MIN_REGRESSION;
+    if is_regression {
+        regress(sequence, &mut linear.photographs, &mut candidates, progress)?;
+        candidates.retain(|c| c.weights[4] > LEAST_OWN * guess.light[c.pixel as usize]);
+    } else {
         candidates.retain(|c| guess.margin[c.pixel as usize] > LEAST_MARGIN);
-        mixed_pixels::drop_unlit(&mut candidates, grid, camera);
+    }
+    mixed_pixels::drop_unlit(&mut candidates, grid, camera);
+    let first = Registration::of_labels(cells(&candidates, guess.cell.len()), grid, &format);
+    let stripes = projector_map::decode(folder, sequence, projector, linear, &first, progress)?;
+    let method = if is_regression {
+        let stripes = stripes.as_ref().and_then(|stripes| stripes.as_ref().ok());
+        let places = stripes.and_then(|stripes| stripes.map(&first, linear).ok());
+        let is_placed = |pixel: u32| {
+            let uncertainty = places.as_ref().map(|map| map.uncertainty[pixel as usize]);
+            uncertainty.is_some_and(|uncertainty| uncertainty < PLACED)
+        };
+        mixed_pixels::drop_indirect(&mut candidates, &guess.light, is_placed);
+        mixed_pixels::judge(&mut candidates, grid, camera);
+        RegistrationMethod::Regression {
+            photographs: taken,
+            is_coded,
+        }
+    } else {
         judge_by_guess(&mut candidates, &guess, grid, camera);
         if is_coded {
             RegistrationMethod::GrayCode { photographs: taken }
@@ -152,43 +182,35 @@ pub(crate) fn register(
                 photographs: sequence.images.len(),
             }
         }
-    } else {
-        regress(sequence, photographs, &mut candidates, progress)?;
-        candidates.retain(|c| c.weights[4] > LEAST_OWN * guess.light[c.pixel as usize]);
-        mixed_pixels::drop_unlit(&mut candidates, grid, camera);
-        mixed_pixels::drop_indirect(&mut candidates, &guess.light);
-        mixed_pixels::judge(&mut candidates, grid, camera);
-        RegistrationMethod::Regression {
-            photographs: taken,
-            is_coded,
-        }
     };
     progress.end();
     count.weak = count.coded - candidates.len();
-    let mut cell_of_pixel = vec![NO_CELL; guess.cell.len()];
-    let mut seen_cell = cell_of_pixel.clone();
-    for seen in &candidates {
-        seen_cell[seen.pixel as usize] = seen.cell;
-        count.moved += usize::from(seen.cell != guess.cell[seen.pixel as usize]);
-    }
-    for kept in purest(&mut candidates) {
-        cell_of_pixel[kept.pixel as usize] = kept.cell;
-        count.kept += 1;
-    }
+    let moved = |seen: &&Candidate| seen.cell != guess.cell[seen.pixel as usize];
+    count.moved = candidates.iter().filter(moved).count();
+    let seen = cells(&candidates, guess.cell.len());
+    let pure = purest(&mut candidates);
+    count.kept = pure.len();
     count.mixed = candidates.len() - count.kept;
-    let centre = cell_map::centres(grid, camera, &seen_cell);
+    let registration = Registration {
+        cell_of_pixel: cells(&pure, guess.cell.len()),
+        ..Registration::of_labels(seen, grid, &format)
+    };
+    let of_stripes = stripes.map(|found| found.and_then(|found| found.map(&registration, linear)));
     Ok(Registered {
-        registration: Registration {
-            camera,
-            binning: photographs.format.binning,
-            cell_of_pixel,
-            seen_cell,
-            centre,
-        },
+        map: of_stripes.or(map),
+        registration,
         method,
         count,
-        map,
     })
+}
+
+/// The cell of each of a camera's pixels.
+fn cells(candidates: &[Candidate], pixels: usize) -> Vec<u32> {
+    let mut cells = vec![NO_CELL; pixels];
+    for candidate in candidates {
+        cells[candidate.pixel as usize] = candidate.cell;
+    }
+    cells
 }
 
 /// Without a regression: a pixel counts as mixed when one of its four

@@ -237,36 +237,29 @@ struct Fine {
 /// # Errors
 /// A manifest's or a photograph's own error; [`CaptureError::Unlike`] if they are not of the
 /// capture's kind.
-pub(crate) fn find(
+pub(crate) fn decode(
     folder: &Path,
     sequence: &Sequence,
     settings: &ProjectorSettings,
     linear: &LinearPhotographs<'_>,
     registration: &Registration,
     progress: &dyn Progress,
-) -> Result<Option<Result<ProjectorMap, MapError>>, CaptureError> {
+) -> Result<Option<Result<DecodedStripes, MapError>>, CaptureError> {
     match StripeManifest::read_if_there(folder)? {
         Some(manifest) => {
             let found = listed(folder, sequence, settings, manifest, linear, progress)?;
-            Ok(Some(found.and_then(|found| {
+            Ok(Some(found.map(|found| {
                 let pixel = registration.pixel_in_cells(sequence.grid);
-                found
-                    .told_apart(pixel.map(|pixel| pixel as f32))
-                    .map(registration, linear)
+                found.told_apart(pixel.map(|pixel| pixel as f32))
             })))
         }
         None if sequence.finer.is_empty() => Ok(None),
-        None => {
-            let found = left_out(folder, sequence, linear, progress)?;
-            Ok(Some(
-                found.and_then(|found| found.map(registration, linear)),
-            ))
-        }
+        None => left_out(folder, sequence, linear, progress).map(Some),
     }
 }
 
 /// All that a map is made from.
-struct Decoding {
+pub(crate) struct DecodedStripes {
     projector: ProjectorPixels,
     /// Columns of cells.
     cols: usize,
@@ -284,7 +277,7 @@ fn listed(
     manifest: StripeManifest,
     linear: &LinearPhotographs<'_>,
     progress: &dyn Progress,
-) -> Result<Result<Decoding, MapError>, CaptureError> {
+) -> Result<Result<DecodedStripes, MapError>, CaptureError> {
     let all = manifest.shots.len();
     let (mut shots, mut missing) = (Vec::new(), None);
     for mut shot in manifest.shots {
@@ -334,7 +327,7 @@ fn listed(
             let parts = cells[at] << light[at].bits.len();
             (inner[at] as f32 / parts as f32, 0.0, 0)
         });
-        Decoding {
+        DecodedStripes {
             projector,
             cols: cells[0],
             scale,
@@ -349,7 +342,7 @@ fn left_out(
     sequence: &Sequence,
     linear: &LinearPhotographs<'_>,
     progress: &dyn Progress,
-) -> Result<Result<Decoding, MapError>, CaptureError> {
+) -> Result<Result<DecodedStripes, MapError>, CaptureError> {
     let stripe = |bracket: &Bracket| {
         let (axis, bit, inverse) = bracket.shots.first()?.role.as_stripe()?;
         Some(StripeRole::Code { axis, bit, inverse })
@@ -378,7 +371,7 @@ fn left_out(
     let Some(size) = size else {
         return Ok(Err(MapError::Slides(width as u32, height as u32)));
     };
-    Ok(Ok(Decoding {
+    Ok(Ok(DecodedStripes {
         projector: ProjectorPixels::whole(size),
         cols: sequence.grid.cols(),
         scale,
@@ -474,7 +467,7 @@ impl Fine {
     }
 }
 
-impl Decoding {
+impl DecodedStripes {
     /// Leaves out what is too fine for a camera whose pixel covers `covered` cells along their
     /// width and height: its contrast is there by chance, or turned round.
     fn told_apart(mut self, covered: [f32; 2]) -> Self {
@@ -493,8 +486,11 @@ impl Decoding {
         self
     }
 
-    /// Puts both axes together.
-    fn map(
+    /// The map of all pixels that see a cell: both axes together.
+    ///
+    /// # Errors
+    /// [`MapError::Contradiction`] where the waves are not at the places that the code says.
+    pub(crate) fn map(
         &self,
         registration: &Registration,
         linear: &LinearPhotographs<'_>,
@@ -671,7 +667,7 @@ mod tests {
     use super::*;
 
     /// Cells of 96 pixels, halved four times, and waves.
-    fn decoding() -> Decoding {
+    fn decoding() -> DecodedStripes {
         let light = || AxisLight {
             bits: vec![Vec::new(); 4],
             waves: Some(WaveLight {
@@ -679,7 +675,7 @@ mod tests {
                 rest: Vec::new(),
             }),
         };
-        Decoding {
+        DecodedStripes {
             projector: ProjectorPixels::whole(FrameSize::new(960, 960).unwrap()),
             cols: 10,
             scale: [(6.0, 0.0, 0); 2],
