@@ -20,10 +20,6 @@ install_packages() {
     DEBIAN_FRONTEND=noninteractive as_root apt-get install -y -qq --no-install-recommends "$@"
 }
 
-# Everything is built once here: nothing would be gained by what makes a second build
-# quick, and a third of the time of the first one is lost by it.
-export CARGO_INCREMENTAL=0
-
 wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 
 new_enough() {

@@ -113,9 +113,11 @@ fn main() {
             vec![1.02, 1.05, 1.1, 1.2, 1.4, 2.2],
         ),
     ];
+    let sharper = [("width = 220\nheight = 160", "width = 440\nheight = 320")];
     let rigs = rigs.into_iter().chain([
         ("painted panels", panels(0.0), Vec::new()),
         ("painted corner", corner(0.0), Vec::new()),
+        ("stage", scene("stage", &sharper), Vec::new()),
     ]);
     let mut wrong = 0;
     for (name, scene, gammas) in rigs {
@@ -131,7 +133,7 @@ fn main() {
         };
         let any = &[Outcome::Passed, Outcome::Inconclusive, Outcome::Failed];
         let mut cases = match name {
-            "painted panels" | "painted corner" => {
+            "painted panels" | "painted corner" | "stage" => {
                 let good = |seed: u64| rig.good(&format!("good, seed {seed}"), seed);
                 (1..=6).map(good).collect()
             }

@@ -1,8 +1,12 @@
-//! Projector map of fine stripes against geometry: lines of sight to the M-shaped panels, and
-//! from there to the projector, worked out here from the numbers of the scene's description.
+//! Projector map of fine stripes against geometry: lines of sight to the M-shaped panels and the
+//! stage's floor, and from there to the projector, worked out here from the numbers of the scenes'
+//! descriptions.
 
-use iltm::capture::{self, CameraSettings, CaptureOptions, MapSource, ProjectorMap};
+use iltm::capture::{
+    self, CameraSettings, CaptureOptions, MapSource, Measurements, NO_CELL, ProjectorMap,
+};
 use iltm::progress::Silent;
+use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::UnfilledCapture;
 use iltm::scene::{Forced, VirtualCamera};
 use iltm::session::{self, Layout, OrderOptions, order};
@@ -37,9 +41,9 @@ struct View {
 }
 
 impl View {
-    fn new(position: [f64; 3], field_of_view: f64, aspect: f64) -> Self {
-        let position = Vector3::from(position);
-        let forward = (Vector3::new(0.0, 0.0, -0.5) - position).normalize();
+    fn new([from, to]: [[f64; 3]; 2], field_of_view: f64, aspect: f64) -> Self {
+        let position = Vector3::from(from);
+        let forward = (Vector3::from(to) - position).normalize();
         let half = (0.5 * field_of_view.to_radians()).tan();
         let right = forward.cross(&Vector3::y()).normalize();
         Self {
@@ -58,9 +62,14 @@ impl View {
             .map(|axis| 0.5 + 0.5 * way.dot(&axis) / (depth * axis.norm_squared()))
     }
 
+    /// The direction to a place of its picture.
+    fn way(&self, [across, down]: [f64; 2]) -> Vector3<f64> {
+        self.forward + (2.0 * across - 1.0) * self.right + (2.0 * down - 1.0) * self.down
+    }
+
     /// The panel that it sees at a place of its picture, and the point of it.
-    fn panel(&self, [across, down]: [f64; 2]) -> Option<(usize, Vector3<f64>)> {
-        let way = self.forward + (2.0 * across - 1.0) * self.right + (2.0 * down - 1.0) * self.down;
+    fn panel(&self, at: [f64; 2]) -> Option<(usize, Vector3<f64>)> {
+        let way = self.way(at);
         let hit = |panel: usize| {
             let ((x, z), (end, _)) = (FOLDS[panel], FOLDS[panel + 1]);
             let slope = FOLDS[panel + 1].1 - z;
@@ -76,6 +85,14 @@ impl View {
     }
 }
 
+/// Where a pixel of a picture is in it, 0 to 1.
+fn place(pixel: usize, (width, height): (usize, usize)) -> [f64; 2] {
+    [
+        ((pixel % width) as f64 + 0.5) / width as f64,
+        ((pixel / width) as f64 + 0.5) / height as f64,
+    ]
+}
+
 /// How far a map is off: the root mean square of each direction on flat parts, and what 95 % of
 /// the pixels beside creases and edges keep; and the shares of the pixels that are lit and known.
 struct Off {
@@ -88,16 +105,12 @@ struct Off {
 
 fn off(map: &ProjectorMap) -> Off {
     let (width, height) = map.camera;
-    let camera = View::new([0.6, 0.3, 9.0], 27.0, width as f64 / height as f64);
-    let projector = View::new([-0.4, 0.0, 9.0], 23.0, 21.0 / 13.0);
-    let place = |x: usize, y: usize| {
-        [
-            (x as f64 + 0.5) / width as f64,
-            (y as f64 + 0.5) / height as f64,
-        ]
-    };
+    let middle = [0.0, 0.0, -0.5];
+    let aspect = width as f64 / height as f64;
+    let camera = View::new([[0.6, 0.3, 9.0], middle], 27.0, aspect);
+    let projector = View::new([[-0.4, 0.0, 9.0], middle], 23.0, 21.0 / 13.0);
     let seen: Vec<Option<(usize, Vector3<f64>)>> = (0..width * height)
-        .map(|pixel| camera.panel(place(pixel % width, pixel / width)))
+        .map(|pixel| camera.panel(place(pixel, (width, height))))
         .collect();
     let panel = |x: isize, y: isize| {
         let at = usize::try_from(x).ok()?;
@@ -143,6 +156,34 @@ fn off(map: &ProjectorMap) -> Off {
     }
 }
 
+/// A session with fine stripes and 10 random patterns, as it is photographed and measured.
+fn measured(scene: &Scene, projector: (u16, u16), border: u16, jpeg: bool) -> Measurements {
+    let simulation = simulation(scene, Forced::default());
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("session");
+    let options = OrderOptions {
+        bernoulli: 10,
+        ramp: 0,
+        probe: false,
+        ..OrderOptions::default()
+    };
+    let size = FrameSize::new(projector.0, projector.1).unwrap();
+    let layout = Layout::new(simulation.grid(), size, border).unwrap();
+    let settings = CameraSettings {
+        response: scene.camera.response.into(),
+        ..CameraSettings::default()
+    };
+    let slides = order(&layout, &options);
+    session::write(&slides, &layout, &settings, &folder, &Silent).unwrap();
+    let unfilled = UnfilledCapture::read(&folder, simulation.grid()).unwrap();
+    let taken = VirtualCamera::new(scene, &simulation, 1).unwrap();
+    unfilled.take_missing(&taken, &Silent).unwrap();
+    if jpeg {
+        as_jpeg(&folder.join("photos"), 90);
+    }
+    capture::read(&folder, &CaptureOptions::default(), &Silent).unwrap()
+}
+
 #[test]
 fn every_pixel_finds_its_place_across_creases_with_twelve_bits_and_with_jpeg() {
     for (camera, jpeg) in [(1, false), (1, true), (2, false), (2, true)] {
@@ -156,30 +197,7 @@ fn every_pixel_finds_its_place_across_creases_with_twelve_bits_and_with_jpeg() {
                 ("bits = 12", &format!("bits = 12\nresponse = \"{curve}\"")),
             ],
         );
-        let simulation = simulation(&scene, Forced::default());
-        let place = tempfile::tempdir().unwrap();
-        let folder = place.path().join("session");
-        let options = OrderOptions {
-            bernoulli: 10,
-            ramp: 0,
-            probe: false,
-            ..OrderOptions::default()
-        };
-        let size = FrameSize::new(PROJECTOR.0, PROJECTOR.1).unwrap();
-        let layout = Layout::new(simulation.grid(), size, BORDER).unwrap();
-        let settings = CameraSettings {
-            response: scene.camera.response.into(),
-            ..CameraSettings::default()
-        };
-        let slides = order(&layout, &options);
-        session::write(&slides, &layout, &settings, &folder, &Silent).unwrap();
-        let unfilled = UnfilledCapture::read(&folder, simulation.grid()).unwrap();
-        let taken = VirtualCamera::new(&scene, &simulation, 1).unwrap();
-        unfilled.take_missing(&taken, &Silent).unwrap();
-        if jpeg {
-            as_jpeg(&folder.join("photos"), 90);
-        }
-        let measured = capture::read(&folder, &CaptureOptions::default(), &Silent).unwrap();
+        let measured = measured(&scene, PROJECTOR, BORDER, jpeg);
         let map = measured.map.unwrap().unwrap();
         assert_eq!(map.source, MapSource::Waves);
         let off = off(&map);
@@ -193,5 +211,35 @@ fn every_pixel_finds_its_place_across_creases_with_twelve_bits_and_with_jpeg() {
         // What a map says of itself is neither less nor many times what it is.
         let true_one = off.flat[0].hypot(off.flat[1]);
         assert!((1.0..3.0).contains(&(off.stated / true_one)), "{words}");
+    }
+}
+
+/// It gets a quarter of the light of the backdrop that it shares cells with.
+#[test]
+fn a_floor_that_the_projector_grazes_keeps_its_pixels() {
+    for camera in [1, 2] {
+        let (width, height) = (220 * camera, 160 * camera);
+        let size = format!("width = {width}\nheight = {height}");
+        let scene = scene("stage", &[("width = 220\nheight = 160", &size)]);
+        let registration = measured(&scene, (400, 280), 0, false).registration;
+        let middle = [0.0, 0.9, 0.0];
+        let aspect = width as f64 / height as f64;
+        let camera = View::new([[0.7, 1.6, 5.2], middle], 38.0, aspect);
+        let projector = View::new([[0.0, 1.4, 5.0], middle], 32.0, 20.0 / 14.0);
+        let (mut lit, mut seen) = (0.0, 0.0);
+        for (pixel, cell) in registration.seen_cell.iter().enumerate() {
+            let way = camera.way(place(pixel, (width, height)));
+            let point = camera.position - way * (camera.position.y / way.y);
+            // To the left of the column and its shadow, not at an edge.
+            let floor = (-1.35..-0.6).contains(&point.x) && (0.05..1.55).contains(&point.z);
+            let inside = |at: &f64| (0.02..0.97).contains(at);
+            if floor && projector.sees(&point).iter().all(inside) {
+                lit += 1.0;
+                seen += f64::from(u8::from(*cell != NO_CELL));
+            }
+        }
+        let words = format!("camera of {width}: {seen} of {lit} pixels");
+        println!("{words}");
+        assert!(lit > 100.0 && seen > 0.95 * lit, "{words}");
     }
 }

@@ -123,8 +123,8 @@ impl CaptureEvidence {
         let response = devices.devices.projector.clone();
         let known = &KnownImages::new(folder, sequence, projector.pixels(), response);
         let shown = images.as_mut().map(|images| (known, images));
-        let code = (sequence, projector);
-        let mut registered = registration::register(folder, code, linear, shown, progress)?;
+        let mut registered =
+            registration::register(folder, (sequence, projector), linear, shown, progress)?;
         let registration = &registered.registration;
         let pixels = CellPixels::choose(registration, &linear.saturated);
         let photographs = &mut linear.photographs;

@@ -67,9 +67,9 @@ pub(crate) fn drop_unlit(candidates: &mut Vec<Candidate>, grid: Grid, camera: (u
 
 /// Removes candidates that get their cell's light from other surfaces only, as beyond
 /// the border of the projection beside a crease: much darker than the cell's other
-/// pixels, and not for a dark paint, which darkens light from everywhere alike, unless the pixel's
-/// place is known: beside a crease a surface that the projector grazes is as dark. `light` is the
-/// flood light of each camera pixel.
+/// pixels, and not for a dark paint, which darkens light from everywhere alike. A surface that
+/// the projector grazes is as dark beside a crease; its pixels stay where stripes tell their
+/// places (`is_placed`). `light` is the flood light of each camera pixel.
 pub(crate) fn drop_indirect(
     candidates: &mut Vec<Candidate>,
     light: &[f32],

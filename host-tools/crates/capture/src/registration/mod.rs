@@ -46,8 +46,8 @@ const LEAST_OWN: f32 = 0.15;
 /// Smallest Gray code margin that is believed without a regression.
 const LEAST_MARGIN: f32 = 0.2;
 
-/// Uncertainty of a pixel's place, in pixels of the projector, below which stripes were seen
-/// there: they are on surfaces that the projector lights, and light from elsewhere blurs them.
+/// Uncertainty of a pixel's place, in pixels of the projector, below which it sees fine stripes:
+/// only a surface that the projector itself lights shows them.
 const PLACED: f32 = 0.5;
 
 /// How pixels were registered.
