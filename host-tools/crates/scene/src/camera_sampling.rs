@@ -16,6 +16,8 @@ use rayon::prelude::*;
 
 /// Rays along each side of a pixel.
 const RAYS: usize = 6;
+/// Rows of pixels that are sampled together.
+const ROWS_TOGETHER: u32 = 32;
 /// Mirrors that a ray is followed over at most.
 const MOST_MIRRORS: usize = 16;
 /// Part of a ray that is followed no further.
@@ -69,18 +71,22 @@ impl CameraSampling {
             near,
             options,
         };
-        let pixels = pixels.all();
-        let rows = |of| rows(&pixels, options.channels, of);
-        Self {
-            direct: rows(|pixel| &pixel.direct),
-            indirect: rows(|pixel| &pixel.indirect),
-            detail: rows(|pixel| &pixel.detail),
-            lobes: SparseRows::from_rows(pixels.iter().map(|pixel| {
-                let lobes = pixel.lobes.iter();
-                lobes.map(|(index, share)| (*index, share[0])).collect()
-            })),
-            open: pixels.iter().map(|pixel| pixel.open as f32).collect(),
-        }
+        let channels = vec![SparseRows::default(); options.channels];
+        let mut sampling = Self {
+            direct: channels.clone(),
+            indirect: channels.clone(),
+            detail: channels,
+            lobes: SparseRows::default(),
+            open: Vec::new(),
+        };
+        pixels.each(|pixel| {
+            push(&mut sampling.direct, &pixel.direct);
+            push(&mut sampling.indirect, &pixel.indirect);
+            push(&mut sampling.detail, &pixel.detail);
+            push(std::slice::from_mut(&mut sampling.lobes), &pixel.lobes);
+            sampling.open.push(pixel.open as f32);
+        });
+        sampling
     }
 }
 
@@ -98,20 +104,16 @@ pub(crate) fn direct(
         near: None,
         options,
     };
-    rows(&pixels.all(), options.channels, |pixel| &pixel.direct)
+    let mut direct = vec![SparseRows::default(); options.channels];
+    pixels.each(|pixel| push(&mut direct, &pixel.direct));
+    direct
 }
 
-/// Some of what pixels see, one entry a channel.
-fn rows(
-    pixels: &[PixelSamples],
-    channels: usize,
-    of: fn(&PixelSamples) -> &Vec<Contribution>,
-) -> Vec<SparseRows> {
-    let of_channel = |channel: usize| {
-        let entry = |(index, share): &Contribution| (*index, share[channel]);
-        SparseRows::from_rows(pixels.iter().map(|p| of(p).iter().map(entry).collect()))
-    };
-    (0..channels).map(of_channel).collect()
+/// Adds a row of what a pixel sees to each channel's.
+fn push(channels: &mut [SparseRows], seen: &[Contribution]) {
+    for (channel, rows) in channels.iter_mut().enumerate() {
+        rows.push(seen.iter().map(|(index, share)| (*index, share[channel])));
+    }
 }
 
 /// One pixel's view of a cell or a patch: which, and how much of it by channel.
@@ -162,13 +164,20 @@ struct SurfacePoint<'e> {
 }
 
 impl<'e> PixelSampler<'e> {
-    /// Every pixel, row by row.
-    fn all(&self) -> Vec<PixelSamples> {
+    /// Hands over every pixel, row by row. What a pixel sees takes much more memory here than in
+    /// sparse rows, so that only some rows of pixels are held at a time.
+    fn each(&self, mut with: impl FnMut(PixelSamples)) {
         let (width, height) = self.facets.scene().camera.size;
-        (0..width * height)
-            .into_par_iter()
-            .map(|pixel| self.pixel(pixel % width, pixel / width))
-            .collect()
+        let mut row = 0;
+        while row < height {
+            let below = height.min(row + ROWS_TOGETHER);
+            let pixels: Vec<_> = (row * width..below * width)
+                .into_par_iter()
+                .map(|pixel| self.pixel(pixel % width, pixel / width))
+                .collect();
+            pixels.into_iter().for_each(&mut with);
+            row = below;
+        }
     }
 
     fn pixel(&self, col: u32, row: u32) -> PixelSamples {

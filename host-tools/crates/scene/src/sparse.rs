@@ -6,28 +6,32 @@ use rayon::prelude::*;
 /// A sparse matrix whose rows list their entries.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SparseRows {
-    /// Where each row begins in `entries`, one more than rows, if there are any.
-    begin: Vec<usize>,
+    /// Where each row ends in `entries`.
+    end: Vec<usize>,
     entries: Vec<(u32, f32)>,
 }
 
 impl SparseRows {
     /// From the entries of each row: column and value.
     pub(crate) fn from_rows(rows: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
-        let (mut begin, mut entries) = (vec![0], Vec::new());
+        let mut all = Self::default();
         for row in rows {
-            entries.extend(
-                row.into_iter()
-                    .map(|(column, value)| (column, value as f32)),
-            );
-            begin.push(entries.len());
+            all.push(row);
         }
-        Self { begin, entries }
+        all
+    }
+
+    /// Adds a row below the others, from its entries: column and value.
+    pub(crate) fn push(&mut self, row: impl IntoIterator<Item = (u32, f64)>) {
+        let entries = row.into_iter();
+        self.entries
+            .extend(entries.map(|(column, value)| (column, value as f32)));
+        self.end.push(self.entries.len());
     }
 
     /// Number of rows.
     pub(crate) fn count(&self) -> usize {
-        self.begin.len().saturating_sub(1)
+        self.end.len()
     }
 
     /// Number of entries.
@@ -37,7 +41,8 @@ impl SparseRows {
 
     /// The entries of a row: column and value.
     pub(crate) fn row(&self, row: usize) -> &[(u32, f32)] {
-        &self.entries[self.begin[row]..self.begin[row + 1]]
+        let begin = row.checked_sub(1).map_or(0, |above| self.end[above]);
+        &self.entries[begin..self.end[row]]
     }
 
     /// The product with a vector that is given by its elements.

@@ -66,7 +66,7 @@ impl CalibrationPhotos {
         let whites = whites(sequence, linear, &used)?;
         let list = folder.join(CALIBRATION_FILE);
         let brackets = Bracket::of_list(&shots, &list, sequence.longest)?;
-        let mut photographs = linear.others(folder, brackets)?;
+        let mut photographs = linear.others(folder, brackets)?.read_once();
         progress.begin("reading the calibration", shots.len() as u64);
         let black = mean_of(&linear.black, &used);
         let all: Vec<usize> = (0..shots.len()).collect();

@@ -124,8 +124,9 @@ impl<'a> LinearPhotographs<'a> {
             ..self.photographs.format.reading.clone()
         };
         let known = std::mem::take(&mut self.saturated);
-        // Their memory is needed for the new ones.
+        // Their room is needed for the new ones.
         self.photographs.kept.clear();
+        self.photographs.spool.give_up();
         *self = Self::read(self.photographs.folder, sequence, &reading, progress)?;
         self.keep_saturated(&known);
         Ok(())
@@ -156,7 +157,8 @@ impl<'a> LinearPhotographs<'a> {
         brackets: Vec<Bracket>,
     ) -> Result<Photographs<'f>, CaptureError> {
         let reading = &self.photographs.format.reading;
-        let mut others = Photographs::of_brackets(folder, brackets, reading)?;
+        let others = Photographs::of_brackets(folder, brackets, reading)?;
+        let mut others = others.beside(&self.photographs);
         self.photographs.format.check_like(&others.format)?;
         others.unmixing.clone_from(&self.photographs.unmixing);
         Ok(others)

@@ -1,10 +1,11 @@
-//! Photographs: all photographs of a capture in linear light, each decoded once as long as
-//! they fit in a fixed amount of memory.
+//! Photographs: all photographs of a capture in linear light, each decoded once, in a fixed
+//! amount of memory.
 //!
 //! | what | module |
 //! |---|---|
 //! | one file, decoded and linearised | `photo` |
 //! | a bracket's photographs as one | `merge` |
+//! | those that memory has no room for, in a file | `spool` |
 //! | mean of white and black | `linearise` |
 //! | pixels that white clips | `clipping` |
 //! | squares of pixels from every photograph | `sampled` |
@@ -20,6 +21,7 @@ pub(crate) mod order;
 pub(crate) mod photo;
 pub(crate) mod photo_stats;
 pub(crate) mod sampled;
+mod spool;
 
 use crate::format::bracket::{self, Bracket};
 use crate::format::error::CaptureError;
@@ -29,14 +31,15 @@ use crate::format::settings::Reading;
 use iltm_picture::progress::Progress;
 use photo::{Photo, PhotoFormat};
 use rayon::prelude::*;
+use spool::Spool;
 use std::path::{Path, PathBuf};
 
-/// Bytes of photographs that are kept decoded: 44 of 16 megapixels in colour. Those beyond
-/// are decoded again in every pass.
-const KEPT_BYTES: usize = 2 << 30;
+/// Bytes of photographs that are kept decoded in memory: 21 of 12 megapixels in colour. Those
+/// beyond are kept in a file.
+const KEPT_BYTES: usize = 768 << 20;
 
 /// Bytes of photographs that are decoded at the same time.
-const BATCH_BYTES: usize = 1 << 30;
+const BATCH_BYTES: usize = 256 << 20;
 
 /// The photographs named in a manifest, those of a bracket as one.
 pub(crate) struct Photographs<'a> {
@@ -52,6 +55,8 @@ pub(crate) struct Photographs<'a> {
     kept: Vec<Option<Photo>>,
     /// How many more may be kept.
     room: usize,
+    /// Those that there is no room for.
+    spool: Spool,
     /// Photographs decoded at the same time.
     batch: usize,
 }
@@ -94,6 +99,7 @@ impl<'a> Photographs<'a> {
             saturated: times.fold(Photo::SATURATED, |most, time| most.max((1.0 / time) as f32)),
             kept: vec![None; brackets.len()],
             room: KEPT_BYTES / format.bytes(),
+            spool: Spool::new(brackets.len(), format.channels, format.pixels()),
             folder,
             brackets,
             format,
@@ -113,14 +119,23 @@ impl<'a> Photographs<'a> {
         for photo in self.kept.iter_mut().flatten() {
             photo.unmix(&inverse, self.saturated);
         }
+        let saturated = self.saturated;
+        self.spool.change(|photo| photo.unmix(&inverse, saturated));
         self.unmixing = Some(inverse);
     }
 
-    /// As if the photographs were too large to be kept.
-    #[cfg(test)]
-    fn forget(&mut self) {
-        self.kept.fill(None);
-        (self.room, self.batch) = (0, 3);
+    /// Keeps no photograph after it was visited: for those that are read once.
+    pub(crate) fn read_once(mut self) -> Self {
+        self.room = 0;
+        self.spool.give_up();
+        self
+    }
+
+    /// Leaves room in memory for this list, which has the same format, beside `other`.
+    fn beside(mut self, other: &Photographs<'_>) -> Self {
+        let taken = other.kept.iter().flatten().count();
+        self.room = self.room.saturating_sub(taken);
+        self
     }
 
     /// The file of a bracket, the first if there are several.
@@ -167,38 +182,37 @@ impl<'a> Photographs<'a> {
         mut visit: impl FnMut(&[(usize, &Photo)]),
     ) -> Result<(), CaptureError> {
         for batch in shots.chunks(self.batch) {
-            let unknown = |shot: &usize| self.kept[*shot].is_none();
-            let new: Vec<usize> = batch.iter().copied().filter(unknown).collect();
-            let read: Vec<_> = new.par_iter().map(|&shot| self.read(shot)).collect();
-            let mut passing = Vec::new();
-            for (shot, photo) in new.into_iter().zip(read) {
+            let spool = &mut self.spool;
+            let mut passing: Vec<Option<Photo>> =
+                batch.iter().map(|shot| spool.read(*shot)).collect();
+            let unknown = |at: &usize| self.kept[batch[*at]].is_none() && passing[*at].is_none();
+            let new: Vec<usize> = (0..batch.len()).filter(unknown).collect();
+            let read: Vec<_> = new.par_iter().map(|&at| self.read(batch[at])).collect();
+            for (at, photo) in new.into_iter().zip(read) {
                 let photo = photo?;
                 if self.room > 0 {
                     self.room -= 1;
-                    self.kept[shot] = Some(photo);
+                    self.kept[batch[at]] = Some(photo);
                 } else {
-                    passing.push(photo);
+                    self.spool.write(batch[at], &photo);
+                    passing[at] = Some(photo);
                 }
             }
-            let mut passing = passing.iter();
-            let photo = |&shot: &usize| {
-                let photo = self.kept[shot].as_ref().or_else(|| passing.next());
-                photo.map(|photo| (shot, photo))
-            };
-            visit(&batch.iter().filter_map(photo).collect::<Vec<_>>());
+            let photos = batch.iter().zip(&passing).filter_map(|(shot, passing)| {
+                let photo = self.kept[*shot].as_ref().or(passing.as_ref());
+                photo.map(|photo| (*shot, photo))
+            });
+            visit(&photos.collect::<Vec<_>>());
             progress.advance(batch.len() as u64);
         }
         Ok(())
     }
 
-    /// Decodes all photographs in parallel, if all of them are going to be kept.
+    /// Decodes all photographs in parallel.
     ///
     /// # Errors
     /// As [`Photographs::for_batches`].
     pub(crate) fn prefetch(&mut self, progress: &dyn Progress) -> Result<(), CaptureError> {
-        if self.room < self.brackets.len() {
-            return Ok(());
-        }
         let all: Vec<usize> = (0..self.brackets.len()).collect();
         progress.begin("reading photographs", all.len() as u64);
         self.for_batches(&all, progress, |_| {})?;
@@ -282,8 +296,13 @@ mod tests {
             seen
         };
         let (first, kept) = (collect(&mut photographs), collect(&mut photographs));
-        photographs.forget();
+        photographs.kept.fill(None);
+        (photographs.room, photographs.batch) = (0, 3);
         assert_eq!(first, kept);
+        // Decoded once more, and then from the file.
+        assert_eq!(first, collect(&mut photographs));
+        assert_eq!(first, collect(&mut photographs));
+        photographs.spool.give_up();
         assert_eq!(first, collect(&mut photographs));
         assert!(
             first

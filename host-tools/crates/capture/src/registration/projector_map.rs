@@ -395,7 +395,7 @@ fn light(
         return Ok(Vec::new());
     }
     let count = brackets.len();
-    let mut photographs = linear.others(folder, brackets)?;
+    let mut photographs = linear.others(folder, brackets)?.read_once();
     progress.begin("reading fine stripes", count as u64);
     let mut light = vec![Vec::new(); count];
     let all: Vec<usize> = (0..count).collect();
