@@ -34,12 +34,12 @@ use rayon::prelude::*;
 use spool::Spool;
 use std::path::{Path, PathBuf};
 
-/// Bytes of photographs that are kept decoded in memory: 21 of 12 megapixels in colour. Those
+/// Bytes of photographs that are kept decoded in memory: 14 of 12 megapixels in colour. Those
 /// beyond are kept in a file.
-const KEPT_BYTES: usize = 768 << 20;
+const KEPT_BYTES: usize = 512 << 20;
 
 /// Bytes of photographs that are decoded at the same time.
-const BATCH_BYTES: usize = 256 << 20;
+const BATCH_BYTES: usize = 512 << 20;
 
 /// The photographs named in a manifest, those of a bracket as one.
 pub(crate) struct Photographs<'a> {
