@@ -17,7 +17,7 @@ use rayon::prelude::*;
 /// Rays along each side of a pixel.
 const RAYS: usize = 6;
 /// Rows of pixels that are sampled together.
-const ROWS_TOGETHER: u32 = 32;
+const ROWS_TOGETHER: usize = 32;
 /// Mirrors that a ray is followed over at most.
 const MOST_MIRRORS: usize = 16;
 /// Part of a ray that is followed no further.
@@ -168,15 +168,13 @@ impl<'e> PixelSampler<'e> {
     /// sparse rows, so that only some rows of pixels are held at a time.
     fn each(&self, mut with: impl FnMut(PixelSamples)) {
         let (width, height) = self.facets.scene().camera.size;
-        let mut row = 0;
-        while row < height {
-            let below = height.min(row + ROWS_TOGETHER);
-            let pixels: Vec<_> = (row * width..below * width)
+        for top in (0..height).step_by(ROWS_TOGETHER) {
+            let below = height.min(top + ROWS_TOGETHER as u32);
+            let pixels: Vec<_> = (top * width..below * width)
                 .into_par_iter()
                 .map(|pixel| self.pixel(pixel % width, pixel / width))
                 .collect();
             pixels.into_iter().for_each(&mut with);
-            row = below;
         }
     }
 

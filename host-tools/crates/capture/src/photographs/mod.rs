@@ -299,9 +299,12 @@ mod tests {
         photographs.kept.fill(None);
         (photographs.room, photographs.batch) = (0, 3);
         assert_eq!(first, kept);
-        // Decoded once more, and then from the file.
+        // Decoded once more, then from the temporary file alone, and again without one.
         assert_eq!(first, collect(&mut photographs));
+        let (taken, away) = (folder.path().join("photos"), folder.path().join("away"));
+        std::fs::rename(&taken, &away).unwrap();
         assert_eq!(first, collect(&mut photographs));
+        std::fs::rename(&away, &taken).unwrap();
         photographs.spool.give_up();
         assert_eq!(first, collect(&mut photographs));
         assert!(

@@ -11,8 +11,8 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 pub(super) struct Spool {
     /// Has no name, so that it is gone with the process.
     file: Option<File>,
-    /// Whether it is of no use: it could not be made, or is full.
-    failed: bool,
+    /// Whether it holds nothing from now on: it could not be made, is full, or is not wanted.
+    given_up: bool,
     /// Which photographs are in it, each at its own place.
     held: Vec<bool>,
     channels: usize,
@@ -24,7 +24,7 @@ impl Spool {
     pub(super) fn new(count: usize, channels: usize, pixels: usize) -> Self {
         Self {
             file: None,
-            failed: false,
+            given_up: false,
             held: vec![false; count],
             channels,
             pixels,
@@ -33,7 +33,7 @@ impl Spool {
 
     /// Writes a photograph at its place.
     pub(super) fn write(&mut self, at: usize, photo: &Photo) {
-        if self.failed {
+        if self.given_up {
             return;
         }
         self.held[at] = self.try_write(at, photo).is_ok();
@@ -64,7 +64,7 @@ impl Spool {
 
     /// Gives the file's space back and holds nothing from now on.
     pub(super) fn give_up(&mut self) {
-        self.failed = true;
+        self.given_up = true;
         self.file = None;
         self.held.fill(false);
     }
