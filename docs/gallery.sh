@@ -1,22 +1,30 @@
 #!/usr/bin/env bash
-# Makes the pictures of docs/gallery.md: each scene photographed, solved, and a test image
-# of the verification as it was wanted, on the wall as it is, and on the wall compensated.
+# Makes the pictures of docs/gallery.md: each scene photographed, solved and verified, and one
+# image of the verification, finer than the cells, as the camera sees it: as it was wanted, on
+# the wall as it is, and on the wall compensated.
 # Needs `iltm` on the path; takes some minutes.
 set -euo pipefail
 cd "$(dirname "$0")"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p gallery
-for scene in installation painted-corner m-panels-painted dome; do
-    file=../host-tools/scenes/$scene.toml
+cp ../host-tools/scenes/*.png "$work"
+for scene in installation painted-corner m-panels-painted; do
+    # A camera that sees pixels of the projector rather than its cells alone, with 12 bits.
+    file=$work/$scene.toml
+    sed -e 's/^width = .*/width = 640/' -e 's/^height = .*/height = 480/' \
+        -e 's/^bits = .*/bits = 12/' -e 's/^full_well = .*/full_well = 60000.0/' \
+        "../host-tools/scenes/$scene.toml" > "$file"
     iltm simulate "$file" -o "$work/$scene" --photos 80
     iltm solve "$work/$scene" -o "$work/$scene.iltm"
     iltm verify "$work/$scene.iltm" -o "$work/$scene-verify"
     iltm simulate "$file" --photograph "$work/$scene-verify" --without drift
-    # The verdict may be that the table errs more than it should: shown all the same.
-    iltm verify "$work/$scene.iltm" "$work/$scene-verify" --report "$work/$scene-verdict" ||
-        [ $? = 31 ]
+    # The verdict may be that the table errs more than it should, or that the camera's noise
+    # hides whether it does: shown all the same.
+    code=0
+    iltm verify "$work/$scene.iltm" "$work/$scene-verify" --report "$work/$scene-verdict" || code=$?
+    case $code in 0 | 31 | 34) ;; *) exit "$code" ;; esac
     for part in wanted before after; do
-        cp "$work/$scene-verdict/1-$part.png" "gallery/$scene-$part.png"
+        cp "$work/$scene-verdict/fine-$part.png" "gallery/$scene-$part.png"
     done
 done

@@ -2,8 +2,8 @@
 //!
 //! `cargo bench -p iltm --bench solve` prints one line a size: the median of a
 //! few whole solves (`lambda` by held-out photographs included) of a simulated
-//! corner with noisy photographs, and the most memory that one held at a time
-//! beyond its input. `cargo bench -p iltm --bench solve -- 64x64` does one size.
+//! corner with noisy photographs, the most memory that one held at a time
+//! beyond its input, and the error of natural images that are compensated with it. `cargo bench -p iltm --bench solve -- 64x64` does one size.
 
 #![allow(missing_docs)]
 
@@ -13,15 +13,17 @@ mod test_scene;
 
 use iltm::capture::Role;
 use iltm::progress::Silent;
-use iltm::solve::{CellNoise, Method, Observed, ObservedChannel, SolveOptions, solve_observed};
+use iltm::solve::{
+    CellNoise, Method, Observed, ObservedChannel, SolveOptions, solve_observed, wanted_images,
+};
 use iltm_runtime::Grid;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVectorView};
 use peak_alloc::PeakAlloc;
 use std::time::Instant;
 use test_scene::{Corner, add_noise, patterns};
 
 /// Rows, columns, Bernoulli photographs, channels, solves.
-const SIZES: [(u16, u16, usize, usize, usize); 8] = [
+const SIZES: [(u16, u16, usize, usize, usize); 10] = [
     (13, 21, 40, 1, 7),
     (13, 21, 150, 1, 7),
     (13, 21, 300, 1, 7),
@@ -29,21 +31,33 @@ const SIZES: [(u16, u16, usize, usize, usize); 8] = [
     (16, 24, 150, 3, 3),
     (32, 32, 150, 1, 3),
     (32, 32, 300, 1, 3),
+    (24, 32, 250, 1, 3),
     (45, 45, 300, 1, 1),
+    (48, 64, 250, 1, 1),
 ];
 
+/// Cells beyond which the paper's methods take very long.
+const MOST_CELLS: usize = 2048;
+
 /// Brute force needs more patterns than cells.
-const METHODS: [Method; 3] = [Method::Joint, Method::Direct, Method::TwoStage];
+const METHODS: [Method; 4] = [
+    Method::Joint,
+    Method::Links,
+    Method::Direct,
+    Method::TwoStage,
+];
 
 fn main() {
     let only = std::env::args().skip(1).find(|arg| !arg.starts_with("--"));
     println!(
-        "method  grid     cells  photographs  channels  seconds (choose + solve)  peak MB  iterations"
+        "method  grid     cells  photographs  channels  seconds (choose + solve)  peak MB  iterations  error"
     );
     for method in METHODS {
         for size in SIZES {
             let grid = format!("{}x{}", size.0, size.1);
-            if only.as_ref().is_none_or(|only| *only == grid) {
+            let few = usize::from(size.0) * usize::from(size.1) <= MOST_CELLS;
+            let ours = matches!(method, Method::Joint | Method::Links);
+            if only.as_ref().is_none_or(|only| *only == grid) && (few || ours) {
                 measure(method, size);
             }
         }
@@ -58,10 +72,15 @@ fn measure(
         return;
     };
     let patterns = patterns(grid.cells(), bernoulli);
-    let light: Vec<DMatrix<f64>> = (0..channels)
+    let scenes: Vec<Corner> = (0..channels)
         .map(|channel| {
             let albedo = |cell: usize| 0.5 + 0.3 * ((cell + 7 * channel) as f64 * 0.7).sin();
-            let scene = Corner::new(grid.rows(), grid.cols(), albedo);
+            Corner::new(grid.rows(), grid.cols(), albedo)
+        })
+        .collect();
+    let light: Vec<DMatrix<f64>> = scenes
+        .iter()
+        .map(|scene| {
             let mut light = scene.photograph(&patterns);
             add_noise(&mut light, 2e-3);
             light
@@ -91,7 +110,7 @@ fn measure(
         blur: 0.0,
     };
     let options = SolveOptions {
-        method,
+        method: Some(method),
         ..SolveOptions::default()
     };
     let mut seconds = Vec::new();
@@ -101,7 +120,7 @@ fn measure(
     for _ in 0..solves {
         let start = Instant::now();
         match solve_observed(&observed, &options, &Silent) {
-            Ok((_, report)) => last = Some(report),
+            Ok(found) => last = Some(found),
             Err(error) => {
                 println!("{method} {grid}: {error}");
                 return;
@@ -110,9 +129,13 @@ fn measure(
         seconds.push(start.elapsed().as_secs_f64());
     }
     seconds.sort_by(f64::total_cmp);
-    let Some(report) = last else { return };
+    let Some((found, report)) = last else { return };
+    let peak = MEMORY.peak_usage() - before;
+    let scenes = scenes.iter().enumerate();
+    let errors = scenes.map(|(channel, scene)| error(&found.channel(channel).dense(), scene, grid));
+    let error = errors.sum::<f64>() / channels.len() as f64;
     println!(
-        "{:7} {:8} {:5}  {:11}  {:8}  {:7.3} ({:.3} + {:.3})  {:15.1}  {:10}",
+        "{:7} {:8} {:5}  {:11}  {:8}  {:7.3} ({:.3} + {:.3})  {:15.1}  {:10}  {:.5}",
         method,
         format!("{rows}x{cols}"),
         grid.cells(),
@@ -121,9 +144,21 @@ fn measure(
         seconds[seconds.len() / 2],
         report.seconds.choose,
         report.seconds.solve,
-        (MEMORY.peak_usage() - before) as f64 / 1e6,
+        peak as f64 / 1e6,
         report.iterations,
+        error,
     );
+}
+
+/// Mean over natural images of `||light - wanted|| / ||wanted||`, compensated without clipping.
+fn error(inverse: &DMatrix<f64>, scene: &Corner, grid: Grid) -> f64 {
+    let wanted = wanted_images(grid);
+    let seen = scene.photograph(&(inverse * &wanted));
+    let of_image = |(seen, wanted): (DVectorView<'_, f64>, DVectorView<'_, f64>)| {
+        (seen - wanted).norm() / wanted.norm()
+    };
+    let pairs = seen.column_iter().zip(wanted.column_iter());
+    pairs.map(of_image).sum::<f64>() / wanted.ncols() as f64
 }
 
 #[global_allocator]

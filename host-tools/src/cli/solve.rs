@@ -26,10 +26,12 @@ const FRAMES: usize = 48;
 
 pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
-    if arguments.lambda.is_some() && arguments.method != Method::Joint {
+    if let (Some(method), Some(_)) = (arguments.method, arguments.lambda)
+        && method != Method::Joint
+    {
         return Err(Failure::new(
             Kind::Usage,
-            format!("the method `{}` has no weight", arguments.method),
+            format!("the method `{method}` has no weight"),
             "Leave --lambda or --method away.",
         ));
     }

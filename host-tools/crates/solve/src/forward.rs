@@ -19,6 +19,10 @@ const MOST_BOUNCES: usize = 200;
 const SETTLED: usize = 20;
 /// Steps of each power iteration; the condition number is good to a few percent.
 const POWER_STEPS: usize = 30;
+/// Relative change of an eigenvalue in a step from which no further one is worth its time.
+const POWER_TOLERANCE: f64 = 3e-3;
+/// [`BOUNCE_TOLERANCE`] of light that only a condition number is worked out from.
+const CONDITION_TOLERANCE: f64 = 1e-3;
 
 /// `T^-1 = diag(gain) - operator` of one channel; cells that are not live have a
 /// zero gain.
@@ -103,8 +107,12 @@ impl Inverse {
     /// ambient, to 1e-6 of its norm; `None` if the inverse is singular.
     #[must_use]
     pub fn light(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        self.light_within(BOUNCE_TOLERANCE, patterns)
+    }
+
+    fn light_within(&self, tolerance: f64, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         if self.factor.get().is_none()
-            && let Some(light) = self.sum_bounces(patterns)
+            && let Some(light) = self.sum_bounces(tolerance, patterns)
         {
             return Some(light);
         }
@@ -112,7 +120,7 @@ impl Inverse {
     }
 
     /// `None` if the bounces fade too slowly or not at all.
-    fn sum_bounces(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    fn sum_bounces(&self, tolerance: f64, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let fade = self.fade();
         let mut bounce = patterns.clone();
         scale_rows(&mut bounce, &fade);
@@ -127,10 +135,10 @@ impl Inverse {
             if !total.is_finite() {
                 return None;
             }
-            if added <= BOUNCE_TOLERANCE * total {
+            if added <= tolerance * total {
                 return Some(light);
             }
-            let missing = (BOUNCE_TOLERANCE * total / added).ln() / (added / before).ln();
+            let missing = (tolerance * total / added).ln() / (added / before).ln();
             // Written so that light which grows is too slow as well.
             let soon = added < before && missing < (MOST_BOUNCES - step) as f64;
             if step >= SETTLED && !soon {
@@ -178,13 +186,16 @@ impl Inverse {
             scale_rows(&mut y, &self.gain);
             y
         };
-        let largest_of_inverse = power(&start, |x| {
-            let y = inverse(x) - &self.operator * x;
-            Some(inverse(&y) - self.operator.tr_mul(&y))
-        });
         // With `D = diag(g)`, `T^T = (D - K^T)^-1`.
         let transposed = Self::new(self.gain.clone(), self.operator.transpose());
-        let largest_of_forward = power(&start, |x| transposed.light(&self.light(x)?));
+        let largest_of_inverse = power(&start, |x| {
+            let y = inverse(x) - product(&self.operator, x);
+            Some(inverse(&y) - product(&transposed.operator, &y))
+        });
+        let largest_of_forward = power(&start, |x| {
+            let light = self.light_within(CONDITION_TOLERANCE, x)?;
+            transposed.light_within(CONDITION_TOLERANCE, &light)
+        });
         match (largest_of_inverse, largest_of_forward) {
             (Some(a), Some(b)) => (a * b).sqrt(),
             _ => f64::INFINITY,
@@ -192,13 +203,22 @@ impl Inverse {
     }
 }
 
-/// `left * right`, columns of `right` in parallel.
+/// `left * right`, columns of `right` in parallel, or rows of `left` if there are few columns.
 pub(super) fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     /// Columns of one task: enough to pay for reading `left` again.
     const COLUMNS: usize = 64;
+    /// Rows of one task.
+    const ROWS: usize = 256;
     let mut result = DMatrix::zeros(left.nrows(), right.ncols());
     if right.ncols() <= COLUMNS || left.nrows() == 0 {
-        result.gemm(1.0, left, right, 0.0);
+        let tasks = (0..left.nrows()).into_par_iter().step_by(ROWS);
+        let parts = tasks.map(|first| {
+            let rows = ROWS.min(left.nrows() - first);
+            (first, left.rows(first, rows) * right)
+        });
+        for (first, part) in parts.collect::<Vec<_>>() {
+            result.rows_mut(first, part.nrows()).copy_from(&part);
+        }
         return result;
     }
     let rows = left.nrows();
@@ -224,7 +244,7 @@ fn power(
     apply: impl Fn(&DMatrix<f64>) -> Option<DMatrix<f64>>,
 ) -> Option<f64> {
     let mut x = start / start.norm();
-    let mut value = 0.0;
+    let (mut value, mut before) = (0.0, 0.0_f64);
     for _ in 0..POWER_STEPS {
         let y = apply(&x)?;
         value = y.norm();
@@ -232,6 +252,10 @@ fn power(
             return None;
         }
         x = y / value;
+        if (value - before).abs() <= POWER_TOLERANCE * value {
+            break;
+        }
+        before = value;
     }
     Some(value)
 }

@@ -99,7 +99,7 @@ impl<'p> Solver<'p> {
         progress.begin("choosing lambda", 0);
         let mut folds: Vec<Fold<'p, 's>> = Vec::new();
         for split in splits {
-            let photographs = self.photographs(&split.solved);
+            let photographs = Photographs::new(self.prepared, &split.solved);
             if folds.is_empty() {
                 self.settle_scales(&photographs, progress);
             }
@@ -189,7 +189,7 @@ impl<'p> Solver<'p> {
     /// Solves for all photographs.
     pub(super) fn solve(&mut self, lambda: f64, progress: &dyn Progress) -> Solution {
         let all: Vec<usize> = (0..self.prepared.roles.len()).collect();
-        let photographs = self.photographs(&all);
+        let photographs = Photographs::new(self.prepared, &all);
         progress.begin("solving", 0);
         self.settle_scales(&photographs, progress);
         let data = self.data(&photographs);
@@ -199,19 +199,6 @@ impl<'p> Solver<'p> {
         self.add_deviations(&mut found, &photographs, lambda, self.stop, progress);
         progress.end();
         found
-    }
-
-    fn photographs(&self, chosen: &[usize]) -> Photographs {
-        let channels = 0..self.prepared.light.len();
-        let light = self.prepared.light.iter();
-        Photographs {
-            sources: channels.map(|c| self.prepared.sources(c, chosen)).collect(),
-            patterns: (self.prepared.patterns.iter())
-                .map(|patterns| patterns.select_columns(chosen))
-                .collect(),
-            weights: self.prepared.weights.select_columns(chosen),
-            light: light.map(|c| c.select_columns(chosen)).collect(),
-        }
     }
 
     /// The data term of the joint solve: light scaled so that all channels have
@@ -335,7 +322,7 @@ impl<'p> Solver<'p> {
 
 /// Photographs chosen for one solve, `N x m` each, by channel.
 #[derive(Debug)]
-struct Photographs {
+pub(super) struct Photographs {
     patterns: Vec<DMatrix<f64>>,
     /// Those of all channels.
     weights: DMatrix<f64>,
@@ -345,6 +332,22 @@ struct Photographs {
 }
 
 impl Photographs {
+    pub(super) fn new(prepared: &Prepared, chosen: &[usize]) -> Self {
+        let channels = 0..prepared.light.len();
+        let select = |of: &[DMatrix<f64>]| of.iter().map(|c| c.select_columns(chosen)).collect();
+        Self {
+            sources: channels.map(|c| prepared.sources(c, chosen)).collect(),
+            patterns: select(&prepared.patterns),
+            weights: prepared.weights.select_columns(chosen),
+            light: select(&prepared.light),
+        }
+    }
+
+    /// [`Self::fitted_gain`] beside a channel's operator.
+    pub(super) fn gain(&self, channel: usize, operator: &DMatrix<f64>) -> DVector<f64> {
+        self.fitted_gain(channel, &product(operator, &self.sources[channel]))
+    }
+
     /// Number and sources of each channel.
     fn channels(&self) -> impl Iterator<Item = (usize, &DMatrix<f64>)> {
         self.sources.iter().enumerate()

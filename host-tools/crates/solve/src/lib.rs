@@ -3,7 +3,8 @@
 //! The inverse of a scene's light transport is `T^-1 = diag(g) - K`: texture is
 //! in the gains `g` alone, and `K` is geometry, one bounce, smooth and
 //! non-negative. [`Method::Joint`] looks for exactly that, over all channels and
-//! all photographs at once; [`Method::Direct`] is the method of Chu, Ng, Pahwa,
+//! all photographs at once; [`Method::Links`] looks for it as links between blocks
+//! of cells, which takes less time for many cells; [`Method::Direct`] is the method of Chu, Ng, Pahwa,
 //! Quek, Huang, *Compressive Inverse Light Transport* (BMVC 2011), for
 //! comparison.
 //!
@@ -14,6 +15,7 @@
 //! haar                  the sparse basis, sixteen images at a time
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
+//! links                 the same answer from blocks of a quadtree, for many cells
 //! by_rows               the paper's method and others, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
 //! clipped_projection    what clipping makes of natural images
@@ -25,7 +27,7 @@
 //!
 //! # Cost
 //!
-//! An iteration takes `O(N^2 min(N, m))` multiplications for `N` cells and `m`
+//! An iteration of [`Method::Joint`] takes `O(N^2 min(N, m))` multiplications for `N` cells and `m`
 //! photographs, memory grows as `N^2 + N m`. `docs/measured.md` has measured times
 //! and memory; `cargo bench -p iltm --bench solve` repeats them.
 
@@ -45,6 +47,7 @@ mod gain_only;
 mod haar;
 mod held_out;
 mod joint;
+mod links;
 mod natural_images;
 mod observability;
 mod observed;
@@ -93,6 +96,7 @@ use iltm_capture::{Measurements, Role};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use joint::Solver;
+use links::{Quadtree, links};
 use prepare::Prepared;
 use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
@@ -148,8 +152,10 @@ fn solve_judged(
     let mut clock = Clock::new();
     options.check()?;
     let prepared = Prepared::new(observed)?;
-    check_count(&prepared, options.method)?;
+    let method = options.method_for(prepared.live_cells(), prepared.roles.len());
+    check_count(&prepared, method)?;
     let haar = Haar::new(observed.grid);
+    let tree = Quadtree::new(observed.grid);
     let splits = Split::all(&prepared);
     let mut seconds = Seconds {
         prepare: clock.lap(),
@@ -162,11 +168,12 @@ fn solve_judged(
     let task = Task {
         prepared: &prepared,
         haar: &haar,
+        tree: &tree,
         splits: &splits,
         stop,
         progress,
     };
-    let outcome = match options.method {
+    let outcome = match method {
         Method::Joint => {
             let joint = task.joint(options.lambda, &mut seconds, &mut clock);
             task.or_two_stage(joint, &mut seconds, &mut clock)
@@ -246,6 +253,7 @@ fn clip(
 struct Task<'t> {
     prepared: &'t Prepared,
     haar: &'t Haar,
+    tree: &'t Quadtree,
     splits: &'t [Split],
     stop: Stop,
     progress: &'t dyn Progress,
@@ -334,6 +342,7 @@ impl<'t> Task<'t> {
             let found = match method {
                 Method::TwoStage => by_rows::two_stage(prepared, haar, chosen, stop, self.progress),
                 Method::BruteForce => by_rows::brute_force(prepared, chosen),
+                Method::Links => Ok(links(prepared, self.tree, chosen, self.progress)),
                 Method::Direct | Method::Joint => {
                     Ok(by_rows::direct(prepared, haar, chosen, stop, self.progress))
                 }
@@ -367,7 +376,7 @@ impl<'t> Task<'t> {
 /// Whether a method uses a photograph.
 fn uses(method: Method, role: Role) -> bool {
     match method {
-        Method::Joint | Method::BruteForce => true,
+        Method::Joint | Method::Links | Method::BruteForce => true,
         // As the paper does.
         Method::Direct | Method::TwoStage => role == Role::White || role.is_content(),
     }

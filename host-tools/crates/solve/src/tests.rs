@@ -14,6 +14,9 @@ const NO_NOISE: CellNoise = CellNoise {
     unlit: 0.0,
 };
 
+/// The methods that look for gains and a non-negative operator of all channels.
+const PHYSICAL: [Method; 2] = [Method::Joint, Method::Links];
+
 /// Owns what an [`Observed`] borrows.
 #[derive(Clone)]
 struct Capture {
@@ -77,7 +80,7 @@ impl Capture {
 
 fn method(method: Method) -> SolveOptions {
     SolveOptions {
-        method,
+        method: Some(method),
         ..SolveOptions::default()
     }
 }
@@ -165,6 +168,40 @@ fn fewer_photographs_than_cells_suffice_and_knowing_physics_helps() {
 }
 
 #[test]
+fn links_from_many_photographs_err_as_little_as_joint() {
+    let size = (13, 21);
+    let scene = corner(size.0, size.1);
+    let mut capture = Capture::new(&scene, size, 200);
+    add_noise(&mut capture.light[0], 2e-3);
+    let [joint, links] = PHYSICAL.map(|method_name| {
+        let (found, report) = capture.solve(&method(method_name)).unwrap();
+        assert_eq!(report.method, method_name);
+        closed_loop(&found, &scene, size)
+    });
+    assert!(links < 1.05 * joint, "{links} against {joint}");
+}
+
+#[test]
+fn links_is_the_default_of_many_cells_and_photographs_alone() {
+    let default = SolveOptions::default();
+    let weighted = SolveOptions {
+        lambda: Some(0.01),
+        ..default
+    };
+    for (options, cells, photographs, wanted) in [
+        (&default, 2047, 1000, Method::Joint),
+        (&default, 2048, 199, Method::Joint),
+        (&default, 2048, 200, Method::Links),
+        (&default, 6145, 20, Method::Links),
+        (&weighted, 6145, 200, Method::Joint),
+        (&method(Method::Direct), 6145, 200, Method::Direct),
+    ] {
+        let chosen = options.method_for(cells, photographs);
+        assert_eq!(chosen, wanted, "{cells} {photographs}");
+    }
+}
+
+#[test]
 fn the_operator_is_non_negative_with_a_zero_diagonal_in_every_channel() {
     let mut capture = Capture::new(&corner(6, 8), (6, 8), 40);
     let other = Corner::new(6, 8, |cell| 0.8 - 0.5 * textured(cell));
@@ -173,18 +210,21 @@ fn the_operator_is_non_negative_with_a_zero_diagonal_in_every_channel() {
     for light in &mut capture.light {
         add_noise(light, 1e-2);
     }
-    let (found, _) = capture.solved();
-    assert!(found.shared.min() >= 0.0);
-    assert_eq!(found.shared.diagonal().amax(), 0.0);
-    for channel in 0..3 {
-        let inverse = inverse(&found, channel);
-        for (index, value) in inverse.iter().enumerate() {
-            let diagonal = index % 48 == index / 48;
-            assert!(if diagonal {
-                *value > 0.0
-            } else {
-                *value <= 1e-12
-            });
+    for method_name in PHYSICAL {
+        let (found, _) = capture.solve(&method(method_name)).unwrap();
+        assert!(found.shared.min() >= 0.0);
+        assert!(found.shared.max() > 0.0);
+        assert_eq!(found.shared.diagonal().amax(), 0.0);
+        for channel in 0..3 {
+            let inverse = inverse(&found, channel);
+            for (index, value) in inverse.iter().enumerate() {
+                let diagonal = index % 48 == index / 48;
+                assert!(if diagonal {
+                    *value > 0.0
+                } else {
+                    *value <= 1e-12
+                });
+            }
         }
     }
 }
@@ -196,13 +236,16 @@ fn a_projectors_gain_in_each_channel_is_found() {
     let light = capture.light[0].clone();
     // Twice the light is the same scene under a projector twice as bright.
     capture.light = [0.5, 1.0, 2.0].map(|gain| &light * gain).to_vec();
-    let (found, _) = capture.solved();
-    let scales: Vec<f64> = found.channels.iter().map(|c| c.scale).collect();
-    assert!((scales[0] / scales[1] - 2.0).abs() < 0.05, "{scales:?}");
-    assert!((scales[1] / scales[2] - 2.0).abs() < 0.05, "{scales:?}");
-    for (channel, gain) in [0.5, 1.0, 2.0].into_iter().enumerate() {
-        let wanted = scene.inverse() / gain;
-        assert!(relative(&inverse(&found, channel), &wanted) < 0.01);
+    for method_name in PHYSICAL {
+        let (found, _) = capture.solve(&method(method_name)).unwrap();
+        let scales: Vec<f64> = found.channels.iter().map(|c| c.scale).collect();
+        assert!((scales[0] / scales[1] - 2.0).abs() < 0.05, "{scales:?}");
+        assert!((scales[1] / scales[2] - 2.0).abs() < 0.05, "{scales:?}");
+        for (channel, gain) in [0.5, 1.0, 2.0].into_iter().enumerate() {
+            let wanted = scene.inverse() / gain;
+            let error = relative(&inverse(&found, channel), &wanted);
+            assert!(error < 0.01, "{method_name} {error}");
+        }
     }
 }
 
@@ -210,11 +253,16 @@ fn a_projectors_gain_in_each_channel_is_found() {
 fn a_longer_exposure_scales_the_inverse_and_nothing_else() {
     let mut capture = Capture::new(&corner(5, 7), (5, 7), 40);
     add_noise(&mut capture.light[0], 3e-3);
-    let (once, report) = capture.solved();
-    capture.light[0] *= 4.0;
-    let (four_times, longer) = capture.solved();
-    assert_eq!(report.lambda, longer.lambda);
-    assert!(relative(&(inverse(&four_times, 0) * 4.0), &inverse(&once, 0)) < 1e-6);
+    let mut longer = capture.clone();
+    longer.light[0] *= 4.0;
+    longer.noise.lit *= 4.0;
+    longer.noise.unlit *= 4.0;
+    for method_name in PHYSICAL {
+        let (once, report) = capture.solve(&method(method_name)).unwrap();
+        let (four_times, longer) = longer.solve(&method(method_name)).unwrap();
+        assert_eq!(report.lambda, longer.lambda);
+        assert!(relative(&(inverse(&four_times, 0) * 4.0), &inverse(&once, 0)) < 1e-6);
+    }
 }
 
 #[test]
@@ -307,7 +355,12 @@ fn patterns_that_repeat_and_contradict_no_one_are_welcome() {
             ..
         }
     ));
-    for method_name in [Method::Joint, Method::Direct, Method::TwoStage] {
+    for method_name in [
+        Method::Joint,
+        Method::Links,
+        Method::Direct,
+        Method::TwoStage,
+    ] {
         let (found, _) = capture.solve(&method(method_name)).unwrap();
         let error = closed_loop(&found, &scene, (6, 8));
         assert!(error < 0.03, "{method_name} {error}");
@@ -331,6 +384,8 @@ fn a_grid_may_be_one_cell_or_one_line() {
 fn a_flat_scene_has_no_operator() {
     let scene = Corner::new(6, 1, textured);
     let capture = Capture::new(&scene, (6, 1), 40);
+    let (links, _) = capture.solve(&method(Method::Links)).unwrap();
+    assert!(links.shared.amax() < 1e-5);
     let (found, report) = capture.solved();
     assert!(found.shared.amax() < 1e-5);
     let bounds = (1.0 / 0.8, 1.0 / 0.3);
@@ -470,18 +525,17 @@ fn what_an_unseen_cell_throws_on_others_does_not_disturb_their_inverse() {
         capture.live[cell] = false;
         capture.light[0].row_mut(cell).fill(0.0);
     }
-    let (found, _) = capture.solved();
     let seen: Vec<usize> = (0..48).filter(|cell| !hidden.contains(cell)).collect();
     // The light between seen cells, bounces over the hidden ones included.
     let forward = scene.inverse().try_inverse().unwrap();
     let between = forward.select_rows(&seen).select_columns(&seen);
     let wanted = between.try_inverse().unwrap();
-    let found = inverse(&found, 0).select_rows(&seen).select_columns(&seen);
-    assert!(
-        relative(&found, &wanted) < 5e-3,
-        "{}",
-        relative(&found, &wanted)
-    );
+    for method_name in PHYSICAL {
+        let (found, _) = capture.solve(&method(method_name)).unwrap();
+        let found = inverse(&found, 0).select_rows(&seen).select_columns(&seen);
+        let error = relative(&found, &wanted);
+        assert!(error < 5e-3, "{method_name} {error}");
+    }
 }
 
 #[test]

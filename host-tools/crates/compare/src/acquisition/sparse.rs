@@ -41,6 +41,7 @@ impl Acquisition for Sparse {
         Description {
             name: match self.method {
                 Method::Joint => format!("iltm, {photographs}"),
+                Method::Links => format!("iltm by links, {photographs}"),
                 Method::Direct => format!("the paper's direct method, {photographs}"),
                 Method::TwoStage => {
                     format!("compressive dual photography by l1 (two-stage), {photographs}")
@@ -49,10 +50,10 @@ impl Acquisition for Sparse {
             },
             source: match self.method {
                 Method::TwoStage | Method::BruteForce => SEN_DARABI,
-                Method::Joint | Method::Direct => Citation::THE_PAPER,
+                Method::Joint | Method::Links | Method::Direct => Citation::THE_PAPER,
             },
             how: match self.method {
-                Method::Joint => {
+                Method::Joint | Method::Links => {
                     "White, Gray code and Bernoulli photographs; gains apart from a non-negative \
                      operator that is sparse in Haar; sparsity chosen by photographs held out."
                 }
@@ -97,7 +98,7 @@ pub(crate) fn patterns(
     let wanted = |role: Role| match role {
         Role::Black | Role::Image => false,
         Role::White | Role::Bernoulli => true,
-        Role::Column { .. } | Role::Row { .. } => method == Method::Joint,
+        Role::Column { .. } | Role::Row { .. } => matches!(method, Method::Joint | Method::Links),
     };
     let shown = pattern_set(grid, photographs, seed).into_iter();
     let shown = shown.filter(|(role, _)| wanted(*role));
@@ -127,7 +128,7 @@ pub(crate) fn solved(
         blur: 0.0,
     };
     let options = SolveOptions {
-        method,
+        method: Some(method),
         ..SolveOptions::default()
     };
     solve_observed(&observed, &options, &Silent)

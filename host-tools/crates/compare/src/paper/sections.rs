@@ -16,6 +16,7 @@ use std::fmt::Write;
 pub(super) fn words(method: Method, photographs: usize) -> String {
     let name = match method {
         Method::Joint => "iltm",
+        Method::Links => "iltm by links",
         Method::Direct => "direct (the paper)",
         Method::TwoStage => "two-stage",
         Method::BruteForce => "brute force",

@@ -167,7 +167,7 @@ impl Base<'_> {
         let mut points = Vec::new();
         for &method in Method::VARIANTS.iter().filter(|method| **method != own) {
             let options = SolveOptions {
-                method,
+                method: Some(method),
                 ..SolveOptions::default()
             };
             let learned = self.learn(self.learned.measurements.clone(), &options);

@@ -1,7 +1,7 @@
 //! Pictures of a verdict: maps of the cells, and the photographs of the wall.
 
 use super::judge::over_images;
-use super::pixels::{on_camera, seen, wanted};
+use super::pixels::{compared, on_camera, seen, wanted};
 use super::{PixelVerdict, Readings, TableVerdict};
 use iltm_capture::NO_CELL;
 use iltm_picture::{
@@ -104,16 +104,16 @@ fn pixel_pictures(
     let (Some(judged), Some(Ok(pixels))) = (&verdict.pixels, &readings.revisited.pixels) else {
         return Vec::new();
     };
-    let fitting = |planes: &[Vec<f32>]| {
-        let mut picture = on_camera(pixels, planes)?;
+    let fitting = |mut picture: LightPicture| {
         while picture.size().width() > MOST_WIDTH {
             picture = picture.halved();
         }
-        Some(picture)
+        picture
     };
     let mut files = Vec::new();
     let colours = pixel_scale(judged);
-    if let Some(errors) = fitting(std::slice::from_ref(&judged.errors)) {
+    if let Some(errors) = on_camera(pixels, std::slice::from_ref(&judged.errors)) {
+        let errors = fitting(errors);
         let values = errors.planes()[0].iter().map(|error| f64::from(*error));
         files.push(picture_file(
             "pixel-errors",
@@ -129,11 +129,41 @@ fn pixel_pictures(
         ("fine-before", seen(table, pixels, 0), scale),
         ("fine-after", seen(table, pixels, 1), scale),
     ];
+    let compared = compared(pixels);
     for (name, planes, scale) in all {
-        let light = fitting(&planes).map(|light| light.scaled(scale).for_display());
+        let light = on_camera(pixels, &planes).map(|light| {
+            let size = light.size();
+            let whole = light.with_planes(|_, plane| filled(size, plane, &compared));
+            fitting(whole).scaled(scale).for_display()
+        });
         files.extend(light.map(|light| picture_file(name, &light)));
     }
     files
+}
+
+/// A plane whose pixels that are not compared have the mean of those beside them, where at least
+/// half of these are: pixels that see the edge of two of the projector's would be dots.
+fn filled(size: FrameSize, plane: &[f32], compared: &[bool]) -> Vec<f32> {
+    let (width, height) = (size.width(), size.height());
+    let mut filled = plane.to_vec();
+    for (at, value) in filled
+        .iter_mut()
+        .enumerate()
+        .filter(|(at, _)| !compared[*at])
+    {
+        let (x, y) = (at % width, at / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        let beside = rows
+            .flat_map(|y| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| y * width + x));
+        let known: Vec<f32> = beside
+            .filter(|at| compared[*at])
+            .map(|at| plane[at])
+            .collect();
+        if known.len() >= 4 {
+            *value = known.iter().sum::<f32>() / known.len() as f32;
+        }
+    }
+    filled
 }
 
 /// Colours of the map of the pixels' errors: up to what 99 of 100 are below.

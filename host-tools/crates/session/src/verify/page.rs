@@ -416,6 +416,7 @@ fn viewer(judged: &PixelVerdict, files: &[PictureFile]) -> Markup {
             figure { (img_named(files, "fine-before", "Photograph of the wall without compensation")) figcaption { "As it is" } }
             figure { (img_named(files, "fine-after", "Photograph of the wall with compensation")) figcaption { "Compensated" } }
         }
+        p .quiet { "All three at the same exposure. Single pixels that are not compared show the mean of those beside them." }
         div .half {
             figure .cells { (img_named(files, "pixel-errors", "Error of every pixel of the camera")) (colour_bar(&pixel_scale(judged), false)) figcaption { "Error of every pixel over " (judged.images.len()) " images, compensated, relative to reference white, noise included" } }
             div {

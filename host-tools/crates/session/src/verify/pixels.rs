@@ -94,7 +94,7 @@ impl PixelVerdict {
                 let error = PictureError::new(
                     &on_camera(pixels, &seen)?,
                     &on_camera(pixels, &wanted)?,
-                    &judged(pixels),
+                    &compared(pixels),
                 )?;
                 let noise = noise(pixels, &seen, &wanted);
                 squares[half] += (error.relative.powi(2) - noise).max(0.0);
@@ -220,13 +220,14 @@ pub(super) fn on_camera(pixels: &PixelReadings, planes: &[Vec<f32>]) -> Option<L
     LightPicture::new(size, planes.iter().map(plane).collect())
 }
 
-fn judged(pixels: &PixelReadings) -> Vec<bool> {
+/// Which of the camera's pixels are compared, by row.
+pub(super) fn compared(pixels: &PixelReadings) -> Vec<bool> {
     let (width, height) = pixels.camera;
-    let mut judged = vec![false; width * height];
+    let mut compared = vec![false; width * height];
     for view in pixels.views.pixels() {
-        judged[view.pixel as usize] = true;
+        compared[view.pixel as usize] = true;
     }
-    judged
+    compared
 }
 
 /// Square of the relative error that noise makes in a photograph, at the brightness of what was

@@ -1,0 +1,389 @@
+//! [`Method::Links`](super::Method::Links): hierarchical inverse light transport, with cost that
+//! grows as the number of cells.
+//!
+//! `K` is a set of links between blocks of a quadtree, as in hierarchical radiosity (Hanrahan,
+//! Salzman, Aupperle, *A Rapid Hierarchical Radiosity Algorithm*, 1991), but found from
+//! photographs. Receiving blocks are solved from the coarsest level down to the cells, each for
+//! itself: its row is a small non-negative least-squares problem over source blocks
+//! ([`row`]) that starts from the row of the block above it and is pulled towards that. A source
+//! block is split where that explains more than noise. Gains follow from the rows after each
+//! level.
+
+mod quadtree;
+mod row;
+
+pub(super) use quadtree::Quadtree;
+
+use super::convergence::Convergence;
+use super::joint::Photographs;
+use super::prepare::Prepared;
+use super::solution::{Channel, Solution};
+use iltm_picture::progress::Progress;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use row::{Prior, Row, Target, axpy, dot, series};
+
+/// Levels above the cells from which rows are solved once more, with the gains of the first sweep.
+/// From coarser ones on they fitted the errors of gains instead.
+const SECOND_SWEEP: usize = 3;
+/// Weight of a series' mean square beside that of its variance: errors of coarse blocks are much
+/// alike in all photographs.
+const MEAN_WEIGHT: f32 = 0.03;
+/// Deviation of a value from that of the block above, as a part of it.
+const RELATIVE: f32 = 0.7;
+/// The same of values that are zero, in those of a row that spreads all light evenly.
+const ABSOLUTE: f32 = 0.1;
+/// Deviation of a channel's value from the shared one.
+const CHANNEL_RELATIVE: f32 = 0.3;
+/// Noise below this part of the mean flood light is none that a solve could use.
+const LEAST_NOISE: f64 = 1e-5;
+
+/// Photographs to solve from, as series.
+struct Data<'d> {
+    prepared: &'d Prepared,
+    tree: &'d Quadtree,
+    photographs: usize,
+    /// Light of all blocks, a column each: channel after channel. Means are reduced.
+    sources: DMatrix<f32>,
+    /// Light of each cell, likewise.
+    light: DMatrix<f32>,
+    /// Patterns of each cell, likewise.
+    patterns: DMatrix<f32>,
+    /// Variance of each photograph's noise relative to that of one in which the cell is lit.
+    variances: DMatrix<f32>,
+}
+
+/// The state of a solve.
+struct State {
+    rows: Vec<Row>,
+    /// By channel and cell.
+    gains: Vec<Vec<f32>>,
+    scales: Vec<f32>,
+}
+
+/// Solves from the photographs `chosen`.
+pub(super) fn links(
+    prepared: &Prepared,
+    tree: &Quadtree,
+    chosen: &[usize],
+    progress: &dyn Progress,
+) -> Solution {
+    let data = Data::new(prepared, tree, chosen);
+    let mut state = data.start();
+    let top = tree.levels() - 1;
+    for (sweep, coarsest) in [top, SECOND_SWEEP.min(top)].into_iter().enumerate() {
+        for level in (0..=coarsest).rev() {
+            data.solve_level(level, &mut state, progress);
+            // Gains of coarse rows are worse than those that a sweep has ended with.
+            if sweep == 0 || level == 0 {
+                data.fit_gains(level, &mut state);
+            }
+        }
+    }
+    data.solution(&state, chosen)
+}
+
+impl<'d> Data<'d> {
+    fn new(prepared: &'d Prepared, tree: &'d Quadtree, chosen: &[usize]) -> Self {
+        let (photographs, channels) = (chosen.len(), prepared.light.len());
+        let length = photographs * channels;
+        let fill = |columns: usize, of: &(dyn Fn(usize) -> DMatrix<f64> + Sync)| {
+            let mut filled = DMatrix::zeros(length, columns);
+            for channel in 0..channels {
+                let matrix = of(channel);
+                for (cell, row) in matrix.row_iter().enumerate() {
+                    let mean = row.mean() as f32 * (1.0 - MEAN_WEIGHT.sqrt());
+                    for (k, value) in row.iter().enumerate() {
+                        filled[(channel * photographs + k, cell)] = *value as f32 - mean;
+                    }
+                }
+            }
+            filled
+        };
+        let cells = tree.cells();
+        let mut sources = fill(tree.blocks(), &|channel| prepared.sources(channel, chosen));
+        tree.sum_cells(&mut sources);
+        let variances = DMatrix::from_fn(photographs, cells, |k, cell| {
+            let least = prepared.weights.row(cell).min();
+            (least / prepared.weights[(cell, chosen[k])]) as f32
+        });
+        Self {
+            prepared,
+            tree,
+            photographs,
+            sources,
+            light: fill(cells, &|channel| {
+                prepared.light[channel].select_columns(chosen)
+            }),
+            patterns: fill(cells, &|channel| {
+                prepared.patterns[channel].select_columns(chosen)
+            }),
+            variances,
+        }
+    }
+
+    const fn channels(&self) -> usize {
+        self.prepared.light.len()
+    }
+
+    fn segment(&self, channel: usize) -> std::ops::Range<usize> {
+        channel * self.photographs..(channel + 1) * self.photographs
+    }
+
+    fn start(&self) -> State {
+        let top: Vec<usize> = self.tree.level(self.tree.levels() - 1).collect();
+        let row = Row {
+            values: vec![0.0; top.len()],
+            blocks: top,
+        };
+        let mut state = State {
+            rows: vec![row; self.tree.blocks()],
+            gains: vec![vec![0.0; self.tree.cells()]; self.channels()],
+            scales: vec![1.0; self.channels()],
+        };
+        self.fit_gains(0, &mut state);
+        state
+    }
+
+    /// Solves the rows of one level's blocks.
+    fn solve_level(&self, level: usize, state: &mut State, progress: &dyn Progress) {
+        let sources = self.scaled_sources(&state.scales);
+        let channels: Vec<usize> = (0..self.channels()).collect();
+        let found: Vec<Row> = (self.tree.level(level).into_par_iter())
+            .map(|block| {
+                let Some(mut target) = self.target(block, &channels, &sources, &state.gains) else {
+                    return Row::default();
+                };
+                let around = self.tree.around(block);
+                let rows: Vec<(&Row, f32)> = (around.iter())
+                    .map(|(block, share)| (&state.rows[*block], *share))
+                    .collect();
+                let start = rows.first().map_or(&state.rows[block], |(row, _)| *row);
+                let row = if rows.is_empty() {
+                    // The coarsest blocks start anew.
+                    let top: Vec<usize> = self.tree.level(level).collect();
+                    let start = Row {
+                        values: vec![0.0; top.len()],
+                        blocks: top,
+                    };
+                    target.fit(&start, None, true)
+                } else {
+                    target.fit(start, Row::mean(self.tree, &rows), true)
+                };
+                progress.advance(1);
+                row
+            })
+            .collect();
+        for (block, row) in self.tree.level(level).zip(found) {
+            state.rows[block] = row;
+        }
+    }
+
+    /// Sources by which all channels have the same operator.
+    fn scaled_sources(&self, scales: &[f32]) -> DMatrix<f32> {
+        let mut sources = self.sources.clone();
+        for mut column in sources.column_iter_mut() {
+            for (channel, scale) in scales.iter().enumerate() {
+                let segment = self.segment(channel);
+                for value in &mut column.as_mut_slice()[segment] {
+                    *value *= scale;
+                }
+            }
+        }
+        sources
+    }
+
+    /// What the row of a block must make of the light in some channels: the mean over its cells,
+    /// those with less noise counting more. `None` if no cell is live.
+    fn target<'t>(
+        &'t self,
+        block: usize,
+        channels: &[usize],
+        sources: &'t DMatrix<f32>,
+        gains: &[Vec<f32>],
+    ) -> Option<Target<'t>> {
+        let cells = self.tree.cells_of(block);
+        let live = |cell: &usize| self.prepared.live[*cell];
+        let cells: Vec<usize> = cells.into_iter().filter(live).collect();
+        if cells.is_empty() {
+            return None;
+        }
+        let length = channels.len() * self.photographs;
+        let mut target = Target {
+            tree: self.tree,
+            sources,
+            precision: Vec::with_capacity(length),
+            wanted: Vec::with_capacity(length),
+            own: Vec::new(),
+            prior: Prior {
+                relative: RELATIVE,
+                absolute: ABSOLUTE / self.tree.cells() as f32,
+            },
+        };
+        for (place, channel) in channels.iter().enumerate() {
+            let segment = self.segment(*channel);
+            let mut wanted = vec![0.0; self.photographs];
+            let mut own = vec![0.0; self.photographs];
+            let mut variance = vec![0.0; self.photographs];
+            let mut total = 0.0;
+            for cell in &cells {
+                let noise = self.prepared.noise[*channel][*cell].lit.max(LEAST_NOISE) as f32;
+                let gain = gains[*channel][*cell];
+                let share = (gain * noise).powi(2).recip();
+                if !share.is_finite() {
+                    continue;
+                }
+                let light = &series(&self.light, *cell)[segment.clone()];
+                axpy(&mut own, share * gain, light);
+                axpy(
+                    &mut wanted,
+                    -share,
+                    &series(&self.patterns, *cell)[segment.clone()],
+                );
+                // (share * gain * noise)^2 is the share itself.
+                axpy(&mut variance, share, series(&self.variances, *cell));
+                total += share;
+            }
+            axpy(&mut wanted, 1.0, &own);
+            let precision = variance.iter().map(|variance| total / variance.sqrt());
+            target.precision.extend(precision);
+            let precision = &target.precision[place * self.photographs..];
+            let whiten = |series: &mut [f32]| {
+                for (value, precision) in series.iter_mut().zip(precision) {
+                    *value *= precision / total;
+                }
+            };
+            whiten(&mut wanted);
+            whiten(&mut own);
+            target.wanted.extend(wanted);
+            let norm = dot(&own, &own).sqrt();
+            if norm > 0.0 {
+                let mut unit = vec![0.0; length];
+                axpy(
+                    &mut unit[place * self.photographs..][..self.photographs],
+                    norm.recip(),
+                    &own,
+                );
+                target.own.push(unit);
+            }
+        }
+        Some(target)
+    }
+
+    /// Gains, and the channels' scales, with which the rows of a level explain the light best.
+    fn fit_gains(&self, level: usize, state: &mut State) {
+        let fitted: Vec<Vec<(f32, f32, f32)>> = (0..self.tree.cells())
+            .into_par_iter()
+            .map(|cell| {
+                if !self.prepared.live[cell] {
+                    return vec![(0.0, 0.0, 0.0); self.channels()];
+                }
+                let mut reflected = vec![0.0; self.sources.nrows()];
+                let row = &state.rows[self.tree.ancestor(cell, level)];
+                row.add_light(&self.sources, &mut reflected);
+                let channel = |channel: usize| {
+                    let segment = self.segment(channel);
+                    let light = &series(&self.light, cell)[segment.clone()];
+                    let pattern = &series(&self.patterns, cell)[segment.clone()];
+                    let reflected = &reflected[segment];
+                    let square = dot(light, light);
+                    if square <= 0.0 {
+                        return (0.0, 0.0, 0.0);
+                    }
+                    let along = dot(light, reflected) / square;
+                    let gain = dot(light, pattern) / square + state.scales[channel] * along;
+                    let both = along * dot(light, pattern) - dot(reflected, pattern);
+                    let norm = dot(reflected, reflected) - along * along * square;
+                    (gain, both, norm)
+                };
+                (0..self.channels()).map(channel).collect()
+            })
+            .collect();
+        for channel in 0..self.channels() {
+            for (cell, fitted) in fitted.iter().enumerate() {
+                state.gains[channel][cell] = fitted[channel].0;
+            }
+        }
+        if self.channels() == 1 {
+            return;
+        }
+        let scale = |channel: usize| {
+            let both: f32 = fitted.iter().map(|fitted| fitted[channel].1).sum();
+            let norm: f32 = fitted.iter().map(|fitted| fitted[channel].2).sum();
+            both / norm
+        };
+        let scales: Vec<f32> = (0..self.channels()).map(scale).collect();
+        if scales.iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
+            let mean = scales.iter().map(|scale| scale.ln()).sum::<f32>() / scales.len() as f32;
+            state.scales = scales.iter().map(|scale| scale / mean.exp()).collect();
+        }
+    }
+
+    /// The answer by cells, with each channel's deviation from the shared operator.
+    fn solution(&self, state: &State, chosen: &[usize]) -> Solution {
+        let cells = self.tree.cells();
+        let shared = self.dense(&state.rows[..cells]);
+        let photographs = Photographs::new(self.prepared, chosen);
+        let channels = (0..self.channels()).map(|channel| {
+            let scale = f64::from(state.scales[channel]);
+            let deviation = (self.channels() > 1).then(|| {
+                let rows = self.channel_rows(channel, state);
+                self.dense(&rows) - &shared * scale
+            });
+            let mut operator = &shared * scale;
+            if let Some(deviation) = &deviation {
+                operator += deviation;
+            }
+            Channel {
+                gain: photographs.gain(channel, &operator),
+                scale,
+                deviation,
+            }
+        });
+        let channels = channels.collect();
+        Solution {
+            coefficients: shared.iter().filter(|value| **value != 0.0).count(),
+            shared,
+            channels,
+            convergence: Convergence {
+                iterations: 2,
+                ..Convergence::best()
+            },
+        }
+    }
+
+    /// One channel's rows, near the shared ones.
+    fn channel_rows(&self, channel: usize, state: &State) -> Vec<Row> {
+        let sources = self
+            .sources
+            .rows(channel * self.photographs, self.photographs)
+            .into_owned();
+        let cells = 0..self.tree.cells();
+        cells
+            .into_par_iter()
+            .map(|cell| {
+                let Some(mut target) = self.target(cell, &[channel], &sources, &state.gains) else {
+                    return Row::default();
+                };
+                target.prior.relative = CHANNEL_RELATIVE;
+                let mut start = state.rows[cell].clone();
+                for value in &mut start.values {
+                    *value *= state.scales[channel];
+                }
+                target.fit(&start, None, false)
+            })
+            .collect()
+    }
+
+    /// `N x N`, zero on the diagonal.
+    fn dense(&self, rows: &[Row]) -> DMatrix<f64> {
+        let mut dense = DMatrix::zeros(rows.len(), rows.len());
+        for (cell, row) in rows.iter().enumerate() {
+            for (source, value) in row.cells(self.tree) {
+                dense[(cell, source)] = f64::from(value);
+            }
+        }
+        dense.fill_diagonal(0.0);
+        dense
+    }
+}

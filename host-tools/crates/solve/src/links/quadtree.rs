@@ -1,0 +1,213 @@
+//! A quadtree over a grid of cells: blocks of 2 x 2, of 4 x 4 and so on, each a sum of the four
+//! below it. Blocks at the right and lower border may have fewer.
+
+use iltm_runtime::Grid;
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// Blocks of the coarsest level along the shorter side, at least.
+const LEAST_SIDE: usize = 2;
+
+/// The blocks of all levels, numbered from the cells up, each level by rows.
+#[derive(Clone, Debug)]
+pub(in super::super) struct Quadtree {
+    levels: Vec<Level>,
+    /// The block above each, of all but the coarsest.
+    parents: Vec<usize>,
+    blocks: usize,
+}
+
+/// Blocks of one size.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    rows: usize,
+    cols: usize,
+    first: usize,
+}
+
+impl Level {
+    fn blocks(self) -> Range<usize> {
+        self.first..self.first + self.rows * self.cols
+    }
+}
+
+impl Quadtree {
+    pub(in super::super) fn new(grid: Grid) -> Self {
+        let mut level = Level {
+            rows: grid.rows(),
+            cols: grid.cols(),
+            first: 0,
+        };
+        let mut tree = Self {
+            levels: vec![level],
+            parents: Vec::new(),
+            blocks: level.blocks().end,
+        };
+        loop {
+            let above = Level {
+                rows: level.rows.div_ceil(2),
+                cols: level.cols.div_ceil(2),
+                first: tree.blocks,
+            };
+            if above.rows.min(above.cols) < LEAST_SIDE {
+                return tree;
+            }
+            for at in 0..level.rows * level.cols {
+                let (row, col) = (at / level.cols, at % level.cols);
+                let parent = above.first + row / 2 * above.cols + col / 2;
+                tree.parents.push(parent);
+            }
+            tree.blocks = above.blocks().end;
+            tree.levels.push(above);
+            level = above;
+        }
+    }
+
+    /// Number of blocks, cells among them.
+    pub(super) const fn blocks(&self) -> usize {
+        self.blocks
+    }
+
+    /// Number of cells.
+    pub(super) fn cells(&self) -> usize {
+        self.level(0).len()
+    }
+
+    /// Number of levels; the first has the cells.
+    pub(super) const fn levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// The blocks of a level.
+    pub(super) fn level(&self, level: usize) -> Range<usize> {
+        self.levels[level].blocks()
+    }
+
+    fn level_of(&self, block: usize) -> usize {
+        let finer = |level: &&Level| level.first <= block;
+        self.levels.iter().take_while(finer).count() - 1
+    }
+
+    /// The block above; `None` for one of the coarsest.
+    pub(super) fn parent(&self, block: usize) -> Option<usize> {
+        self.parents.get(block).copied()
+    }
+
+    /// The block that a cell or block belongs to, so many levels above.
+    pub(super) fn ancestor(&self, block: usize, levels: usize) -> usize {
+        (0..levels).fold(block, |block, _| self.parents[block])
+    }
+
+    /// The four blocks below, fewer at the border; none below a cell.
+    pub(super) fn children(&self, block: usize) -> impl Iterator<Item = usize> {
+        let level = self.level_of(block);
+        let own = self.levels[level];
+        let below = level.checked_sub(1).map(|below| self.levels[below]);
+        let (row, col) = (
+            (block - own.first) / own.cols,
+            (block - own.first) % own.cols,
+        );
+        below.into_iter().flat_map(move |below| {
+            let places = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
+            places
+                .map(move |(down, right)| (2 * row + down, 2 * col + right))
+                .filter(move |(row, col)| *row < below.rows && *col < below.cols)
+                .map(move |(row, col)| below.first + row * below.cols + col)
+        })
+    }
+
+    /// The cells of a block.
+    pub(super) fn cells_of(&self, block: usize) -> Vec<usize> {
+        let mut blocks = vec![block];
+        for _ in 0..self.level_of(block) {
+            blocks = (blocks.iter())
+                .flat_map(|block| self.children(*block))
+                .collect();
+        }
+        blocks
+    }
+
+    /// Gives each block the sum of its cells: a column of `series` each, those of cells given.
+    pub(super) fn sum_cells(&self, series: &mut DMatrix<f32>) {
+        for block in self.cells()..self.blocks {
+            let children: Vec<usize> = self.children(block).collect();
+            let sum = series.select_columns(&children).column_sum();
+            series.set_column(block, &sum);
+        }
+    }
+
+    /// The blocks whose centres surround that of `block`, one level above it, with their shares:
+    /// its parent (9), the two beside that which are nearer (3 each) and the one between (1).
+    pub(super) fn around(&self, block: usize) -> Vec<(usize, f32)> {
+        let level = self.level_of(block);
+        let Some(above) = self.levels.get(level + 1) else {
+            return Vec::new();
+        };
+        let own = self.levels[level];
+        let (row, col) = (
+            (block - own.first) / own.cols,
+            (block - own.first) % own.cols,
+        );
+        let beside = |at: usize, count: usize| {
+            let (parent, upper) = (at / 2, at % 2 == 1);
+            let next = if upper {
+                parent + 1
+            } else {
+                parent.wrapping_sub(1)
+            };
+            [(parent, 3.0), (next, 1.0)]
+                .into_iter()
+                .filter(move |(at, _)| *at < count)
+        };
+        let mut found = Vec::new();
+        for (row, share) in beside(row, above.rows) {
+            for (col, other) in beside(col, above.cols) {
+                found.push((above.first + row * above.cols + col, share * other));
+            }
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_is_in_one_block_of_each_level() {
+        for (rows, cols) in [(1, 1), (1, 9), (2, 2), (3, 5), (13, 21), (24, 32)] {
+            let tree = Quadtree::new(Grid::new(rows, cols).unwrap());
+            for level in 0..tree.levels() {
+                let mut cells: Vec<usize> =
+                    tree.level(level).flat_map(|b| tree.cells_of(b)).collect();
+                cells.sort_unstable();
+                assert!(
+                    cells.into_iter().eq(0..tree.cells()),
+                    "{rows} x {cols}, {level}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn children_and_parents_are_each_others() {
+        let tree = Quadtree::new(Grid::new(5, 7).unwrap());
+        for block in 0..tree.blocks() {
+            for child in tree.children(block) {
+                assert_eq!(tree.parent(child), Some(block));
+            }
+        }
+        let tops = (0..tree.blocks()).filter(|b| tree.parent(*b).is_none());
+        assert!(tops.eq(tree.level(tree.levels() - 1)));
+    }
+
+    #[test]
+    fn blocks_around_a_cell_have_its_parent_first_and_end_at_the_border() {
+        // 4 x 4 cells, 2 x 2 blocks above them: 16 to 19.
+        let tree = Quadtree::new(Grid::new(4, 4).unwrap());
+        assert_eq!(tree.around(0), [(16, 9.0)]);
+        assert_eq!(tree.around(5), [(16, 9.0), (17, 3.0), (18, 3.0), (19, 1.0)]);
+        assert_eq!(tree.around(7), [(17, 9.0), (19, 3.0)]);
+        assert!(tree.around(16).is_empty());
+    }
+}

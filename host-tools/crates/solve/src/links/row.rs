@@ -1,0 +1,444 @@
+//! One row of `K` as links to blocks of source cells: a small non-negative least-squares problem,
+//! whose blocks are split where the photographs ask for it.
+
+use super::quadtree::Quadtree;
+use nalgebra::DMatrix;
+use std::collections::HashMap;
+
+/// A split must explain as many times the noise variance, or what is left where that is more.
+const SPLIT: f32 = 5.0;
+/// Splits of less than this part of the best one wait for the next round.
+const SPLIT_TOGETHER: f32 = 0.25;
+/// Blocks of a row beyond which none is split any more.
+const MOST_BLOCKS: usize = 200;
+/// Rounds of splits at most.
+const MOST_ROUNDS: usize = 40;
+/// Sweeps of coordinate descent at most, and the gain in units of the noise variance below which
+/// no sweep is worth another.
+const MOST_SWEEPS: usize = 200;
+const LEAST_GAIN: f32 = 1e-3;
+
+/// Links of one receiving block: the light of all cells of a source block together, times a value.
+/// No two source blocks overlap; all of them together are the whole grid.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Row {
+    pub(super) blocks: Vec<usize>,
+    pub(super) values: Vec<f32>,
+}
+
+impl Row {
+    /// The values by cell.
+    pub(super) fn cells<'r>(
+        &'r self,
+        tree: &'r Quadtree,
+    ) -> impl Iterator<Item = (usize, f32)> + 'r {
+        let links = self.blocks.iter().zip(&self.values);
+        let links = links.filter(|(_, value)| **value != 0.0);
+        links
+            .flat_map(|(block, value)| tree.cells_of(*block).into_iter().map(|cell| (cell, *value)))
+    }
+
+    /// Adds the row's light to `light`; `sources` has the series of each block.
+    pub(super) fn add_light(&self, sources: &DMatrix<f32>, light: &mut [f32]) {
+        for (block, value) in self.blocks.iter().zip(&self.values) {
+            if *value != 0.0 {
+                axpy(light, *value, series(sources, *block));
+            }
+        }
+    }
+
+    /// Means of several rows with shares, over the blocks of the first.
+    pub(super) fn mean(tree: &Quadtree, rows: &[(&Self, f32)]) -> Option<Vec<f32>> {
+        let (first, share) = rows.first()?;
+        let mut mean: Vec<f32> = first.values.iter().map(|value| share * value).collect();
+        let mut total = *share;
+        for (row, share) in &rows[1..] {
+            if row.blocks.is_empty() {
+                continue;
+            }
+            total += share;
+            let links = row.blocks.iter().copied().zip(row.values.iter().copied());
+            let values: HashMap<usize, f32> = links.collect();
+            for (mean, block) in mean.iter_mut().zip(&first.blocks) {
+                *mean += share * value(tree, &values, *block);
+            }
+        }
+        for mean in &mut mean {
+            *mean /= total;
+        }
+        Some(mean)
+    }
+}
+
+/// The mean value of links on a block, which may be finer or coarser than they are.
+fn value(tree: &Quadtree, values: &HashMap<usize, f32>, block: usize) -> f32 {
+    let mut at = Some(block);
+    while let Some(block) = at {
+        if let Some(value) = values.get(&block) {
+            return *value;
+        }
+        at = tree.parent(block);
+    }
+    let (mut sum, mut count) = (0.0, 0.0);
+    for child in tree.children(block) {
+        sum += value(tree, values, child);
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// What a row is fitted to: series are photographs of one channel after the other.
+pub(super) struct Target<'t> {
+    pub(super) tree: &'t Quadtree,
+    /// Light of each block, a column each, in the channels' units of the shared operator.
+    pub(super) sources: &'t DMatrix<f32>,
+    /// Reciprocal of the noise's deviation in the target.
+    pub(super) precision: Vec<f32>,
+    /// What the row must make of the sources, noise 1.
+    pub(super) wanted: Vec<f32>,
+    /// Series of unit length, orthogonal to one another, that gains explain; noise 1.
+    pub(super) own: Vec<Vec<f32>>,
+    /// How far values may be from those that they start from: a part of the value, and beyond.
+    pub(super) prior: Prior,
+}
+
+/// Deviation of a value from where it starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    pub(super) relative: f32,
+    pub(super) absolute: f32,
+}
+
+impl Target<'_> {
+    /// Fits the row that starts from `start`; or from `instead`, other values of the same blocks,
+    /// if these explain more.
+    pub(super) fn fit(&mut self, start: &Row, instead: Option<Vec<f32>>, split: bool) -> Row {
+        for own in &self.own {
+            let along = dot(own, &self.wanted);
+            axpy(&mut self.wanted, -along, own);
+        }
+        let mut problem = Problem {
+            blocks: start.blocks.clone(),
+            columns: self.columns(&start.blocks),
+            gram: DMatrix::zeros(0, 0),
+            values: start.values.clone(),
+            start: start.values.clone(),
+        };
+        problem.gram = problem.columns.transpose() * &problem.columns;
+        if let Some(instead) = instead {
+            let squared = |left: Vec<f32>| dot(&left, &left);
+            if squared(problem.left(&self.wanted, &instead))
+                < squared(problem.left(&self.wanted, &start.values))
+            {
+                problem.values.clone_from(&instead);
+                problem.start = instead;
+            }
+        }
+        for _ in 0..MOST_ROUNDS {
+            problem.descend(&self.wanted, self.prior);
+            if !split || problem.blocks.len() > MOST_BLOCKS {
+                break;
+            }
+            let splits = self.splits(&problem);
+            if splits.is_empty() {
+                break;
+            }
+            self.split(&mut problem, &splits);
+        }
+        Row {
+            blocks: problem.blocks,
+            values: problem.values,
+        }
+    }
+
+    /// Sources with noise 1, free of what gains explain.
+    fn columns(&self, blocks: &[usize]) -> DMatrix<f32> {
+        let mut columns = DMatrix::zeros(self.wanted.len(), blocks.len());
+        let length = self.wanted.len();
+        for (column, block) in columns.as_mut_slice().chunks_exact_mut(length).zip(blocks) {
+            let source = series(self.sources, *block).iter().zip(&self.precision);
+            for (value, (source, precision)) in column.iter_mut().zip(source) {
+                *value = source * precision;
+            }
+            for own in &self.own {
+                let along = dot(own, column);
+                axpy(column, -along, own);
+            }
+        }
+        columns
+    }
+
+    /// Links whose split explains more than noise would, by index.
+    fn splits(&self, problem: &Problem) -> Vec<usize> {
+        let left = problem.left(&self.wanted, &problem.values);
+        let (series_length, links) = (left.len() as f32, problem.blocks.len() as f32);
+        let free = series_length - self.own.len() as f32 - links.min(0.5 * series_length);
+        let variance = (dot(&left, &left) / free.max(1.0)).max(1.0);
+        // Products with series as they are instead of with noise 1.
+        let times = |series: &[f32]| -> Vec<f32> {
+            series
+                .iter()
+                .zip(&self.precision)
+                .map(|(a, b)| a * b)
+                .collect()
+        };
+        let left = times(&left);
+        let own: Vec<Vec<f32>> = self.own.iter().map(|own| times(own)).collect();
+        let squares = times(&self.precision);
+        let mut found = Vec::new();
+        for (link, (block, value)) in problem.blocks.iter().zip(&problem.values).enumerate() {
+            let mut explained = 0.0;
+            for child in self.tree.children(*block) {
+                let source = series(self.sources, child);
+                let along: f32 = own.iter().map(|own| dot(own, source).powi(2)).sum();
+                let square = weighted_square(source, &squares) - along;
+                let slope = dot(&left, source);
+                if square > 0.0 && (*value > 0.0 || slope > 0.0) {
+                    explained += slope * slope / square;
+                }
+            }
+            if explained > SPLIT * variance {
+                found.push((link, explained));
+            }
+        }
+        let best = found
+            .iter()
+            .map(|(_, explained)| *explained)
+            .fold(0.0, f32::max);
+        found.retain(|(_, explained)| *explained > SPLIT_TOGETHER * best);
+        found.into_iter().map(|(link, _)| link).collect()
+    }
+
+    fn split(&self, problem: &mut Problem, splits: &[usize]) {
+        let kept: Vec<usize> = (0..problem.blocks.len())
+            .filter(|link| !splits.contains(link))
+            .collect();
+        let pick = |values: &[f32]| -> Vec<f32> { kept.iter().map(|link| values[*link]).collect() };
+        let mut blocks: Vec<usize> = kept.iter().map(|link| problem.blocks[*link]).collect();
+        let (mut values, mut start) = (pick(&problem.values), pick(&problem.start));
+        for link in splits {
+            for child in self.tree.children(problem.blocks[*link]) {
+                blocks.push(child);
+                values.push(problem.values[*link]);
+                start.push(problem.values[*link]);
+            }
+        }
+        let added = self.columns(&blocks[kept.len()..]);
+        let before = problem.columns.select_columns(&kept);
+        let (old, all) = (kept.len(), blocks.len());
+        let mut gram = DMatrix::zeros(all, all);
+        gram.view_mut((0, 0), (old, old))
+            .copy_from(&problem.gram.select_rows(&kept).select_columns(&kept));
+        let across = before.transpose() * &added;
+        gram.view_mut((0, old), (old, all - old)).copy_from(&across);
+        gram.view_mut((old, 0), (all - old, old))
+            .copy_from(&across.transpose());
+        gram.view_mut((old, old), (all - old, all - old))
+            .copy_from(&(added.transpose() * &added));
+        let mut columns = before.resize_horizontally(all, 0.0);
+        columns.columns_mut(old, all - old).copy_from(&added);
+        *problem = Problem {
+            blocks,
+            columns,
+            gram,
+            values,
+            start,
+        };
+    }
+}
+
+/// `min ||columns values - wanted||^2 + prior`, values not negative.
+struct Problem {
+    blocks: Vec<usize>,
+    columns: DMatrix<f32>,
+    gram: DMatrix<f32>,
+    values: Vec<f32>,
+    /// What values are pulled towards.
+    start: Vec<f32>,
+}
+
+impl Problem {
+    /// What values leave unexplained.
+    fn left(&self, wanted: &[f32], values: &[f32]) -> Vec<f32> {
+        let mut left = wanted.to_vec();
+        for (column, value) in self.columns.column_iter().zip(values) {
+            if *value != 0.0 {
+                axpy(&mut left, -value, column.data.into_slice());
+            }
+        }
+        left
+    }
+
+    /// Coordinate descent (Hastie, Tibshirani, Wainwright, *Statistical Learning with Sparsity*,
+    /// 2015, section 5.4) on the normal equations.
+    fn descend(&mut self, wanted: &[f32], prior: Prior) {
+        let left = self.left(wanted, &self.values);
+        let mut slopes: Vec<f32> = (self.columns.column_iter())
+            .map(|column| dot(column.data.into_slice(), &left))
+            .collect();
+        let precision =
+            |start: &f32| ((prior.relative * start).powi(2) + prior.absolute.powi(2)).recip();
+        let pulls: Vec<f32> = self.start.iter().map(precision).collect();
+        for _ in 0..MOST_SWEEPS {
+            let mut gained = 0.0_f32;
+            for link in 0..self.values.len() {
+                let curvature = self.gram[(link, link)] + pulls[link];
+                let before = self.values[link];
+                let slope = slopes[link] - pulls[link] * (before - self.start[link]);
+                let next = (before + slope / curvature).max(0.0);
+                let step = next - before;
+                if step != 0.0 {
+                    self.values[link] = next;
+                    axpy(&mut slopes, -step, self.gram.column(link).data.into_slice());
+                    gained = gained.max(step * step * curvature);
+                }
+            }
+            if gained < LEAST_GAIN {
+                break;
+            }
+        }
+    }
+}
+
+/// The series of a block.
+pub(super) fn series(sources: &DMatrix<f32>, block: usize) -> &[f32] {
+    let length = sources.nrows();
+    &sources.as_slice()[block * length..][..length]
+}
+
+/// Sums side by side, which the processor can add at once.
+const LANES: usize = 16;
+
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let (whole, rest) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let mut sum: f32 = whole
+        .remainder()
+        .iter()
+        .zip(rest.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in whole.zip(rest) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sum += sums.iter().sum::<f32>();
+    sum
+}
+
+/// `sum weight a^2`.
+fn weighted_square(a: &[f32], weights: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    let (whole, rest) = (a.chunks_exact(LANES), weights.chunks_exact(LANES));
+    let pairs = whole.remainder().iter().zip(rest.remainder());
+    let sum: f32 = pairs.map(|(a, w)| w * a * a).sum();
+    for (a, w) in whole.zip(rest) {
+        for lane in 0..LANES {
+            sums[lane] += w[lane] * a[lane] * a[lane];
+        }
+    }
+    sum + sums.iter().sum::<f32>()
+}
+
+pub(super) fn axpy(y: &mut [f32], by: f32, x: &[f32]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += by * x;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use iltm_runtime::Grid;
+
+    /// Light of 8 x 8 cells in so many photographs, by block.
+    fn sources(tree: &Quadtree, photographs: usize) -> DMatrix<f32> {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut sources = DMatrix::zeros(photographs, tree.blocks());
+        for cell in 0..tree.cells() {
+            sources
+                .column_mut(cell)
+                .apply(|light| *light = random.f32() - 0.5);
+        }
+        tree.sum_cells(&mut sources);
+        sources
+    }
+
+    fn fitted(tree: &Quadtree, sources: &DMatrix<f32>, wanted: &[f32], noise: f32) -> Row {
+        let mut own = series(sources, 0).to_vec();
+        let norm = dot(&own, &own).sqrt();
+        for value in &mut own {
+            *value /= norm;
+        }
+        let mut target = Target {
+            tree,
+            sources,
+            precision: vec![noise.recip(); wanted.len()],
+            wanted: wanted.iter().map(|value| value / noise).collect(),
+            own: vec![own],
+            prior: Prior {
+                relative: 0.7,
+                absolute: 0.01,
+            },
+        };
+        let top: Vec<usize> = tree.level(tree.levels() - 1).collect();
+        let start = Row {
+            values: vec![0.0; top.len()],
+            blocks: top,
+        };
+        target.fit(&start, None, true)
+    }
+
+    #[test]
+    fn blocks_are_split_down_to_the_cell_that_lights_the_row_and_nowhere_else() {
+        let tree = Quadtree::new(Grid::new(8, 8).unwrap());
+        let sources = sources(&tree, 200);
+        // Cell 0 is the row's own, which gains explain.
+        let wanted: Vec<f32> = (series(&sources, 45).iter().zip(series(&sources, 0)))
+            .map(|(light, own)| 0.05 * light + 3.0 * own)
+            .collect();
+        let row = fitted(&tree, &sources, &wanted, 1e-3);
+        let mut covered: Vec<usize> = row.blocks.iter().flat_map(|b| tree.cells_of(*b)).collect();
+        covered.sort_unstable();
+        assert!(covered.into_iter().eq(0..64));
+        assert!(row.blocks.contains(&45), "{row:?}");
+        assert!(row.blocks.len() < 16, "{row:?}");
+        for (block, value) in row.blocks.iter().zip(&row.values) {
+            let wanted = if *block == 45 { 0.05 } else { 0.0 };
+            assert!((value - wanted).abs() < 2e-3, "{block}: {value}");
+        }
+    }
+
+    #[test]
+    fn noise_alone_splits_little_and_light_that_is_missing_makes_no_link() {
+        let tree = Quadtree::new(Grid::new(8, 8).unwrap());
+        let sources = sources(&tree, 200);
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut noise = || (0..12).map(|_| random.f32()).sum::<f32>() - 6.0;
+        let wanted: Vec<f32> = (series(&sources, 45).iter())
+            .map(|light| 1e-2 * noise() - 0.05 * light)
+            .collect();
+        let row = fitted(&tree, &sources, &wanted, 1e-2);
+        assert!(row.values.iter().all(|value| *value >= 0.0));
+        assert!(row.cells(&tree).all(|(cell, _)| cell != 45), "{row:?}");
+        assert!(row.blocks.len() < 32, "{row:?}");
+    }
+
+    #[test]
+    fn the_mean_of_rows_is_over_the_blocks_of_the_first() {
+        let tree = Quadtree::new(Grid::new(4, 4).unwrap());
+        let row = |blocks: Vec<usize>, values: Vec<f32>| Row { blocks, values };
+        // 16 to 19 are the blocks of 2 x 2 cells; 16 has cells 0, 1, 4 and 5.
+        let first = row(vec![16, 17, 18, 19], vec![4.0, 0.0, 0.0, 0.0]);
+        let finer = row(
+            vec![0, 1, 4, 5, 17, 18, 19],
+            vec![4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        );
+        let mean = Row::mean(&tree, &[(&first, 3.0), (&finer, 1.0)]).unwrap();
+        assert_eq!(mean, [3.25, 0.25, 0.0, 0.0]);
+        let mean = Row::mean(&tree, &[(&finer, 1.0), (&first, 1.0)]).unwrap();
+        assert_eq!(mean, [4.0, 2.0, 2.0, 2.0, 0.5, 0.0, 0.0]);
+        assert_eq!(Row::mean(&tree, &[]), None);
+    }
+}
