@@ -46,7 +46,7 @@ fn error_of(input: impl Fn(&DMatrix<f64>) -> DMatrix<f64>, white: f64) -> f64 {
 
 fn learned(method: Method) -> (InverseTransport, f64) {
     let options = SolveOptions {
-        method,
+        method: Some(method),
         ..SolveOptions::default()
     };
     let solved = solve(measurements(), &options, &Silent).expect("the sample can be solved");
