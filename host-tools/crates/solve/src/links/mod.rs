@@ -69,7 +69,7 @@ pub(super) fn links(
     progress: &dyn Progress,
 ) -> Solution {
     let data = Data::new(prepared, tree, chosen);
-    let mut state = data.start();
+    let mut state = data.first_state();
     let top = tree.levels() - 1;
     for (sweep, coarsest) in [top, SECOND_SWEEP.min(top)].into_iter().enumerate() {
         for level in (0..=coarsest).rev() {
@@ -130,14 +130,9 @@ impl<'d> Data<'d> {
         channel * self.photographs..(channel + 1) * self.photographs
     }
 
-    fn start(&self) -> State {
-        let top: Vec<usize> = self.tree.level(self.tree.levels() - 1).collect();
-        let row = Row {
-            values: vec![0.0; top.len()],
-            blocks: top,
-        };
+    fn first_state(&self) -> State {
         let mut state = State {
-            rows: vec![row; self.tree.blocks()],
+            rows: vec![self.dark(); self.tree.blocks()],
             gains: vec![vec![0.0; self.tree.cells()]; self.channels()],
             scales: vec![1.0; self.channels()],
         };
@@ -154,28 +149,32 @@ impl<'d> Data<'d> {
                 let Some(mut target) = self.target(block, &channels, &sources, &state.gains) else {
                     return Row::default();
                 };
-                let around = self.tree.around(block);
-                let rows: Vec<(&Row, f32)> = (around.iter())
-                    .map(|(block, share)| (&state.rows[*block], *share))
-                    .collect();
-                let start = rows.first().map_or(&state.rows[block], |(row, _)| *row);
-                let row = if rows.is_empty() {
-                    // The coarsest blocks start anew.
-                    let top: Vec<usize> = self.tree.level(level).collect();
-                    let start = Row {
-                        values: vec![0.0; top.len()],
-                        blocks: top,
-                    };
-                    target.fit(&start, None, true)
-                } else {
-                    target.fit(start, Row::mean(self.tree, &rows), true)
-                };
+                let row = target.fit(&self.start(block, &state.rows), true);
                 progress.advance(1);
-                row
+                row.merged(self.tree)
             })
             .collect();
         for (block, row) in self.tree.level(level).zip(found) {
             state.rows[block] = row;
+        }
+    }
+
+    /// What the row of a block starts from: the mean of the rows of the blocks around it, one level
+    /// above.
+    fn start(&self, block: usize, rows: &[Row]) -> Row {
+        let around: Vec<(&Row, f32)> = (self.tree.around(block).into_iter())
+            .map(|(block, share)| (&rows[block], share))
+            .filter(|(row, _)| !row.blocks.is_empty())
+            .collect();
+        Row::mean(self.tree, &around).unwrap_or_else(|| self.dark())
+    }
+
+    /// A row without light, of the coarsest blocks.
+    fn dark(&self) -> Row {
+        let blocks: Vec<usize> = self.tree.level(self.tree.levels() - 1).collect();
+        Row {
+            values: vec![0.0; blocks.len()],
+            blocks,
         }
     }
 
@@ -370,7 +369,7 @@ impl<'d> Data<'d> {
                 for value in &mut start.values {
                     *value *= state.scales[channel];
                 }
-                target.fit(&start, None, false)
+                target.fit(&start, false)
             })
             .collect()
     }

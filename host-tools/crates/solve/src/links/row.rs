@@ -3,7 +3,7 @@
 
 use super::quadtree::Quadtree;
 use nalgebra::DMatrix;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// A split must explain as many times the noise variance, or what is left where that is more.
 const SPLIT: f32 = 5.0;
@@ -13,6 +13,8 @@ const SPLIT_TOGETHER: f32 = 0.25;
 const MOST_BLOCKS: usize = 200;
 /// Rounds of splits at most.
 const MOST_ROUNDS: usize = 40;
+/// Values that differ by at most this part are alike.
+const ALIKE: f32 = 0.1;
 /// Sweeps of coordinate descent at most, and the gain in units of the noise variance below which
 /// no sweep is worth another.
 const MOST_SWEEPS: usize = 200;
@@ -47,15 +49,49 @@ impl Row {
         }
     }
 
+    /// The same with fewer blocks: four whose values are alike become the one above them.
+    pub(super) fn merged(mut self, tree: &Quadtree) -> Self {
+        loop {
+            let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+            for (link, block) in self.blocks.iter().enumerate() {
+                if let Some(parent) = tree.parent(*block) {
+                    groups.entry(parent).or_default().push(link);
+                }
+            }
+            groups.retain(|parent, links| {
+                let values = links.iter().map(|link| self.values[*link]);
+                let (least, most) = values
+                    .fold((f32::INFINITY, 0.0_f32), |(least, most), value| {
+                        (least.min(value), most.max(value))
+                    });
+                links.len() == tree.children(*parent).count() && most - least <= ALIKE * most
+            });
+            if groups.is_empty() {
+                return self;
+            }
+            let mut kept = vec![true; self.blocks.len()];
+            for (parent, links) in groups {
+                let sum: f32 = links.iter().map(|link| self.values[*link]).sum();
+                for link in &links {
+                    kept[*link] = false;
+                }
+                self.blocks.push(parent);
+                self.values.push(sum / links.len() as f32);
+                kept.push(true);
+            }
+            let mut keep = kept.iter();
+            self.blocks.retain(|_| keep.next() == Some(&true));
+            let mut keep = kept.iter();
+            self.values.retain(|_| keep.next() == Some(&true));
+        }
+    }
+
     /// Means of several rows with shares, over the blocks of the first.
-    pub(super) fn mean(tree: &Quadtree, rows: &[(&Self, f32)]) -> Option<Vec<f32>> {
+    pub(super) fn mean(tree: &Quadtree, rows: &[(&Self, f32)]) -> Option<Self> {
         let (first, share) = rows.first()?;
         let mut mean: Vec<f32> = first.values.iter().map(|value| share * value).collect();
         let mut total = *share;
         for (row, share) in &rows[1..] {
-            if row.blocks.is_empty() {
-                continue;
-            }
             total += share;
             let links = row.blocks.iter().copied().zip(row.values.iter().copied());
             let values: HashMap<usize, f32> = links.collect();
@@ -66,7 +102,10 @@ impl Row {
         for mean in &mut mean {
             *mean /= total;
         }
-        Some(mean)
+        Some(Self {
+            blocks: first.blocks.clone(),
+            values: mean,
+        })
     }
 }
 
@@ -110,30 +149,20 @@ pub(super) struct Prior {
 }
 
 impl Target<'_> {
-    /// Fits the row that starts from `start`; or from `instead`, other values of the same blocks,
-    /// if these explain more.
-    pub(super) fn fit(&mut self, start: &Row, instead: Option<Vec<f32>>, split: bool) -> Row {
+    /// Fits the row that starts from `start`.
+    pub(super) fn fit(&mut self, start: &Row, split: bool) -> Row {
         for own in &self.own {
             let along = dot(own, &self.wanted);
             axpy(&mut self.wanted, -along, own);
         }
+        let columns = self.columns(&start.blocks);
         let mut problem = Problem {
             blocks: start.blocks.clone(),
-            columns: self.columns(&start.blocks),
-            gram: DMatrix::zeros(0, 0),
+            gram: columns.transpose() * &columns,
+            columns,
             values: start.values.clone(),
             start: start.values.clone(),
         };
-        problem.gram = problem.columns.transpose() * &problem.columns;
-        if let Some(instead) = instead {
-            let squared = |left: Vec<f32>| dot(&left, &left);
-            if squared(problem.left(&self.wanted, &instead))
-                < squared(problem.left(&self.wanted, &start.values))
-            {
-                problem.values.clone_from(&instead);
-                problem.start = instead;
-            }
-        }
         for _ in 0..MOST_ROUNDS {
             problem.descend(&self.wanted, self.prior);
             if !split || problem.blocks.len() > MOST_BLOCKS {
@@ -387,7 +416,7 @@ mod tests {
             values: vec![0.0; top.len()],
             blocks: top,
         };
-        target.fit(&start, None, true)
+        target.fit(&start, true)
     }
 
     #[test]
@@ -426,6 +455,37 @@ mod tests {
     }
 
     #[test]
+    fn blocks_whose_values_are_alike_become_the_one_above_them() {
+        let tree = Quadtree::new(Grid::new(8, 8).unwrap());
+        // 64 to 79 are the blocks of 2 x 2 cells, 80 to 83 those of 4 x 4.
+        let mut blocks: Vec<usize> = vec![0, 1, 8, 9];
+        blocks.extend(65..80);
+        let mut values = vec![1.0; blocks.len()];
+        values[0] = 0.95;
+        let merged = |values: &[f32]| {
+            let (blocks, values) = (blocks.clone(), values.to_vec());
+            let row = Row { blocks, values }.merged(&tree);
+            let mut links: Vec<(usize, f32)> = row.blocks.into_iter().zip(row.values).collect();
+            links.sort_by_key(|(block, _)| *block);
+            links
+        };
+        let even = merged(&values);
+        assert_eq!(
+            even.iter().map(|(block, _)| *block).collect::<Vec<_>>(),
+            [80, 81, 82, 83]
+        );
+        assert!((even[0].1 - (3.0 + 3.95 / 4.0) / 4.0).abs() < 1e-6);
+        // One cell is brighter: the blocks that it is in stay apart.
+        values[0] = 1.2;
+        let found = merged(&values);
+        let wanted = [0, 1, 8, 9, 65, 68, 69, 81, 82, 83];
+        assert_eq!(
+            found.iter().map(|(block, _)| *block).collect::<Vec<_>>(),
+            wanted
+        );
+    }
+
+    #[test]
     fn the_mean_of_rows_is_over_the_blocks_of_the_first() {
         let tree = Quadtree::new(Grid::new(4, 4).unwrap());
         let row = |blocks: Vec<usize>, values: Vec<f32>| Row { blocks, values };
@@ -436,9 +496,9 @@ mod tests {
             vec![4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
         );
         let mean = Row::mean(&tree, &[(&first, 3.0), (&finer, 1.0)]).unwrap();
-        assert_eq!(mean, [3.25, 0.25, 0.0, 0.0]);
+        assert_eq!(mean.values, [3.25, 0.25, 0.0, 0.0]);
         let mean = Row::mean(&tree, &[(&finer, 1.0), (&first, 1.0)]).unwrap();
-        assert_eq!(mean, [4.0, 2.0, 2.0, 2.0, 0.5, 0.0, 0.0]);
-        assert_eq!(Row::mean(&tree, &[]), None);
+        assert_eq!(mean.values, [4.0, 2.0, 2.0, 2.0, 0.5, 0.0, 0.0]);
+        assert!(Row::mean(&tree, &[]).is_none());
     }
 }
