@@ -3,7 +3,8 @@
 //! `cargo bench -p iltm --bench solve` prints one line a size: the median of a
 //! few whole solves (`lambda` by held-out photographs included) of a simulated
 //! corner with noisy photographs, the most memory that one held at a time
-//! beyond its input, and the error of natural images that are compensated with it. `cargo bench -p iltm --bench solve -- 64x64` does one size.
+//! beyond its input, and the error of natural images that are compensated with
+//! it. `cargo bench -p iltm --bench solve -- 48x64` does one size.
 
 #![allow(missing_docs)]
 
@@ -23,7 +24,7 @@ use std::time::Instant;
 use test_scene::{Corner, add_noise, patterns};
 
 /// Rows, columns, Bernoulli photographs, channels, solves.
-const SIZES: [(u16, u16, usize, usize, usize); 10] = [
+const SIZES: [(u16, u16, usize, usize, usize); 12] = [
     (13, 21, 40, 1, 7),
     (13, 21, 150, 1, 7),
     (13, 21, 300, 1, 7),
@@ -31,8 +32,10 @@ const SIZES: [(u16, u16, usize, usize, usize); 10] = [
     (16, 24, 150, 3, 3),
     (32, 32, 150, 1, 3),
     (32, 32, 300, 1, 3),
+    (24, 32, 60, 1, 3),
     (24, 32, 250, 1, 3),
     (45, 45, 300, 1, 1),
+    (48, 64, 60, 1, 1),
     (48, 64, 250, 1, 1),
 ];
 

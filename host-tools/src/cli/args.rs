@@ -337,7 +337,7 @@ pub(super) struct Solve {
     /// physics knows), `links` (the same from blocks of cells, in less time for many),
     /// `direct` (the paper's plain l1), `two-stage` (plain l1 for the transport, then
     /// its inverse) or `brute-force` (least squares for the transport); by default
-    /// `joint`, or `links` from 2048 cells and 200 photographs on
+    /// `joint`, or `links` from 2048 cells and 200 photographs on and above 6144 cells
     #[arg(long, value_parser = method(), hide_possible_values = true)]
     pub(super) method: Option<Method>,
     /// Weight of sparsity, relative to a flood photograph of mean 1; chosen by

@@ -4,9 +4,9 @@
 //! in the gains `g` alone, and `K` is geometry, one bounce, smooth and
 //! non-negative. [`Method::Joint`] looks for exactly that, over all channels and
 //! all photographs at once; [`Method::Links`] looks for it as links between blocks
-//! of cells, which takes less time for many cells; [`Method::Direct`] is the method of Chu, Ng, Pahwa,
-//! Quek, Huang, *Compressive Inverse Light Transport* (BMVC 2011), for
-//! comparison.
+//! of cells, which takes less time for many cells; [`Method::Direct`] is the method
+//! of Chu, Ng, Pahwa, Quek, Huang, *Compressive Inverse Light Transport* (BMVC
+//! 2011), for comparison.
 //!
 //! ```text
 //! observed, prepare     what is solved from, checked and scaled
@@ -27,8 +27,9 @@
 //!
 //! # Cost
 //!
-//! An iteration of [`Method::Joint`] takes `O(N^2 min(N, m))` multiplications for `N` cells and `m`
-//! photographs, memory grows as `N^2 + N m`. `docs/measured.md` has measured times
+//! An iteration of [`Method::Joint`] takes `O(N^2 min(N, m))` multiplications for
+//! `N` cells and `m` photographs, memory grows as `N^2 + N m`. What follows a solve
+//! works with all of `N^2`, whatever the method. `docs/measured.md` has measured times
 //! and memory; `cargo bench -p iltm --bench solve` repeats them.
 
 mod admm;
@@ -96,7 +97,7 @@ use iltm_capture::{Measurements, Role};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use joint::Solver;
-use links::{Quadtree, links};
+use links::links;
 use prepare::Prepared;
 use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
@@ -155,7 +156,6 @@ fn solve_judged(
     let method = options.method_for(prepared.live_cells(), prepared.roles.len());
     check_count(&prepared, method)?;
     let haar = Haar::new(observed.grid);
-    let tree = Quadtree::new(observed.grid);
     let splits = Split::all(&prepared);
     let mut seconds = Seconds {
         prepare: clock.lap(),
@@ -168,7 +168,7 @@ fn solve_judged(
     let task = Task {
         prepared: &prepared,
         haar: &haar,
-        tree: &tree,
+        grid: observed.grid,
         splits: &splits,
         stop,
         progress,
@@ -253,7 +253,7 @@ fn clip(
 struct Task<'t> {
     prepared: &'t Prepared,
     haar: &'t Haar,
-    tree: &'t Quadtree,
+    grid: Grid,
     splits: &'t [Split],
     stop: Stop,
     progress: &'t dyn Progress,
@@ -342,7 +342,7 @@ impl<'t> Task<'t> {
             let found = match method {
                 Method::TwoStage => by_rows::two_stage(prepared, haar, chosen, stop, self.progress),
                 Method::BruteForce => by_rows::brute_force(prepared, chosen),
-                Method::Links => Ok(links(prepared, self.tree, chosen, self.progress)),
+                Method::Links => Ok(links(prepared, self.grid, chosen, self.progress)),
                 Method::Direct | Method::Joint => {
                     Ok(by_rows::direct(prepared, haar, chosen, stop, self.progress))
                 }

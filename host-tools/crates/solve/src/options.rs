@@ -92,10 +92,9 @@ impl Default for SolveOptions {
 impl SolveOptions {
     /// The method for so many live cells and photographs.
     ///
-    /// Of 1,536 cells and up to 124 photographs `joint` errs a quarter to a half less and takes
-    /// half a minute; of 3,072 cells and 256 photographs `links` errs as little and takes minutes
-    /// less. Of more than [`MOST_JOINT_CELLS`] `joint` would take more memory than most computers
-    /// have.
+    /// `docs/measured.md` compares both. On folded panels with few photographs, or with folds within
+    /// the blocks of the quadtree, `joint` errs less, so it is the default while it takes seconds. Of
+    /// more than [`MOST_JOINT_CELLS`] it would take more memory than most computers have.
     pub(super) fn method_for(&self, cells: usize, photographs: usize) -> Method {
         let many = cells >= MANY_CELLS && photographs >= MANY_PHOTOGRAPHS;
         match self.method {

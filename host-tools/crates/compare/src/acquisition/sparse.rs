@@ -53,7 +53,12 @@ impl Acquisition for Sparse {
                 Method::Joint | Method::Links | Method::Direct => Citation::THE_PAPER,
             },
             how: match self.method {
-                Method::Joint | Method::Links => {
+                Method::Links => {
+                    "White, Gray code and Bernoulli photographs; gains apart from a non-negative \
+                     operator of links between blocks of cells, refined where that explains more \
+                     than noise."
+                }
+                Method::Joint => {
                     "White, Gray code and Bernoulli photographs; gains apart from a non-negative \
                      operator that is sparse in Haar; sparsity chosen by photographs held out."
                 }

@@ -304,6 +304,27 @@ mod tests {
     use iltm_picture::Samples;
 
     #[test]
+    fn a_pixel_that_is_not_compared_shows_those_beside_it_and_none_beyond_the_picture_does() {
+        let size = FrameSize::new(5, 3).unwrap();
+        let mut compared = vec![false; 15];
+        let mut plane = vec![0.0; 15];
+        // The left 3 x 3 pixels but for their middle.
+        for at in [0, 1, 2, 5, 7, 10, 11, 12] {
+            compared[at] = true;
+            plane[at] = if at < 3 { 0.8 } else { 0.4 };
+        }
+        let mut wanted = plane.clone();
+        wanted[6] = (3.0 * 0.8 + 5.0 * 0.4) / 8.0;
+        for (at, (found, wanted)) in filled(size, &plane, &compared)
+            .iter()
+            .zip(wanted)
+            .enumerate()
+        {
+            assert!((found - wanted).abs() < 1e-6, "{at}: {found} {wanted}");
+        }
+    }
+
+    #[test]
     fn a_map_shows_every_cell_in_its_place() {
         let grid = Grid::new(2, 3).unwrap();
         let scale = ColourScale::linear(Palette::Magma, 1.0);

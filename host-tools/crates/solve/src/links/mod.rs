@@ -5,21 +5,21 @@
 //! Salzman, Aupperle, *A Rapid Hierarchical Radiosity Algorithm*, 1991), but found from
 //! photographs. Receiving blocks are solved from the coarsest level down to the cells, each for
 //! itself: its row is a small non-negative least-squares problem over source blocks
-//! ([`row`]) that starts from the row of the block above it and is pulled towards that. A source
-//! block is split where that explains more than noise. Gains follow from the rows after each
-//! level.
+//! ([`row`]) that starts from the mean of the rows around it, one level above, and is pulled towards
+//! that. A source block is split where that explains more than noise. Gains follow from the rows
+//! after each level.
 
 mod quadtree;
 mod row;
-
-pub(super) use quadtree::Quadtree;
 
 use super::convergence::Convergence;
 use super::joint::Photographs;
 use super::prepare::Prepared;
 use super::solution::{Channel, Solution};
 use iltm_picture::progress::Progress;
+use iltm_runtime::Grid;
 use nalgebra::DMatrix;
+use quadtree::Quadtree;
 use rayon::prelude::*;
 use row::{Prior, Row, Target, axpy, dot, series};
 
@@ -29,7 +29,7 @@ const SECOND_SWEEP: usize = 3;
 /// Weight of a series' mean square beside that of its variance: errors of coarse blocks are much
 /// alike in all photographs.
 const MEAN_WEIGHT: f32 = 0.03;
-/// Deviation of a value from that of the block above, as a part of it.
+/// Deviation of a value from where it starts, as a part of it.
 const RELATIVE: f32 = 0.7;
 /// The same of values that are zero, in those of a row that spreads all light evenly.
 const ABSOLUTE: f32 = 0.1;
@@ -64,11 +64,12 @@ struct State {
 /// Solves from the photographs `chosen`.
 pub(super) fn links(
     prepared: &Prepared,
-    tree: &Quadtree,
+    grid: Grid,
     chosen: &[usize],
     progress: &dyn Progress,
 ) -> Solution {
-    let data = Data::new(prepared, tree, chosen);
+    let tree = Quadtree::new(grid);
+    let data = Data::new(prepared, &tree, chosen);
     let mut state = data.first_state();
     let top = tree.levels() - 1;
     for (sweep, coarsest) in [top, SECOND_SWEEP.min(top)].into_iter().enumerate() {
@@ -87,7 +88,7 @@ impl<'d> Data<'d> {
     fn new(prepared: &'d Prepared, tree: &'d Quadtree, chosen: &[usize]) -> Self {
         let (photographs, channels) = (chosen.len(), prepared.light.len());
         let length = photographs * channels;
-        let fill = |columns: usize, of: &(dyn Fn(usize) -> DMatrix<f64> + Sync)| {
+        let fill = |columns: usize, of: &dyn Fn(usize) -> DMatrix<f64>| {
             let mut filled = DMatrix::zeros(length, columns);
             for channel in 0..channels {
                 let matrix = of(channel);
@@ -132,7 +133,7 @@ impl<'d> Data<'d> {
 
     fn first_state(&self) -> State {
         let mut state = State {
-            rows: vec![self.dark(); self.tree.blocks()],
+            rows: vec![Row::default(); self.tree.blocks()],
             gains: vec![vec![0.0; self.tree.cells()]; self.channels()],
             scales: vec![1.0; self.channels()],
         };
@@ -344,10 +345,7 @@ impl<'d> Data<'d> {
             coefficients: shared.iter().filter(|value| **value != 0.0).count(),
             shared,
             channels,
-            convergence: Convergence {
-                iterations: 2,
-                ..Convergence::best()
-            },
+            convergence: Convergence::best(),
         }
     }
 

@@ -10,7 +10,7 @@ const LEAST_SIDE: usize = 2;
 
 /// The blocks of all levels, numbered from the cells up, each level by rows.
 #[derive(Clone, Debug)]
-pub(in super::super) struct Quadtree {
+pub(super) struct Quadtree {
     levels: Vec<Level>,
     /// The block above each, of all but the coarsest.
     parents: Vec<usize>,
@@ -32,7 +32,7 @@ impl Level {
 }
 
 impl Quadtree {
-    pub(in super::super) fn new(grid: Grid) -> Self {
+    pub(super) fn new(grid: Grid) -> Self {
         let mut level = Level {
             rows: grid.rows(),
             cols: grid.cols(),

@@ -3,7 +3,7 @@
 
 use super::quadtree::Quadtree;
 use nalgebra::DMatrix;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// A split must explain as many times the noise variance, or what is left where that is more.
 const SPLIT: f32 = 5.0;
@@ -69,20 +69,17 @@ impl Row {
             if groups.is_empty() {
                 return self;
             }
-            let mut kept = vec![true; self.blocks.len()];
-            for (parent, links) in groups {
-                let sum: f32 = links.iter().map(|link| self.values[*link]).sum();
-                for link in &links {
-                    kept[*link] = false;
-                }
-                self.blocks.push(parent);
-                self.values.push(sum / links.len() as f32);
-                kept.push(true);
-            }
-            let mut keep = kept.iter();
-            self.blocks.retain(|_| keep.next() == Some(&true));
-            let mut keep = kept.iter();
-            self.values.retain(|_| keep.next() == Some(&true));
+            let gone: HashSet<usize> = groups.values().flatten().copied().collect();
+            let mean = |links: &[usize]| {
+                let values = links.iter().map(|link| self.values[*link]);
+                values.sum::<f32>() / links.len() as f32
+            };
+            let kept = (0..self.blocks.len())
+                .filter(|link| !gone.contains(link))
+                .map(|link| (self.blocks[link], self.values[link]));
+            let merged = groups.iter().map(|(parent, links)| (*parent, mean(links)));
+            let (blocks, values) = kept.chain(merged).unzip();
+            self = Self { blocks, values };
         }
     }
 
@@ -220,7 +217,7 @@ impl Target<'_> {
             for child in self.tree.children(*block) {
                 let source = series(self.sources, child);
                 let along: f32 = own.iter().map(|own| dot(own, source).powi(2)).sum();
-                let square = weighted_square(source, &squares) - along;
+                let square = sum(source, &squares, |light, square| square * light * light) - along;
                 let slope = dot(&left, source);
                 if square > 0.0 && (*value > 0.0 || slope > 0.0) {
                     explained += slope * slope / square;
@@ -338,36 +335,22 @@ pub(super) fn series(sources: &DMatrix<f32>, block: usize) -> &[f32] {
 /// Sums side by side, which the processor can add at once.
 const LANES: usize = 16;
 
-pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
+/// `sum of(a, b)` over the pairs of two series.
+fn sum(a: &[f32], b: &[f32], of: impl Fn(f32, f32) -> f32) -> f32 {
     let mut sums = [0.0_f32; LANES];
-    let (whole, rest) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let mut sum: f32 = whole
-        .remainder()
-        .iter()
-        .zip(rest.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in whole.zip(rest) {
+    let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest = a.remainder().iter().zip(b.remainder());
+    let rest: f32 = rest.map(|(a, b)| of(*a, *b)).sum();
+    for (a, b) in a.zip(b) {
         for lane in 0..LANES {
-            sums[lane] += a[lane] * b[lane];
+            sums[lane] += of(a[lane], b[lane]);
         }
     }
-    sum += sums.iter().sum::<f32>();
-    sum
+    rest + sums.iter().sum::<f32>()
 }
 
-/// `sum weight a^2`.
-fn weighted_square(a: &[f32], weights: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    let (whole, rest) = (a.chunks_exact(LANES), weights.chunks_exact(LANES));
-    let pairs = whole.remainder().iter().zip(rest.remainder());
-    let sum: f32 = pairs.map(|(a, w)| w * a * a).sum();
-    for (a, w) in whole.zip(rest) {
-        for lane in 0..LANES {
-            sums[lane] += w[lane] * a[lane] * a[lane];
-        }
-    }
-    sum + sums.iter().sum::<f32>()
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
+    sum(a, b, |a, b| a * b)
 }
 
 pub(super) fn axpy(y: &mut [f32], by: f32, x: &[f32]) {
