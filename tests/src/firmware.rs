@@ -397,7 +397,7 @@ pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) ->
     let cells = grid.cells();
     let mut inverse = wedge(grid, channels);
     if !effects.operator {
-        inverse.shared.fill(0.0);
+        inverse.shared *= 0.0;
     }
     for (index, channel) in inverse.channels.iter_mut().enumerate() {
         for gain in &mut channel.gain {
@@ -411,10 +411,11 @@ pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) ->
             };
         }
         channel.deviation = effects.deviation.then(|| {
-            nalgebra::DMatrix::from_fn(cells, cells, |i, j| {
+            let deviation = nalgebra::DMatrix::from_fn(cells, cells, |i, j| {
                 let chosen = i != j && (i + 5 * j + index).is_multiple_of(23);
                 if chosen { 0.003 * random.f64() } else { 0.0 }
-            })
+            });
+            deviation.into()
         });
     }
     let (rows, cols) = (2 * grid.rows() + 1, 3 * grid.cols());

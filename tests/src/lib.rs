@@ -113,20 +113,21 @@ pub fn wedge(grid: Grid, channels: usize) -> InverseTransport {
         gain: (0..cells).map(|cell| 1.0 / albedo(channel, cell)).collect(),
         scale: if channel == 2 { 0.5 } else { 1.0 },
         deviation: (channel == 2).then(|| {
-            DMatrix::from_fn(cells, cells, |i, j| {
+            let added = DMatrix::from_fn(cells, cells, |i, j| {
                 if i != j && (i + 3 * j).is_multiple_of(17) {
                     0.002
                 } else {
                     0.0
                 }
-            })
+            });
+            added.into()
         }),
         ambient: vec![0.01; cells],
     };
     InverseTransport {
         grid,
         live: vec![true; cells],
-        shared,
+        shared: shared.into(),
         channels: (0..channels).map(of_channel).collect(),
     }
 }

@@ -76,8 +76,7 @@ pub fn errors(scene: &CoaxialScene, found: &InverseTransport) -> LoopErrors {
 
 /// `diag(g) - K` of the first channel.
 pub fn dense(found: &InverseTransport) -> DMatrix<f64> {
-    let channel = found.channel(0);
-    DMatrix::from_diagonal(&channel.gain) - channel.operator
+    found.channel(0).dense()
 }
 
 /// What projected images are judged by.

@@ -112,7 +112,7 @@ fn reference_white_is_reached_by_every_cell_and_exactly_by_one() {
 fn a_scene_without_interreflection_has_a_table_without_operator() {
     let grid = grid(4, 5);
     let mut inverse = wedge(grid, 1);
-    inverse.shared.fill(0.0);
+    inverse.shared *= 0.0;
     inverse.channels[0].ambient.fill(0.0);
     let options = iltm::compile::CompileOptions::default();
     let compiled = iltm::compile::compile(&inverse, None, &options).expect("a plain scene");

@@ -129,7 +129,7 @@ fn error(measured: &Measurements, mix: [[f64; 3]; 3]) -> f64 {
     let shown = [0, 1, 2].map(|channel| {
         let wanted = &wanted[channel];
         let gain = DVector::from_vec(inverse.channels[channel].gain.clone());
-        let input = gain.component_mul(wanted) - inverse.channel(channel).operator * wanted;
+        let input = gain.component_mul(wanted) - &inverse.channel(channel).operator * wanted;
         let scene = scene();
         let bounced = BOUNCED[channel];
         DVector::from_fn(cells, |cell, _| {

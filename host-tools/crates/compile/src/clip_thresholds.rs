@@ -9,8 +9,8 @@
 use super::{CompileError, FineGains};
 use iltm_picture::{Lattice, LightPicture};
 use iltm_runtime::FrameSize;
-use iltm_solve::InverseTransport;
-use nalgebra::{DMatrix, DVector};
+use iltm_solve::{Interreflection, InverseTransport};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 /// What of the content is cut.
@@ -41,7 +41,7 @@ pub struct ClipThresholds {
 #[derive(Debug)]
 struct Channel {
     gain: Vec<f64>,
-    operator: DMatrix<f64>,
+    operator: Interreflection,
     /// `t` of every sample.
     offset: Vec<f64>,
 }
@@ -81,7 +81,7 @@ impl ClipThresholds {
             let operator = inverse.channel(index).operator;
             let ambient = DVector::from_column_slice(&own.ambient);
             let driven = DVector::from_column_slice(&own.gain).component_mul(&ambient);
-            let offset = lattice.expand((driven - &operator * ambient).as_slice());
+            let offset = lattice.expand((driven - &operator * &ambient).as_slice());
             Channel {
                 offset: offset.into_iter().map(f64::from).collect(),
                 gain,
@@ -121,7 +121,7 @@ impl ClipThresholds {
 
     fn of_plane(&self, channel: &Channel, light: &[f32]) -> Vec<f32> {
         let cells = self.lattice.average(light);
-        let received = &channel.operator * DVector::from_column_slice(&cells);
+        let received = &channel.operator * &DVector::from_column_slice(&cells);
         let received = self.lattice.expand(received.as_slice());
         let samples = channel
             .gain

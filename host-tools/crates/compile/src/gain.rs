@@ -67,12 +67,11 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
                 cell_light[cell_of(index)] += f64::from(*light) / (wide * tall) as f64;
             }
             let operator = inverse.channel(index).operator;
-            let bounces = operator.iter().any(|entry| *entry != 0.0);
-            let numerator: Vec<f64> = if !flood.mapped || !bounces {
+            let numerator: Vec<f64> = if !flood.mapped || operator.is_none() {
                 let lit = channel.gain.iter().zip(observed);
                 lit.map(|(gain, light)| gain * light).collect()
             } else {
-                let bounced = operator * DVector::from_column_slice(observed);
+                let bounced = &operator * &DVector::from_column_slice(observed);
                 bounced.iter().map(|bounced| 1.0 + bounced).collect()
             };
             let interpolate = |index: usize| {

@@ -7,7 +7,7 @@
 //! entries of the shared operator and those that one channel adds stand in one
 //! queue: an entry is worth what it changes per multiplication.
 
-use iltm_solve::{Haar, IMAGES, Inverse, InverseTransport};
+use iltm_solve::{Haar, IMAGES, Interreflection, Inverse, InverseTransport};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -104,22 +104,14 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]
 /// All non-zero entries, most useful first.
 fn queue(inverse: &InverseTransport, haar: &Haar, sigma: &DVector<f64>) -> Vec<Entry> {
     let mut entries = Vec::new();
-    let mut add = |part: Part, operator: &DMatrix<f64>| {
-        let transformed = haar.analyse_operator(operator);
-        let largest = transformed.amax();
-        for (col, column) in transformed.column_iter().enumerate() {
-            for (row, value) in column.iter().enumerate() {
-                // Rounding of the transform itself is not an entry.
-                if value.abs() > 1e-12 * largest {
-                    entries.push(Entry {
-                        part,
-                        row,
-                        col,
-                        value: *value,
-                    });
-                }
-            }
-        }
+    let mut add = |part: Part, operator: &Interreflection| {
+        let found = operator.haar_coefficients(haar).into_iter();
+        entries.extend(found.map(|coefficient| Entry {
+            part,
+            row: coefficient.row as usize,
+            col: coefficient.col as usize,
+            value: coefficient.value,
+        }));
     };
     add(Part::Shared, &inverse.shared);
     for (index, channel) in inverse.channels.iter().enumerate() {

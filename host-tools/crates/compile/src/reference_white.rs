@@ -4,6 +4,7 @@ use super::clip_thresholds::{ClipThresholds, Cut};
 use super::{CompileError, FineGains};
 use iltm_picture::LightPicture;
 use iltm_solve::InverseTransport;
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// What reference white is asked for, if not the brightest even grey that every live cell
@@ -123,19 +124,18 @@ impl ReferenceWhite {
 #[must_use]
 pub fn uniform_white(inverse: &InverseTransport) -> Option<f64> {
     let mut lowest: Option<f64> = None;
+    let cells = inverse.grid.cells();
+    let live = |cell: usize| inverse.live.get(cell).copied().unwrap_or(false);
     for (index, channel) in inverse.channels.iter().enumerate() {
-        let operator = inverse.channel(index).operator;
-        let live = |cell: usize| inverse.live.get(cell).copied().unwrap_or(false);
-        for cell in (0..inverse.grid.cells()).filter(|cell| live(*cell)) {
-            let row = operator.row(cell);
-            let (mut slope, mut offset) = (
-                channel.gain[cell],
-                channel.gain[cell] * channel.ambient[cell],
-            );
-            for (source, value) in row.iter().enumerate().filter(|(source, _)| live(*source)) {
-                slope -= value;
-                offset -= value * channel.ambient[source];
-            }
+        // Even light, and what is there under black.
+        let light = DMatrix::from_fn(cells, 2, |cell, column| match column {
+            _ if !live(cell) => 0.0,
+            0 => 1.0,
+            _ => channel.ambient[cell],
+        });
+        let drive = inverse.channel(index).apply(&light);
+        for cell in (0..cells).filter(|cell| live(*cell)) {
+            let (slope, offset) = (drive[(cell, 0)], drive[(cell, 1)]);
             if slope <= 0.0 {
                 continue;
             }

@@ -19,7 +19,7 @@ use iltm_runtime::{
     placement::ProjectorPixels,
     units::Light,
 };
-use iltm_solve::{InverseTransport, natural_images};
+use iltm_solve::{Interreflection, InverseTransport, natural_images};
 use std::ops::Range;
 use thiserror::Error;
 
@@ -256,12 +256,12 @@ fn check_options(options: &CompileOptions) -> Result<(), CompileError> {
 fn check_finite(inverse: &InverseTransport) -> Result<(), CompileError> {
     let refuse = |place| Err(CompileError::NotFinite { place });
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-    if !finite(inverse.shared.as_slice()) {
+    if !inverse.shared.is_finite() {
         return refuse("the shared operator");
     }
     for channel in &inverse.channels {
         let deviation = channel.deviation.as_ref();
-        if !deviation.is_none_or(|matrix| finite(matrix.as_slice())) || !channel.scale.is_finite() {
+        if !deviation.is_none_or(Interreflection::is_finite) || !channel.scale.is_finite() {
             return refuse("a channel's operator");
         }
         if !finite(&channel.gain) {

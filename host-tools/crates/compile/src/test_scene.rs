@@ -22,7 +22,7 @@ pub(crate) fn inverse(
     InverseTransport {
         grid,
         live: vec![true; cells],
-        shared: DMatrix::from_fn(cells, cells, shared),
+        shared: DMatrix::from_fn(cells, cells, shared).into(),
         channels: (0..channels).map(channel).collect(),
     }
 }

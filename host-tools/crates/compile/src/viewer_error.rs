@@ -441,7 +441,7 @@ impl Scene {
                 };
                 let input: Vec<f64> = cells.iter().enumerate().map(input).collect();
                 let light = inverse.light(&DMatrix::from_column_slice(input.len(), 1, &input))?;
-                let received = &inverse.operator * light.column(0);
+                let received = &inverse.operator * &light.column(0).into_owned();
                 let bounced = self.bounced(channel, received.as_slice());
                 let seen = |(at, bounced): (usize, f64)| {
                     let gain = self.gains[channel][at].max(f64::MIN_POSITIVE);

@@ -3,7 +3,6 @@
 use iltm_picture::{ColourScale, Palette, Picture};
 use iltm_runtime::FrameSize;
 use iltm_solve::{Haar, InverseTransport};
-use nalgebra::DMatrix;
 
 /// Powers of ten below the largest coefficient that have colours of their own.
 const DECADES: i32 = 4;
@@ -41,18 +40,22 @@ impl CoefficientMap {
     #[must_use]
     pub fn new(inverse: &InverseTransport) -> Self {
         let haar = Haar::new(inverse.grid);
-        let magnitudes = haar.analyse_operator(&inverse.shared).abs();
-        let largest = magnitudes.amax();
+        let coefficients = inverse.shared.haar_coefficients(&haar);
+        let magnitudes = coefficients.iter().map(|c| c.value.abs());
+        let largest = magnitudes.fold(0.0, f64::max);
         let scale = ColourScale::logarithmic(Palette::Viridis, 1.0, DECADES);
-        let cells = magnitudes.nrows();
+        let cells = inverse.grid.cells();
         let side = cells.min(MOST_PIXELS);
         // A frame's sides fit 16 bits, since this one is at most `MOST_PIXELS`.
         let size = FrameSize::new(side as u16, side as u16);
         let size = size.unwrap_or(FrameSize::of_grid(inverse.grid));
-        let values = (0..side * side).map(|at| {
-            let value = largest_in(&magnitudes, at / side, at % side, side);
-            if largest > 0.0 { value / largest } else { 0.0 }
-        });
+        // Both axes reversed, since coefficients are numbered fine to coarse.
+        let pixel = |number: u32| ((cells - number as usize) * side - 1) / cells;
+        let mut values = vec![0.0_f64; side * side];
+        for coefficient in coefficients {
+            let value = &mut values[pixel(coefficient.row) * side + pixel(coefficient.col)];
+            *value = value.max(coefficient.value.abs() / largest);
+        }
         Self {
             picture: scale.picture(size, values),
             scale,
@@ -60,20 +63,6 @@ impl CoefficientMap {
             coefficients: cells * cells,
         }
     }
-}
-
-/// The largest coefficient in one of `side * side` pixels, both axes reversed,
-/// since coefficients are numbered fine to coarse.
-fn largest_in(magnitudes: &DMatrix<f64>, row: usize, col: usize, side: usize) -> f64 {
-    let cells = magnitudes.nrows();
-    let run = |pixel: usize| {
-        let (start, end) = (pixel * cells / side, (pixel + 1) * cells / side);
-        cells - end..cells - start
-    };
-    let (rows, cols) = (run(row), run(col));
-    magnitudes
-        .view((rows.start, cols.start), (rows.len(), cols.len()))
-        .max()
 }
 
 /// The levels, from the fineness of each coefficient in its own order.

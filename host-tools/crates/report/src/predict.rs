@@ -22,8 +22,8 @@ use iltm_runtime::{
     pipeline::prepare_pixels,
     units::{Halfword, Light},
 };
-use iltm_solve::InverseTransport;
-use nalgebra::{DMatrix, DVector};
+use iltm_solve::{Interreflection, InverseTransport};
+use nalgebra::DVector;
 
 /// Bounces after which the rest is below rounding for any scene that reflects
 /// less than 97 % of what it receives.
@@ -47,7 +47,7 @@ struct Channel {
     /// `g`, drive per reference light, one a pixel.
     gain: Vec<f32>,
     /// `K`, drive per reference light, `N x N`.
-    operator: DMatrix<f64>,
+    operator: Interreflection,
     /// `a`, relative to reference white, one a pixel.
     ambient: Vec<f32>,
 }
@@ -78,7 +78,7 @@ impl Projection {
         let planes = pixels.gain.into_iter().zip(pixels.ambient);
         let channel = |(index, (gain, ambient))| Channel {
             gain,
-            operator: inverse.channel(index).operator * white,
+            operator: &inverse.channel(index).operator * white,
             ambient,
         };
         Some(Self {
@@ -132,7 +132,7 @@ impl Projection {
 
     /// `U K l` of the cells' light.
     fn received(&self, channel: &Channel, cells: &[f64]) -> Vec<f32> {
-        let received = &channel.operator * DVector::from_column_slice(cells);
+        let received = &channel.operator * &DVector::from_column_slice(cells);
         self.lattice.expand(received.as_slice())
     }
 
@@ -302,7 +302,7 @@ mod tests {
         let grey = LightPicture::new(size, vec![vec![0.5; size.pixels()]]).unwrap();
         let bounced = projection.bounced(&grey);
         // At the grid's own size U and A do nothing: the sum of a row of K, over g.
-        let row: f64 = inverse.shared.row(11).iter().sum();
+        let row: f64 = inverse.shared.dense().row(11).iter().sum();
         let expected = row * (0.5 - ambient) / inverse.channels[0].gain[11];
         assert!((f64::from(bounced.planes()[0][11]) - expected).abs() < 1e-4);
     }

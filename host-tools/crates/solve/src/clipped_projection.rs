@@ -7,7 +7,7 @@
 //! than all interreflection. So natural images are sent through the transport
 //! that was found, with the operator, with gains alone and as they are.
 
-use super::forward::product;
+use super::forward::{Inverse, product};
 use super::gain_only::gains;
 use super::natural_images::wanted_images;
 use super::prepare::Prepared;
@@ -49,15 +49,16 @@ impl<'c> ClippedProjection<'c> {
         }
     }
 
-    /// Error with inverses, one a channel, `N x N`: on the images, and as the
+    /// Error with inverses, one a channel: on the images, and as the
     /// geometric mean with that on those a blurred projector can show.
-    pub(super) fn operator(&self, inverses: &[DMatrix<f64>]) -> (f64, f64) {
+    pub(super) fn operator(&self, inverses: &[&Inverse]) -> (f64, f64) {
+        let even = DMatrix::from_element(self.images.nrows(), 1, 1.0);
         let error = |images: &DMatrix<f64>| {
             self.error(images, |channel| {
                 let inverse = &inverses[channel];
                 // Reference white: the brightest even grey.
-                let white = inverse.column_sum().max().max(f64::MIN_POSITIVE).recip();
-                product(inverse, images) * white
+                let drive = inverse.apply(&even).max();
+                inverse.apply(images) * drive.max(f64::MIN_POSITIVE).recip()
             })
         };
         let natural = error(&self.images);

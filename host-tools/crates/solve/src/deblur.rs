@@ -9,7 +9,8 @@
 //! those that the blurred projector can show.
 
 use super::clipped_projection::ClippedProjection;
-use super::forward::product;
+use super::forward::{Inverse, product};
+use super::interreflection::Interreflection;
 use super::solution::{Candidate, Channel, drop_dead};
 use nalgebra::{DMatrix, DVector};
 
@@ -23,7 +24,7 @@ pub(super) struct Deblurred {
     /// Error on natural images.
     pub(super) error: f64,
     /// The operator all channels share, and the channels.
-    pub(super) parts: (DMatrix<f64>, Vec<Channel>),
+    pub(super) parts: (Interreflection, Vec<Channel>),
 }
 
 /// `blur` is that of live cells only; `None` if there is no channel.
@@ -34,23 +35,25 @@ pub(super) fn deblur(
     content: &ClippedProjection<'_>,
 ) -> Option<Deblurred> {
     let wholes: Vec<DMatrix<f64>> = candidates.iter().map(|c| c.inverse.dense()).collect();
-    let mut best: Option<(f64, f64, Vec<DMatrix<f64>>)> = None;
+    let mut best: Option<(f64, f64, Vec<Inverse>)> = None;
     for softness in SOFTNESS {
         let sharper = regularised_inverse(blur, softness);
-        let sharp: Vec<_> = wholes
-            .iter()
-            .map(|whole| product(&sharper, whole))
-            .collect();
-        let (natural, both) = content.operator(&sharp);
+        let sharp = wholes.iter().zip(candidates).map(|(whole, candidate)| {
+            let gain = candidate.inverse.gain.clone();
+            let operator = DMatrix::from_diagonal(&gain) - product(&sharper, whole);
+            Inverse::new(gain, operator)
+        });
+        let sharp: Vec<Inverse> = sharp.collect();
+        let (natural, both) = content.operator(&sharp.iter().collect::<Vec<_>>());
         if best.as_ref().is_none_or(|(_, least, _)| both < *least) {
             best = Some((natural, both, sharp));
         }
     }
     let (error, _, sharp) = best?;
-    let operators = sharp.iter().zip(candidates).map(|(sharp, candidate)| {
-        let mut operator = DMatrix::from_diagonal(&candidate.inverse.gain) - sharp;
+    let operators = sharp.into_iter().map(|sharp| {
+        let mut operator = sharp.operator.dense();
         drop_dead(&mut operator, live);
-        (candidate.inverse.gain.clone(), operator)
+        (sharp.gain, operator)
     });
     Some(Deblurred {
         error,
@@ -59,7 +62,7 @@ pub(super) fn deblur(
 }
 
 /// The mean operator, and each channel's own deviation from it.
-fn parts(operators: Vec<(DVector<f64>, DMatrix<f64>)>) -> (DMatrix<f64>, Vec<Channel>) {
+fn parts(operators: Vec<(DVector<f64>, DMatrix<f64>)>) -> (Interreflection, Vec<Channel>) {
     let count = operators.len() as f64;
     let cells = operators.first().map_or(0, |(gain, _)| gain.len());
     let mut shared = DMatrix::zeros(cells, cells);
@@ -70,10 +73,10 @@ fn parts(operators: Vec<(DVector<f64>, DMatrix<f64>)>) -> (DMatrix<f64>, Vec<Cha
     let channels = operators.into_iter().map(|(gain, operator)| Channel {
         gain,
         scale: 1.0,
-        deviation: (!alone).then(|| operator - &shared),
+        deviation: (!alone).then(|| Interreflection::Dense(operator - &shared)),
     });
     let channels = channels.collect();
-    (shared, channels)
+    (Interreflection::Dense(shared), channels)
 }
 
 fn regularised_inverse(blur: &DMatrix<f64>, softness: f64) -> DMatrix<f64> {

@@ -43,11 +43,11 @@ impl Flux {
     /// an even one.
     #[must_use]
     pub fn find(inverse: &InverseTransport) -> Option<Self> {
-        let shared = &inverse.shared;
-        let cells = shared.nrows();
+        let cells = inverse.shared.cells();
         if cells > MOST_CELLS {
             return None;
         }
+        let shared = inverse.shared.dense();
         let strongest = shared.iter().copied().fold(0.0, f64::max);
         let mut pairs = Vec::new();
         for i in 0..cells {
@@ -115,7 +115,7 @@ fn solve(cells: usize, pairs: &[(usize, usize, f64, f64)]) -> Option<DVector<f64
 
 #[cfg(test)]
 mod tests {
-    use super::super::ChannelInverse;
+    use super::super::{ChannelInverse, Interreflection};
     use super::*;
     use iltm_runtime::Grid;
 
@@ -130,7 +130,7 @@ mod tests {
                 0.02 / (1.0 + (rows * rows + cols * cols) as f64)
             }
         };
-        let shared = DMatrix::from_fn(48, 48, |i, j| exchange(i, j) / flux(i));
+        let shared = DMatrix::from_fn(48, 48, |i, j| exchange(i, j) / flux(i)).into();
         InverseTransport {
             grid,
             live: vec![true; 48],
@@ -164,13 +164,15 @@ mod tests {
     fn an_asymmetry_that_no_flux_explains_is_none() {
         let mut odd = inverse(|_| 1.0);
         let mut sign = 1_u64;
-        for value in &mut odd.shared {
+        let mut shared = odd.shared.dense();
+        for value in &mut shared {
             sign = sign.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             *value *= if sign >> 63 == 0 { 1.3 } else { 0.7 };
         }
+        odd.shared = shared.into();
         assert_eq!(Flux::find(&odd), None);
         let dark = InverseTransport {
-            shared: DMatrix::zeros(48, 48),
+            shared: Interreflection::none(Grid::new(6, 8).unwrap()),
             ..inverse(|_| 1.0)
         };
         assert_eq!(Flux::find(&dark), None);

@@ -6,6 +6,9 @@
 //! too slowly (a deep wedge of white paper), or the operator is no reflection
 //! (it undoes a blur as well), the system is factorised once.
 
+use super::haar::Haar;
+use super::interreflection::{Coefficient, Interreflection};
+use super::links::Links;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -31,7 +34,7 @@ pub struct Inverse {
     /// The diagonal `g`, length `N`.
     pub gain: DVector<f64>,
     /// The operator `K_c`, `N x N`.
-    pub operator: DMatrix<f64>,
+    pub operator: Interreflection,
     /// The whole inverse, factorised when first needed.
     factor: OnceLock<LU<f64, Dyn, Dyn>>,
 }
@@ -39,10 +42,10 @@ pub struct Inverse {
 impl Inverse {
     /// `diag(gain) - operator`, sizes `N` and `N x N`.
     #[must_use]
-    pub const fn new(gain: DVector<f64>, operator: DMatrix<f64>) -> Self {
+    pub fn new(gain: DVector<f64>, operator: impl Into<Interreflection>) -> Self {
         Self {
             gain,
-            operator,
+            operator: operator.into(),
             factor: OnceLock::new(),
         }
     }
@@ -50,7 +53,27 @@ impl Inverse {
     /// `diag(gain) - operator`, `N x N`.
     #[must_use]
     pub fn dense(&self) -> DMatrix<f64> {
-        DMatrix::from_diagonal(&self.gain) - &self.operator
+        DMatrix::from_diagonal(&self.gain) - self.operator.dense()
+    }
+
+    /// The projector input `T^-1 d` of each column of `wanted`, `N x n` from `N x n`.
+    #[must_use]
+    pub fn apply(&self, wanted: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut input = wanted.clone();
+        scale_rows(&mut input, &self.gain);
+        input - &self.operator * wanted
+    }
+
+    /// The elements of `W^T T^-1 W` that are not zero.
+    pub(super) fn haar_coefficients(&self, haar: &Haar) -> Vec<Coefficient> {
+        let whole = match &self.operator {
+            Interreflection::Dense(_) => Interreflection::Dense(self.dense()),
+            links @ Interreflection::Links(_) => {
+                let gain = Links::diagonal(haar.grid(), self.gain.as_slice());
+                &(links * -1.0) + &Interreflection::Links(gain)
+            }
+        };
+        whole.haar_coefficients(haar)
     }
 
     /// Why this cannot be the inverse of a real scene's transport, if so.
@@ -126,7 +149,7 @@ impl Inverse {
         scale_rows(&mut bounce, &fade);
         let mut light = bounce.clone();
         for step in 0..MOST_BOUNCES {
-            let mut next = product(&self.operator, &bounce);
+            let mut next = &self.operator * &bounce;
             scale_rows(&mut next, &fade);
             light += &next;
             let before = bounce.norm();
@@ -151,7 +174,7 @@ impl Inverse {
     /// By factorising the inverse.
     fn solved(&self, patterns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let factor = self.factor.get_or_init(|| {
-            let mut whole = -&self.operator;
+            let mut whole = -self.operator.dense();
             for (cell, gain) in self.gain.iter().enumerate() {
                 // A cell that is not live is dark whatever is projected.
                 whole[(cell, cell)] += if *gain > 0.0 { *gain } else { 1.0 };
@@ -181,17 +204,9 @@ impl Inverse {
                 0.0
             }
         });
-        let inverse = |x: &DMatrix<f64>| {
-            let mut y = x.clone();
-            scale_rows(&mut y, &self.gain);
-            y
-        };
         // With `D = diag(g)`, `T^T = (D - K^T)^-1`.
         let transposed = Self::new(self.gain.clone(), self.operator.transpose());
-        let largest_of_inverse = power(&start, |x| {
-            let y = inverse(x) - product(&self.operator, x);
-            Some(inverse(&y) - product(&transposed.operator, &y))
-        });
+        let largest_of_inverse = power(&start, |x| Some(transposed.apply(&self.apply(x))));
         let largest_of_forward = power(&start, |x| {
             let light = self.light_within(CONDITION_TOLERANCE, x)?;
             transposed.light_within(CONDITION_TOLERANCE, &light)
@@ -302,8 +317,8 @@ mod tests {
         for albedo in [0.5, 0.999] {
             let mut inverse = sphere(10, albedo);
             inverse.gain[3] = 0.0;
-            inverse.operator.row_mut(3).fill(0.0);
-            inverse.operator.column_mut(3).fill(0.0);
+            let live: Vec<bool> = (0..10).map(|cell| cell != 3).collect();
+            inverse.operator = inverse.operator.between(&live, &live);
             let light = inverse.light(&DMatrix::from_element(10, 2, 1.0)).unwrap();
             assert!(light.row(3).amax() < 1e-300);
         }

@@ -1,12 +1,13 @@
 //! Gain only: the inverse without an operator, which corrects each cell's brightness.
 
 use super::held_out;
+use super::interreflection::Interreflection;
 use super::observed::Observed;
 use super::options::GainOnly;
 use super::prepare::Prepared;
 use super::solution::{ChannelInverse, InverseTransport};
 use super::{SolveError, SolveReport};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// The inverse without an operator that `report` found best, from the same
 /// observations.
@@ -20,7 +21,6 @@ pub fn gain_only(
 ) -> Result<InverseTransport, SolveError> {
     let prepared = Prepared::new(observed)?;
     let all: Vec<usize> = (0..prepared.roles.len()).collect();
-    let cells = prepared.cells();
     let kind = report.prediction.gain_only_kind;
     let channels = observed.channels.iter().enumerate();
     let channels = channels.map(|(index, channel)| ChannelInverse {
@@ -35,7 +35,7 @@ pub fn gain_only(
     Ok(InverseTransport {
         grid: observed.grid,
         live: prepared.live.clone(),
-        shared: DMatrix::zeros(cells, cells),
+        shared: Interreflection::none(observed.grid),
         channels: channels.collect(),
     })
 }

@@ -14,6 +14,7 @@ use super::data_term::DataTerm;
 use super::forward::product;
 use super::haar::Haar;
 use super::held_out::{Judged, Split, squared_light, squared_misfit};
+use super::interreflection::Interreflection;
 use super::prepare::Prepared;
 use super::report::LambdaTrial;
 use super::solution::{Channel, Solution, drop_dead_rows};
@@ -233,10 +234,11 @@ impl<'p> Solver<'p> {
         shared.apply(|value| *value = value.max(0.0));
         shared.fill_diagonal(0.0);
         drop_dead_rows(&mut shared, &self.prepared.live);
+        let shared = Interreflection::Dense(shared);
         let channels = photographs.channels().zip(&self.scales);
         let channels = channels
             .map(|((channel, sources), scale)| Channel {
-                gain: photographs.fitted_gain(channel, &(product(&shared, sources) * *scale)),
+                gain: photographs.fitted_gain(channel, &(&shared * sources * *scale)),
                 scale: *scale,
                 deviation: None,
             })
@@ -264,7 +266,7 @@ impl<'p> Solver<'p> {
                 .map(|(channel, sources)| {
                     let light = &photographs.light[channel];
                     let patterns = &photographs.patterns[channel];
-                    fitted_scale(light, &product(&shared, sources), patterns)
+                    fitted_scale(light, &(&shared * sources), patterns)
                 })
                 .collect();
             // Where the light tells nothing (no interreflection) nothing is told.
@@ -300,7 +302,7 @@ impl<'p> Solver<'p> {
             return;
         }
         for (channel, (index, sources)) in found.channels.iter_mut().zip(photographs.channels()) {
-            let own = &found.shared * channel.scale;
+            let own = found.shared.dense() * channel.scale;
             let target = &photographs.patterns[index] + product(&own, sources);
             let data = DataTerm::new(vec![sources.clone()], vec![target], &photographs.weights);
             let floor = -&own;
@@ -315,7 +317,7 @@ impl<'p> Solver<'p> {
             drop_dead_rows(&mut deviation, &self.prepared.live);
             let reflected = product(&(&own + &deviation), sources);
             channel.gain = photographs.fitted_gain(index, &reflected);
-            channel.deviation = Some(deviation);
+            channel.deviation = Some(Interreflection::Dense(deviation));
         }
     }
 }
@@ -344,8 +346,8 @@ impl Photographs {
     }
 
     /// [`Self::fitted_gain`] beside a channel's operator.
-    pub(super) fn gain(&self, channel: usize, operator: &DMatrix<f64>) -> DVector<f64> {
-        self.fitted_gain(channel, &product(operator, &self.sources[channel]))
+    pub(super) fn gain(&self, channel: usize, operator: &Interreflection) -> DVector<f64> {
+        self.fitted_gain(channel, &(operator * &self.sources[channel]))
     }
 
     /// Number and sources of each channel.

@@ -16,6 +16,7 @@
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
 //! links                 the same answer from blocks of a quadtree, for many cells
+//! interreflection       the operator that is found, dense or as links
 //! by_rows               the paper's method and others, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
 //! clipped_projection    what clipping makes of natural images
@@ -28,9 +29,10 @@
 //! # Cost
 //!
 //! An iteration of [`Method::Joint`] takes `O(N^2 min(N, m))` multiplications for
-//! `N` cells and `m` photographs, memory grows as `N^2 + N m`. What follows a solve
-//! works with all of `N^2`, whatever the method. `docs/measured.md` has measured times
-//! and memory; `cargo bench -p iltm --bench solve` repeats them.
+//! `N` cells and `m` photographs, memory grows as `N^2 + N m`. [`Method::Links`] and what
+//! follows it work with links, some 100 a cell, and never with all `N^2` elements, but for a
+//! projector out of focus and for light that hardly fades. `docs/measured.md` has measured
+//! times and memory; `cargo bench -p iltm --bench solve` repeats them.
 
 mod admm;
 mod basis_pursuit;
@@ -47,6 +49,7 @@ mod forward;
 mod gain_only;
 mod haar;
 mod held_out;
+mod interreflection;
 mod joint;
 mod links;
 mod natural_images;
@@ -76,6 +79,8 @@ pub use flux::Flux;
 pub use forward::Inverse;
 pub use gain_only::gain_only;
 pub use haar::Haar;
+pub use interreflection::{Coefficient, Interreflection};
+pub use links::Links;
 pub use natural_images::{
     DARKEST_SHOWN, DARKEST_WANTED, IMAGES, SUPERSAMPLING, fine_natural_images, natural_images,
     wanted_images,
@@ -236,7 +241,7 @@ fn clip(
         .and_then(|blur| deblur(blur, &prepared.live, candidates, &content));
     let with_operator = deblurred.as_ref().map_or_else(
         || {
-            let inverses: Vec<_> = candidates.iter().map(|c| c.inverse.dense()).collect();
+            let inverses: Vec<_> = candidates.iter().map(|c| &c.inverse).collect();
             content.operator(&inverses).0
         },
         |deblurred| deblurred.error,

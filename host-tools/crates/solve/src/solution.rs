@@ -2,7 +2,8 @@
 //! in units of [`Prepared`](super::prepare::Prepared).
 
 use super::convergence::Convergence;
-use super::forward::{Inverse, product};
+use super::forward::Inverse;
+use super::interreflection::Interreflection;
 use super::observed::Observed;
 use super::prepare::Prepared;
 use super::report::SolveReport;
@@ -24,7 +25,7 @@ pub struct InverseTransport {
     /// The interreflection operator that all channels share, `N x N`, projector
     /// white per camera unit. Its diagonal is zero unless it undoes the
     /// projector's blur as well.
-    pub shared: DMatrix<f64>,
+    pub shared: Interreflection,
     /// One entry (grey) or three (red, green, blue).
     pub channels: Vec<ChannelInverse>,
 }
@@ -38,7 +39,7 @@ pub struct ChannelInverse {
     pub scale: f64,
     /// What this channel's operator adds to the shared one, `N x N`; `None`
     /// when it is zero (a grey scene).
-    pub deviation: Option<DMatrix<f64>>,
+    pub deviation: Option<Interreflection>,
     /// Observed light under black `a`, length `N`, camera units.
     pub ambient: Vec<f64>,
 }
@@ -53,7 +54,7 @@ impl InverseTransport {
         let channel = &self.channels[index];
         let shared = &self.shared * channel.scale;
         let operator = match &channel.deviation {
-            Some(deviation) => shared + deviation,
+            Some(deviation) => &shared + deviation,
             None => shared,
         };
         Inverse::new(DVector::from_column_slice(&channel.gain), operator)
@@ -90,7 +91,7 @@ pub(super) struct Solution {
     /// are not live belong to the light that falls on them
     /// ([`Prepared::unseen`](super::prepare::Prepared::unseen)), their rows are
     /// zero.
-    pub(super) shared: DMatrix<f64>,
+    pub(super) shared: Interreflection,
     pub(super) channels: Vec<Channel>,
     /// Non-zero Haar coefficients of the operators as solved for.
     pub(super) coefficients: usize,
@@ -102,7 +103,7 @@ pub(super) struct Solution {
 pub(super) struct Channel {
     pub(super) gain: DVector<f64>,
     pub(super) scale: f64,
-    pub(super) deviation: Option<DMatrix<f64>>,
+    pub(super) deviation: Option<Interreflection>,
 }
 
 /// An inverse together with what cells that are not live throw on the others.
@@ -111,7 +112,7 @@ pub(super) struct Candidate {
     pub(super) inverse: Inverse,
     /// Columns of the operator that belong to cells that are not live; `None` if
     /// all are.
-    thrown: Option<DMatrix<f64>>,
+    thrown: Option<Interreflection>,
 }
 
 impl Candidate {
@@ -137,7 +138,7 @@ impl Candidate {
         chosen: &[usize],
     ) -> Option<DMatrix<f64>> {
         let (thrown, unseen) = (self.thrown.as_ref()?, prepared.unseen.as_ref()?);
-        Some(product(thrown, &unseen[channel].select_columns(chosen)))
+        Some(thrown * &unseen[channel].select_columns(chosen))
     }
 }
 
@@ -166,11 +167,11 @@ impl Solution {
         let channel = |(operator, gain)| Channel {
             gain,
             scale: 1.0,
-            deviation: (!alone).then(|| operator - &shared),
+            deviation: (!alone).then(|| Interreflection::Dense(operator - &shared)),
         };
         let channels = operators.into_iter().zip(gains).map(channel).collect();
         Self {
-            shared,
+            shared: Interreflection::Dense(shared),
             channels,
             coefficients,
             convergence,
@@ -181,16 +182,15 @@ impl Solution {
         let candidate = |channel: &Channel| {
             let mut operator = &self.shared * channel.scale;
             if let Some(deviation) = &channel.deviation {
-                operator += deviation;
+                operator = &operator + deviation;
             }
             let thrown = live.contains(&false).then(|| {
-                let mut thrown = operator.clone();
-                for (cell, _) in live.iter().enumerate().filter(|(_, live)| **live) {
-                    thrown.column_mut(cell).fill(0.0);
-                }
-                thrown
+                let dead: Vec<bool> = live.iter().map(|live| !live).collect();
+                operator.between(live, &dead)
             });
-            drop_dead(&mut operator, live);
+            if live.contains(&false) {
+                operator = operator.between(live, live);
+            }
             Candidate {
                 inverse: Inverse::new(channel.gain.clone(), operator),
                 thrown,
@@ -202,32 +202,25 @@ impl Solution {
     /// The inverse for light in camera units; `deblurred` is what stands for the
     /// operators and channels if it undoes the projector's blur.
     pub(super) fn in_camera_units(
-        mut self,
+        self,
         observed: &Observed<'_>,
         prepared: &Prepared,
-        deblurred: Option<(DMatrix<f64>, Vec<Channel>)>,
+        deblurred: Option<(Interreflection, Vec<Channel>)>,
     ) -> InverseTransport {
-        drop_dead(&mut self.shared, &prepared.live);
-        for deviation in self
-            .channels
-            .iter_mut()
-            .filter_map(|c| c.deviation.as_mut())
-        {
-            drop_dead(deviation, &prepared.live);
-        }
-        if let Some(deblurred) = deblurred {
-            (self.shared, self.channels) = deblurred;
-        }
-        let channels = self.channels.into_iter().zip(&observed.channels);
+        let (shared, channels) = deblurred.unwrap_or((self.shared, self.channels));
+        let live = &prepared.live;
+        let in_camera_units =
+            |operator: &Interreflection| &operator.between(live, live) * prepared.unit.recip();
+        let channels = channels.into_iter().zip(&observed.channels);
         InverseTransport {
             grid: observed.grid,
             live: prepared.live.clone(),
-            shared: self.shared / prepared.unit,
+            shared: in_camera_units(&shared),
             channels: channels
                 .map(|(channel, observed)| ChannelInverse {
                     gain: (channel.gain / prepared.unit).iter().copied().collect(),
                     scale: channel.scale,
-                    deviation: channel.deviation.map(|deviation| deviation / prepared.unit),
+                    deviation: channel.deviation.as_ref().map(in_camera_units),
                     ambient: observed.ambient.to_vec(),
                 })
                 .collect(),

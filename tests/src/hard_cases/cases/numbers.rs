@@ -7,7 +7,7 @@ use iltm::capture::Settings;
 use iltm::compile::{CompileOptions, compile};
 use iltm::progress::Silent;
 use iltm::scene::coaxial::{CoaxialScene, Panels};
-use iltm::solve::{InverseTransport, SolveOptions, solve_observed};
+use iltm::solve::{Interreflection, InverseTransport, SolveOptions, solve_observed};
 use std::path::Path;
 
 const NOT_FINITE: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
@@ -151,19 +151,24 @@ fn compiled(inverse: &InverseTransport, options: &CompileOptions) -> Result<(), 
         .map_err(|error| error.to_string())
 }
 
+/// The operator with one element of this value.
+fn with_element(operator: &Interreflection, value: f64) -> Interreflection {
+    let mut elements = operator.dense();
+    elements[(3, 4)] = value;
+    elements.into()
+}
+
 fn inverses(_: u64) -> CaseOutcome {
     let Ok((inverse, _)) = capture().solve() else {
         return CaseOutcome::new(false, "an inverse", "none");
     };
     let spoil: [fn(&mut InverseTransport, f64); 5] = [
-        |inverse, value| inverse.shared[(3, 4)] = value,
+        |inverse, value| inverse.shared = with_element(&inverse.shared, value),
         |inverse, value| inverse.channels[0].gain[3] = value,
         |inverse, value| inverse.channels[0].scale = value,
         |inverse, value| inverse.channels[0].ambient[3] = value,
         |inverse, value| {
-            let mut deviation = inverse.shared.clone();
-            deviation[(3, 4)] = value;
-            inverse.channels[0].deviation = Some(deviation);
+            inverse.channels[0].deviation = Some(with_element(&inverse.shared, value));
         },
     ];
     let mut results = Vec::new();

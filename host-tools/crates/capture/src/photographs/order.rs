@@ -12,6 +12,7 @@ use super::sampled::Sampled;
 use crate::format::sequence::Sequence;
 use iltm_picture::statistics::median;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Pixels that are given to cells.
@@ -102,8 +103,10 @@ pub(crate) fn find(sequence: &Sequence, sampled: &Sampled) -> Option<Order> {
     }
     let light = light(sampled);
     let unshifted = Assigned::new(&light, &patterns, Shift::NONE);
-    let best = Shift::all(patterns.len())
-        .map(|shift| Assigned::new(&light, &patterns, shift))
+    let shifts: Vec<Shift> = Shift::all(patterns.len()).collect();
+    let assigned = shifts.par_iter();
+    let assigned = assigned.map(|shift| Assigned::new(&light, &patterns, *shift));
+    let best = (assigned.collect::<Vec<_>>().into_iter())
         .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))
         .filter(|best| best.likelihood > LIKELIER * unshifted.likelihood)
         .unwrap_or(unshifted);
@@ -195,7 +198,8 @@ impl Assigned {
                 column /= norm;
             }
         }
-        let alike = series.tr_mul(&codes);
+        // Unlike `tr_mul` this is a blocked product.
+        let alike = series.transpose() * &codes;
         let best = (alike.row_iter().enumerate()).map(|(pixel, row)| {
             let (mut cell, mut most) = (0, f32::MIN);
             for (at, &value) in row.iter().enumerate() {

@@ -2,8 +2,8 @@
 //! at the camera's full resolution.
 
 use iltm_capture::{NO_CELL, Registration};
-use iltm_solve::InverseTransport;
-use nalgebra::{DMatrix, DVector};
+use iltm_solve::{Interreflection, InverseTransport};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// A camera pixel on the wall.
@@ -39,7 +39,7 @@ pub struct BounceOperator {
 
 #[derive(Clone, Debug)]
 struct OperatorChannel {
-    operator: DMatrix<f64>,
+    operator: Interreflection,
     /// `1 / g(x)` by place: light that is seen for light that lands.
     fade: Vec<f32>,
 }
@@ -144,7 +144,7 @@ impl BounceOperator {
     /// If there is no such channel, or not a value a pixel.
     pub(super) fn next_bounce(&self, channel: usize, light: &[f32]) -> Vec<f32> {
         let channel = &self.channels[channel];
-        let thrown = &channel.operator * self.means(light);
+        let thrown = &channel.operator * &self.means(light);
         let mut next = self.interpolated(&thrown);
         for (light, fade) in next.iter_mut().zip(&channel.fade) {
             *light *= fade;

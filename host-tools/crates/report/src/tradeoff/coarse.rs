@@ -8,9 +8,8 @@
 use iltm_compile::FineGains;
 use iltm_picture::Lattice;
 use iltm_runtime::{FrameSize, Grid};
-use iltm_solve::{ChannelInverse, InverseTransport};
+use iltm_solve::{ChannelInverse, Interreflection, InverseTransport};
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 /// The grid with one cell where there were `factor` along each side, rounded up; `None`
 /// if that leaves a side of one cell, or the grid as it was.
@@ -70,21 +69,28 @@ pub(super) fn averaged(
 }
 
 /// `A K U`, coarse cells by coarse cells.
-fn average_operator(operator: &DMatrix<f64>, lattice: &Lattice) -> DMatrix<f64> {
-    let (cells, pixels) = (lattice.cells(), operator.nrows());
-    let columns: Vec<Vec<f64>> = (0..cells)
-        .into_par_iter()
-        .map(|cell| {
+fn average_operator(operator: &Interreflection, lattice: &Lattice) -> Interreflection {
+    /// Columns at a time.
+    const COLUMNS: usize = 64;
+    let (cells, pixels) = (lattice.cells(), operator.cells());
+    let mut averaged = DMatrix::zeros(cells, cells);
+    for first in (0..cells).step_by(COLUMNS) {
+        let count = COLUMNS.min(cells - first);
+        let mut spread = DMatrix::zeros(pixels, count);
+        for (column, mut spread) in spread.column_iter_mut().enumerate() {
             let mut one = vec![0.0; cells];
-            one[cell] = 1.0;
-            let spread = lattice.expand(&one);
-            let spread = DMatrix::from_iterator(pixels, 1, spread.into_iter().map(f64::from));
-            let received = operator * spread;
+            one[first + column] = 1.0;
+            let expanded = lattice.expand(&one);
+            spread.copy_from_slice(&expanded.into_iter().map(f64::from).collect::<Vec<_>>());
+        }
+        let received = operator * &spread;
+        for (column, received) in received.column_iter().enumerate() {
             let received: Vec<f32> = received.iter().map(|light| *light as f32).collect();
-            lattice.average(&received)
-        })
-        .collect();
-    DMatrix::from_iterator(cells, cells, columns.into_iter().flatten())
+            let means = lattice.average(&received);
+            averaged.column_mut(first + column).copy_from_slice(&means);
+        }
+    }
+    averaged.into()
 }
 
 #[cfg(test)]
@@ -105,7 +111,7 @@ mod tests {
         // Every cell receives 0.01 of every one of 4 x 6: of 2 x 3, four times that.
         let (averaged, fine) =
             averaged(&inverse(4, 6, |_, _| 0.01), Grid::new(2, 3).unwrap()).unwrap();
-        let light = averaged.shared.column_sum();
+        let light = averaged.shared.dense().column_sum();
         assert!(light.iter().all(|light| (light - 0.24).abs() < 1e-6));
         assert_eq!(fine.size, FrameSize::new(6, 4).unwrap());
         assert_eq!(fine.channels[0][5], 6.0);
@@ -124,6 +130,7 @@ mod tests {
         let given = inverse(4, 4, |i, j| ((i * 7 + j * 3) % 11) as f64);
         let coarse = Grid::new(2, 2).unwrap();
         let (averaged, _) = averaged(&given, coarse).unwrap();
+        let (given, averaged) = (given.shared.dense(), averaged.shared.dense());
         // By hand: centres at 0.5 and 2.5 cells of four, so the interpolation weights of
         // the first are 1, 3/4, 1/4 and 0.
         let along = [[1.0, 0.75, 0.25, 0.0], [0.0, 0.25, 0.75, 1.0]];
@@ -132,10 +139,10 @@ mod tests {
             for i in [0, 1, 4, 5].map(|i| i + row / 2 * 8 + row % 2 * 2) {
                 for j in 0..16 {
                     let weight = along[col / 2][j / 4] * along[col % 2][j % 4];
-                    expected += given.shared[(i, j)] * weight / 4.0;
+                    expected += given[(i, j)] * weight / 4.0;
                 }
             }
-            let found = averaged.shared[(row, col)];
+            let found = averaged[(row, col)];
             assert!(
                 (found - expected).abs() < 1e-5,
                 "{row}, {col}: {found}, {expected}"

@@ -256,9 +256,10 @@ mod tests {
             channel.scale = scale;
         }
         if let Some(blue) = inverse.channels.get_mut(2) {
-            blue.deviation = Some(DMatrix::from_fn(grid.cells(), grid.cells(), |i, j| {
+            let added = DMatrix::from_fn(grid.cells(), grid.cells(), |i, j| {
                 if (i + 2 * j) % 11 == 1 { 0.003 } else { 0.0 }
-            }));
+            });
+            blue.deviation = Some(added.into());
         }
         inverse
     }

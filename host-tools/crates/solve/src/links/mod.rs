@@ -9,19 +9,26 @@
 //! that. A source block is split where that explains more than noise. Gains follow from the rows
 //! after each level.
 
+mod haar;
+mod operator;
 mod quadtree;
 mod row;
 
+pub use operator::Links;
+
 use super::convergence::Convergence;
+use super::interreflection::Interreflection;
 use super::joint::Photographs;
 use super::prepare::Prepared;
 use super::solution::{Channel, Solution};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
+use operator::Link;
 use quadtree::Quadtree;
 use rayon::prelude::*;
 use row::{Prior, Row, Target, axpy, dot, series};
+use std::sync::Arc;
 
 /// Levels above the cells from which rows are solved once more, with the gains of the first sweep.
 /// From coarser ones on they fitted the errors of gains instead.
@@ -41,7 +48,7 @@ const LEAST_NOISE: f64 = 1e-5;
 /// Photographs to solve from, as series.
 struct Data<'d> {
     prepared: &'d Prepared,
-    tree: &'d Quadtree,
+    tree: Arc<Quadtree>,
     photographs: usize,
     /// Light of all blocks, a column each: channel after channel. Means are reduced.
     sources: DMatrix<f32>,
@@ -68,10 +75,9 @@ pub(super) fn links(
     chosen: &[usize],
     progress: &dyn Progress,
 ) -> Solution {
-    let tree = Quadtree::new(grid);
-    let data = Data::new(prepared, &tree, chosen);
+    let data = Data::new(prepared, grid, chosen);
     let mut state = data.first_state();
-    let top = tree.levels() - 1;
+    let top = data.tree.coarsest();
     for (sweep, coarsest) in [top, SECOND_SWEEP.min(top)].into_iter().enumerate() {
         for level in (0..=coarsest).rev() {
             data.solve_level(level, &mut state, progress);
@@ -85,7 +91,8 @@ pub(super) fn links(
 }
 
 impl<'d> Data<'d> {
-    fn new(prepared: &'d Prepared, tree: &'d Quadtree, chosen: &[usize]) -> Self {
+    fn new(prepared: &'d Prepared, grid: Grid, chosen: &[usize]) -> Self {
+        let tree = Quadtree::new(grid);
         let (photographs, channels) = (chosen.len(), prepared.light.len());
         let length = photographs * channels;
         let fill = |columns: usize, of: &dyn Fn(usize) -> DMatrix<f64>| {
@@ -103,14 +110,14 @@ impl<'d> Data<'d> {
         };
         let cells = tree.cells();
         let mut sources = fill(tree.blocks(), &|channel| prepared.sources(channel, chosen));
-        tree.sum_cells(&mut sources);
+        row::sum_cells(&tree, &mut sources);
         let variances = DMatrix::from_fn(photographs, cells, |k, cell| {
             let least = prepared.weights.row(cell).min();
             (least / prepared.weights[(cell, chosen[k])]) as f32
         });
         Self {
             prepared,
-            tree,
+            tree: Arc::new(tree),
             photographs,
             sources,
             light: fill(cells, &|channel| {
@@ -152,7 +159,7 @@ impl<'d> Data<'d> {
                 };
                 let row = target.fit(&self.start(block, &state.rows), true);
                 progress.advance(1);
-                row.merged(self.tree)
+                row.merged(&self.tree)
             })
             .collect();
         for (block, row) in self.tree.level(level).zip(found) {
@@ -167,12 +174,12 @@ impl<'d> Data<'d> {
             .map(|(block, share)| (&rows[block], share))
             .filter(|(row, _)| !row.blocks.is_empty())
             .collect();
-        Row::mean(self.tree, &around).unwrap_or_else(|| self.dark())
+        Row::mean(&self.tree, &around).unwrap_or_else(|| self.dark())
     }
 
     /// A row without light, of the coarsest blocks.
     fn dark(&self) -> Row {
-        let blocks: Vec<usize> = self.tree.level(self.tree.levels() - 1).collect();
+        let blocks: Vec<usize> = self.tree.level(self.tree.coarsest()).collect();
         Row {
             values: vec![0.0; blocks.len()],
             blocks,
@@ -210,7 +217,7 @@ impl<'d> Data<'d> {
         }
         let length = channels.len() * self.photographs;
         let mut target = Target {
-            tree: self.tree,
+            tree: &self.tree,
             sources,
             precision: Vec::with_capacity(length),
             wanted: Vec::with_capacity(length),
@@ -319,32 +326,27 @@ impl<'d> Data<'d> {
         }
     }
 
-    /// The answer by cells, with each channel's deviation from the shared operator.
+    /// The answer, with each channel's deviation from the shared operator.
     fn solution(&self, state: &State, chosen: &[usize]) -> Solution {
-        let cells = self.tree.cells();
-        let shared = self.dense(&state.rows[..cells]);
         let photographs = Photographs::new(self.prepared, chosen);
-        let channels = (0..self.channels()).map(|channel| {
+        let rows = &state.rows[..self.tree.cells()];
+        let shared = self.operator(rows);
+        let channel = |channel: usize| {
             let scale = f64::from(state.scales[channel]);
-            let deviation = (self.channels() > 1).then(|| {
-                let rows = self.channel_rows(channel, state);
-                self.dense(&rows) - &shared * scale
-            });
-            let mut operator = &shared * scale;
-            if let Some(deviation) = &deviation {
-                operator += deviation;
-            }
+            let even = &shared * scale;
+            let own =
+                (self.channels() > 1).then(|| self.operator(&self.channel_rows(channel, state)));
             Channel {
-                gain: photographs.gain(channel, &operator),
+                gain: photographs.gain(channel, own.as_ref().unwrap_or(&even)),
                 scale,
-                deviation,
+                deviation: own.map(|own| &own + &(&even * -1.0)),
             }
-        });
-        let channels = channels.collect();
+        };
+        let links = |row: &Row| row.values.iter().filter(|value| **value != 0.0).count();
         Solution {
-            coefficients: shared.iter().filter(|value| **value != 0.0).count(),
+            channels: (0..self.channels()).map(channel).collect(),
+            coefficients: rows.iter().map(links).sum(),
             shared,
-            channels,
             convergence: Convergence::best(),
         }
     }
@@ -372,15 +374,27 @@ impl<'d> Data<'d> {
             .collect()
     }
 
-    /// `N x N`, zero on the diagonal.
-    fn dense(&self, rows: &[Row]) -> DMatrix<f64> {
-        let mut dense = DMatrix::zeros(rows.len(), rows.len());
-        for (cell, row) in rows.iter().enumerate() {
-            for (source, value) in row.cells(self.tree) {
-                dense[(cell, source)] = f64::from(value);
+    /// An operator of these rows, zero on the diagonal.
+    fn operator(&self, rows: &[Row]) -> Interreflection {
+        let rows = rows.iter().enumerate().map(|(cell, row)| {
+            let links = row.blocks.iter().zip(&row.values);
+            let links = links.filter(|(_, value)| **value != 0.0);
+            let mut links: Vec<Link> = links
+                .map(|(block, value)| Link {
+                    block: *block as u32,
+                    value: f64::from(*value),
+                })
+                .collect();
+            let holds = |link: &&Link| self.tree.holds(link.block as usize, cell);
+            if let Some(link) = links.iter().find(holds) {
+                // What a block sends to its own cell is taken away again.
+                links.push(Link {
+                    block: cell as u32,
+                    value: -link.value,
+                });
             }
-        }
-        dense.fill_diagonal(0.0);
-        dense
+            links
+        });
+        Interreflection::Links(Links::new(Arc::clone(&self.tree), rows.collect()))
     }
 }

@@ -2,19 +2,20 @@
 //! below it. Blocks at the right and lower border may have fewer.
 
 use iltm_runtime::Grid;
-use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Blocks of the coarsest level along the shorter side, at least.
+/// Blocks along the shorter side of the coarsest level that links are of, at least.
 const LEAST_SIDE: usize = 2;
 
 /// The blocks of all levels, numbered from the cells up, each level by rows.
 #[derive(Clone, Debug)]
 pub(super) struct Quadtree {
     levels: Vec<Level>,
-    /// The block above each, of all but the coarsest.
+    /// The block above each, of all but the one of all cells.
     parents: Vec<usize>,
-    blocks: usize,
+    /// Cells of each block.
+    sizes: Vec<u32>,
+    coarsest: usize,
 }
 
 /// Blocks of one size.
@@ -41,31 +42,34 @@ impl Quadtree {
         let mut tree = Self {
             levels: vec![level],
             parents: Vec::new(),
-            blocks: level.blocks().end,
+            sizes: vec![1; level.blocks().end],
+            coarsest: 0,
         };
-        loop {
+        while level.rows * level.cols > 1 {
             let above = Level {
                 rows: level.rows.div_ceil(2),
                 cols: level.cols.div_ceil(2),
-                first: tree.blocks,
+                first: tree.blocks(),
             };
-            if above.rows.min(above.cols) < LEAST_SIDE {
-                return tree;
-            }
-            for at in 0..level.rows * level.cols {
+            tree.sizes.resize(above.blocks().end, 0);
+            for (at, block) in level.blocks().enumerate() {
                 let (row, col) = (at / level.cols, at % level.cols);
                 let parent = above.first + row / 2 * above.cols + col / 2;
                 tree.parents.push(parent);
+                tree.sizes[parent] += tree.sizes[block];
             }
-            tree.blocks = above.blocks().end;
+            if above.rows.min(above.cols) >= LEAST_SIDE {
+                tree.coarsest += 1;
+            }
             tree.levels.push(above);
             level = above;
         }
+        tree
     }
 
     /// Number of blocks, cells among them.
     pub(super) const fn blocks(&self) -> usize {
-        self.blocks
+        self.sizes.len()
     }
 
     /// Number of cells.
@@ -73,9 +77,19 @@ impl Quadtree {
         self.level(0).len()
     }
 
-    /// Number of levels; the first has the cells.
+    /// Number of levels: the first has the cells, the last one block of all of them.
     pub(super) const fn levels(&self) -> usize {
         self.levels.len()
+    }
+
+    /// The coarsest level that links are of.
+    pub(super) const fn coarsest(&self) -> usize {
+        self.coarsest
+    }
+
+    /// Number of cells of a block.
+    pub(super) fn size(&self, block: usize) -> usize {
+        self.sizes[block] as usize
     }
 
     /// The blocks of a level.
@@ -88,7 +102,7 @@ impl Quadtree {
         self.levels.iter().take_while(finer).count() - 1
     }
 
-    /// The block above; `None` for one of the coarsest.
+    /// The block above; `None` for that of all cells.
     pub(super) fn parent(&self, block: usize) -> Option<usize> {
         self.parents.get(block).copied()
     }
@@ -98,8 +112,18 @@ impl Quadtree {
         (0..levels).fold(block, |block, _| self.parents[block])
     }
 
+    /// Whether a block has this cell.
+    pub(super) fn holds(&self, block: usize, cell: usize) -> bool {
+        self.ancestor(cell, self.level_of(block)) == block
+    }
+
     /// The four blocks below, fewer at the border; none below a cell.
     pub(super) fn children(&self, block: usize) -> impl Iterator<Item = usize> {
+        self.square(block).into_iter().flatten()
+    }
+
+    /// The blocks below: left above, right above, left below, right below.
+    pub(super) fn square(&self, block: usize) -> [Option<usize>; 4] {
         let level = self.level_of(block);
         let own = self.levels[level];
         let below = level.checked_sub(1).map(|below| self.levels[below]);
@@ -107,12 +131,11 @@ impl Quadtree {
             (block - own.first) / own.cols,
             (block - own.first) % own.cols,
         );
-        below.into_iter().flat_map(move |below| {
-            let places = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
-            places
-                .map(move |(down, right)| (2 * row + down, 2 * col + right))
-                .filter(move |(row, col)| *row < below.rows && *col < below.cols)
-                .map(move |(row, col)| below.first + row * below.cols + col)
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(down, right)| {
+            let below = below?;
+            let (row, col) = (2 * row + down, 2 * col + right);
+            let there = row < below.rows && col < below.cols;
+            there.then(|| below.first + row * below.cols + col)
         })
     }
 
@@ -127,22 +150,32 @@ impl Quadtree {
         blocks
     }
 
-    /// Gives each block the sum of its cells: a column of `series` each, those of cells given.
-    pub(super) fn sum_cells(&self, series: &mut DMatrix<f32>) {
-        for block in self.cells()..self.blocks {
-            let children: Vec<usize> = self.children(block).collect();
-            let sum = series.select_columns(&children).column_sum();
-            series.set_column(block, &sum);
+    /// Gives each block the sum of its cells: one value a block, those of cells given, all others
+    /// zero. `add` adds its second argument to the first.
+    pub(super) fn sum_cells<T>(&self, values: &mut [T], add: impl Fn(&mut T, &T)) {
+        for (block, parent) in self.parents.iter().enumerate() {
+            let (below, above) = values.split_at_mut(*parent);
+            add(&mut above[0], &below[block]);
+        }
+    }
+
+    /// Gives each cell the sum of all blocks that it is part of, itself among them.
+    pub(super) fn spread_to_cells<T>(&self, values: &mut [T], add: impl Fn(&mut T, &T)) {
+        for (block, parent) in self.parents.iter().enumerate().rev() {
+            let (below, above) = values.split_at_mut(*parent);
+            add(&mut below[block], &above[0]);
         }
     }
 
     /// The blocks whose centres surround that of `block`, one level above it, with their shares:
-    /// its parent (9), the two beside that which are nearer (3 each) and the one between (1).
+    /// its parent (9), the two beside that which are nearer (3 each) and the one between (1). None
+    /// surround one of the coarsest level that links are of.
     pub(super) fn around(&self, block: usize) -> Vec<(usize, f32)> {
         let level = self.level_of(block);
-        let Some(above) = self.levels.get(level + 1) else {
+        if level >= self.coarsest {
             return Vec::new();
-        };
+        }
+        let above = self.levels[level + 1];
         let own = self.levels[level];
         let (row, col) = (
             (block - own.first) / own.cols,
@@ -199,6 +232,9 @@ mod tests {
         }
         let tops = (0..tree.blocks()).filter(|b| tree.parent(*b).is_none());
         assert!(tops.eq(tree.level(tree.levels() - 1)));
+        assert_eq!(tree.size(tree.blocks() - 1), 35);
+        // 5 x 7, 3 x 4, 2 x 2.
+        assert_eq!(tree.coarsest(), 2);
     }
 
     #[test]

@@ -29,17 +29,6 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The values by cell.
-    pub(super) fn cells<'r>(
-        &'r self,
-        tree: &'r Quadtree,
-    ) -> impl Iterator<Item = (usize, f32)> + 'r {
-        let links = self.blocks.iter().zip(&self.values);
-        let links = links.filter(|(_, value)| **value != 0.0);
-        links
-            .flat_map(|(block, value)| tree.cells_of(*block).into_iter().map(|cell| (cell, *value)))
-    }
-
     /// Adds the row's light to `light`; `sources` has the series of each block.
     pub(super) fn add_light(&self, sources: &DMatrix<f32>, light: &mut [f32]) {
         for (block, value) in self.blocks.iter().zip(&self.values) {
@@ -51,10 +40,12 @@ impl Row {
 
     /// The same with fewer blocks: four whose values are alike become the one above them.
     pub(super) fn merged(mut self, tree: &Quadtree) -> Self {
+        let end = tree.level(tree.coarsest()).end;
         loop {
             let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
             for (link, block) in self.blocks.iter().enumerate() {
-                if let Some(parent) = tree.parent(*block) {
+                let parent = tree.parent(*block);
+                if let Some(parent) = parent.filter(|parent| *parent < end) {
                     groups.entry(parent).or_default().push(link);
                 }
             }
@@ -326,6 +317,13 @@ impl Problem {
     }
 }
 
+/// Gives each block the sum of the series of its cells, a column each.
+pub(super) fn sum_cells(tree: &Quadtree, sources: &mut DMatrix<f32>) {
+    let length = sources.nrows();
+    let mut series: Vec<&mut [f32]> = sources.as_mut_slice().chunks_exact_mut(length).collect();
+    tree.sum_cells(&mut series, |sum, own| axpy(sum, 1.0, own));
+}
+
 /// The series of a block.
 pub(super) fn series(sources: &DMatrix<f32>, block: usize) -> &[f32] {
     let length = sources.nrows();
@@ -373,7 +371,7 @@ mod tests {
                 .column_mut(cell)
                 .apply(|light| *light = random.f32() - 0.5);
         }
-        tree.sum_cells(&mut sources);
+        sum_cells(tree, &mut sources);
         sources
     }
 
@@ -433,7 +431,9 @@ mod tests {
             .collect();
         let row = fitted(&tree, &sources, &wanted, 1e-2);
         assert!(row.values.iter().all(|value| *value >= 0.0));
-        assert!(row.cells(&tree).all(|(cell, _)| cell != 45), "{row:?}");
+        let links = row.blocks.iter().zip(&row.values);
+        let mut lit = links.filter(|(_, value)| **value != 0.0);
+        assert!(lit.all(|(block, _)| !tree.holds(*block, 45)), "{row:?}");
         assert!(row.blocks.len() < 32, "{row:?}");
     }
 

@@ -198,11 +198,11 @@ fn largest(sensing: &Sensing) -> (usize, usize) {
 
 /// Coefficients that hold [`ENERGY`] of a row of `W^T T^-1 W`, median of the rows.
 fn effective_coefficients(inverse: &Inverse, haar: &Haar) -> usize {
-    // Rows as columns, which are contiguous.
-    let coded = haar.analyse_operator(&inverse.dense()).transpose();
-    let count = |row: usize| {
-        let row = coded.column(row);
-        let mut squares: Vec<f64> = row.iter().map(|c| c * c).collect();
+    let mut squares: Vec<Vec<f64>> = vec![Vec::new(); inverse.gain.len()];
+    for coefficient in inverse.haar_coefficients(haar) {
+        squares[coefficient.row as usize].push(coefficient.value.powi(2));
+    }
+    let count = |mut squares: Vec<f64>| {
         squares.sort_unstable_by(|a, b| b.total_cmp(a));
         let enough = ENERGY * squares.iter().sum::<f64>();
         let mut sum = 0.0;
@@ -212,9 +212,10 @@ fn effective_coefficients(inverse: &Inverse, haar: &Haar) -> usize {
         });
         last.map_or(squares.len(), |at| at + 1)
     };
-    let rows = (0..coded.ncols()).into_par_iter();
     // The row of a function on cells that took no part has no energy.
-    let live = rows.filter(|row| coded.column(*row).norm_squared() > 0.0);
+    let live = squares
+        .into_par_iter()
+        .filter(|squares| !squares.is_empty());
     let mut counts: Vec<usize> = live.map(count).collect();
     counts.sort_unstable();
     counts.get(counts.len() / 2).copied().unwrap_or(1)

@@ -172,7 +172,7 @@ impl Transported {
         let columns = transposed.light(&haar.synthesise_columns(&chosen))?;
         let condition = if pool.len() == cells {
             // W (T^T W)^T is T itself.
-            let whole = DMatrix::from_diagonal(&gain) - &inverse.operator;
+            let whole = DMatrix::from_diagonal(&gain) - inverse.operator.dense();
             norm(&haar.synthesise_columns(&columns.transpose())) * norm(&whole)
         } else {
             f64::INFINITY
