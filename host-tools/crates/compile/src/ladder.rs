@@ -7,9 +7,10 @@
 //! entries of the shared operator and those that one channel adds stand in one
 //! queue: an entry is worth what it changes per multiplication.
 
-use iltm_solve::{Haar, IMAGES, Interreflection, Inverse, InverseTransport};
+use iltm_solve::{Coefficient, Haar, IMAGES, Interreflection, Inverse, InverseTransport};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Errors that tiers aim for, each about half the one before. The third is one
 /// step of an 8-bit code.
@@ -21,6 +22,12 @@ pub const TARGETS: [f64; 6] = [
     1.0 / 1024.0,
     1.0 / 4096.0,
 ];
+
+/// Coefficients of an operator beyond which those that no tier needs stand in no queue.
+const MANY: usize = 1 << 22;
+
+/// Error of those, as a part of the finest target.
+const ASIDE: f64 = 0.05;
 
 /// Which operator an entry belongs to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -78,8 +85,9 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]
             .row_iter()
             .map(|row| row.norm() / (row.len().max(1) as f64).sqrt()),
     );
-    let mut entries = queue(inverse, &haar, &sigma);
-    let judge = Judge::new(inverse, &haar, content, &coefficients);
+    let mut judge = Judge::new(inverse, &haar, content, &coefficients);
+    let finest = targets.last().copied().unwrap_or(0.0);
+    let mut entries = queue(inverse, &sigma, finest, &mut judge);
     let all = judge.error(&entries);
     let gain_only = judge.error_as_bright_as_fits(&entries);
     let mut tiers: Vec<Tier> = Vec::new();
@@ -101,12 +109,29 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]
     }
 }
 
-/// All non-zero entries, most useful first.
-fn queue(inverse: &InverseTransport, haar: &Haar, sigma: &DVector<f64>) -> Vec<Entry> {
+/// All non-zero entries, most useful first, but those of operators with many that together err by
+/// a small part of the target `finest`: the judge counts them as never there.
+fn queue(
+    inverse: &InverseTransport,
+    sigma: &DVector<f64>,
+    finest: f64,
+    judge: &mut Judge<'_>,
+) -> Vec<Entry> {
     let mut entries = Vec::new();
+    let gains = inverse.channels.iter().flat_map(|channel| &channel.gain);
+    let gain = gains.clone().sum::<f64>() / gains.count().max(1) as f64;
+    let least = ASIDE * finest * gain * sigma.norm();
     let mut add = |part: Part, operator: &Interreflection| {
-        let found = operator.haar_coefficients(haar).into_iter();
-        entries.extend(found.map(|coefficient| Entry {
+        let mut found = operator.haar_coefficients(judge.haar);
+        if found.len() > MANY {
+            let worth = |coefficient: &Coefficient| {
+                coefficient.value.abs() * sigma[coefficient.col as usize]
+            };
+            let needed = needed_from(&found, worth, least);
+            judge.leave_out(part, found.iter().filter(|c| worth(c) < needed));
+            found.retain(|coefficient| worth(coefficient) >= needed);
+        }
+        entries.extend(found.into_iter().map(|coefficient| Entry {
             part,
             row: coefficient.row as usize,
             col: coefficient.col as usize,
@@ -129,6 +154,28 @@ fn queue(inverse: &InverseTransport, haar: &Haar, sigma: &DVector<f64>) -> Vec<E
     entries
 }
 
+/// The worth from which coefficients are needed: the squares of all that are worth less sum up to
+/// at most that of `least`. It is a power of two.
+fn needed_from(
+    coefficients: &[Coefficient],
+    worth: impl Fn(&Coefficient) -> f64,
+    least: f64,
+) -> f64 {
+    let mut squares: BTreeMap<i32, f64> = BTreeMap::new();
+    for worth in coefficients.iter().map(worth).filter(|worth| *worth > 0.0) {
+        *squares.entry(worth.log2().floor() as i32).or_default() += worth * worth;
+    }
+    let (mut sum, mut needed) = (0.0, 0.0);
+    for (power, square) in squares {
+        sum += square;
+        if sum > least * least {
+            break;
+        }
+        needed = f64::from(power + 1).exp2();
+    }
+    needed
+}
+
 /// One value for each image.
 type PerImage = [f64; IMAGES];
 
@@ -138,6 +185,8 @@ struct Judge<'a> {
     haar: &'a Haar,
     content: &'a DMatrix<f64>,
     coefficients: Vec<PerImage>,
+    /// What entries that stand in no queue would add, by channel and output coefficient.
+    left_out: Vec<Vec<PerImage>>,
 }
 
 impl<'a> Judge<'a> {
@@ -150,11 +199,27 @@ impl<'a> Judge<'a> {
         let channels = inverse.channels.iter().enumerate();
         let channels = channels.map(|(index, channel)| (channel.scale, inverse.channel(index)));
         let row = |row: usize| std::array::from_fn(|image| coefficients[(row, image)]);
+        let nothing = vec![[0.0; IMAGES]; coefficients.nrows()];
         Self {
             channels: channels.collect(),
             haar,
             content,
             coefficients: (0..coefficients.nrows()).map(row).collect(),
+            left_out: vec![nothing; inverse.channels.len()],
+        }
+    }
+
+    /// Counts entries as left out whatever the tier.
+    fn leave_out<'c>(&mut self, part: Part, entries: impl Iterator<Item = &'c Coefficient>) {
+        for coefficient in entries {
+            let inputs = &self.coefficients[coefficient.col as usize];
+            let channels = self.channels.iter().zip(&mut self.left_out).enumerate();
+            for (index, ((scale, _), left_out)) in channels {
+                let Some(factor) = factor(part, index, *scale, coefficient.value) else {
+                    continue;
+                };
+                add(&mut left_out[coefficient.row as usize], factor, inputs);
+            }
         }
     }
 
@@ -211,16 +276,14 @@ impl<'a> Judge<'a> {
     /// `None` if light grows from bounce to bounce.
     fn missing_light(&self, index: usize, left_out: &[Entry]) -> Option<DMatrix<f64>> {
         let (scale, inverse) = &self.channels[index];
-        let mut missing: Vec<PerImage> = vec![[0.0; IMAGES]; self.coefficients.len()];
+        let mut missing = self.left_out[index].clone();
         for entry in left_out {
-            let factor = match entry.part {
-                Part::Shared => scale * entry.value,
-                Part::Channel(own) if own == index => entry.value,
-                Part::Channel(_) => continue,
-            };
-            let inputs = &self.coefficients[entry.col];
-            for (missing, input) in missing[entry.row].iter_mut().zip(inputs) {
-                *missing += factor * input;
+            if let Some(factor) = factor(entry.part, index, *scale, entry.value) {
+                add(
+                    &mut missing[entry.row],
+                    factor,
+                    &self.coefficients[entry.col],
+                );
             }
         }
         let missing = DMatrix::from_fn(missing.len(), IMAGES, |row, image| missing[row][image]);
@@ -246,6 +309,21 @@ impl<'a> Judge<'a> {
     }
 }
 
+/// What an entry's input is multiplied with in a channel of this index and scale; `None` if it
+/// belongs to another one.
+fn factor(part: Part, channel: usize, scale: f64, value: f64) -> Option<f64> {
+    match part {
+        Part::Shared => Some(scale * value),
+        Part::Channel(own) => (own == channel).then_some(value),
+    }
+}
+
+fn add(sum: &mut PerImage, factor: f64, input: &PerImage) {
+    for (sum, input) in sum.iter_mut().zip(input) {
+        *sum += factor * input;
+    }
+}
+
 /// Mean over the columns of `|difference| / |wanted|`.
 #[must_use]
 pub fn relative_error(difference: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
@@ -259,4 +337,54 @@ pub fn relative_error(difference: &DMatrix<f64>, wanted: &DMatrix<f64>) -> f64 {
     };
     let columns = wanted.ncols();
     (0..columns).map(ratio).sum::<f64>() / columns.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scene::inverse;
+    use iltm_runtime::Grid;
+    use iltm_solve::natural_images;
+
+    #[test]
+    fn entries_that_stand_in_no_queue_err_as_if_they_did_and_by_no_more_than_asked() {
+        let grid = Grid::new(4, 5).unwrap();
+        let near = |i: usize, j: usize| {
+            if i == j {
+                0.0
+            } else {
+                0.3 / (i + 2 * j + 9) as f64
+            }
+        };
+        let mut scene = inverse(grid, 3, |cell, _| 2.0 + 0.1 * cell as f64, near);
+        scene.channels[1].scale = 0.7;
+        scene.channels[2].deviation = Some(&scene.shared * 0.1);
+        let haar = Haar::new(grid);
+        let content = natural_images(grid);
+        let coefficients = haar.analyse_columns(&content);
+        let sigma = DVector::from_iterator(
+            coefficients.nrows(),
+            coefficients.row_iter().map(|row| row.norm() / 4.0),
+        );
+        let mut judge = Judge::new(&scene, &haar, &content, &coefficients);
+        let entries = queue(&scene, &sigma, 0.0, &mut judge);
+        let wanted = judge.error(&entries);
+        let shared = scene.shared.haar_coefficients(&haar);
+        let worth = |c: &Coefficient| c.value.abs() * sigma[c.col as usize];
+        let all = shared.iter().map(|c| worth(c).powi(2)).sum::<f64>().sqrt();
+        let needed = needed_from(&shared, worth, 0.1 * all);
+        let less = |c: &&Coefficient| worth(c) < needed;
+        let squares: f64 = shared.iter().filter(less).map(|c| worth(c).powi(2)).sum();
+        assert!(squares > 0.0 && squares.sqrt() <= 0.1 * all, "{squares}");
+        judge.leave_out(Part::Shared, shared.iter().filter(less));
+        let others: Vec<Entry> = entries
+            .iter()
+            .filter(|e| e.part != Part::Shared || e.value.abs() * sigma[e.col] >= needed)
+            .copied()
+            .collect();
+        assert!(others.len() < entries.len());
+        assert!((judge.error(&others) - wanted).abs() < 1e-12);
+        let few = entries.len() - others.len();
+        assert!(judge.error(&[]) > 0.0, "{few} are left out");
+    }
 }
