@@ -57,8 +57,7 @@ impl Interreflection {
     }
 
     /// `K^T`.
-    #[must_use]
-    pub fn transpose(&self) -> Self {
+    pub(super) fn transpose(&self) -> Self {
         match self {
             Self::Dense(elements) => Self::Dense(elements.transpose()),
             Self::Links(links) => Self::Links(links.transpose()),
@@ -112,6 +111,15 @@ impl Interreflection {
             .fold(0.0_f64, |most, c| most.max(c.value.abs()));
         found.retain(|coefficient| coefficient.value.abs() > 1e-12 * largest);
         found
+    }
+
+    /// Without the rows and columns of cells that did not take part.
+    pub(super) fn of_live(self, live: &[bool]) -> Self {
+        if live.contains(&false) {
+            self.between(live, live)
+        } else {
+            self
+        }
     }
 
     /// The rows of the cells `to` and the columns of the cells `from` of it, the others zero.

@@ -30,8 +30,8 @@
 //!
 //! An iteration of [`Method::Joint`] takes `O(N^2 min(N, m))` multiplications for
 //! `N` cells and `m` photographs, memory grows as `N^2 + N m`. [`Method::Links`] and what
-//! follows it work with links, some 100 a cell, and never with all `N^2` elements, but for a
-//! projector out of focus and for light that hardly fades. `docs/measured.md` has measured
+//! follows it work with links and never with all `N^2` elements, but for a projector out of
+//! focus and for light that hardly fades. `docs/measured.md` has measured
 //! times and memory; `cargo bench -p iltm --bench solve` repeats them.
 
 mod admm;

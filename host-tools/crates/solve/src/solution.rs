@@ -188,9 +188,7 @@ impl Solution {
                 let dead: Vec<bool> = live.iter().map(|live| !live).collect();
                 operator.between(live, &dead)
             });
-            if live.contains(&false) {
-                operator = operator.between(live, live);
-            }
+            let operator = operator.of_live(live);
             Candidate {
                 inverse: Inverse::new(channel.gain.clone(), operator),
                 thrown,
@@ -209,18 +207,21 @@ impl Solution {
     ) -> InverseTransport {
         let (shared, channels) = deblurred.unwrap_or((self.shared, self.channels));
         let live = &prepared.live;
-        let in_camera_units =
-            |operator: &Interreflection| &operator.between(live, live) * prepared.unit.recip();
+        let in_camera_units = |operator: Interreflection| {
+            let mut operator = operator.of_live(live);
+            operator *= prepared.unit.recip();
+            operator
+        };
         let channels = channels.into_iter().zip(&observed.channels);
         InverseTransport {
             grid: observed.grid,
             live: prepared.live.clone(),
-            shared: in_camera_units(&shared),
+            shared: in_camera_units(shared),
             channels: channels
                 .map(|(channel, observed)| ChannelInverse {
                     gain: (channel.gain / prepared.unit).iter().copied().collect(),
                     scale: channel.scale,
-                    deviation: channel.deviation.as_ref().map(in_camera_units),
+                    deviation: channel.deviation.map(in_camera_units),
                     ambient: observed.ambient.to_vec(),
                 })
                 .collect(),

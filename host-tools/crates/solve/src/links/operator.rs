@@ -116,8 +116,12 @@ impl Links {
     }
 
     /// The sum of both. Links of the same block become one.
+    ///
+    /// # Panics
+    /// If one is of another number of cells, or transposed and the other is not.
     pub(crate) fn plus(&self, other: &Self) -> Self {
-        assert_eq!(self.transposed, other.transposed, "both or none");
+        let shape = |links: &Self| (links.cells(), links.transposed);
+        assert_eq!(shape(self), shape(other), "operators of one kind");
         let rows = self.rows.par_iter().zip(other.rows.par_iter());
         let rows = rows.map(|(a, b)| {
             let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
