@@ -4,7 +4,7 @@
 //! few whole solves (`lambda` by held-out photographs included) of a simulated
 //! corner with noisy photographs, the most memory that one held at a time
 //! beyond its input, and the error of natural images that are compensated with
-//! it. `cargo bench -p iltm --bench solve -- 48x64` does one size.
+//! it. `cargo bench -p iltm --bench solve -- 48x64 links` does one size by one method.
 
 #![allow(missing_docs)]
 
@@ -51,7 +51,14 @@ const METHODS: [Method; 4] = [
 ];
 
 fn main() {
-    let only = std::env::args().skip(1).find(|arg| !arg.starts_with("--"));
+    let words: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|word| !word.starts_with("--"))
+        .collect();
+    let (methods, grids): (Vec<_>, Vec<_>) = words
+        .into_iter()
+        .partition(|word| word.parse::<Method>().is_ok());
+    let wanted = |among: &[String], name: String| among.is_empty() || among.contains(&name);
     println!(
         "method  grid     cells  photographs  channels  seconds (choose + solve)  peak MB  iterations  error"
     );
@@ -60,7 +67,8 @@ fn main() {
             let grid = format!("{}x{}", size.0, size.1);
             let few = usize::from(size.0) * usize::from(size.1) <= MOST_CELLS;
             let ours = matches!(method, Method::Joint | Method::Links);
-            if only.as_ref().is_none_or(|only| *only == grid) && (few || ours) {
+            let chosen = wanted(&methods, method.to_string()) && wanted(&grids, grid);
+            if chosen && (few || ours) {
                 measure(method, size);
             }
         }

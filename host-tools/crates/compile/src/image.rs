@@ -154,7 +154,7 @@ pub(super) fn operator_sections(cells: usize, quantised: &[Quantised]) -> Vec<(u
     let section = |segment: &Quantised| {
         let channel = match segment.part {
             Part::Shared => 0,
-            Part::Channel(channel) => channel as u16 + 1,
+            Part::Channel(channel) => u16::from(channel) + 1,
         };
         let selector = u16::from(segment.tier) + 256 * channel;
         (selector, segment_bytes(cells, &segment.rows))

@@ -35,7 +35,7 @@ pub enum Part {
     /// The operator that all channels share.
     Shared,
     /// What one channel adds to it.
-    Channel(usize),
+    Channel(u8),
 }
 
 /// One entry of an operator in the orthonormal Haar domain.
@@ -44,9 +44,9 @@ pub struct Entry {
     /// The operator.
     pub part: Part,
     /// Output coefficient.
-    pub row: usize,
+    pub row: u32,
     /// Input coefficient.
-    pub col: usize,
+    pub col: u32,
     /// `K^_ij`, drive per camera unit.
     pub value: f64,
 }
@@ -88,16 +88,17 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]
     let mut judge = Judge::new(inverse, &haar, content, &coefficients);
     let finest = targets.last().copied().unwrap_or(0.0);
     let mut entries = queue(inverse, &sigma, finest, &mut judge);
-    let all = judge.error(&entries);
-    let gain_only = judge.error_as_bright_as_fits(&entries);
+    let mut search = Search::new(&judge, &entries);
+    // The finest tier first: what the others leave out has its rest in it.
+    let found: Vec<Tier> = (targets.iter().rev())
+        .map(|target| search.fewest_entries(*target))
+        .collect();
+    let all = search.error(0);
+    let gain_only = judge.error_as_bright_as_fits(search.missing(0));
     let mut tiers: Vec<Tier> = Vec::new();
-    for &target in targets {
+    for (&target, tier) in targets.iter().zip(found.into_iter().rev()) {
         let last = tiers.last().map_or(all, |tier| tier.error);
-        if last <= target {
-            continue;
-        }
-        let tier = judge.fewest_entries(&entries, target);
-        if tiers.last().is_none_or(|last| tier.entries > last.entries) {
+        if last > target && tiers.last().is_none_or(|last| tier.entries > last.entries) {
             tiers.push(tier);
         }
     }
@@ -133,18 +134,18 @@ fn queue(
         }
         entries.extend(found.into_iter().map(|coefficient| Entry {
             part,
-            row: coefficient.row as usize,
-            col: coefficient.col as usize,
+            row: coefficient.row,
+            col: coefficient.col,
             value: coefficient.value,
         }));
     };
     add(Part::Shared, &inverse.shared);
     for (index, channel) in inverse.channels.iter().enumerate() {
         if let Some(deviation) = &channel.deviation {
-            add(Part::Channel(index), deviation);
+            add(Part::Channel(index as u8), deviation);
         }
     }
-    let worth = |entry: &Entry| entry.value.abs() * sigma[entry.col];
+    let worth = |entry: &Entry| entry.value.abs() * sigma[entry.col as usize];
     entries.sort_by(|a, b| {
         let place = |e: &Entry| (e.row, e.col);
         worth(b)
@@ -179,14 +180,17 @@ fn needed_from(
 /// One value for each image.
 type PerImage = [f64; IMAGES];
 
+/// Light of each image that is missing, by channel and output coefficient.
+type Missing = Vec<Vec<PerImage>>;
+
 /// Predicts the error of leaving entries out.
 struct Judge<'a> {
     channels: Vec<(f64, Inverse)>,
     haar: &'a Haar,
     content: &'a DMatrix<f64>,
     coefficients: Vec<PerImage>,
-    /// What entries that stand in no queue would add, by channel and output coefficient.
-    left_out: Vec<Vec<PerImage>>,
+    /// What entries that stand in no queue would add.
+    left_out: Missing,
 }
 
 impl<'a> Judge<'a> {
@@ -223,42 +227,51 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Error when all of `left_out` are missing, all channels together.
-    fn error(&self, left_out: &[Entry]) -> f64 {
-        let channels = 0..self.channels.len();
-        let errors: Vec<f64> = channels
-            .into_par_iter()
-            .map(|channel| self.error_in(channel, left_out))
-            .collect();
-        let squares: f64 = errors.iter().map(|error| error * error).sum();
-        (squares / errors.len().max(1) as f64).sqrt()
+    /// Adds what entries that are left out would add.
+    fn add(&self, left_out: &[Entry], missing: &mut Missing) {
+        let channels = missing.par_iter_mut().enumerate();
+        channels.for_each(|(index, missing)| {
+            let (scale, _) = self.channels[index];
+            for entry in left_out {
+                if let Some(factor) = factor(entry.part, index, scale, entry.value) {
+                    let inputs = &self.coefficients[entry.col as usize];
+                    add(&mut missing[entry.row as usize], factor, inputs);
+                }
+            }
+        });
     }
 
-    fn error_in(&self, index: usize, left_out: &[Entry]) -> f64 {
-        let light = self.missing_light(index, left_out);
-        // Light that grows from bounce to bounce cannot be predicted.
-        light.map_or(f64::INFINITY, |light| relative_error(&light, self.content))
+    /// Error when this is missing, all channels together.
+    fn error(&self, missing: &Missing) -> f64 {
+        let squares = missing.par_iter().enumerate().map(|(index, missing)| {
+            let light = self.light(index, missing);
+            // Light that grows from bounce to bounce cannot be predicted.
+            light.map_or(f64::INFINITY, |light| {
+                relative_error(&light, self.content).powi(2)
+            })
+        });
+        let squares: Vec<f64> = squares.collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
-    /// Error when all of `left_out` are missing, each image shown as bright as suits it
+    /// Error when this is missing, each image shown as bright as suits it
     /// best: mean over the images of `min_t |t shown - wanted| / |wanted|`, all channels
     /// together.
-    fn error_as_bright_as_fits(&self, left_out: &[Entry]) -> f64 {
-        let channels = 0..self.channels.len();
-        let missing: Option<Vec<_>> = channels
-            .into_par_iter()
-            .map(|channel| self.missing_light(channel, left_out))
+    fn error_as_bright_as_fits(&self, missing: &Missing) -> f64 {
+        let channels = missing.par_iter().enumerate();
+        let light: Option<Vec<_>> = channels
+            .map(|(index, missing)| self.light(index, missing))
             .collect();
-        let Some(missing) = missing else {
+        let Some(light) = light else {
             return f64::INFINITY;
         };
         let images = self.content.ncols();
         let of_image = |image: usize| {
             let wanted = self.content.column(image);
             let (mut both, mut own, mut whole) = (0.0, 0.0, 0.0);
-            for missing in &missing {
+            for light in &light {
                 // What the operator does not take away is there as well.
-                let shown = wanted + missing.column(image);
+                let shown = wanted + light.column(image);
                 both += shown.dot(&wanted);
                 own += shown.norm_squared();
                 whole += wanted.norm_squared();
@@ -272,39 +285,78 @@ impl<'a> Judge<'a> {
         (0..images).map(of_image).sum::<f64>() / images.max(1) as f64
     }
 
-    /// What is on the wall when all of `left_out` are missing, beyond what is wanted;
+    /// What is on the wall of one channel when this is missing, beyond what is wanted;
     /// `None` if light grows from bounce to bounce.
-    fn missing_light(&self, index: usize, left_out: &[Entry]) -> Option<DMatrix<f64>> {
-        let (scale, inverse) = &self.channels[index];
-        let mut missing = self.left_out[index].clone();
-        for entry in left_out {
-            if let Some(factor) = factor(entry.part, index, *scale, entry.value) {
-                add(
-                    &mut missing[entry.row],
-                    factor,
-                    &self.coefficients[entry.col],
-                );
-            }
-        }
+    fn light(&self, index: usize, missing: &[PerImage]) -> Option<DMatrix<f64>> {
         let missing = DMatrix::from_fn(missing.len(), IMAGES, |row, image| missing[row][image]);
+        let (_, inverse) = &self.channels[index];
         inverse.light(&self.haar.synthesise_columns(&missing))
+    }
+}
+
+/// A search for tiers, which adds up each part of the queue once.
+struct Search<'s> {
+    judge: &'s Judge<'s>,
+    entries: &'s [Entry],
+    /// Errors when the entries from a place on are missing, by place.
+    errors: BTreeMap<usize, f64>,
+    /// What those would add. Some places are forgotten.
+    missing: BTreeMap<usize, Missing>,
+}
+
+impl<'s> Search<'s> {
+    fn new(judge: &'s Judge<'s>, entries: &'s [Entry]) -> Self {
+        Self {
+            judge,
+            entries,
+            errors: BTreeMap::new(),
+            missing: BTreeMap::from([(entries.len(), judge.left_out.clone())]),
+        }
+    }
+
+    /// What the entries from `place` on would add.
+    fn missing(&mut self, place: usize) -> &Missing {
+        let behind = self.missing.range(place..).next();
+        let (end, rest) = behind.expect("the end of the queue is never forgotten");
+        if *end > place {
+            let (end, mut missing) = (*end, rest.clone());
+            self.judge.add(&self.entries[place..end], &mut missing);
+            self.missing.insert(place, missing);
+        }
+        &self.missing[&place]
+    }
+
+    /// Error when the entries from `place` on are missing.
+    fn error(&mut self, place: usize) -> f64 {
+        if let Some(error) = self.errors.get(&place) {
+            return *error;
+        }
+        let judge = self.judge;
+        let error = judge.error(self.missing(place));
+        self.errors.insert(place, error);
+        error
     }
 
     /// The shortest front of the queue whose rest errs by at most `target`.
-    fn fewest_entries(&self, entries: &[Entry], target: f64) -> Tier {
-        let (mut low, mut high) = (0, entries.len());
+    fn fewest_entries(&mut self, target: f64) -> Tier {
+        let (mut low, mut high) = (0, self.entries.len());
         // Half a per cent of the entries is as fine as a tier needs to be cut.
         while high - low > 1 + high / 200 {
             let middle = usize::midpoint(low, high);
-            if self.error(&entries[middle..]) <= target {
+            if self.error(middle) <= target {
                 high = middle;
             } else {
                 low = middle;
             }
         }
+        let error = self.error(high);
+        // The next search is for fewer entries.
+        let end = self.entries.len();
+        self.missing
+            .retain(|place, _| *place <= high || *place == end);
         Tier {
             entries: high,
-            error: self.error(&entries[high..]),
+            error,
         }
     }
 }
@@ -314,7 +366,7 @@ impl<'a> Judge<'a> {
 fn factor(part: Part, channel: usize, scale: f64, value: f64) -> Option<f64> {
     match part {
         Part::Shared => Some(scale * value),
-        Part::Channel(own) => (own == channel).then_some(value),
+        Part::Channel(own) => (usize::from(own) == channel).then_some(value),
     }
 }
 
@@ -368,7 +420,7 @@ mod tests {
         );
         let mut judge = Judge::new(&scene, &haar, &content, &coefficients);
         let entries = queue(&scene, &sigma, 0.0, &mut judge);
-        let wanted = judge.error(&entries);
+        let wanted = Search::new(&judge, &entries).error(0);
         let shared = scene.shared.haar_coefficients(&haar);
         let worth = |c: &Coefficient| c.value.abs() * sigma[c.col as usize];
         let all = shared.iter().map(|c| worth(c).powi(2)).sum::<f64>().sqrt();
@@ -379,12 +431,19 @@ mod tests {
         judge.leave_out(Part::Shared, shared.iter().filter(less));
         let others: Vec<Entry> = entries
             .iter()
-            .filter(|e| e.part != Part::Shared || e.value.abs() * sigma[e.col] >= needed)
+            .filter(|e| e.part != Part::Shared || e.value.abs() * sigma[e.col as usize] >= needed)
             .copied()
             .collect();
         assert!(others.len() < entries.len());
-        assert!((judge.error(&others) - wanted).abs() < 1e-12);
+        let mut search = Search::new(&judge, &others);
+        // Forwards and backwards: what places have in common is added once.
+        for place in [others.len() / 2, others.len() / 3, others.len(), 0] {
+            let mut missing = judge.left_out.clone();
+            judge.add(&others[place..], &mut missing);
+            assert!((search.error(place) - judge.error(&missing)).abs() < 1e-12);
+        }
+        assert!((search.error(0) - wanted).abs() < 1e-12);
         let few = entries.len() - others.len();
-        assert!(judge.error(&[]) > 0.0, "{few} are left out");
+        assert!(search.error(others.len()) > 0.0, "{few} are left out");
     }
 }

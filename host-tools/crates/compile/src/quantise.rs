@@ -91,11 +91,12 @@ pub fn quantise(
         let of_row = entries.chunk_by(|a, b| a.row == b.row);
         let rows = of_row.map(|row| {
             let values = row.iter().map(|entry| {
-                let shift = functions[entry.col].input_shift() + CORRECTION_GUARD_BITS;
-                let unit = f64::from(shift).exp2() / (norms[entry.row] * norms[entry.col]);
+                let (row, col) = (entry.row as usize, entry.col as usize);
+                let shift = functions[col].input_shift() + CORRECTION_GUARD_BITS;
+                let unit = f64::from(shift).exp2() / (norms[row] * norms[col]);
                 (entry.col as u16, entry.value * scale(part) * unit)
             });
-            quantise_row(row[0].row, &values.collect::<Vec<_>>())
+            quantise_row(row[0].row as usize, &values.collect::<Vec<_>>())
         });
         let rows: Result<Vec<StoredRow>, TooStrong> = rows.collect();
         Ok(Quantised {

@@ -322,7 +322,12 @@ impl StoredOperator {
         let factor = |part| match part {
             Part::Shared => white * largest,
             // The runtime multiplies by the channel's scale afterwards.
-            Part::Channel(channel) => white / scales[channel].max(U1F15::DELTA).to_num::<f64>(),
+            Part::Channel(channel) => {
+                white
+                    / scales[usize::from(channel)]
+                        .max(U1F15::DELTA)
+                        .to_num::<f64>()
+            }
         };
         let mut quantised = Vec::new();
         for (tier, info) in (1..).zip(&ladder.tiers) {

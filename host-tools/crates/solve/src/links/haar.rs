@@ -71,7 +71,7 @@ impl<'t> Splits<'t> {
         for link in row.iter().filter(|link| link.value != 0.0) {
             let block = link.block as usize;
             let norm = (self.tree.size(block) as f64).sqrt();
-            *sums.entry(block).or_default() += link.value * norm;
+            *sums.entry(block).or_default() += f64::from(link.value) * norm;
         }
         let mut found = Sparse::new();
         while let Some((block, sum)) = sums.first_key_value() {

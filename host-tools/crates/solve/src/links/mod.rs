@@ -27,9 +27,12 @@ use nalgebra::DMatrix;
 use operator::Link;
 use quadtree::Quadtree;
 use rayon::prelude::*;
-use row::{Prior, Row, Target, axpy, dot, series};
+use row::{Fit, Prior, Row, Target, axpy, dot, series};
 use std::sync::Arc;
 
+/// Level with which the first sweep ends: gains of blocks of 2 x 2 cells are good enough for the
+/// second one.
+const FIRST_ENDS: usize = 1;
 /// Levels above the cells from which rows are solved once more, with the gains of the first sweep.
 /// From coarser ones on they fitted the errors of gains instead.
 const SECOND_SWEEP: usize = 3;
@@ -78,37 +81,49 @@ pub(super) fn links(
     let data = Data::new(prepared, grid, chosen);
     let mut state = data.first_state();
     let top = data.tree.coarsest();
-    for (sweep, coarsest) in [top, SECOND_SWEEP.min(top)].into_iter().enumerate() {
-        for level in (0..=coarsest).rev() {
-            data.solve_level(level, &mut state, progress);
-            // Gains of coarse rows are worse than those that a sweep has ended with.
-            if sweep == 0 || level == 0 {
-                data.fit_gains(level, &mut state);
-            }
-        }
+    for level in (FIRST_ENDS.min(top)..=top).rev() {
+        data.solve_level(level, &mut state, progress);
+        data.fit_gains(level, &mut state);
     }
-    data.solution(&state, chosen)
+    // Gains of coarse rows are worse than those that the first sweep has ended with.
+    for level in (1..=SECOND_SWEEP.min(top)).rev() {
+        data.solve_level(level, &mut state, progress);
+    }
+    let own = data.solve_cells(&mut state, progress);
+    data.fit_gains(0, &mut state);
+    data.solution(&state, &own, chosen)
 }
 
 impl<'d> Data<'d> {
     fn new(prepared: &'d Prepared, grid: Grid, chosen: &[usize]) -> Self {
+        /// Cells whose series are filled together: some lines of a cache.
+        const TOGETHER: usize = 64;
         let tree = Quadtree::new(grid);
         let (photographs, channels) = (chosen.len(), prepared.light.len());
         let length = photographs * channels;
+        let cells = tree.cells();
         let fill = |columns: usize, of: &dyn Fn(usize) -> DMatrix<f64>| {
             let mut filled = DMatrix::zeros(length, columns);
             for channel in 0..channels {
                 let matrix = of(channel);
-                for (cell, row) in matrix.row_iter().enumerate() {
-                    let mean = row.mean() as f32 * (1.0 - MEAN_WEIGHT.sqrt());
-                    for (k, value) in row.iter().enumerate() {
-                        filled[(channel * photographs + k, cell)] = *value as f32 - mean;
+                let part = 1.0 - MEAN_WEIGHT.sqrt();
+                let means: Vec<f32> = matrix
+                    .column_mean()
+                    .iter()
+                    .map(|mean| *mean as f32 * part)
+                    .collect();
+                let series = filled.as_mut_slice().par_chunks_mut(length * TOGETHER);
+                series.enumerate().for_each(|(group, series)| {
+                    for (k, light) in matrix.column_iter().enumerate() {
+                        let cells = (group * TOGETHER..cells).zip(series.chunks_exact_mut(length));
+                        for (cell, series) in cells {
+                            series[channel * photographs + k] = light[cell] as f32 - means[cell];
+                        }
                     }
-                }
+                });
             }
             filled
         };
-        let cells = tree.cells();
         let mut sources = fill(tree.blocks(), &|channel| prepared.sources(channel, chosen));
         row::sum_cells(&tree, &mut sources);
         let variances = DMatrix::from_fn(photographs, cells, |k, cell| {
@@ -150,21 +165,51 @@ impl<'d> Data<'d> {
 
     /// Solves the rows of one level's blocks.
     fn solve_level(&self, level: usize, state: &mut State, progress: &dyn Progress) {
-        let sources = self.scaled_sources(&state.scales);
-        let channels: Vec<usize> = (0..self.channels()).collect();
-        let found: Vec<Row> = (self.tree.level(level).into_par_iter())
-            .map(|block| {
-                let Some(mut target) = self.target(block, &channels, &sources, &state.gains) else {
-                    return Row::default();
-                };
-                let row = target.fit(&self.start(block, &state.rows), true);
-                progress.advance(1);
-                row.merged(&self.tree)
-            })
-            .collect();
+        let found = self.fit_level(level, state, progress, |fit| fit.row().merged(&self.tree));
         for (block, row) in self.tree.level(level).zip(found) {
-            state.rows[block] = row;
+            state.rows[block] = row.unwrap_or_default();
         }
+    }
+
+    /// Solves the rows of the cells. In colour, the rows of each channel are what is returned.
+    fn solve_cells(&self, state: &mut State, progress: &dyn Progress) -> Vec<Vec<Row>> {
+        let colour = self.channels() > 1;
+        let found = self.fit_level(0, state, progress, |fit| {
+            let merged = |row: Row| row.merged(&self.tree);
+            let own = colour.then(|| fit.of_channels(CHANNEL_RELATIVE));
+            let own = own.into_iter().flatten().map(merged);
+            (merged(fit.row()), own.collect::<Vec<Row>>())
+        });
+        let nothing = vec![Row::default(); self.tree.cells()];
+        let mut rows = vec![nothing; if colour { self.channels() } else { 0 }];
+        for (cell, found) in found.into_iter().enumerate() {
+            let (shared, own) = found.unwrap_or_default();
+            state.rows[cell] = shared;
+            for ((rows, mut own), scale) in rows.iter_mut().zip(own).zip(&state.scales) {
+                own.values.iter_mut().for_each(|value| *value *= scale);
+                rows[cell] = own;
+            }
+        }
+        rows
+    }
+
+    /// What is made of the fit of each block of a level; `None` if no cell of it is live.
+    fn fit_level<T: Send>(
+        &self,
+        level: usize,
+        state: &State,
+        progress: &dyn Progress,
+        of: impl Fn(Fit<'_>) -> T + Sync,
+    ) -> Vec<Option<T>> {
+        let sources = self.scaled_sources(&state.scales);
+        let blocks = self.tree.level(level).into_par_iter();
+        let found = blocks.map(|block| {
+            let target = self.target(block, &sources, &state.gains)?;
+            let found = of(target.fit(&self.start(block, &state.rows)));
+            progress.advance(1);
+            Some(found)
+        });
+        found.collect()
     }
 
     /// What the row of a block starts from: the mean of the rows of the blocks around it, one level
@@ -200,12 +245,11 @@ impl<'d> Data<'d> {
         sources
     }
 
-    /// What the row of a block must make of the light in some channels: the mean over its cells,
+    /// What the row of a block must make of the light: the mean over its cells,
     /// those with less noise counting more. `None` if no cell is live.
     fn target<'t>(
         &'t self,
         block: usize,
-        channels: &[usize],
         sources: &'t DMatrix<f32>,
         gains: &[Vec<f32>],
     ) -> Option<Target<'t>> {
@@ -215,9 +259,10 @@ impl<'d> Data<'d> {
         if cells.is_empty() {
             return None;
         }
-        let length = channels.len() * self.photographs;
+        let length = self.channels() * self.photographs;
         let mut target = Target {
             tree: &self.tree,
+            photographs: self.photographs,
             sources,
             precision: Vec::with_capacity(length),
             wanted: Vec::with_capacity(length),
@@ -227,15 +272,15 @@ impl<'d> Data<'d> {
                 absolute: ABSOLUTE / self.tree.cells() as f32,
             },
         };
-        for (place, channel) in channels.iter().enumerate() {
-            let segment = self.segment(*channel);
+        for (channel, gains) in gains.iter().enumerate() {
+            let segment = self.segment(channel);
             let mut wanted = vec![0.0; self.photographs];
             let mut own = vec![0.0; self.photographs];
             let mut variance = vec![0.0; self.photographs];
             let mut total = 0.0;
             for cell in &cells {
-                let noise = self.prepared.noise[*channel][*cell].lit.max(LEAST_NOISE) as f32;
-                let gain = gains[*channel][*cell];
+                let noise = self.prepared.noise[channel][*cell].lit.max(LEAST_NOISE) as f32;
+                let gain = gains[*cell];
                 let share = (gain * noise).powi(2).recip();
                 if !share.is_finite() {
                     continue;
@@ -254,7 +299,7 @@ impl<'d> Data<'d> {
             axpy(&mut wanted, 1.0, &own);
             let precision = variance.iter().map(|variance| total / variance.sqrt());
             target.precision.extend(precision);
-            let precision = &target.precision[place * self.photographs..];
+            let precision = &target.precision[segment.clone()];
             let whiten = |series: &mut [f32]| {
                 for (value, precision) in series.iter_mut().zip(precision) {
                     *value *= precision / total;
@@ -266,11 +311,7 @@ impl<'d> Data<'d> {
             let norm = dot(&own, &own).sqrt();
             if norm > 0.0 {
                 let mut unit = vec![0.0; length];
-                axpy(
-                    &mut unit[place * self.photographs..][..self.photographs],
-                    norm.recip(),
-                    &own,
-                );
+                axpy(&mut unit[segment], norm.recip(), &own);
                 target.own.push(unit);
             }
         }
@@ -327,15 +368,14 @@ impl<'d> Data<'d> {
     }
 
     /// The answer, with each channel's deviation from the shared operator.
-    fn solution(&self, state: &State, chosen: &[usize]) -> Solution {
+    fn solution(&self, state: &State, own: &[Vec<Row>], chosen: &[usize]) -> Solution {
         let photographs = Photographs::new(self.prepared, chosen);
         let rows = &state.rows[..self.tree.cells()];
         let shared = self.operator(rows);
         let channel = |channel: usize| {
             let scale = f64::from(state.scales[channel]);
             let even = &shared * scale;
-            let own =
-                (self.channels() > 1).then(|| self.operator(&self.channel_rows(channel, state)));
+            let own = own.get(channel).map(|rows| self.operator(rows));
             Channel {
                 gain: photographs.gain(channel, own.as_ref().unwrap_or(&even)),
                 scale,
@@ -351,29 +391,6 @@ impl<'d> Data<'d> {
         }
     }
 
-    /// One channel's rows, near the shared ones.
-    fn channel_rows(&self, channel: usize, state: &State) -> Vec<Row> {
-        let sources = self
-            .sources
-            .rows(channel * self.photographs, self.photographs)
-            .into_owned();
-        let cells = 0..self.tree.cells();
-        cells
-            .into_par_iter()
-            .map(|cell| {
-                let Some(mut target) = self.target(cell, &[channel], &sources, &state.gains) else {
-                    return Row::default();
-                };
-                target.prior.relative = CHANNEL_RELATIVE;
-                let mut start = state.rows[cell].clone();
-                for value in &mut start.values {
-                    *value *= state.scales[channel];
-                }
-                target.fit(&start, false)
-            })
-            .collect()
-    }
-
     /// An operator of these rows, zero on the diagonal.
     fn operator(&self, rows: &[Row]) -> Interreflection {
         let rows = rows.iter().enumerate().map(|(cell, row)| {
@@ -382,7 +399,7 @@ impl<'d> Data<'d> {
             let mut links: Vec<Link> = links
                 .map(|(block, value)| Link {
                     block: *block as u32,
-                    value: f64::from(*value),
+                    value: *value,
                 })
                 .collect();
             let holds = |link: &&Link| self.tree.holds(link.block as usize, cell);

@@ -2,7 +2,7 @@
 //! whose blocks are split where the photographs ask for it.
 
 use super::quadtree::Quadtree;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView, Dyn, U1};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// A split must explain as many times the noise variance, or what is left where that is more.
@@ -117,6 +117,8 @@ fn value(tree: &Quadtree, values: &HashMap<usize, f32>, block: usize) -> f32 {
 /// What a row is fitted to: series are photographs of one channel after the other.
 pub(super) struct Target<'t> {
     pub(super) tree: &'t Quadtree,
+    /// Length of one channel's series.
+    pub(super) photographs: usize,
     /// Light of each block, a column each, in the channels' units of the shared operator.
     pub(super) sources: &'t DMatrix<f32>,
     /// Reciprocal of the noise's deviation in the target.
@@ -136,36 +138,44 @@ pub(super) struct Prior {
     pub(super) absolute: f32,
 }
 
-impl Target<'_> {
-    /// Fits the row that starts from `start`.
-    pub(super) fn fit(&mut self, start: &Row, split: bool) -> Row {
+impl<'t> Target<'t> {
+    /// Fits the row that starts from `start`; its blocks are split.
+    pub(super) fn fit(mut self, start: &Row) -> Fit<'t> {
         for own in &self.own {
             let along = dot(own, &self.wanted);
             axpy(&mut self.wanted, -along, own);
         }
         let columns = self.columns(&start.blocks);
-        let mut problem = Problem {
+        let mut fit = Fit {
             blocks: start.blocks.clone(),
-            gram: columns.transpose() * &columns,
+            grams: (0..self.channels())
+                .map(|channel| gram(&self.of_channel(&columns, channel)))
+                .collect(),
             columns,
             values: start.values.clone(),
             start: start.values.clone(),
+            target: self,
         };
         for _ in 0..MOST_ROUNDS {
-            problem.descend(&self.wanted, self.prior);
-            if !split || problem.blocks.len() > MOST_BLOCKS {
+            fit.descend();
+            if fit.blocks.len() > MOST_BLOCKS {
                 break;
             }
-            let splits = self.splits(&problem);
+            let splits = fit.splits();
             if splits.is_empty() {
                 break;
             }
-            self.split(&mut problem, &splits);
+            fit.split(&splits);
         }
-        Row {
-            blocks: problem.blocks,
-            values: problem.values,
-        }
+        fit
+    }
+
+    fn channels(&self) -> usize {
+        self.wanted.len() / self.photographs
+    }
+
+    fn of_channel<'c>(&self, columns: &'c DMatrix<f32>, channel: usize) -> Columns<'c> {
+        columns.rows(channel * self.photographs, self.photographs)
     }
 
     /// Sources with noise 1, free of what gains explain.
@@ -184,29 +194,131 @@ impl Target<'_> {
         }
         columns
     }
+}
+
+/// Some rows of all columns.
+type Columns<'c> = DMatrixView<'c, f32, U1, Dyn>;
+
+/// `columns^T columns`.
+fn gram(columns: &Columns<'_>) -> DMatrix<f32> {
+    /// Columns from which the half that is the other's transpose is worth leaving out.
+    const HALVED: usize = 64;
+    let all = columns.ncols();
+    if all < HALVED {
+        return products(columns, columns);
+    }
+    let (left, right) = columns.columns_range_pair(..all / 2, all / 2..);
+    joined(&gram(&left), &products(&left, &right), &gram(&right))
+}
+
+/// `left^T right`: not by `tr_mul`, which takes one product after the other.
+fn products(left: &Columns<'_>, right: &Columns<'_>) -> DMatrix<f32> {
+    left.transpose() * right
+}
+
+/// A symmetric matrix from its blocks on the diagonal and the one beside it.
+fn joined(first: &DMatrix<f32>, across: &DMatrix<f32>, second: &DMatrix<f32>) -> DMatrix<f32> {
+    let (old, all) = (first.nrows(), first.nrows() + second.nrows());
+    let mut whole = DMatrix::zeros(all, all);
+    whole.view_mut((0, 0), first.shape()).copy_from(first);
+    whole.view_mut((0, old), across.shape()).copy_from(across);
+    let mut below = whole.view_mut((old, 0), (all - old, old));
+    below.tr_copy_from(across);
+    whole.view_mut((old, old), second.shape()).copy_from(second);
+    whole
+}
+
+/// `min ||columns values - wanted||^2 + prior`, values not negative.
+pub(super) struct Fit<'t> {
+    target: Target<'t>,
+    blocks: Vec<usize>,
+    /// Series of the blocks, noise 1.
+    columns: DMatrix<f32>,
+    /// Products of any two of them within each channel.
+    grams: Vec<DMatrix<f32>>,
+    values: Vec<f32>,
+    /// What values are pulled towards.
+    start: Vec<f32>,
+}
+
+impl Fit<'_> {
+    pub(super) fn row(&self) -> Row {
+        Row {
+            blocks: self.blocks.clone(),
+            values: self.values.clone(),
+        }
+    }
+
+    /// Each channel's own row: a value is pulled to the shared one by a deviation of `relative`
+    /// times it.
+    pub(super) fn of_channels(&self, relative: f32) -> Vec<Row> {
+        let left = self.left(&self.values);
+        let prior = Prior {
+            relative,
+            ..self.target.prior
+        };
+        let channel = |(channel, gram): (usize, &DMatrix<f32>)| {
+            let length = self.target.photographs;
+            let segment = channel * length..(channel + 1) * length;
+            let slope = |column: &[f32]| dot(&column[segment.clone()], &left[segment.clone()]);
+            let columns = self.columns.column_iter();
+            let slopes = columns.map(|column| slope(column.data.into_slice()));
+            let mut row = self.row();
+            descend(gram, slopes.collect(), &mut row.values, &self.values, prior);
+            row
+        };
+        self.grams.iter().enumerate().map(channel).collect()
+    }
+
+    /// What values leave unexplained.
+    fn left(&self, values: &[f32]) -> Vec<f32> {
+        let mut left = self.target.wanted.clone();
+        for (column, value) in self.columns.column_iter().zip(values) {
+            if *value != 0.0 {
+                axpy(&mut left, -value, column.data.into_slice());
+            }
+        }
+        left
+    }
+
+    fn descend(&mut self) {
+        let left = self.left(&self.values);
+        let slopes = (self.columns.column_iter())
+            .map(|column| dot(column.data.into_slice(), &left))
+            .collect();
+        let prior = self.target.prior;
+        match self.grams.as_slice() {
+            [gram] => descend(gram, slopes, &mut self.values, &self.start, prior),
+            grams => {
+                let gram: DMatrix<f32> = grams.iter().sum();
+                descend(&gram, slopes, &mut self.values, &self.start, prior);
+            }
+        }
+    }
 
     /// Links whose split explains more than noise would, by index.
-    fn splits(&self, problem: &Problem) -> Vec<usize> {
-        let left = problem.left(&self.wanted, &problem.values);
-        let (series_length, links) = (left.len() as f32, problem.blocks.len() as f32);
-        let free = series_length - self.own.len() as f32 - links.min(0.5 * series_length);
+    fn splits(&self) -> Vec<usize> {
+        let target = &self.target;
+        let left = self.left(&self.values);
+        let (series_length, links) = (left.len() as f32, self.blocks.len() as f32);
+        let free = series_length - target.own.len() as f32 - links.min(0.5 * series_length);
         let variance = (dot(&left, &left) / free.max(1.0)).max(1.0);
         // Products with series as they are instead of with noise 1.
         let times = |series: &[f32]| -> Vec<f32> {
             series
                 .iter()
-                .zip(&self.precision)
+                .zip(&target.precision)
                 .map(|(a, b)| a * b)
                 .collect()
         };
         let left = times(&left);
-        let own: Vec<Vec<f32>> = self.own.iter().map(|own| times(own)).collect();
-        let squares = times(&self.precision);
+        let own: Vec<Vec<f32>> = target.own.iter().map(|own| times(own)).collect();
+        let squares = times(&target.precision);
         let mut found = Vec::new();
-        for (link, (block, value)) in problem.blocks.iter().zip(&problem.values).enumerate() {
+        for (link, (block, value)) in self.blocks.iter().zip(&self.values).enumerate() {
             let mut explained = 0.0;
-            for child in self.tree.children(*block) {
-                let source = series(self.sources, child);
+            for child in target.tree.children(*block) {
+                let source = series(target.sources, child);
                 let along: f32 = own.iter().map(|own| dot(own, source).powi(2)).sum();
                 let square = sum(source, &squares, |light, square| square * light * light) - along;
                 let slope = dot(&left, source);
@@ -226,93 +338,65 @@ impl Target<'_> {
         found.into_iter().map(|(link, _)| link).collect()
     }
 
-    fn split(&self, problem: &mut Problem, splits: &[usize]) {
-        let kept: Vec<usize> = (0..problem.blocks.len())
+    fn split(&mut self, splits: &[usize]) {
+        let kept: Vec<usize> = (0..self.blocks.len())
             .filter(|link| !splits.contains(link))
             .collect();
         let pick = |values: &[f32]| -> Vec<f32> { kept.iter().map(|link| values[*link]).collect() };
-        let mut blocks: Vec<usize> = kept.iter().map(|link| problem.blocks[*link]).collect();
-        let (mut values, mut start) = (pick(&problem.values), pick(&problem.start));
+        let mut blocks: Vec<usize> = kept.iter().map(|link| self.blocks[*link]).collect();
+        let (mut values, mut start) = (pick(&self.values), pick(&self.start));
         for link in splits {
-            for child in self.tree.children(problem.blocks[*link]) {
+            for child in self.target.tree.children(self.blocks[*link]) {
                 blocks.push(child);
-                values.push(problem.values[*link]);
-                start.push(problem.values[*link]);
+                values.push(self.values[*link]);
+                start.push(self.values[*link]);
             }
         }
-        let added = self.columns(&blocks[kept.len()..]);
-        let before = problem.columns.select_columns(&kept);
         let (old, all) = (kept.len(), blocks.len());
-        let mut gram = DMatrix::zeros(all, all);
-        gram.view_mut((0, 0), (old, old))
-            .copy_from(&problem.gram.select_rows(&kept).select_columns(&kept));
-        let across = before.transpose() * &added;
-        gram.view_mut((0, old), (old, all - old)).copy_from(&across);
-        gram.view_mut((old, 0), (all - old, old))
-            .copy_from(&across.transpose());
-        gram.view_mut((old, old), (all - old, all - old))
-            .copy_from(&(added.transpose() * &added));
-        let mut columns = before.resize_horizontally(all, 0.0);
-        columns.columns_mut(old, all - old).copy_from(&added);
-        *problem = Problem {
-            blocks,
-            columns,
-            gram,
-            values,
-            start,
-        };
+        let added = self.target.columns(&blocks[old..]);
+        let before = self.columns.select_columns(&kept);
+        for (channel, gram) in self.grams.iter_mut().enumerate() {
+            let of_channel = |columns| self.target.of_channel(columns, channel);
+            *gram = joined(
+                &gram.select_rows(&kept).select_columns(&kept),
+                &products(&of_channel(&before), &of_channel(&added)),
+                &self::gram(&of_channel(&added)),
+            );
+        }
+        self.columns = before.resize_horizontally(all, 0.0);
+        self.columns.columns_mut(old, all - old).copy_from(&added);
+        (self.blocks, self.values, self.start) = (blocks, values, start);
     }
 }
 
-/// `min ||columns values - wanted||^2 + prior`, values not negative.
-struct Problem {
-    blocks: Vec<usize>,
-    columns: DMatrix<f32>,
-    gram: DMatrix<f32>,
-    values: Vec<f32>,
-    /// What values are pulled towards.
-    start: Vec<f32>,
-}
-
-impl Problem {
-    /// What values leave unexplained.
-    fn left(&self, wanted: &[f32], values: &[f32]) -> Vec<f32> {
-        let mut left = wanted.to_vec();
-        for (column, value) in self.columns.column_iter().zip(values) {
-            if *value != 0.0 {
-                axpy(&mut left, -value, column.data.into_slice());
+/// Coordinate descent (Hastie, Tibshirani, Wainwright, *Statistical Learning with Sparsity*,
+/// 2015, section 5.4) on the normal equations. `slopes` are those where the values are.
+fn descend(
+    gram: &DMatrix<f32>,
+    mut slopes: Vec<f32>,
+    values: &mut [f32],
+    start: &[f32],
+    prior: Prior,
+) {
+    let precision =
+        |start: &f32| ((prior.relative * start).powi(2) + prior.absolute.powi(2)).recip();
+    let pulls: Vec<f32> = start.iter().map(precision).collect();
+    for _ in 0..MOST_SWEEPS {
+        let mut gained = 0.0_f32;
+        for link in 0..values.len() {
+            let curvature = gram[(link, link)] + pulls[link];
+            let before = values[link];
+            let slope = slopes[link] - pulls[link] * (before - start[link]);
+            let next = (before + slope / curvature).max(0.0);
+            let step = next - before;
+            if step != 0.0 {
+                values[link] = next;
+                axpy(&mut slopes, -step, gram.column(link).data.into_slice());
+                gained = gained.max(step * step * curvature);
             }
         }
-        left
-    }
-
-    /// Coordinate descent (Hastie, Tibshirani, Wainwright, *Statistical Learning with Sparsity*,
-    /// 2015, section 5.4) on the normal equations.
-    fn descend(&mut self, wanted: &[f32], prior: Prior) {
-        let left = self.left(wanted, &self.values);
-        let mut slopes: Vec<f32> = (self.columns.column_iter())
-            .map(|column| dot(column.data.into_slice(), &left))
-            .collect();
-        let precision =
-            |start: &f32| ((prior.relative * start).powi(2) + prior.absolute.powi(2)).recip();
-        let pulls: Vec<f32> = self.start.iter().map(precision).collect();
-        for _ in 0..MOST_SWEEPS {
-            let mut gained = 0.0_f32;
-            for link in 0..self.values.len() {
-                let curvature = self.gram[(link, link)] + pulls[link];
-                let before = self.values[link];
-                let slope = slopes[link] - pulls[link] * (before - self.start[link]);
-                let next = (before + slope / curvature).max(0.0);
-                let step = next - before;
-                if step != 0.0 {
-                    self.values[link] = next;
-                    axpy(&mut slopes, -step, self.gram.column(link).data.into_slice());
-                    gained = gained.max(step * step * curvature);
-                }
-            }
-            if gained < LEAST_GAIN {
-                break;
-            }
+        if gained < LEAST_GAIN {
+            break;
         }
     }
 }
@@ -381,8 +465,9 @@ mod tests {
         for value in &mut own {
             *value /= norm;
         }
-        let mut target = Target {
+        let target = Target {
             tree,
+            photographs: wanted.len(),
             sources,
             precision: vec![noise.recip(); wanted.len()],
             wanted: wanted.iter().map(|value| value / noise).collect(),
@@ -397,7 +482,7 @@ mod tests {
             values: vec![0.0; top.len()],
             blocks: top,
         };
-        target.fit(&start, true)
+        target.fit(&start).row()
     }
 
     #[test]
