@@ -49,6 +49,17 @@ new_enough || {
     exit 1
 }
 
+# `mpirun iltm solve`; libclang reads MPI's headers. Where they cannot be had, what is tested
+# with them is left out, and said to be.
+has_mpi() {
+    command -v mpirun >/dev/null && command -v mpicc >/dev/null &&
+        ls /usr/lib/llvm-*/lib/libclang*.so* >/dev/null 2>&1
+}
+if ! has_mpi && command -v apt-get >/dev/null; then
+    install_packages libopenmpi-dev openmpi-bin libclang-dev || say "MPI cannot be installed"
+    hash -r
+fi
+
 # rustfmt and clippy come with rustup's default profile and with Debian's Rust in
 # packages of their own.
 for component in rustfmt clippy; do
@@ -75,6 +86,9 @@ cargo fmt --manifest-path tests/mutations/Cargo.toml --check
 
 say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings
+if has_mpi; then
+    cargo clippy --workspace --all-targets --locked --features iltm/mpi -- -D warnings
+fi
 # The firmware's own checks need a Rust with a core library for its target; where
 # there is none, core is built with the firmware, and only the firmware.
 has_target=
@@ -101,6 +115,11 @@ log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 status=0
 cargo test --workspace --locked --no-fail-fast 2>&1 | tee "$log" || status=$?
+if has_mpi; then
+    cargo test --workspace --locked --features iltm/mpi --test mpi 2>&1 | tee -a "$log" || status=$?
+else
+    say "no MPI here: what is tested with it is left out"
+fi
 
 count() { sed -n "s/^test result:.* \([0-9]\+\) $1;.*/\1/p" "$log" | awk '{ sum += $1 } END { print sum + 0 }'; }
 printf '\n%s passed, %s failed\n' "$(count passed)" "$(count failed)"

@@ -28,6 +28,7 @@ mod output;
 mod patterns;
 mod ports;
 mod progress;
+mod ranks;
 mod refine;
 mod simulate;
 mod simulate_chain;
@@ -43,10 +44,12 @@ mod verify;
 mod words;
 
 use crate::compare::Meter;
+use crate::solve::Processes;
 use args::{Arguments, Command};
 use clap::{CommandFactory, Parser};
 use failure::{Failure, Kind};
 use output::Output;
+use ranks::Ranks;
 use std::env;
 use std::process::ExitCode;
 
@@ -66,6 +69,14 @@ pub fn exit_codes() -> Vec<(u8, &'static str, &'static str)> {
 /// allocator, if that counts.
 #[must_use]
 pub fn run(meter: Option<Meter>) -> ExitCode {
+    match Ranks::join() {
+        Ok(ranks) => ranks.run(|processes| run_alone(meter, processes)),
+        Err(failure) => Output::new(false).failure(&failure),
+    }
+}
+
+/// The same for the one process that reads and writes.
+fn run_alone(meter: Option<Meter>, processes: Processes) -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return refused(&error),
@@ -78,7 +89,7 @@ pub fn run(meter: Option<Meter>) -> ExitCode {
         Command::Check(check) => check::run(check, &output),
         Command::Patterns(patterns) => patterns::run(patterns, &output),
         Command::Capture(capture) => capture::run(capture, &output),
-        Command::Solve(solve) => solve::run(solve, &output),
+        Command::Solve(solve) => solve::run(solve, processes, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),

@@ -11,7 +11,7 @@ use crate::build_table::{BuiltTable, TableOptions, build_table_from};
 use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
-use crate::solve::{Method, SolveOptions};
+use crate::solve::{Method, Processes, SolveOptions};
 use crate::solve_page::{self, Content};
 use crate::video::{Fit, PlacedFrames, VideoError, sampled_frames};
 use iltm_picture::{LightPicture, Picture, progress::Progress, whole_file};
@@ -24,7 +24,7 @@ use std::time::Instant;
 /// Frames of each of the user's videos that are looked at.
 const FRAMES: usize = 48;
 
-pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
     if let (Some(method), Some(_)) = (arguments.method, arguments.lambda)
         && method != Method::Joint
@@ -47,6 +47,7 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     let options = SolveOptions {
         method: arguments.method,
         lambda: arguments.lambda,
+        processes,
         ..SolveOptions::default()
     };
     let bars = progress(output);
@@ -101,6 +102,14 @@ pub(super) fn run(arguments: &Solve, output: &Output) -> Result<(), Failure> {
     }
     let mut text = table_words::lines(&arguments.output, &table);
     text += &remarks(&built);
+    if processes.count() > 1 && built.report.method != Method::Links {
+        let _ = writeln!(
+            text,
+            "note        ranks: `{}` works on one of {}; `--method links` on all",
+            built.report.method,
+            processes.count(),
+        );
+    }
     let _ = writeln!(
         text,
         "written     {}{} in {seconds:.2} s",

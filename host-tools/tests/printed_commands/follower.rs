@@ -187,6 +187,9 @@ impl Follower {
             .env("PATH", path.expect("no colons in it"))
             .env("CARGO_INSTALL_ROOT", installed)
             .env("BROWSER", "true")
+            // In a container everything is root's.
+            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
             .env("ILTM_CONFIG_DIR", self.place.join("config"))
             .env("ILTM_STATE_DIR", self.place.join("state"))
             .env_remove("ILTM_PAGES")

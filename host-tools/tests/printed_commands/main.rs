@@ -102,6 +102,7 @@ pages! {
     the_page_of_testing, "docs/testing.md", |_| ();
     the_page_of_fuzzing, "docs/fuzzing.md", |_| ();
     the_page_of_porting, "docs/porting.md", |_| ();
+    the_page_of_clusters, "docs/cluster.md", |_| ();
 }
 
 fn there(clone: &Path, names: &[&str]) {

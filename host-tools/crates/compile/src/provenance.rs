@@ -218,10 +218,14 @@ impl Provenance {
         toml::from_str(text).unwrap_or_default()
     }
 
-    /// Now, as a table says it.
+    /// Now, as a table says it, or the second that `SOURCE_DATE_EPOCH` is: who makes a table twice
+    /// gets the same bytes (<https://reproducible-builds.org/specs/source-date-epoch/>).
     pub(crate) fn now() -> String {
-        let now = chrono::Utc::now().format("%Y-%m-%d %H:%M:%S UTC");
-        now.to_string()
+        let given = std::env::var("SOURCE_DATE_EPOCH").ok();
+        let given = given.and_then(|seconds| seconds.parse().ok());
+        let time = given.and_then(|seconds| chrono::DateTime::from_timestamp(seconds, 0));
+        let time = time.unwrap_or_else(chrono::Utc::now);
+        time.format("%Y-%m-%d %H:%M:%S UTC").to_string()
     }
 
     /// What people call the table: its scene, and the day when it was made.

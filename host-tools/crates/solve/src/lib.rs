@@ -16,6 +16,7 @@
 //! joint                 lambda, scales of the channels, solve, gains, deviations
 //!   admm                the iteration, over data_term, row_block and column_block
 //! links                 the same answer from blocks of a quadtree, for many cells
+//! group                 processes that share the work of links
 //! interreflection       the operator that is found, dense or as links
 //! by_rows               the paper's method and others, over basis_pursuit
 //! forward, held_out     light from an inverse; the photographs it is judged by
@@ -47,6 +48,7 @@ mod error;
 mod flux;
 mod forward;
 mod gain_only;
+mod group;
 mod haar;
 mod held_out;
 mod interreflection;
@@ -78,6 +80,7 @@ pub use error::SolveError;
 pub use flux::Flux;
 pub use forward::Inverse;
 pub use gain_only::gain_only;
+pub use group::{Group, Processes};
 pub use haar::Haar;
 pub use interreflection::{Coefficient, Interreflection};
 pub use links::Links;
@@ -176,6 +179,7 @@ fn solve_judged(
         grid: observed.grid,
         splits: &splits,
         stop,
+        processes: options.processes,
         progress,
     };
     let outcome = match method {
@@ -261,6 +265,7 @@ struct Task<'t> {
     grid: Grid,
     splits: &'t [Split],
     stop: Stop,
+    processes: Processes,
     progress: &'t dyn Progress,
 }
 
@@ -347,7 +352,10 @@ impl<'t> Task<'t> {
             let found = match method {
                 Method::TwoStage => by_rows::two_stage(prepared, haar, chosen, stop, self.progress),
                 Method::BruteForce => by_rows::brute_force(prepared, chosen),
-                Method::Links => Ok(links(prepared, self.grid, chosen, self.progress)),
+                Method::Links => {
+                    let found = links(prepared, self.grid, chosen, self.processes, self.progress);
+                    Ok(found)
+                }
                 Method::Direct | Method::Joint => {
                     Ok(by_rows::direct(prepared, haar, chosen, stop, self.progress))
                 }

@@ -1,6 +1,7 @@
 //! Options of a solve: the method, and the settings that it has.
 
 use super::error::SolveError;
+use super::group::Processes;
 use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 /// How the inverse is found; the name on the command line and in reports is in kebab case.
@@ -76,6 +77,8 @@ pub struct SolveOptions {
     pub tolerance: f64,
     /// Most iterations of one solve.
     pub iterations: u32,
+    /// Processes that share the work of [`Method::Links`]; this one is the first of them.
+    pub processes: Processes,
 }
 
 impl Default for SolveOptions {
@@ -85,6 +88,7 @@ impl Default for SolveOptions {
             lambda: None,
             tolerance: 5e-4,
             iterations: 2000,
+            processes: Processes::default(),
         }
     }
 }

@@ -17,17 +17,20 @@ mod row;
 pub use operator::Links;
 
 use super::convergence::Convergence;
+use super::group::Processes;
 use super::interreflection::Interreflection;
 use super::joint::Photographs;
 use super::prepare::Prepared;
 use super::solution::{Channel, Solution};
-use iltm_picture::progress::Progress;
+use iltm_picture::progress::{Progress, Silent};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
 use operator::Link;
 use quadtree::Quadtree;
 use rayon::prelude::*;
 use row::{Fit, Prior, Row, Target, axpy, dot, series};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Level with which the first sweep ends: gains of blocks of 2 x 2 cells are good enough for the
@@ -49,10 +52,14 @@ const CHANNEL_RELATIVE: f32 = 0.3;
 const LEAST_NOISE: f64 = 1e-5;
 
 /// Photographs to solve from, as series.
-struct Data<'d> {
-    prepared: &'d Prepared,
-    tree: Arc<Quadtree>,
+#[derive(Serialize, Deserialize)]
+pub(super) struct Data {
+    tree: Quadtree,
     photographs: usize,
+    /// Cells that can be solved for.
+    live: Vec<bool>,
+    /// Deviation of a lit cell's light, by channel and cell.
+    noise: Vec<Vec<f32>>,
     /// Light of all blocks, a column each: channel after channel. Means are reduced.
     sources: DMatrix<f32>,
     /// Light of each cell, likewise.
@@ -76,26 +83,44 @@ pub(super) fn links(
     prepared: &Prepared,
     grid: Grid,
     chosen: &[usize],
+    processes: Processes,
     progress: &dyn Progress,
 ) -> Solution {
     let data = Data::new(prepared, grid, chosen);
-    let mut state = data.first_state();
+    processes.ask(&data);
+    let (state, own) = sweeps(&data, processes, progress);
+    data.solution(&state, &own, &Photographs::new(prepared, chosen))
+}
+
+/// Does a part of what another process solves.
+pub(super) fn help(data: &Data, processes: Processes) {
+    sweeps(data, processes, &Silent);
+}
+
+/// The state with the rows of all blocks, and in colour the rows of each channel's cells.
+fn sweeps(data: &Data, processes: Processes, progress: &dyn Progress) -> (State, Vec<Vec<Row>>) {
+    let sweep = Sweep {
+        data,
+        processes,
+        progress,
+    };
+    let mut state = sweep.first_state();
     let top = data.tree.coarsest();
     for level in (FIRST_ENDS.min(top)..=top).rev() {
-        data.solve_level(level, &mut state, progress);
-        data.fit_gains(level, &mut state);
+        sweep.solve_level(level, &mut state);
+        sweep.fit_gains(level, &mut state);
     }
     // Gains of coarse rows are worse than those that the first sweep has ended with.
     for level in (1..=SECOND_SWEEP.min(top)).rev() {
-        data.solve_level(level, &mut state, progress);
+        sweep.solve_level(level, &mut state);
     }
-    let own = data.solve_cells(&mut state, progress);
-    data.fit_gains(0, &mut state);
-    data.solution(&state, &own, chosen)
+    let own = sweep.solve_cells(&mut state);
+    sweep.fit_gains(0, &mut state);
+    (state, own)
 }
 
-impl<'d> Data<'d> {
-    fn new(prepared: &'d Prepared, grid: Grid, chosen: &[usize]) -> Self {
+impl Data {
+    fn new(prepared: &Prepared, grid: Grid, chosen: &[usize]) -> Self {
         /// Cells whose series are filled together: some lines of a cache.
         const TOGETHER: usize = 64;
         let tree = Quadtree::new(grid);
@@ -130,10 +155,17 @@ impl<'d> Data<'d> {
             let least = prepared.weights.row(cell).min();
             (least / prepared.weights[(cell, chosen[k])]) as f32
         });
+        let noise = (prepared.noise.iter()).map(|cells| {
+            cells
+                .iter()
+                .map(|noise| noise.lit.max(LEAST_NOISE) as f32)
+                .collect()
+        });
         Self {
-            prepared,
-            tree: Arc::new(tree),
+            tree,
             photographs,
+            live: prepared.live.clone(),
+            noise: noise.collect(),
             sources,
             light: fill(cells, &|channel| {
                 prepared.light[channel].select_columns(chosen)
@@ -146,70 +178,11 @@ impl<'d> Data<'d> {
     }
 
     const fn channels(&self) -> usize {
-        self.prepared.light.len()
+        self.noise.len()
     }
 
     fn segment(&self, channel: usize) -> std::ops::Range<usize> {
         channel * self.photographs..(channel + 1) * self.photographs
-    }
-
-    fn first_state(&self) -> State {
-        let mut state = State {
-            rows: vec![Row::default(); self.tree.blocks()],
-            gains: vec![vec![0.0; self.tree.cells()]; self.channels()],
-            scales: vec![1.0; self.channels()],
-        };
-        self.fit_gains(0, &mut state);
-        state
-    }
-
-    /// Solves the rows of one level's blocks.
-    fn solve_level(&self, level: usize, state: &mut State, progress: &dyn Progress) {
-        let found = self.fit_level(level, state, progress, |fit| fit.row().merged(&self.tree));
-        for (block, row) in self.tree.level(level).zip(found) {
-            state.rows[block] = row.unwrap_or_default();
-        }
-    }
-
-    /// Solves the rows of the cells. In colour, the rows of each channel are what is returned.
-    fn solve_cells(&self, state: &mut State, progress: &dyn Progress) -> Vec<Vec<Row>> {
-        let colour = self.channels() > 1;
-        let found = self.fit_level(0, state, progress, |fit| {
-            let merged = |row: Row| row.merged(&self.tree);
-            let own = colour.then(|| fit.of_channels(CHANNEL_RELATIVE));
-            let own = own.into_iter().flatten().map(merged);
-            (merged(fit.row()), own.collect::<Vec<Row>>())
-        });
-        let nothing = vec![Row::default(); self.tree.cells()];
-        let mut rows = vec![nothing; if colour { self.channels() } else { 0 }];
-        for (cell, found) in found.into_iter().enumerate() {
-            let (shared, own) = found.unwrap_or_default();
-            state.rows[cell] = shared;
-            for ((rows, mut own), scale) in rows.iter_mut().zip(own).zip(&state.scales) {
-                own.values.iter_mut().for_each(|value| *value *= scale);
-                rows[cell] = own;
-            }
-        }
-        rows
-    }
-
-    /// What is made of the fit of each block of a level; `None` if no cell of it is live.
-    fn fit_level<T: Send>(
-        &self,
-        level: usize,
-        state: &State,
-        progress: &dyn Progress,
-        of: impl Fn(Fit<'_>) -> T + Sync,
-    ) -> Vec<Option<T>> {
-        let sources = self.scaled_sources(&state.scales);
-        let blocks = self.tree.level(level).into_par_iter();
-        let found = blocks.map(|block| {
-            let target = self.target(block, &sources, &state.gains)?;
-            let found = of(target.fit(&self.start(block, &state.rows)));
-            progress.advance(1);
-            Some(found)
-        });
-        found.collect()
     }
 
     /// What the row of a block starts from: the mean of the rows of the blocks around it, one level
@@ -254,7 +227,7 @@ impl<'d> Data<'d> {
         gains: &[Vec<f32>],
     ) -> Option<Target<'t>> {
         let cells = self.tree.cells_of(block);
-        let live = |cell: &usize| self.prepared.live[*cell];
+        let live = |cell: &usize| self.live[*cell];
         let cells: Vec<usize> = cells.into_iter().filter(live).collect();
         if cells.is_empty() {
             return None;
@@ -279,7 +252,7 @@ impl<'d> Data<'d> {
             let mut variance = vec![0.0; self.photographs];
             let mut total = 0.0;
             for cell in &cells {
-                let noise = self.prepared.noise[channel][*cell].lit.max(LEAST_NOISE) as f32;
+                let noise = self.noise[channel][*cell];
                 let gain = gains[*cell];
                 let share = (gain * noise).powi(2).recip();
                 if !share.is_finite() {
@@ -318,64 +291,15 @@ impl<'d> Data<'d> {
         Some(target)
     }
 
-    /// Gains, and the channels' scales, with which the rows of a level explain the light best.
-    fn fit_gains(&self, level: usize, state: &mut State) {
-        let fitted: Vec<Vec<(f32, f32, f32)>> = (0..self.tree.cells())
-            .into_par_iter()
-            .map(|cell| {
-                if !self.prepared.live[cell] {
-                    return vec![(0.0, 0.0, 0.0); self.channels()];
-                }
-                let mut reflected = vec![0.0; self.sources.nrows()];
-                let row = &state.rows[self.tree.ancestor(cell, level)];
-                row.add_light(&self.sources, &mut reflected);
-                let channel = |channel: usize| {
-                    let segment = self.segment(channel);
-                    let light = &series(&self.light, cell)[segment.clone()];
-                    let pattern = &series(&self.patterns, cell)[segment.clone()];
-                    let reflected = &reflected[segment];
-                    let square = dot(light, light);
-                    if square <= 0.0 {
-                        return (0.0, 0.0, 0.0);
-                    }
-                    let along = dot(light, reflected) / square;
-                    let gain = dot(light, pattern) / square + state.scales[channel] * along;
-                    let both = along * dot(light, pattern) - dot(reflected, pattern);
-                    let norm = dot(reflected, reflected) - along * along * square;
-                    (gain, both, norm)
-                };
-                (0..self.channels()).map(channel).collect()
-            })
-            .collect();
-        for channel in 0..self.channels() {
-            for (cell, fitted) in fitted.iter().enumerate() {
-                state.gains[channel][cell] = fitted[channel].0;
-            }
-        }
-        if self.channels() == 1 {
-            return;
-        }
-        let scale = |channel: usize| {
-            let both: f32 = fitted.iter().map(|fitted| fitted[channel].1).sum();
-            let norm: f32 = fitted.iter().map(|fitted| fitted[channel].2).sum();
-            both / norm
-        };
-        let scales: Vec<f32> = (0..self.channels()).map(scale).collect();
-        if scales.iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
-            let mean = scales.iter().map(|scale| scale.ln()).sum::<f32>() / scales.len() as f32;
-            state.scales = scales.iter().map(|scale| scale / mean.exp()).collect();
-        }
-    }
-
     /// The answer, with each channel's deviation from the shared operator.
-    fn solution(&self, state: &State, own: &[Vec<Row>], chosen: &[usize]) -> Solution {
-        let photographs = Photographs::new(self.prepared, chosen);
+    fn solution(&self, state: &State, own: &[Vec<Row>], photographs: &Photographs) -> Solution {
+        let tree = Arc::new(self.tree.clone());
         let rows = &state.rows[..self.tree.cells()];
-        let shared = self.operator(rows);
+        let shared = operator(&tree, rows);
         let channel = |channel: usize| {
             let scale = f64::from(state.scales[channel]);
             let even = &shared * scale;
-            let own = own.get(channel).map(|rows| self.operator(rows));
+            let own = own.get(channel).map(|rows| operator(&tree, rows));
             Channel {
                 gain: photographs.gain(channel, own.as_ref().unwrap_or(&even)),
                 scale,
@@ -390,28 +314,140 @@ impl<'d> Data<'d> {
             convergence: Convergence::best(),
         }
     }
+}
 
-    /// An operator of these rows, zero on the diagonal.
-    fn operator(&self, rows: &[Row]) -> Interreflection {
-        let rows = rows.iter().enumerate().map(|(cell, row)| {
-            let links = row.blocks.iter().zip(&row.values);
-            let links = links.filter(|(_, value)| **value != 0.0);
-            let mut links: Vec<Link> = links
-                .map(|(block, value)| Link {
-                    block: *block as u32,
-                    value: *value,
-                })
-                .collect();
-            let holds = |link: &&Link| self.tree.holds(link.block as usize, cell);
-            if let Some(link) = links.iter().find(holds) {
-                // What a block sends to its own cell is taken away again.
-                links.push(Link {
-                    block: cell as u32,
-                    value: -link.value,
-                });
-            }
-            links
+/// An operator of these rows, zero on the diagonal.
+fn operator(tree: &Arc<Quadtree>, rows: &[Row]) -> Interreflection {
+    let rows = rows.iter().enumerate().map(|(cell, row)| {
+        let links = row.blocks.iter().zip(&row.values);
+        let links = links.filter(|(_, value)| **value != 0.0);
+        let mut links: Vec<Link> = links
+            .map(|(block, value)| Link {
+                block: *block as u32,
+                value: *value,
+            })
+            .collect();
+        let holds = |link: &&Link| tree.holds(link.block as usize, cell);
+        if let Some(link) = links.iter().find(holds) {
+            // What a block sends to its own cell is taken away again.
+            links.push(Link {
+                block: cell as u32,
+                value: -link.value,
+            });
+        }
+        links
+    });
+    Interreflection::Links(Links::new(Arc::clone(tree), rows.collect()))
+}
+
+/// Work on the rows that processes share.
+struct Sweep<'s> {
+    data: &'s Data,
+    processes: Processes,
+    progress: &'s dyn Progress,
+}
+
+impl Sweep<'_> {
+    fn first_state(&self) -> State {
+        let mut state = State {
+            rows: vec![Row::default(); self.data.tree.blocks()],
+            gains: vec![vec![0.0; self.data.tree.cells()]; self.data.channels()],
+            scales: vec![1.0; self.data.channels()],
+        };
+        self.fit_gains(0, &mut state);
+        state
+    }
+
+    /// Solves the rows of one level's blocks.
+    fn solve_level(&self, level: usize, state: &mut State) {
+        let found = self.fit_level(level, state, |fit| fit.row().merged(&self.data.tree));
+        for (block, row) in self.data.tree.level(level).zip(found) {
+            state.rows[block] = row.unwrap_or_default();
+        }
+    }
+
+    /// Solves the rows of the cells. In colour, the rows of each channel are what is returned.
+    fn solve_cells(&self, state: &mut State) -> Vec<Vec<Row>> {
+        let colour = self.data.channels() > 1;
+        let found = self.fit_level(0, state, |fit| {
+            let merged = |row: Row| row.merged(&self.data.tree);
+            let own = colour.then(|| fit.of_channels(CHANNEL_RELATIVE));
+            let own = own.into_iter().flatten().map(merged);
+            (merged(fit.row()), own.collect::<Vec<Row>>())
         });
-        Interreflection::Links(Links::new(Arc::clone(&self.tree), rows.collect()))
+        let nothing = vec![Row::default(); self.data.tree.cells()];
+        let mut rows = vec![nothing; if colour { self.data.channels() } else { 0 }];
+        for (cell, found) in found.into_iter().enumerate() {
+            let (shared, own) = found.unwrap_or_default();
+            state.rows[cell] = shared;
+            for ((rows, mut own), scale) in rows.iter_mut().zip(own).zip(&state.scales) {
+                own.values.iter_mut().for_each(|value| *value *= scale);
+                rows[cell] = own;
+            }
+        }
+        rows
+    }
+
+    /// What is made of the fit of each block of a level; `None` if no cell of it is live.
+    fn fit_level<T: Serialize + DeserializeOwned + Send>(
+        &self,
+        level: usize,
+        state: &State,
+        of: impl Fn(Fit<'_>) -> T + Send + Sync,
+    ) -> Vec<Option<T>> {
+        let sources = self.data.scaled_sources(&state.scales);
+        self.processes.map(self.data.tree.level(level), |block| {
+            let target = self.data.target(block, &sources, &state.gains)?;
+            let found = of(target.fit(&self.data.start(block, &state.rows)));
+            self.progress.advance(1);
+            Some(found)
+        })
+    }
+
+    /// Gains, and the channels' scales, with which the rows of a level explain the light best.
+    fn fit_gains(&self, level: usize, state: &mut State) {
+        let cells = 0..self.data.tree.cells();
+        let fitted: Vec<Vec<(f32, f32, f32)>> = self.processes.map(cells, |cell| {
+            if !self.data.live[cell] {
+                return vec![(0.0, 0.0, 0.0); self.data.channels()];
+            }
+            let mut reflected = vec![0.0; self.data.sources.nrows()];
+            let row = &state.rows[self.data.tree.ancestor(cell, level)];
+            row.add_light(&self.data.sources, &mut reflected);
+            let channel = |channel: usize| {
+                let segment = self.data.segment(channel);
+                let light = &series(&self.data.light, cell)[segment.clone()];
+                let pattern = &series(&self.data.patterns, cell)[segment.clone()];
+                let reflected = &reflected[segment];
+                let square = dot(light, light);
+                if square <= 0.0 {
+                    return (0.0, 0.0, 0.0);
+                }
+                let along = dot(light, reflected) / square;
+                let gain = dot(light, pattern) / square + state.scales[channel] * along;
+                let both = along * dot(light, pattern) - dot(reflected, pattern);
+                let norm = dot(reflected, reflected) - along * along * square;
+                (gain, both, norm)
+            };
+            (0..self.data.channels()).map(channel).collect()
+        });
+        for channel in 0..self.data.channels() {
+            for (cell, fitted) in fitted.iter().enumerate() {
+                state.gains[channel][cell] = fitted[channel].0;
+            }
+        }
+        if self.data.channels() == 1 {
+            return;
+        }
+        let scale = |channel: usize| {
+            let both: f32 = fitted.iter().map(|fitted| fitted[channel].1).sum();
+            let norm: f32 = fitted.iter().map(|fitted| fitted[channel].2).sum();
+            both / norm
+        };
+        let scales: Vec<f32> = (0..self.data.channels()).map(scale).collect();
+        if scales.iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
+            let mean = scales.iter().map(|scale| scale.ln()).sum::<f32>() / scales.len() as f32;
+            state.scales = scales.iter().map(|scale| scale / mean.exp()).collect();
+        }
     }
 }

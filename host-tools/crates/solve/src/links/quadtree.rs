@@ -2,13 +2,14 @@
 //! below it. Blocks at the right and lower border may have fewer.
 
 use iltm_runtime::Grid;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Blocks along the shorter side of the coarsest level that links are of, at least.
 const LEAST_SIDE: usize = 2;
 
 /// The blocks of all levels, numbered from the cells up, each level by rows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Quadtree {
     levels: Vec<Level>,
     /// The block above each, of all but the one of all cells.
@@ -19,7 +20,7 @@ pub(super) struct Quadtree {
 }
 
 /// Blocks of one size.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Level {
     rows: usize,
     cols: usize,

@@ -3,6 +3,7 @@
 
 use super::quadtree::Quadtree;
 use nalgebra::{DMatrix, DMatrixView, Dyn, U1};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// A split must explain as many times the noise variance, or what is left where that is more.
@@ -22,7 +23,7 @@ const LEAST_GAIN: f32 = 1e-3;
 
 /// Links of one receiving block: the light of all cells of a source block together, times a value.
 /// No two source blocks overlap; all of them together are the whole grid.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Row {
     pub(super) blocks: Vec<usize>,
     pub(super) values: Vec<f32>,

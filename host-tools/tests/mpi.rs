@@ -1,0 +1,145 @@
+//! `mpirun iltm solve`: the same table from any number of ranks, and what a rank does that fails.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+use tempfile::tempdir;
+
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("samples")
+        .join(name)
+}
+
+/// `iltm` on so many ranks; with 0 it is not MPI that starts it.
+fn iltm(ranks: usize) -> Command {
+    let program = env!("CARGO_BIN_EXE_iltm");
+    if ranks == 0 {
+        return Command::new(program);
+    }
+    let mut command = Command::new("mpirun");
+    command
+        // In a container everything is root's, and cores are few.
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .args(["--oversubscribe", "-n", &ranks.to_string(), program]);
+    command
+}
+
+fn solve(ranks: usize, capture: &Path, table: &Path) -> Command {
+    let mut command = iltm(ranks);
+    command
+        .env("SOURCE_DATE_EPOCH", "1000000000")
+        .args([OsStr::new("solve"), capture.as_os_str()])
+        .args(["--method", "links", "-o"])
+        .arg(table);
+    command
+}
+
+fn words(output: &Output) -> String {
+    [&output.stdout, &output.stderr]
+        .map(|words| String::from_utf8_lossy(words))
+        .concat()
+}
+
+#[test]
+fn any_number_of_ranks_makes_the_same_bytes_and_says_it_once() {
+    let folder = tempdir().unwrap();
+    for name in ["m-panels", "m-panels-colour"] {
+        let tables = [0, 1, 2, 3].map(|ranks| {
+            let table = folder.path().join(format!("{name}-{ranks}.iltm"));
+            let output = solve(ranks, &sample(name), &table).output().unwrap();
+            let words = words(&output);
+            assert!(output.status.success(), "{words}");
+            assert_eq!(words.matches("predicted to be").count(), 1, "{words}");
+            fs::read(table).unwrap()
+        });
+        assert!(tables.iter().all(|table| *table == tables[0]), "{name}");
+    }
+}
+
+#[test]
+fn a_method_that_is_not_shared_says_so() {
+    let folder = tempdir().unwrap();
+    let solve = |ranks| {
+        let mut command = iltm(ranks);
+        command.arg("solve").arg(sample("m-panels")).arg("-o");
+        words(&command.arg(folder.path().join("t.iltm")).output().unwrap())
+    };
+    let note = "`joint` works on one of 2";
+    assert!(solve(2).contains(note));
+    assert!(!solve(1).contains("ranks:"));
+}
+
+#[test]
+fn an_error_is_said_once_and_has_its_exit_code() {
+    let folder = tempdir().unwrap();
+    let nowhere = folder.path().join("nowhere");
+    let output = solve(2, &nowhere, &folder.path().join("t.iltm"))
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    assert_eq!(words(&output).matches("is not a capture").count(), 1);
+    let output = iltm(2)
+        .args(["solve", "--no-such-option"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(words(&output).matches("--no-such-option").count(), 1);
+}
+
+/// The process of a rank, once it is there.
+fn rank(mpirun: &Child, rank: usize) -> u32 {
+    let is_it = |id: &u32| {
+        let environment = fs::read(format!("/proc/{id}/environ")).unwrap_or_default();
+        let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+        let parent = stat
+            .rsplit(')')
+            .next()
+            .and_then(|rest| rest.split_whitespace().nth(1));
+        let wanted = format!("OMPI_COMM_WORLD_RANK={rank}");
+        parent == Some(&mpirun.id().to_string())
+            && environment
+                .split(|byte| *byte == 0)
+                .any(|variable| variable == wanted.as_bytes())
+    };
+    let start = Instant::now();
+    loop {
+        let all = fs::read_dir("/proc").unwrap();
+        let mut all = all.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok());
+        if let Some(found) = all.find(is_it) {
+            return found;
+        }
+        assert!(
+            start.elapsed() < Duration::from_mins(1),
+            "rank {rank} never came"
+        );
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_rank_that_dies_ends_the_run_with_an_error_and_no_table() {
+    for dies in [0, 1] {
+        let folder = tempdir().unwrap();
+        let table = folder.path().join("t.iltm");
+        let mut command = solve(2, &sample("m-panels-colour"), &table);
+        let run = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let id = rank(&run, dies);
+        let kill = format!("kill -9 {id}");
+        let killed = Command::new("sh").args(["-c", &kill]).status().unwrap();
+        assert!(killed.success());
+        let output = run.wait_with_output().unwrap();
+        let words = words(&output);
+        assert!(!output.status.success(), "{words}");
+        assert!(words.contains(&format!("rank {dies}")), "{words}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "{words}");
+    }
+}
