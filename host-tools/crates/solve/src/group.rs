@@ -74,7 +74,9 @@ impl Processes {
             if job.is_empty() {
                 return;
             }
-            links::help(&unpacked(&job), self);
+            let data = unpacked(&job);
+            drop(job);
+            links::help(&data, self);
         }
     }
 
