@@ -71,7 +71,7 @@ pub fn exit_codes() -> Vec<(u8, &'static str, &'static str)> {
 pub fn run(meter: Option<Meter>) -> ExitCode {
     match Ranks::join() {
         Ok(ranks) => ranks.run(|processes| run_alone(meter, processes)),
-        Err(failure) => Output::new(false).failure(&failure),
+        Err(failure) => Output::new(asks_for_json()).failure(&failure),
     }
 }
 
@@ -121,11 +121,15 @@ fn run_alone(meter: Option<Meter>, processes: Processes) -> ExitCode {
     }
 }
 
+/// Whether the command line asks for objects, as far as it can be told without understanding it.
+fn asks_for_json() -> bool {
+    let mut before_files = env::args_os().take_while(|word| word != "--");
+    before_files.any(|word| word == "--json")
+}
+
 /// Says that the command line cannot be understood, or prints the help that it asks for.
 fn refused(error: &clap::Error) -> ExitCode {
-    let mut before_files = env::args_os().take_while(|word| word != "--");
-    let is_json = before_files.any(|word| word == "--json");
-    if error.use_stderr() && is_json {
+    if error.use_stderr() && asks_for_json() {
         let said = error.to_string();
         // What is wrong ends where the usage begins.
         let wrong = said.lines().take_while(|line| !line.trim().is_empty());

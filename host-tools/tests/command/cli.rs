@@ -406,22 +406,22 @@ fn inspect_says_of_the_theorem_what_solve_said() {
 #[cfg(not(feature = "mpi"))]
 #[test]
 fn ranks_that_would_all_do_the_same_are_refused() {
-    let run = |count: &str| {
+    let run = |count: &str, line: &[&str]| {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_iltm"));
-        let output = command
-            .env("OMPI_COMM_WORLD_SIZE", count)
-            .arg("ports")
-            .output();
-        output.unwrap()
+        let output = command.env("OMPI_COMM_WORLD_SIZE", count).args(line);
+        output.output().unwrap()
     };
-    let refused = run("2");
+    let refused = run("2", &["ports"]);
     assert_eq!(refused.status.code(), Some(2));
     let words = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(
         words.contains("without MPI") && words.contains("--features mpi"),
         "{words}"
     );
-    assert_ne!(run("1").status.code(), Some(2));
+    let refused = run("2", &["ports", "--json"]);
+    let object: serde_json::Value = serde_json::from_slice(&refused.stdout).unwrap();
+    assert_eq!(object["error"]["kind"], "usage");
+    assert_ne!(run("1", &["ports"]).status.code(), Some(2));
 }
 
 #[test]

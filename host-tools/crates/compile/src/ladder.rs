@@ -89,7 +89,7 @@ pub fn build(inverse: &InverseTransport, content: &DMatrix<f64>, targets: &[f64]
     let finest = targets.last().copied().unwrap_or(0.0);
     let mut entries = queue(inverse, &sigma, finest, &mut judge);
     let mut search = Search::new(&judge, &entries);
-    // The finest tier first: what the others leave out has its rest in it.
+    // The finest tier first: a coarser one leaves out all that this one does, and more.
     let found: Vec<Tier> = (targets.iter().rev())
         .map(|target| search.fewest_entries(*target))
         .collect();

@@ -23,54 +23,37 @@ pub trait Group: Sync {
     fn gather(&self, own: &[u8]) -> Vec<Vec<u8>>;
 }
 
-/// A process that has no others.
-struct Alone;
-
-impl Group for Alone {
-    fn rank(&self) -> usize {
-        0
-    }
-
-    fn size(&self) -> usize {
-        1
-    }
-
-    fn broadcast(&self, bytes: Vec<u8>) -> Vec<u8> {
-        bytes
-    }
-
-    fn gather(&self, own: &[u8]) -> Vec<Vec<u8>> {
-        vec![own.to_vec()]
-    }
-}
-
-/// The group that a solve is shared with.
-#[derive(Clone, Copy)]
-pub struct Processes(&'static dyn Group);
+/// The group that a solve is shared with; by default this process is alone.
+#[derive(Clone, Copy, Default)]
+pub struct Processes(Option<&'static dyn Group>);
 
 impl Processes {
     /// This process and those of `group`.
     #[must_use]
     pub fn new(group: &'static dyn Group) -> Self {
-        Self(group)
+        Self(Some(group))
     }
 
     /// How many there are.
     #[must_use]
     pub fn count(self) -> usize {
-        self.0.size()
+        self.0.map_or(1, Group::size)
+    }
+
+    fn rank(self) -> usize {
+        self.0.map_or(0, Group::rank)
     }
 
     /// Whether this is the one that reads and writes.
     #[must_use]
     pub fn is_first(self) -> bool {
-        self.0.rank() == 0
+        self.rank() == 0
     }
 
     /// Helps the first process until it ends; to be called by all the others.
     pub fn help(self) {
-        loop {
-            let job = self.0.broadcast(Vec::new());
+        while let Some(group) = self.0 {
+            let job = group.broadcast(Vec::new());
             if job.is_empty() {
                 return;
             }
@@ -82,15 +65,15 @@ impl Processes {
 
     /// Lets the others end; to be called by the first one.
     pub fn dismiss(self) {
-        if self.count() > 1 {
-            self.0.broadcast(Vec::new());
+        if let Some(group) = self.0 {
+            group.broadcast(Vec::new());
         }
     }
 
     /// Gives the others what they [`help`](Self::help) with.
     pub(super) fn ask(self, job: &impl Serialize) {
-        if self.count() > 1 {
-            self.0.broadcast(packed(job));
+        if let Some(group) = self.0 {
+            group.broadcast(packed(job));
         }
     }
 
@@ -103,34 +86,27 @@ impl Processes {
     ) -> Vec<T> {
         let count = self.count();
         let border = |rank: usize| items.start + items.len() * rank / count;
-        let rank = self.0.rank();
-        let own = border(rank)..border(rank + 1);
+        let own = border(self.rank())..border(self.rank() + 1);
         let own: Vec<T> = own.into_par_iter().map(of).collect();
-        if count == 1 {
+        let Some(group) = self.0 else {
             return own;
-        }
-        let parts = self.0.gather(&packed(&own));
+        };
+        let parts = group.gather(&packed(&own));
         drop(own);
         let parts = parts.iter().map(|part| unpacked::<Vec<T>>(part));
         parts.flatten().collect()
     }
 }
 
-impl Default for Processes {
-    fn default() -> Self {
-        Self(&Alone)
-    }
-}
-
 impl PartialEq for Processes {
     fn eq(&self, other: &Self) -> bool {
-        (self.0.rank(), self.0.size()) == (other.0.rank(), other.0.size())
+        (self.rank(), self.count()) == (other.rank(), other.count())
     }
 }
 
 impl Debug for Processes {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "rank {} of {}", self.0.rank(), self.0.size())
+        write!(f, "rank {} of {}", self.rank(), self.count())
     }
 }
 
