@@ -4,6 +4,7 @@
 //! `--seeds N` (5) says how often each case is run; other words choose the cases
 //! whose names contain one of them.
 
+use iltm_tests::hard_cases::case::{METHODS, Trials};
 use iltm_tests::hard_cases::{cases, page};
 use iltm_tests::hard_frames;
 use std::process::ExitCode;
@@ -24,17 +25,21 @@ fn main() -> ExitCode {
         let chosen = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
         let mut rows = Vec::new();
         for case in cases.into_iter().filter(|case| chosen(case.name)) {
-            let start = std::time::Instant::now();
-            let outcome = (case.run)(seeds);
-            eprintln!(
-                "{:12} {} ({:.1} s): {} [{}]",
-                outcome.verdict(),
-                case.name,
-                start.elapsed().as_secs_f64(),
-                outcome.measured,
-                outcome.bound
-            );
-            rows.push((case, outcome));
+            let outcomes = METHODS.map(|method| {
+                let start = std::time::Instant::now();
+                let outcome = (case.run)(Trials { seeds, method });
+                eprintln!(
+                    "{:12} {}, {} ({:.1} s): {} [{}]",
+                    outcome.verdict(),
+                    case.name,
+                    method,
+                    start.elapsed().as_secs_f64(),
+                    outcome.measured,
+                    outcome.bound
+                );
+                outcome
+            });
+            rows.push((case, outcomes));
         }
         groups.push((title, rows));
     }

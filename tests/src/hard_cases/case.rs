@@ -4,7 +4,7 @@ use super::closed_loop::{LoopErrors, errors};
 use super::theory;
 use crate::hard_cases::observations::Capture;
 use iltm::scene::coaxial::CoaxialScene;
-use iltm::solve::{Compensation, SolveError, gain_only};
+use iltm::solve::{Compensation, Method, SolveError, SolveOptions, gain_only};
 
 /// One hard case.
 #[derive(Clone, Copy, Debug)]
@@ -15,8 +15,36 @@ pub struct Case {
     pub reason: &'static str,
     /// Which theory the bound is from.
     pub theory: &'static str,
-    /// Runs it, with so many seeds.
-    pub run: fn(seeds: u64) -> CaseOutcome,
+    /// Runs it.
+    pub run: fn(Trials) -> CaseOutcome,
+}
+
+/// The methods that every case is run through: the defaults for few cells and for many.
+pub const METHODS: [Method; 2] = [Method::Joint, Method::Links];
+
+/// How a case is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Trials {
+    /// How often, each time with other patterns and other noise.
+    pub seeds: u64,
+    /// How inverses are found.
+    pub method: Method,
+}
+
+impl Trials {
+    /// The same, no more often than this.
+    pub(super) fn at_most(self, seeds: u64) -> Self {
+        let seeds = self.seeds.min(seeds);
+        Self { seeds, ..self }
+    }
+
+    /// Options of the solver.
+    pub(super) fn options(self) -> SolveOptions {
+        SolveOptions {
+            method: Some(self.method),
+            ..SolveOptions::default()
+        }
+    }
 }
 
 /// What came of a [`Case`].
@@ -26,6 +54,8 @@ pub struct CaseOutcome {
     pub bound: String,
     /// What was found.
     pub measured: String,
+    /// What that compares with, which is the same for all methods.
+    pub beside: String,
     /// Whether it does.
     pub holds: bool,
     /// Whether it holds because the input was refused.
@@ -38,6 +68,7 @@ impl CaseOutcome {
         Self {
             bound: bound.into(),
             measured: measured.into(),
+            beside: String::new(),
             holds,
             refused: false,
         }
@@ -54,6 +85,7 @@ impl CaseOutcome {
                 refused: true,
                 bound,
                 measured: message,
+                beside: String::new(),
             },
         }
     }
@@ -85,16 +117,16 @@ pub struct Demand {
 /// What is chosen may never be worse than gain alone or nothing.
 pub fn closed_loop(
     scene: &CoaxialScene,
-    seeds: u64,
+    trials: Trials,
     demand: Demand,
     make: impl Fn(u64) -> Capture,
 ) -> CaseOutcome {
     let mut found: Vec<(f64, LoopErrors)> = Vec::new();
     let mut chosen = Vec::new();
     let (mut photographs, mut live) = (0, Vec::new());
-    for seed in 0..seeds {
+    for seed in 0..trials.seeds {
         let capture = make(seed);
-        match loop_of(scene, &capture) {
+        match loop_of(scene, &capture, trials.method) {
             Ok((error, errors, compensation, cells)) => {
                 found.push((error, errors));
                 chosen.push(compensation);
@@ -125,19 +157,26 @@ pub fn closed_loop(
         some if some == chosen.len() => ", with gains alone".to_owned(),
         some => format!(", {some} of {} with gains alone", chosen.len()),
     };
-    let measured = format!(
-        "{median:.4}, worst of {seeds} {worst:.4}{how}; the true inverse {:.4}, gain alone {:.4}, nothing {:.4}",
+    let measured = format!("{median:.4}, worst of {} {worst:.4}{how}", trials.seeds);
+    let beside = format!(
+        "the true inverse {:.4}, gain alone {:.4}, nothing {:.4}",
         errors.perfect, errors.gain_only, errors.nothing
     );
     if demand.no_harm_only {
         let bound = "at most gain alone and nothing";
-        return CaseOutcome::new(harmless, bound, measured);
+        return CaseOutcome {
+            beside,
+            ..CaseOutcome::new(harmless, bound, measured)
+        };
     }
     let words = match demand.required {
         Some(required) => format!("{required:.4} asked for, {theory:.4} by theory"),
         None => format!("{theory:.4}"),
     };
-    CaseOutcome::new(harmless && worst <= bound, words, measured)
+    CaseOutcome {
+        beside,
+        ..CaseOutcome::new(harmless && worst <= bound, words, measured)
+    }
 }
 
 /// Error of what `iltm solve` would write, all errors, what it is and the cells
@@ -145,8 +184,9 @@ pub fn closed_loop(
 fn loop_of(
     scene: &CoaxialScene,
     capture: &Capture,
+    method: Method,
 ) -> Result<(f64, LoopErrors, Compensation, Vec<bool>), SolveError> {
-    let (inverse, report) = capture.solve()?;
+    let (inverse, report) = capture.solve(method)?;
     let inverse = match report.compensation {
         Compensation::Operator => inverse,
         Compensation::GainOnly => gain_only(&capture.observed(), &report)?,

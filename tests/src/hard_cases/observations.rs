@@ -5,8 +5,8 @@ use iltm::capture::{Pattern, Role};
 use iltm::progress::Silent;
 use iltm::scene::coaxial::CoaxialScene;
 use iltm::solve::{
-    CellNoise, InverseTransport, Observed, ObservedChannel, SolveError, SolveOptions, SolveReport,
-    blur, solve_observed,
+    CellNoise, InverseTransport, Method, Observed, ObservedChannel, SolveError, SolveOptions,
+    SolveReport, blur, solve_observed,
 };
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
@@ -114,12 +114,16 @@ impl Capture {
         }
     }
 
-    /// Solves with the default method.
+    /// Solves by a method.
     ///
     /// # Errors
     /// Those of [`solve_observed`].
-    pub fn solve(&self) -> Result<(InverseTransport, SolveReport), SolveError> {
-        solve_observed(&self.observed(), &SolveOptions::default(), &Silent)
+    pub fn solve(&self, method: Method) -> Result<(InverseTransport, SolveReport), SolveError> {
+        let options = SolveOptions {
+            method: Some(method),
+            ..SolveOptions::default()
+        };
+        solve_observed(&self.observed(), &options, &Silent)
     }
 }
 

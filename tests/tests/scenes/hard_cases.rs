@@ -1,5 +1,6 @@
 //! Hard cases: every one holds, and the page in the docs lists them all.
 
+use iltm_tests::hard_cases::case::{METHODS, Trials};
 use iltm_tests::hard_cases::cases;
 use iltm_tests::hard_frames;
 use rayon::prelude::*;
@@ -11,13 +12,15 @@ fn every_hard_case_holds() {
         .into_iter()
         .flat_map(|(_, cases)| cases)
         .collect();
-    let failures: Vec<String> = all
+    let runs = all
         .par_iter()
-        .filter_map(|case| {
-            let outcome = (case.run)(1);
+        .flat_map(|case| METHODS.map(|method| (case, method)));
+    let failures: Vec<String> = runs
+        .filter_map(|(case, method)| {
+            let outcome = (case.run)(Trials { seeds: 1, method });
             (!outcome.holds).then(|| {
                 format!(
-                    "{}: {} where {} must hold",
+                    "{}, {method}: {} where {} must hold",
                     case.name, outcome.measured, outcome.bound
                 )
             })

@@ -179,10 +179,27 @@ pub(super) fn predict(prepared: &Prepared, judged: &[Judged<'_>]) -> Prediction 
         uncompensated: nothing.error,
         gain_only: gain_only.error,
         compensated: compensated.error,
+        noise: noise(prepared, judged),
         confidence: confidence(&gain_only, &compensated),
         photographs: compensated.squares.len(),
         gain_only_kind,
     }
+}
+
+/// Noise of the held-out photographs, relative to their light.
+fn noise(prepared: &Prepared, judged: &[Judged<'_>]) -> f64 {
+    let (mut noise, mut light) = (0.0, 0.0);
+    for judged in judged {
+        let held_out = &judged.split.held_out;
+        light += squared_light(prepared, held_out);
+        for cells in &prepared.noise {
+            let cells = cells.iter().zip(&prepared.live);
+            let live = cells.filter(|(_, live)| **live);
+            let squares = live.map(|(noise, _)| noise.lit.powi(2)).sum::<f64>();
+            noise += held_out.len() as f64 * squares;
+        }
+    }
+    (noise / light.max(f64::MIN_POSITIVE)).sqrt()
 }
 
 /// Error of one way to project, over all held-out photographs.

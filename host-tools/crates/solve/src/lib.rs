@@ -105,7 +105,8 @@ use iltm_capture::{Measurements, Role};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use joint::Solver;
-use links::links;
+use links::{How, Splits, links};
+use options::{MANY_CELLS, MOST_JOINT_CELLS};
 use prepare::Prepared;
 use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
@@ -118,8 +119,11 @@ const HOPELESS: f64 = 0.05;
 const UNPREDICTABLE: f64 = 0.4;
 /// Predicted error up to which no other method is tried.
 const GOOD: f64 = 0.01;
-/// Another method's predicted error, relative to `joint`'s, from which it is taken.
+/// Another method's predicted error, relative to the first one's, from which it is taken.
 const BETTER: f64 = 0.8;
+/// Predicted error with rows of each channel's own, relative to that without, from which they are
+/// taken: they make a table larger and its frames slower.
+const MUCH_BETTER: f64 = 0.9;
 /// Photographs below which no scene of more cells can be told.
 const LEAST_PHOTOGRAPHS: usize = 8;
 
@@ -186,6 +190,10 @@ fn solve_judged(
         Method::Joint => {
             let joint = task.joint(options.lambda, &mut seconds, &mut clock);
             task.or_two_stage(joint, &mut seconds, &mut clock)
+        }
+        Method::Links => {
+            let links = task.links(&mut seconds, &mut clock)?;
+            task.or_two_stage(links, &mut seconds, &mut clock)
         }
         other => task.by_rows(other, &mut seconds, &mut clock)?,
     };
@@ -299,21 +307,63 @@ impl<'t> Task<'t> {
         }
     }
 
-    /// The two-stage answer where held-out photographs say that `joint` errs and that the
+    /// Links with the splits by which the held-out photographs are predicted best, and with rows of
+    /// each channel's own only where those predict them much better. Of many cells splits are always
+    /// few: more only made the errors larger there, and take longer.
+    fn links(&self, seconds: &mut Seconds, clock: &mut Clock) -> Result<Outcome<'t>, SolveError> {
+        let solve = |how| {
+            let (prepared, grid, processes) = (self.prepared, self.grid, self.processes);
+            move |chosen: &[usize]| {
+                let progress = self.progress;
+                Ok(links(prepared, grid, chosen, how, processes, progress))
+            }
+        };
+        let tried: &[Splits] = if self.prepared.live_cells() < MANY_CELLS {
+            &[Splits::Few, Splits::Many]
+        } else {
+            &[Splits::Few]
+        };
+        let error = |tried: &Tried<'_>| predict(self.prepared, &tried.judged).compensated;
+        let mut best: Option<(f64, How, Tried<'t>)> = None;
+        for splits in tried {
+            let how = |own_rows| How {
+                splits: *splits,
+                own_rows,
+            };
+            let mut found = self.judge(Method::Links, solve(how(true)))?;
+            let errors: Vec<f64> = found.iter().map(error).collect();
+            let own_rows = matches!(errors[..], [shared, own] if own < MUCH_BETTER * shared);
+            let chosen = usize::from(own_rows);
+            if best
+                .as_ref()
+                .is_none_or(|(least, ..)| errors[chosen] < *least)
+            {
+                best = Some((errors[chosen], how(own_rows), found.swap_remove(chosen)));
+            }
+        }
+        let (_, how, tried) = best.expect("one at least is tried");
+        seconds.choose = clock.lap();
+        let outcome = self.finish(Method::Links, tried, solve(how));
+        seconds.solve = clock.lap();
+        outcome
+    }
+
+    /// The two-stage answer where held-out photographs say that the first one errs and that the
     /// other errs less: where cells differ much in light, or each lights several places, `K`
-    /// is not what `joint` takes it for, and the transport itself is easier to find.
+    /// is not smooth, and the transport itself is easier to find.
     fn or_two_stage(
         &self,
-        joint: Outcome<'t>,
+        first: Outcome<'t>,
         seconds: &mut Seconds,
         clock: &mut Clock,
     ) -> Outcome<'t> {
-        let error = predict(self.prepared, &joint.judged).compensated;
+        let error = predict(self.prepared, &first.judged).compensated;
         // Written so that what is not a number asks for another answer.
         let good = error <= GOOD;
-        // Few photographs are held out in turns, which takes as many solves.
-        if good || self.splits.len() > 1 {
-            return joint;
+        // Few photographs are held out in turns, which takes as many solves; and the transport of
+        // more cells than that takes more memory than most computers have.
+        if good || self.splits.len() > 1 || self.prepared.live_cells() > MOST_JOINT_CELLS {
+            return first;
         }
         let spent = *seconds;
         let other = self.by_rows(Method::TwoStage, seconds, clock);
@@ -331,10 +381,10 @@ impl<'t> Task<'t> {
                 if instead < BETTER * error {
                     other
                 } else {
-                    joint
+                    first
                 }
             }
-            _ => joint,
+            _ => first,
         }
     }
 
@@ -345,45 +395,76 @@ impl<'t> Task<'t> {
         seconds: &mut Seconds,
         clock: &mut Clock,
     ) -> Result<Outcome<'t>, SolveError> {
-        let usable = self.prepared.with_role(|role| uses(method, role));
-        let solve = |chosen: &[usize], what| {
-            self.progress.begin(what, 0);
+        let solve = |chosen: &[usize]| {
             let (prepared, haar, stop) = (self.prepared, self.haar, self.stop);
             let found = match method {
                 Method::TwoStage => by_rows::two_stage(prepared, haar, chosen, stop, self.progress),
                 Method::BruteForce => by_rows::brute_force(prepared, chosen),
-                Method::Links => {
-                    let found = links(prepared, self.grid, chosen, self.processes, self.progress);
-                    Ok(found)
-                }
-                Method::Direct | Method::Joint => {
+                Method::Direct | Method::Joint | Method::Links => {
                     Ok(by_rows::direct(prepared, haar, chosen, stop, self.progress))
                 }
             };
-            self.progress.end();
-            found
+            Ok(vec![found?])
         };
-        let mut iterations = 0;
-        let mut judged = Vec::new();
+        let tried = self.judge(method, solve)?.pop().unwrap_or_default();
+        seconds.choose = clock.lap();
+        let outcome = self.finish(method, tried, solve);
+        seconds.solve = clock.lap();
+        outcome
+    }
+
+    /// What `solve` finds without the held-out photographs of each split: one or several answers.
+    fn judge(
+        &self,
+        method: Method,
+        solve: impl Fn(&[usize]) -> Result<Vec<Solution>, SolveError>,
+    ) -> Result<Vec<Tried<'t>>, SolveError> {
+        let usable = self.prepared.with_role(|role| uses(method, role));
+        let mut tried: Vec<Tried<'t>> = Vec::new();
         for split in self.splits {
             let kept = |k: &usize| !split.held_out.contains(k);
             let chosen: Vec<usize> = usable.iter().copied().filter(kept).collect();
-            let trial = solve(&chosen, "solving without the held-out photographs")?;
-            iterations += trial.convergence.iterations;
-            judged.push(Judged::new(split, trial, &self.prepared.live));
+            self.progress
+                .begin("solving without the held-out photographs", 0);
+            let found = solve(&chosen)?;
+            self.progress.end();
+            tried.resize_with(found.len(), Tried::default);
+            for (tried, found) in tried.iter_mut().zip(found) {
+                tried.iterations += found.convergence.iterations;
+                let judged = Judged::new(split, found, &self.prepared.live);
+                tried.judged.push(judged);
+            }
         }
-        seconds.choose = clock.lap();
-        let solution = solve(&usable, "solving")?;
-        seconds.solve = clock.lap();
+        Ok(tried)
+    }
+
+    /// What `solve` finds of all photographs: the last of its answers.
+    fn finish(
+        &self,
+        method: Method,
+        tried: Tried<'t>,
+        solve: impl Fn(&[usize]) -> Result<Vec<Solution>, SolveError>,
+    ) -> Result<Outcome<'t>, SolveError> {
+        self.progress.begin("solving", 0);
+        let mut found = solve(&self.prepared.with_role(|role| uses(method, role)))?;
+        self.progress.end();
+        let solution = found.pop().expect("one answer at least");
         Ok(Outcome {
             method,
             lambda: 0.0,
             trials: Vec::new(),
-            iterations: iterations + solution.convergence.iterations,
-            judged,
+            iterations: tried.iterations + solution.convergence.iterations,
+            judged: tried.judged,
             solution,
         })
     }
+}
+
+/// Inverses that have not seen the held-out photographs, and the iterations that they took.
+#[derive(Default)]
+struct Tried<'t> {
+    judged: Vec<Judged<'t>>,
+    iterations: u32,
 }
 
 /// Whether a method uses a photograph.

@@ -58,10 +58,10 @@ impl GainOnly {
 }
 
 /// Cells and photographs from which `links` is the default.
-const MANY_CELLS: usize = 2048;
+pub(super) const MANY_CELLS: usize = 2048;
 const MANY_PHOTOGRAPHS: usize = 200;
 /// Cells above which `links` is the default, however few the photographs.
-const MOST_JOINT_CELLS: usize = 6144;
+pub(super) const MOST_JOINT_CELLS: usize = 6144;
 
 /// Settings of [`solve`](super::solve). The defaults are the recipe that was
 /// measured best; nothing needs to be set.

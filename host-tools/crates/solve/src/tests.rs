@@ -182,6 +182,45 @@ fn links_from_many_photographs_err_as_little_as_joint() {
 }
 
 #[test]
+fn channels_get_links_of_their_own_only_where_light_bounces_otherwise_in_them() {
+    let size = (12, 16);
+    let scene = corner(size.0, size.1);
+    let mut capture = Capture::new(&scene, size, 100);
+    // The second channel has other texture; in the third no light bounces in the upper half.
+    let other = Corner::new(size.0.into(), size.1.into(), |cell| textured(cell + 1));
+    let half = {
+        let mut inverse = scene.inverse();
+        for (row, col) in (0..96).flat_map(|row| (0..192).map(move |col| (row, col))) {
+            if row != col {
+                inverse[(row, col)] = 0.0;
+            }
+        }
+        inverse
+    };
+    let transport = half.clone().try_inverse().unwrap();
+    let (alike, otherwise) = (
+        scene.photograph(&capture.patterns),
+        transport * &capture.patterns,
+    );
+    capture.light.push(other.photograph(&capture.patterns));
+    capture.light.push(alike);
+    let solved = |capture: &mut Capture| {
+        for light in &mut capture.light {
+            add_noise(light, 1e-3);
+        }
+        capture.solve(&method(Method::Links)).unwrap().0
+    };
+    let found = solved(&mut capture);
+    let own = |channel: &ChannelInverse| channel.deviation.is_some();
+    assert!(!found.channels.iter().any(own));
+    capture.light[2] = otherwise;
+    let found = solved(&mut capture);
+    assert!(found.channels.iter().all(own));
+    let error = relative(&inverse(&found, 2), &half);
+    assert!(error < 0.01, "{error}");
+}
+
+#[test]
 fn links_is_the_default_of_many_cells_and_photographs_alone() {
     let default = SolveOptions::default();
     let weighted = SolveOptions {
@@ -555,26 +594,25 @@ fn a_blur_is_undone_where_it_is_stated_and_by_another_method_where_not() {
     });
     let light = |projected: &DMatrix<f64>| scene.photograph(&(&blur * projected));
     let wanted = light(&shown);
-    let error = |deviation| {
-        let observed = Observed {
-            blur: deviation,
-            ..capture.observed()
+    for asked in PHYSICAL {
+        let error = |deviation| {
+            let observed = Observed {
+                blur: deviation,
+                ..capture.observed()
+            };
+            let (found, report) = solve_observed(&observed, &method(asked), &Silent).unwrap();
+            let error = relative(&light(&(inverse(&found, 0) * &wanted)), &wanted);
+            (error, report.method)
         };
-        let (found, report) = solve_observed(&observed, &SolveOptions::default(), &Silent).unwrap();
-        let error = relative(&light(&(inverse(&found, 0) * &wanted)), &wanted);
-        (error, report.method)
-    };
-    let (stated, method) = error(0.5);
-    assert!(
-        stated < 2e-3 && method == Method::Joint,
-        "{stated} {method:?}"
-    );
-    // It takes from `K` its sign, which is what the joint method knows.
-    let (unstated, method) = error(0.0);
-    assert!(
-        unstated < 4e-3 && method == Method::TwoStage,
-        "{unstated} {method:?}"
-    );
+        let (stated, used) = error(0.5);
+        assert!(stated < 2e-3 && used == asked, "{stated} {used:?}");
+        // It takes from `K` its sign, which is what these methods know.
+        let (unstated, used) = error(0.0);
+        assert!(
+            unstated < 4e-3 && used == Method::TwoStage,
+            "{asked}: {unstated} {used:?}"
+        );
+    }
 }
 
 #[test]

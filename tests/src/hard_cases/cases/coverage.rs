@@ -1,7 +1,7 @@
 //! Coverage: cells that no light reaches, that reflect none, that the camera does not see,
 //! or that the surface covers in part.
 
-use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, Trials, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -30,19 +30,19 @@ pub(super) const CASES: [Case; 7] = [
         name: "partly covered cells",
         reason: "the frame is larger than the scene: border cells are covered to 60 %, 30 % and not at all",
         theory: "K's columns scale with the coverage and stay sparse and non-negative",
-        run: |seeds| partly(seeds, 0.4, None),
+        run: |trials| partly(trials, 0.4, None),
     },
     Case {
         name: "partly covered cells, 50 dB",
         reason: "the same with noise",
         theory: "the same, and noise that the coefficients fit",
-        run: |seeds| partly(seeds, 0.4, Some(50.0)),
+        run: |trials| partly(trials, 0.4, Some(50.0)),
     },
     Case {
         name: "partly covered cells, none of them seen",
         reason: "every border cell throws light that the camera cannot measure",
         theory: "the same",
-        run: |seeds| partly(seeds, 0.95, None),
+        run: |trials| partly(trials, 0.95, None),
     },
     Case {
         name: "partly covered cells in colour, 50 dB",
@@ -62,29 +62,29 @@ fn spread(cell: usize) -> bool {
     cell % 27 == 5 && cell < 270
 }
 
-fn black(seeds: u64) -> CaseOutcome {
+fn black(trials: Trials) -> CaseOutcome {
     let mut scene = textured();
     for (cell, albedo) in scene.albedo.iter_mut().enumerate() {
         if spread(cell) {
             *albedo = 0.0;
         }
     }
-    named(&scene, seeds, spread, WhyLeftOut::Black)
+    named(&scene, trials, spread, WhyLeftOut::Black)
 }
 
-fn unlit(seeds: u64) -> CaseOutcome {
+fn unlit(trials: Trials) -> CaseOutcome {
     let mut scene = textured();
     for light in scene.irradiance.iter_mut().take(21) {
         *light = 0.0;
     }
-    named(&scene, seeds, |cell| cell < 21, WhyLeftOut::Unlit)
+    named(&scene, trials, |cell| cell < 21, WhyLeftOut::Unlit)
 }
 
 /// The closed loop over the other cells, and whether all of `wanted` and no
 /// others are left out for the right reason.
 fn named(
     scene: &CoaxialScene,
-    seeds: u64,
+    trials: Trials,
     wanted: fn(usize) -> bool,
     why: WhyLeftOut,
 ) -> CaseOutcome {
@@ -93,8 +93,8 @@ fn named(
         ..Demand::default()
     };
     let make = |seed| Capture::new(scene, 80, seed).noisy(60.0, seed);
-    let mut outcome = closed_loop(scene, seeds, demand, make);
-    let Ok((_, report)) = make(0).solve() else {
+    let mut outcome = closed_loop(scene, trials, demand, make);
+    let Ok((_, report)) = make(0).solve(trials.method) else {
         return outcome;
     };
     let right = report
@@ -108,7 +108,7 @@ fn named(
     outcome
 }
 
-fn unseen(seeds: u64) -> CaseOutcome {
+fn unseen(trials: Trials) -> CaseOutcome {
     let scene = textured();
     // A block of 4 x 5 cells at a valley.
     let hidden = |cell: usize| (4..8).contains(&(cell / 21)) && (3..8).contains(&(cell % 21));
@@ -116,7 +116,7 @@ fn unseen(seeds: u64) -> CaseOutcome {
         required: Some(0.015),
         ..Demand::default()
     };
-    closed_loop(&scene, seeds, demand, |seed| {
+    closed_loop(&scene, trials, demand, |seed| {
         Capture::new(&scene, 80, seed).unseen(hidden)
     })
 }
@@ -132,7 +132,7 @@ fn partly_covered() -> CoaxialScene {
 }
 
 /// Judged in the first channel.
-fn colour(seeds: u64) -> CaseOutcome {
+fn colour(trials: Trials) -> CaseOutcome {
     let scene = partly_covered();
     let others = [3, 4].map(|texture| scene.clone().textured(0.2, 0.8, texture));
     let demand = Demand {
@@ -140,7 +140,7 @@ fn colour(seeds: u64) -> CaseOutcome {
         required: Some(0.015),
         ..Demand::default()
     };
-    closed_loop(&scene, seeds.min(2), demand, |seed| {
+    closed_loop(&scene, trials.at_most(2), demand, |seed| {
         let mut capture = Capture::new(&scene, 80, seed);
         for other in &others {
             capture.light.push(other.transport() * &capture.patterns);
@@ -152,7 +152,7 @@ fn colour(seeds: u64) -> CaseOutcome {
 }
 
 /// Cells covered to less than `least` are too small for the camera.
-fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> CaseOutcome {
+fn partly(trials: Trials, least: f64, decibels: Option<f64>) -> CaseOutcome {
     let scene = partly_covered();
     let noise = decibels.map_or(0.0, |decibels| 10_f64.powf(-decibels / 20.0));
     let demand = Demand {
@@ -160,7 +160,7 @@ fn partly(seeds: u64, least: f64, decibels: Option<f64>) -> CaseOutcome {
         required: Some(0.015),
         ..Demand::default()
     };
-    closed_loop(&scene, seeds, demand, |seed| {
+    closed_loop(&scene, trials, demand, |seed| {
         let capture = Capture::new(&scene, 80, seed).unseen(|cell| scene.coverage[cell] < least);
         match decibels {
             Some(decibels) => capture.noisy(decibels, seed),

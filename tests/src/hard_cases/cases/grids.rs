@@ -1,6 +1,6 @@
 //! Grids of odd sizes.
 
-use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, Trials, closed_loop};
 use super::super::grid;
 use super::super::observations::Capture;
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -42,23 +42,23 @@ pub(super) const CASES: [Case; 6] = [
         name: "257 x 3",
         reason: "a prime just above a power of two, and hardly any width",
         theory: THEORY,
-        run: |s| wedge(s.min(1), (257, 3), 60),
+        run: |s| wedge(s.at_most(1), (257, 3), 60),
     },
 ];
 
-fn wedge(seeds: u64, size: (u16, u16), bernoulli: usize) -> CaseOutcome {
+fn wedge(trials: Trials, size: (u16, u16), bernoulli: usize) -> CaseOutcome {
     let grid = grid(size);
     let scene = CoaxialScene::new(grid, &Panels::corner(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
     let demand = Demand {
         noise: 1e-3,
         ..Demand::default()
     };
-    closed_loop(&scene, seeds, demand, |seed| {
+    closed_loop(&scene, trials, demand, |seed| {
         Capture::new(&scene, bernoulli, seed).noisy(60.0, seed)
     })
 }
 
-fn one_cell(_: u64) -> CaseOutcome {
+fn one_cell(trials: Trials) -> CaseOutcome {
     let grid = grid((1, 1));
     let scene = CoaxialScene::new(
         grid,
@@ -69,7 +69,7 @@ fn one_cell(_: u64) -> CaseOutcome {
         },
         0.5,
     );
-    match Capture::new(&scene, 12, 1).solve() {
+    match Capture::new(&scene, 12, 1).solve(trials.method) {
         Ok((found, report)) => {
             let gain = found.channels[0].gain[0];
             let right = (gain - 2.0).abs() < 1e-6 && found.shared.is_none();
@@ -83,7 +83,7 @@ fn one_cell(_: u64) -> CaseOutcome {
     }
 }
 
-fn column(seeds: u64) -> CaseOutcome {
+fn column(trials: Trials) -> CaseOutcome {
     let grid = grid((33, 1));
     let panels = Panels {
         folds: vec![0.0, 1.0],
@@ -93,7 +93,7 @@ fn column(seeds: u64) -> CaseOutcome {
     let scene = CoaxialScene::new(grid, &panels, 0.5).textured(0.3, 0.9, 1);
     closed_loop(
         &scene,
-        seeds,
+        trials,
         Demand {
             noise: 1e-3,
             ..Demand::default()

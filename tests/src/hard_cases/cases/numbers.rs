@@ -1,6 +1,6 @@
 //! NaN: not a number, infinity and denormals wherever a number may come in.
 
-use super::super::case::{Case, CaseOutcome};
+use super::super::case::{Case, CaseOutcome, Trials};
 use super::super::grid;
 use super::super::observations::Capture;
 use iltm::capture::Settings;
@@ -41,13 +41,13 @@ pub(super) const CASES: [Case; 6] = [
         name: "light of 1e-300",
         reason: "squares underflow to zero",
         theory: "light is scaled to 1 before anything else",
-        run: |_| scaled(1e-300),
+        run: |trials| scaled(trials, 1e-300),
     },
     Case {
         name: "denormal light",
         reason: "values of 1e-310 have lost digits, and their reciprocals are infinite",
         theory: "a gain above the largest number is refused",
-        run: |_| scaled(1e-310),
+        run: |trials| scaled(trials, 1e-310),
     },
 ];
 
@@ -61,19 +61,22 @@ fn capture() -> Capture {
 fn all_refused(results: Vec<Result<(), String>>) -> CaseOutcome {
     let count = results.len();
     let messages: Vec<String> = results.into_iter().filter_map(Result::err).collect();
+    let measured = format!(
+        "{} refused, as: {}",
+        messages.len(),
+        messages.first().cloned().unwrap_or_default()
+    );
     CaseOutcome {
-        holds: messages.len() == count,
         refused: true,
-        bound: format!("{count} of {count} refused"),
-        measured: format!(
-            "{} refused, as: {}",
-            messages.len(),
-            messages.first().cloned().unwrap_or_default()
-        ),
+        ..CaseOutcome::new(
+            messages.len() == count,
+            format!("{count} of {count} refused"),
+            measured,
+        )
     }
 }
 
-fn observations(_: u64) -> CaseOutcome {
+fn observations(trials: Trials) -> CaseOutcome {
     let spoil: [fn(&mut Capture, f64); 5] = [
         |capture, value| capture.light[0][(7, 5)] = value,
         |capture, value| capture.patterns[(7, 5)] = value,
@@ -88,7 +91,7 @@ fn observations(_: u64) -> CaseOutcome {
             spoil(&mut capture, value);
             results.push(
                 capture
-                    .solve()
+                    .solve(trials.method)
                     .map(|_| ())
                     .map_err(|error| error.to_string()),
             );
@@ -97,7 +100,7 @@ fn observations(_: u64) -> CaseOutcome {
     all_refused(results)
 }
 
-fn options(_: u64) -> CaseOutcome {
+fn options(trials: Trials) -> CaseOutcome {
     let capture = capture();
     let solve = |options: SolveOptions| {
         let solved = solve_observed(&capture.observed(), &options, &Silent);
@@ -107,14 +110,14 @@ fn options(_: u64) -> CaseOutcome {
     for value in NOT_FINITE {
         results.push(solve(SolveOptions {
             lambda: Some(value),
-            ..SolveOptions::default()
+            ..trials.options()
         }));
         results.push(solve(SolveOptions {
             tolerance: value,
-            ..SolveOptions::default()
+            ..trials.options()
         }));
     }
-    let Ok((inverse, _)) = capture.solve() else {
+    let Ok((inverse, _)) = capture.solve(trials.method) else {
         return CaseOutcome::new(false, "an inverse", "none");
     };
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e300] {
@@ -158,8 +161,8 @@ fn with_element(operator: &Interreflection, value: f64) -> Interreflection {
     elements.into()
 }
 
-fn inverses(_: u64) -> CaseOutcome {
-    let Ok((inverse, _)) = capture().solve() else {
+fn inverses(trials: Trials) -> CaseOutcome {
+    let Ok((inverse, _)) = capture().solve(trials.method) else {
         return CaseOutcome::new(false, "an inverse", "none");
     };
     let spoil: [fn(&mut InverseTransport, f64); 5] = [
@@ -183,7 +186,7 @@ fn inverses(_: u64) -> CaseOutcome {
     all_refused(results)
 }
 
-fn settings(_: u64) -> CaseOutcome {
+fn settings(_: Trials) -> CaseOutcome {
     let mut results = Vec::new();
     for value in ["nan", "inf", "-inf", "-1", "1e300", "true"] {
         for text in [
@@ -203,27 +206,26 @@ fn settings(_: u64) -> CaseOutcome {
 }
 
 /// An inverse must be the one of light near 1, or be refused.
-fn scaled(factor: f64) -> CaseOutcome {
+fn scaled(trials: Trials, factor: f64) -> CaseOutcome {
     let bound = "the same table as for light near 1, or a refusal";
-    let Ok((plain, _)) = capture().solve() else {
+    let Ok((plain, _)) = capture().solve(trials.method) else {
         return CaseOutcome::new(false, bound, "no inverse");
     };
     let small = capture().map(|light| light * factor);
-    match small.solve() {
+    match small.solve(trials.method) {
         Ok((found, _)) => {
             let same = found.channels[0].gain.iter().zip(&plain.channels[0].gain);
             let change = same
                 .map(|(a, b)| (a * factor / b - 1.0).abs())
                 .fold(0.0, f64::max);
             let table = compiled(&found, &CompileOptions::default());
+            let holds = change < 1e-6 || table.is_err();
+            let refused = table.is_err();
+            let measured = table.err();
+            let measured = measured.unwrap_or_else(|| format!("gains differ by {change:.1e}"));
             CaseOutcome {
-                holds: change < 1e-6 || table.is_err(),
-                refused: table.is_err(),
-                bound: bound.to_owned(),
-                measured: match table {
-                    Ok(()) => format!("gains differ by {change:.1e}"),
-                    Err(error) => error,
-                },
+                refused,
+                ..CaseOutcome::new(holds, bound, measured)
             }
         }
         Err(error) => CaseOutcome {

@@ -1,6 +1,6 @@
 //! Noise, and photographs that say less than they should.
 
-use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, Trials, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -44,13 +44,13 @@ pub(super) const CASES: [Case; 11] = [
         name: "8 random photographs",
         reason: "far fewer than any theory of recovery asks for",
         theory: FOLDS,
-        run: |seeds| few(seeds, 8),
+        run: |trials| few(trials, 8),
     },
     Case {
         name: "no random photographs",
         reason: "Gray code alone: 19 photographs for 273 unknowns a row",
         theory: FOLDS,
-        run: |seeds| few(seeds, 0),
+        run: |trials| few(trials, 0),
     },
     Case {
         name: "5 photographs",
@@ -83,29 +83,29 @@ fn scene() -> CoaxialScene {
     CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.25, 0.95, 1)
 }
 
-fn noise(seeds: u64, decibels: f64, required: Option<f64>) -> CaseOutcome {
+fn noise(trials: Trials, decibels: f64, required: Option<f64>) -> CaseOutcome {
     let scene = scene();
     let demand = Demand {
         noise: 10_f64.powf(-decibels / 20.0),
         required,
         ..Demand::default()
     };
-    closed_loop(&scene, seeds, demand, |seed| {
+    closed_loop(&scene, trials, demand, |seed| {
         Capture::new(&scene, 200, seed).noisy(decibels, seed)
     })
 }
 
-fn no_harm(seeds: u64, make: impl Fn(&CoaxialScene, u64) -> Capture) -> CaseOutcome {
+fn no_harm(trials: Trials, make: impl Fn(&CoaxialScene, u64) -> Capture) -> CaseOutcome {
     let scene = scene();
     let demand = Demand {
         no_harm_only: true,
         ..Demand::default()
     };
-    closed_loop(&scene, seeds, demand, |seed| make(&scene, seed))
+    closed_loop(&scene, trials, demand, |seed| make(&scene, seed))
 }
 
-fn few(seeds: u64, bernoulli: usize) -> CaseOutcome {
-    no_harm(seeds, |scene, seed| {
+fn few(trials: Trials, bernoulli: usize) -> CaseOutcome {
+    no_harm(trials, |scene, seed| {
         Capture::new(scene, bernoulli, seed).noisy(50.0, seed)
     })
 }
@@ -121,9 +121,11 @@ fn kept(mut capture: Capture, filter: impl Fn(usize) -> bool) -> Capture {
     capture
 }
 
-fn five(_: u64) -> CaseOutcome {
+fn five(trials: Trials) -> CaseOutcome {
     let capture = kept(Capture::new(&scene(), 20, 1), |k| k % 8 == 0);
-    let result = capture.solve().map(|_| "an inverse".to_owned());
+    let result = capture
+        .solve(trials.method)
+        .map(|_| "an inverse".to_owned());
     CaseOutcome::refusal(
         result.map_err(|error| error.to_string()),
         "it needs at least 8",
@@ -146,8 +148,8 @@ fn taken(
 /// White, Gray code and its inverse.
 const CODED: usize = 19;
 
-fn repeated(seeds: u64) -> CaseOutcome {
-    no_harm(seeds, |scene, seed| {
+fn repeated(trials: Trials) -> CaseOutcome {
+    no_harm(trials, |scene, seed| {
         let repeat = |patterns: &mut DMatrix<f64>| {
             for k in CODED..patterns.ncols() {
                 let first = patterns.column(CODED + (k - CODED) % 10).into_owned();
@@ -158,8 +160,8 @@ fn repeated(seeds: u64) -> CaseOutcome {
     })
 }
 
-fn dependent(seeds: u64) -> CaseOutcome {
-    no_harm(seeds, |scene, seed| {
+fn dependent(trials: Trials) -> CaseOutcome {
+    no_harm(trials, |scene, seed| {
         let block = |patterns: &mut DMatrix<f64>| {
             for k in CODED..patterns.ncols() {
                 for cell in 0..patterns.nrows() {
@@ -173,8 +175,8 @@ fn dependent(seeds: u64) -> CaseOutcome {
     })
 }
 
-fn white_only(seeds: u64) -> CaseOutcome {
-    no_harm(seeds, |scene, seed| {
+fn white_only(trials: Trials) -> CaseOutcome {
+    no_harm(trials, |scene, seed| {
         taken(scene, seed, 10, |patterns| patterns.fill(1.0)).noisy(50.0, seed)
     })
 }

@@ -1,6 +1,6 @@
 //! Light transport that is strong, ill-conditioned or singular.
 
-use super::super::case::{Case, CaseOutcome, Demand, closed_loop};
+use super::super::case::{Case, CaseOutcome, Demand, Trials, closed_loop};
 use super::super::observations::Capture;
 use super::super::{GRID, grid, theory};
 use iltm::scene::coaxial::{CoaxialScene, Panels};
@@ -51,35 +51,35 @@ pub(super) const CASES: [Case; 7] = [
     },
 ];
 
-fn white_wedge(seeds: u64) -> CaseOutcome {
+fn white_wedge(trials: Trials) -> CaseOutcome {
     let grid = grid(GRID);
     let scene = CoaxialScene::new(grid, &Panels::corner(grid, 30.0), 0.99);
-    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
+    let outcome = closed_loop(&scene, trials, Demand::default(), |seed| {
         Capture::new(&scene, 100, seed)
     });
     with_condition(&scene, 6.0, outcome)
 }
 
-fn dim_wedge(seeds: u64) -> CaseOutcome {
+fn dim_wedge(trials: Trials) -> CaseOutcome {
     let grid = grid(GRID);
     let scene = CoaxialScene::new(grid, &Panels::corner(grid, 30.0), 0.99).vignetted(0.02);
-    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
+    let outcome = closed_loop(&scene, trials, Demand::default(), |seed| {
         Capture::new(&scene, 100, seed)
     });
     with_condition(&scene, 100.0, outcome)
 }
 
-fn sphere(seeds: u64) -> CaseOutcome {
+fn sphere(trials: Trials) -> CaseOutcome {
     let grid = grid(GRID);
     let mut scene = CoaxialScene::new(grid, &Panels::corner(grid, 90.0), 0.995);
     scene.form_factors.fill(1.0 / grid.cells() as f64);
     // In focus; but light is so even there that only images it can make are fair.
     scene.blur = Some(nalgebra::DMatrix::identity(grid.cells(), grid.cells()));
-    let outcome = closed_loop(&scene, seeds, Demand::default(), |seed| {
+    let outcome = closed_loop(&scene, trials, Demand::default(), |seed| {
         Capture::new(&scene, 100, seed)
     });
     let mut outcome = with_condition(&scene, 190.0, outcome);
-    if let Ok((_, report)) = Capture::new(&scene, 100, 0).solve() {
+    if let Ok((_, report)) = Capture::new(&scene, 100, 0).solve(trials.method) {
         outcome.holds &= report.left_out.is_empty();
         outcome.measured = format!(
             "{} cells left out; {}",
@@ -97,7 +97,7 @@ fn with_condition(scene: &CoaxialScene, least: f64, mut outcome: CaseOutcome) ->
     outcome
 }
 
-fn doubled_light(seeds: u64) -> CaseOutcome {
+fn doubled_light(trials: Trials) -> CaseOutcome {
     let grid = grid(GRID);
     let mut scene =
         CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(0.4, 0.9, 1);
@@ -112,8 +112,10 @@ fn doubled_light(seeds: u64) -> CaseOutcome {
         no_harm_only: true,
         ..Demand::default()
     };
-    let mut outcome = closed_loop(&scene, seeds, demand, |seed| Capture::new(&scene, 80, seed));
-    if let Ok((_, report)) = Capture::new(&scene, 80, 0).solve() {
+    let mut outcome = closed_loop(&scene, trials, demand, |seed| {
+        Capture::new(&scene, 80, seed)
+    });
+    if let Ok((_, report)) = Capture::new(&scene, 80, 0).solve(trials.method) {
         let left_out: Vec<usize> = report.left_out.iter().map(|out| out.cell).collect();
         outcome.holds &= left_out == [30, 101, 200];
         outcome.measured = format!("left out: {left_out:?}; {}", outcome.measured);
@@ -121,12 +123,12 @@ fn doubled_light(seeds: u64) -> CaseOutcome {
     outcome
 }
 
-fn flat(seeds: u64) -> CaseOutcome {
-    chosen(0.25, seeds, Compensation::GainOnly)
+fn flat(trials: Trials) -> CaseOutcome {
+    chosen(0.25, trials, Compensation::GainOnly)
 }
 
-fn even(seeds: u64) -> CaseOutcome {
-    let outcome = chosen(0.95, seeds, Compensation::Nothing);
+fn even(trials: Trials) -> CaseOutcome {
+    let outcome = chosen(0.95, trials, Compensation::Nothing);
     CaseOutcome {
         refused: outcome.holds,
         ..outcome
@@ -134,15 +136,18 @@ fn even(seeds: u64) -> CaseOutcome {
 }
 
 /// What is chosen for a flat scene with albedos from `least` to .95, at 40 dB.
-fn chosen(least: f64, seeds: u64, wanted: Compensation) -> CaseOutcome {
+fn chosen(least: f64, trials: Trials, wanted: Compensation) -> CaseOutcome {
     let grid = grid(GRID);
     let mut scene =
         CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7).textured(least, 0.95, 1);
     scene.form_factors.fill(0.0);
     let mut names = Vec::new();
     let mut errors = String::new();
-    for seed in 0..seeds {
-        match Capture::new(&scene, 60, seed).noisy(40.0, seed).solve() {
+    for seed in 0..trials.seeds {
+        match Capture::new(&scene, 60, seed)
+            .noisy(40.0, seed)
+            .solve(trials.method)
+        {
             Ok((_, report)) => {
                 names.push(report.compensation);
                 let prediction = report.prediction;
@@ -157,11 +162,11 @@ fn chosen(least: f64, seeds: u64, wanted: Compensation) -> CaseOutcome {
             Err(error) => errors = error.to_string(),
         }
     }
-    let all = names.len() as u64 == seeds && names.iter().all(|name| *name == wanted);
+    let all = names.len() as u64 == trials.seeds && names.iter().all(|name| *name == wanted);
     CaseOutcome::new(all, format!("{wanted} chosen"), errors)
 }
 
-fn shifted(_: u64) -> CaseOutcome {
+fn shifted(trials: Trials) -> CaseOutcome {
     let grid = grid(GRID);
     let scene = CoaxialScene::new(grid, &Panels::m_shape(grid, 75.0), 0.7);
     let mut capture = Capture::new(&scene, 60, 1);
@@ -172,7 +177,7 @@ fn shifted(_: u64) -> CaseOutcome {
             .set_column(k, &shown.column((k + 1) % shown.ncols()));
     }
     let result = capture
-        .solve()
+        .solve(trials.method)
         .map(|(_, report)| format!("{:?}", report.prediction));
     CaseOutcome::refusal(
         result.map_err(|error| error.to_string()),

@@ -15,6 +15,7 @@ mod quadtree;
 mod row;
 
 pub use operator::Links;
+pub(super) use row::Splits;
 
 use super::convergence::Convergence;
 use super::group::Processes;
@@ -56,6 +57,7 @@ const LEAST_NOISE: f64 = 1e-5;
 pub(super) struct Data {
     tree: Quadtree,
     photographs: usize,
+    how: How,
     /// Cells that can be solved for.
     live: Vec<bool>,
     /// Deviation of a lit cell's light, by channel and cell.
@@ -78,18 +80,34 @@ struct State {
     scales: Vec<f32>,
 }
 
-/// Solves from the photographs `chosen`.
+/// How rows are solved.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub(super) struct How {
+    pub(super) splits: Splits,
+    /// Whether each channel has rows of its own too. Bounced light is the same geometry in all
+    /// channels, so that most scenes need none.
+    pub(super) own_rows: bool,
+}
+
+/// Solves from the photographs `chosen`: with the rows that all channels share, and then with those
+/// of each channel if asked for and there are several.
 pub(super) fn links(
     prepared: &Prepared,
     grid: Grid,
     chosen: &[usize],
+    how: How,
     processes: Processes,
     progress: &dyn Progress,
-) -> Solution {
-    let data = Data::new(prepared, grid, chosen);
+) -> Vec<Solution> {
+    let data = Data::new(prepared, grid, chosen, how);
     processes.ask(&data);
     let (state, own) = sweeps(&data, processes, progress);
-    data.solution(&state, &own, &Photographs::new(prepared, chosen))
+    let photographs = Photographs::new(prepared, chosen);
+    let mut found = vec![data.solution(&state, &[], &photographs)];
+    if !own.is_empty() {
+        found.push(data.solution(&state, &own, &photographs));
+    }
+    found
 }
 
 /// Does a part of what another process solves.
@@ -97,7 +115,7 @@ pub(super) fn help(data: &Data, processes: Processes) {
     sweeps(data, processes, &Silent);
 }
 
-/// The state with the rows of all blocks, and in colour the rows of each channel's cells.
+/// The state with the rows of all blocks, and the rows of each channel's cells if it has its own.
 fn sweeps(data: &Data, processes: Processes, progress: &dyn Progress) -> (State, Vec<Vec<Row>>) {
     let sweep = Sweep {
         data,
@@ -120,7 +138,7 @@ fn sweeps(data: &Data, processes: Processes, progress: &dyn Progress) -> (State,
 }
 
 impl Data {
-    fn new(prepared: &Prepared, grid: Grid, chosen: &[usize]) -> Self {
+    fn new(prepared: &Prepared, grid: Grid, chosen: &[usize], how: How) -> Self {
         /// Cells whose series are filled together: some lines of a cache.
         const TOGETHER: usize = 64;
         let tree = Quadtree::new(grid);
@@ -164,6 +182,7 @@ impl Data {
         Self {
             tree,
             photographs,
+            how,
             live: prepared.live.clone(),
             noise: noise.collect(),
             sources,
@@ -179,6 +198,11 @@ impl Data {
 
     const fn channels(&self) -> usize {
         self.noise.len()
+    }
+
+    /// Whether each channel has rows of its own.
+    const fn own_rows(&self) -> bool {
+        self.how.own_rows && self.channels() > 1
     }
 
     fn segment(&self, channel: usize) -> std::ops::Range<usize> {
@@ -244,6 +268,8 @@ impl Data {
                 relative: RELATIVE,
                 absolute: ABSOLUTE / self.tree.cells() as f32,
             },
+            splits: self.how.splits,
+            apart: self.own_rows(),
         };
         for (channel, gains) in gains.iter().enumerate() {
             let segment = self.segment(channel);
@@ -366,17 +392,17 @@ impl Sweep<'_> {
         }
     }
 
-    /// Solves the rows of the cells. In colour, the rows of each channel are what is returned.
+    /// Solves the rows of the cells. The rows of each channel's own, if any, are what is returned.
     fn solve_cells(&self, state: &mut State) -> Vec<Vec<Row>> {
-        let colour = self.data.channels() > 1;
+        let own_rows = self.data.own_rows();
         let found = self.fit_level(0, state, |fit| {
             let merged = |row: Row| row.merged(&self.data.tree);
-            let own = colour.then(|| fit.of_channels(CHANNEL_RELATIVE));
+            let own = own_rows.then(|| fit.of_channels(CHANNEL_RELATIVE));
             let own = own.into_iter().flatten().map(merged);
             (merged(fit.row()), own.collect::<Vec<Row>>())
         });
         let nothing = vec![Row::default(); self.data.tree.cells()];
-        let mut rows = vec![nothing; if colour { self.data.channels() } else { 0 }];
+        let mut rows = vec![nothing; if own_rows { self.data.channels() } else { 0 }];
         for (cell, found) in found.into_iter().enumerate() {
             let (shared, own) = found.unwrap_or_default();
             state.rows[cell] = shared;

@@ -5,8 +5,11 @@ use iltm_runtime::Grid;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Blocks along the shorter side of the coarsest level that links are of, at least.
+/// Blocks along the shorter side of the coarsest level that links are of, at least, unless it would
+/// have more than [`MOST_COARSEST`].
 const LEAST_SIDE: usize = 2;
+/// See [`LEAST_SIDE`]: a row starts with all blocks of that level, and is to split some.
+const MOST_COARSEST: usize = 32;
 
 /// The blocks of all levels, numbered from the cells up, each level by rows.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -59,7 +62,8 @@ impl Quadtree {
                 tree.parents.push(parent);
                 tree.sizes[parent] += tree.sizes[block];
             }
-            if above.rows.min(above.cols) >= LEAST_SIDE {
+            let too_many = level.rows * level.cols > MOST_COARSEST;
+            if too_many || above.rows.min(above.cols) >= LEAST_SIDE {
                 tree.coarsest += 1;
             }
             tree.levels.push(above);
@@ -236,6 +240,8 @@ mod tests {
         assert_eq!(tree.size(tree.blocks() - 1), 35);
         // 5 x 7, 3 x 4, 2 x 2.
         assert_eq!(tree.coarsest(), 2);
+        // 257 x 3, 129 x 2, 65 x 1, 33 x 1, 17 x 1.
+        assert_eq!(Quadtree::new(Grid::new(257, 3).unwrap()).coarsest(), 4);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DMatrixView, Dyn, U1};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// A split must explain as many times the noise variance, or what is left where that is more.
+/// A split must explain as many times the noise variance.
 const SPLIT: f32 = 5.0;
 /// Splits of less than this part of the best one wait for the next round.
 const SPLIT_TOGETHER: f32 = 0.25;
@@ -130,6 +130,27 @@ pub(super) struct Target<'t> {
     pub(super) own: Vec<Vec<f32>>,
     /// How far values may be from those that they start from: a part of the value, and beyond.
     pub(super) prior: Prior,
+    pub(super) splits: Splits,
+    /// Whether channels will be fitted apart from one another.
+    pub(super) apart: bool,
+}
+
+/// When blocks of sources are split where the photographs leave more unexplained than noise is.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub(in super::super) enum Splits {
+    /// A split must explain five times the mean of what is left.
+    Few,
+    /// Twice that: for scenes whose photographs have little noise beside what blocks cost.
+    Many,
+}
+
+impl Splits {
+    const fn least(self) -> f32 {
+        match self {
+            Self::Few => 5.0,
+            Self::Many => 2.0,
+        }
+    }
 }
 
 /// Deviation of a value from where it starts.
@@ -149,8 +170,8 @@ impl<'t> Target<'t> {
         let columns = self.columns(&start.blocks);
         let mut fit = Fit {
             blocks: start.blocks.clone(),
-            grams: (0..self.channels())
-                .map(|channel| gram(&self.of_channel(&columns, channel)))
+            grams: (0..self.parts())
+                .map(|part| gram(&self.part(&columns, part)))
                 .collect(),
             columns,
             values: start.values.clone(),
@@ -171,12 +192,18 @@ impl<'t> Target<'t> {
         fit
     }
 
-    fn channels(&self) -> usize {
-        self.wanted.len() / self.photographs
+    /// Parts of the series whose products are kept apart: channels, or all of them together.
+    fn parts(&self) -> usize {
+        if self.apart {
+            self.wanted.len() / self.photographs
+        } else {
+            1
+        }
     }
 
-    fn of_channel<'c>(&self, columns: &'c DMatrix<f32>, channel: usize) -> Columns<'c> {
-        columns.rows(channel * self.photographs, self.photographs)
+    fn part<'c>(&self, columns: &'c DMatrix<f32>, part: usize) -> Columns<'c> {
+        let length = self.wanted.len() / self.parts();
+        columns.rows(part * length, length)
     }
 
     /// Sources with noise 1, free of what gains explain.
@@ -235,7 +262,7 @@ pub(super) struct Fit<'t> {
     blocks: Vec<usize>,
     /// Series of the blocks, noise 1.
     columns: DMatrix<f32>,
-    /// Products of any two of them within each channel.
+    /// Products of any two of them within each part of the series.
     grams: Vec<DMatrix<f32>>,
     values: Vec<f32>,
     /// What values are pulled towards.
@@ -250,7 +277,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Each channel's own row: a value is pulled to the shared one by a deviation of `relative`
+    /// Each channel's own row, where they are kept apart: a value is pulled to the shared one by a deviation of `relative`
     /// times it.
     pub(super) fn of_channels(&self, relative: f32) -> Vec<Row> {
         let left = self.left(&self.values);
@@ -303,7 +330,8 @@ impl Fit<'_> {
         let left = self.left(&self.values);
         let (series_length, links) = (left.len() as f32, self.blocks.len() as f32);
         let free = series_length - target.own.len() as f32 - links.min(0.5 * series_length);
-        let variance = (dot(&left, &left) / free.max(1.0)).max(1.0);
+        let variance = dot(&left, &left) / free.max(1.0);
+        let least = SPLIT.max(target.splits.least() * variance);
         // Products with series as they are instead of with noise 1.
         let times = |series: &[f32]| -> Vec<f32> {
             series
@@ -327,7 +355,7 @@ impl Fit<'_> {
                     explained += slope * slope / square;
                 }
             }
-            if explained > SPLIT * variance {
+            if explained > least {
                 found.push((link, explained));
             }
         }
@@ -356,12 +384,12 @@ impl Fit<'_> {
         let (old, all) = (kept.len(), blocks.len());
         let added = self.target.columns(&blocks[old..]);
         let before = self.columns.select_columns(&kept);
-        for (channel, gram) in self.grams.iter_mut().enumerate() {
-            let of_channel = |columns| self.target.of_channel(columns, channel);
+        for (part, gram) in self.grams.iter_mut().enumerate() {
+            let of_part = |columns| self.target.part(columns, part);
             *gram = joined(
                 &gram.select_rows(&kept).select_columns(&kept),
-                &products(&of_channel(&before), &of_channel(&added)),
-                &self::gram(&of_channel(&added)),
+                &products(&of_part(&before), &of_part(&added)),
+                &self::gram(&of_part(&added)),
             );
         }
         self.columns = before.resize_horizontally(all, 0.0);
@@ -477,6 +505,8 @@ mod tests {
                 relative: 0.7,
                 absolute: 0.01,
             },
+            splits: Splits::Few,
+            apart: false,
         };
         let top: Vec<usize> = tree.level(tree.levels() - 1).collect();
         let start = Row {
