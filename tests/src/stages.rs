@@ -1,21 +1,24 @@
 //! Pipeline stages: what they take, in instructions a sample and bytes of firmware.
 //!
 //! Counted on the reference board as in [`instructions`](crate::instructions), for
-//! tables that are made up and list more stages one after the other.
+//! tables that list more stages one after the other.
 //! `docs/stages.csv` and `docs/firmware-sizes.csv` hold the results, and tests compare
 //! them.
 
 use crate::firmware::{elf, elf_of, flash_bytes};
-use crate::instructions::bench;
+use crate::grid;
+use crate::instructions::{bench, cases};
 use crate::made_up::{MadeUp, pairs};
 use iltm::compile::image::StoredRow;
 use iltm::device::emulator::Board;
 use iltm_runtime::features::Stage;
+use iltm_runtime::image::Table;
+use iltm_runtime::operator::{Row, Segment};
 use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write as _;
 
 /// Entries of each row of a made-up operator, in pairs.
-pub const ENTRIES: usize = 8;
+const ENTRIES: usize = 8;
 
 /// A table that lists these stages, and no others, for frames of the grid's size.
 /// [`Stage::FullResolution`] is no section of it but gains finer than the cells, which
@@ -40,6 +43,42 @@ fn rows(grid: Grid) -> Vec<StoredRow> {
         entries: pairs(&mut random, cells, ENTRIES / 2),
     };
     (0..cells).map(row).collect()
+}
+
+/// A table of the list: as [`table`], with the operator of the painted panels at 64 x 64 cells as it
+/// is solved from photographs.
+pub fn listed(stages: &[Stage]) -> MadeUp {
+    let mut table = table(grid(64, 64), stages);
+    if !table.tiers.is_empty() {
+        let cases = cases();
+        let solved = cases.iter().find(|case| case.name == "64x64 colour");
+        let solved = Table::check(&solved.expect("it is listed").image).expect("a table");
+        let operator = solved.operator().expect("panels light each other");
+        let scales = operator.channel_scales();
+        table.scales[..table.channels].copy_from_slice(&scales[..table.channels]);
+        table.tiers = vec![operator.segments().iter().flat_map(stored).collect()];
+    }
+    table
+}
+
+/// The rows of a segment as a table stores them.
+fn stored(segment: &Segment<'_>) -> Vec<StoredRow> {
+    let entries = |row: &Row<'_>| {
+        row.fold(Vec::new(), |mut entries, pair| {
+            let both = [
+                (pair.index, pair.values[0]),
+                (pair.index + 1, pair.values[1]),
+            ];
+            entries.extend(both.into_iter().filter(|(_, value)| *value != 0));
+            entries
+        })
+    };
+    let rows = segment.rows().map(|row| StoredRow {
+        index: row.index,
+        shift: row.shift,
+        entries: entries(&row),
+    });
+    rows.collect()
 }
 
 /// What a frame takes, instructions a sample.
@@ -88,10 +127,9 @@ pub fn instructions(table: &MadeUp, size: FrameSize, firmware_stages: &str) -> u
 
 /// Counts the tables of the list.
 pub fn costs() -> Vec<Cost> {
-    let grid = Grid::new(64, 64).expect("a small grid");
     let larger = FrameSize::new(256, 256).expect("not empty");
     let cost = |&(name, stages): &(&'static str, &[Stage])| {
-        let table = table(grid, stages);
+        let table = listed(stages);
         let of = |size: FrameSize| {
             let samples = size.pixels() * table.channels;
             let all = crate::firmware::ALL_STAGES;
@@ -99,7 +137,7 @@ pub fn costs() -> Vec<Cost> {
         };
         Cost {
             stages: name,
-            cells: of(FrameSize::of_grid(grid)),
+            cells: of(FrameSize::of_grid(table.grid)),
             pixels: of(larger),
         }
     };

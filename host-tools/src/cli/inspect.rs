@@ -240,7 +240,7 @@ fn tiers(table: &Table<'_>, text: &mut String) {
     let _ = writeln!(
         text,
         "\nInstructions are those of a frame of one pixel a cell on the reference board, by a model\n\
-         within 2 % of those counted, not timed; of a frame: of {RATE} a second on a part of {} MHz, if it did one instruction a cycle.\n\
+         within 2 % of those counted, not timed, and 7 more for each sample that is cut off; of a frame: of {RATE} a second on a part of {} MHz, if it did one instruction a cycle.\n\
          Bytes: of a table with that tier and gain only.",
         CLOCK / 1_000_000
     );

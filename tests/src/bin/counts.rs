@@ -16,7 +16,7 @@ use iltm_tests::{costs, rights, stages};
 fn main() {
     match std::env::args().nth(1).as_deref() {
         Some("instructions") => {
-            let counts: Vec<_> = instructions::cases().iter().flat_map(count).collect();
+            let counts: Vec<_> = instructions::all_cases().iter().flat_map(count).collect();
             print!("{}", instructions::csv(&counts));
         }
         Some("costs") => {

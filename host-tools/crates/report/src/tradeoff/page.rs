@@ -129,7 +129,7 @@ impl Tradeoff {
                     }
                     li { b { "Instructions" } ": of a frame of one pixel a cell (" (self.grid) ", "
                         @if self.channels == 1 { "grey" } @else { "colour" }
-                        ") on the reference board, by a model that is within 2 % of the counts. A share of a "
+                        ") on the reference board, by a model that is within 2 % of the counts but for samples that are cut off, at 7 each. A share of a "
                         (RATE) " Hz frame takes a part of " (CLOCK / 1_000_000)
                         " MHz that does one instruction a cycle: a Cortex-M7 can do two, and waits for memory." }
                     li { b { "Microseconds" } ": the same frame, just now, on one core of the machine that wrote this page." }
