@@ -45,8 +45,9 @@ fn rows(grid: Grid) -> Vec<StoredRow> {
     (0..cells).map(row).collect()
 }
 
-/// A table of the list: as [`table`], with the operator of the painted panels at 64 x 64 cells as it
-/// is solved from photographs.
+/// A table of the list: as [`table`], with an operator that has its entries where that of the painted
+/// panels at 64 x 64 cells has them, as it is solved from photographs. Their values are small, so that
+/// hardly any sample is clipped, which would take instructions too.
 pub fn listed(stages: &[Stage]) -> MadeUp {
     let mut table = table(grid(64, 64), stages);
     if !table.tiers.is_empty() {
@@ -54,14 +55,12 @@ pub fn listed(stages: &[Stage]) -> MadeUp {
         let solved = cases.iter().find(|case| case.name == "64x64 colour");
         let solved = Table::check(&solved.expect("it is listed").image).expect("a table");
         let operator = solved.operator().expect("panels light each other");
-        let scales = operator.channel_scales();
-        table.scales[..table.channels].copy_from_slice(&scales[..table.channels]);
         table.tiers = vec![operator.segments().iter().flat_map(stored).collect()];
     }
     table
 }
 
-/// The rows of a segment as a table stores them.
+/// The rows of a segment as a table stores them, with values of 1 and -1.
 fn stored(segment: &Segment<'_>) -> Vec<StoredRow> {
     let entries = |row: &Row<'_>| {
         row.fold(Vec::new(), |mut entries, pair| {
@@ -69,7 +68,8 @@ fn stored(segment: &Segment<'_>) -> Vec<StoredRow> {
                 (pair.index, pair.values[0]),
                 (pair.index + 1, pair.values[1]),
             ];
-            entries.extend(both.into_iter().filter(|(_, value)| *value != 0));
+            let signs = both.map(|(at, value)| (at, value.signum()));
+            entries.extend(signs.into_iter().filter(|(_, sign)| *sign != 0));
             entries
         })
     };

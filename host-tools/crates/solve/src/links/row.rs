@@ -277,8 +277,8 @@ impl Fit<'_> {
         }
     }
 
-    /// Each channel's own row, where they are kept apart: a value is pulled to the shared one by a deviation of `relative`
-    /// times it.
+    /// Each channel's own row, where channels are fitted apart: a value is pulled to the shared one
+    /// by a deviation of `relative` times it.
     pub(super) fn of_channels(&self, relative: f32) -> Vec<Row> {
         let left = self.left(&self.values);
         let prior = Prior {
