@@ -16,7 +16,8 @@ use iltm_tests::{costs, rights, stages};
 fn main() {
     match std::env::args().nth(1).as_deref() {
         Some("instructions") => {
-            let counts: Vec<_> = instructions::all_cases().iter().flat_map(count).collect();
+            let all = [instructions::cases(), instructions::slow_cases()].concat();
+            let counts: Vec<_> = all.iter().flat_map(count).collect();
             print!("{}", instructions::csv(&counts));
         }
         Some("costs") => {

@@ -67,9 +67,11 @@ pub fn render(groups: &[(&str, Vec<CaseRow>)], frames: &[Row]) -> (String, usize
                 let _ = write!(measured, "; {}", joint.beside);
             }
             let by_links = if links == joint {
-                "the same"
+                "the same".to_owned()
+            } else if links.bound == joint.bound {
+                links.measured.clone()
             } else {
-                &links.measured
+                format!("{}; must hold: {}", links.measured, links.bound)
             };
             let verdict = if joint.holds { links } else { joint }.verdict();
             let _ = writeln!(
@@ -80,7 +82,7 @@ pub fn render(groups: &[(&str, Vec<CaseRow>)], frames: &[Row]) -> (String, usize
                 cell(&joint.bound),
                 cell(case.theory),
                 cell(&measured),
-                cell(by_links),
+                cell(&by_links),
             );
         }
     }
