@@ -114,12 +114,11 @@ export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED-1}
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 status=0
-cargo test --workspace --locked --no-fail-fast 2>&1 | tee "$log" || status=$?
-if has_mpi; then
-    cargo test --workspace --locked --features iltm/mpi --test mpi 2>&1 | tee -a "$log" || status=$?
-else
-    say "no MPI here: what is tested with it is left out"
-fi
+# One build for all tests. The one without MPI is what the quick start builds, and its test.
+features=(--features iltm/mpi)
+has_mpi || features=()
+cargo test --workspace --locked --no-fail-fast "${features[@]}" 2>&1 | tee "$log" || status=$?
+has_mpi || say "no MPI here: what is tested with it is left out"
 
 count() { sed -n "s/^test result:.* \([0-9]\+\) $1;.*/\1/p" "$log" | awk '{ sum += $1 } END { print sum + 0 }'; }
 printf '\n%s passed, %s failed\n' "$(count passed)" "$(count failed)"

@@ -403,27 +403,6 @@ fn inspect_says_of_the_theorem_what_solve_said() {
     assert!(sentence(&solved)[2].contains(asks), "{solved}");
 }
 
-#[cfg(not(feature = "mpi"))]
-#[test]
-fn ranks_that_would_all_do_the_same_are_refused() {
-    let run = |count: &str, line: &[&str]| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_iltm"));
-        let output = command.env("OMPI_COMM_WORLD_SIZE", count).args(line);
-        output.output().unwrap()
-    };
-    let refused = run("2", &["ports"]);
-    assert_eq!(refused.status.code(), Some(2));
-    let words = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(
-        words.contains("without MPI") && words.contains("--features mpi"),
-        "{words}"
-    );
-    let refused = run("2", &["ports", "--json"]);
-    let object: serde_json::Value = serde_json::from_slice(&refused.stdout).unwrap();
-    assert_eq!(object["error"]["kind"], "usage");
-    assert_ne!(run("1", &["ports"]).status.code(), Some(2));
-}
-
 #[test]
 fn a_mistake_in_the_command_line_is_an_object_for_programs() {
     for (line, what) in [

@@ -36,6 +36,7 @@ use std::env;
 use std::fs;
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Follows a page; returns the clone in which this was done.
 fn follow(page: &str) -> PathBuf {
@@ -82,6 +83,7 @@ pages! {
         assert!(page.contains("iltm\\-solve"), "{page}");
         let script = fs::read_to_string(clone.join("iltm.bash")).expect("completions");
         assert!(script.contains("complete -F _iltm"), "{script}");
+        refuses_ranks(&clone.join("target/release/iltm"));
     };
     the_technicians_guide, "docs/guide.md", |clone| {
         there(clone, &[
@@ -109,6 +111,26 @@ fn there(clone: &Path, names: &[&str]) {
     for name in names {
         assert!(clone.join(name).exists(), "{name}");
     }
+}
+
+/// Built as the quick start says, without MPI: ranks would all do the same.
+fn refuses_ranks(iltm: &Path) {
+    let run = |count: &str, line: &[&str]| {
+        let mut command = Command::new(iltm);
+        let output = command.env("OMPI_COMM_WORLD_SIZE", count).args(line);
+        output.output().expect("built")
+    };
+    let refused = run("2", &["ports"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let words = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(
+        words.contains("without MPI") && words.contains("--features mpi"),
+        "{words}"
+    );
+    let refused = run("2", &["ports", "--json"]);
+    let object: serde_json::Value = serde_json::from_slice(&refused.stdout).expect("an object");
+    assert_eq!(object["error"]["kind"], "usage");
+    assert_ne!(run("1", &["ports"]).status.code(), Some(2));
 }
 
 #[test]
