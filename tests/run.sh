@@ -114,7 +114,8 @@ export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED-1}
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 status=0
-# One build for all tests. The one without MPI is what the quick start builds, and its test.
+# One build for all tests. The page of the quick start builds the tool without MPI, and its test
+# runs that.
 features=(--features iltm/mpi)
 has_mpi || features=()
 cargo test --workspace --locked --no-fail-fast "${features[@]}" 2>&1 | tee "$log" || status=$?

@@ -169,10 +169,10 @@ impl Follower {
         true
     }
 
-    /// The clone, after the last command.
-    pub(crate) fn finish(mut self) -> PathBuf {
+    /// Checks the clone after the last command, before the next page takes its place.
+    pub(crate) fn finish(mut self, check: fn(&Path)) {
         self.check_what_runs();
-        self.clone.clone()
+        check(&self.clone);
     }
 
     fn bash(&self, script: &str) -> Command {

@@ -35,11 +35,11 @@ use std::collections::BTreeSet;
 use std::env;
 use std::fs;
 use std::io::{Write, stderr};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-/// Follows a page; returns the clone in which this was done.
-fn follow(page: &str) -> PathBuf {
+/// Follows a page, and checks the clone in which this was done.
+fn follow(page: &str, check: fn(&Path)) {
     let full = env::var("ILTM_PAGES").is_ok_and(|pages| pages == "full");
     let mut follower = Follower::new(full);
     let (mut run, mut left) = (0, 0);
@@ -55,7 +55,7 @@ fn follow(page: &str) -> PathBuf {
         stderr(),
         "{page}: {run} blocks run, {left} left to the full run"
     );
-    follower.finish()
+    follower.finish(check);
 }
 
 /// A test for each page, with what must be there at its end.
@@ -67,8 +67,7 @@ macro_rules! pages {
         $(
             #[test]
             fn $test() {
-                let check: fn(&Path) = $check;
-                check(&follow($page));
+                follow($page, $check);
             }
         )*
     };
