@@ -1,4 +1,4 @@
-//! Advice in one line: the cheapest tier that is good enough.
+//! Advice in one line: the cheapest tier that is good enough, and whether fewer cells would do.
 
 use super::{Point, Sweep};
 use iltm_picture::numbers::percent;
@@ -24,10 +24,11 @@ pub(super) fn advice(points: &[Point]) -> String {
     };
     if let Some(chosen) = enough(TARGET) {
         return format!(
-            "{} meets 1/255 at {}; {}",
+            "{} meets 1/255 at {}; {}{}",
             tier(chosen),
             cost(chosen),
-            doubling(points, chosen)
+            doubling(points, chosen),
+            cells(points, chosen, TARGET)
         );
     }
     let Some(chosen) = enough(AS_GOOD * least) else {
@@ -47,11 +48,12 @@ pub(super) fn advice(points: &[Point]) -> String {
         ""
     };
     format!(
-        "{} errs by {}{as_good}, at {}; {}; {own}",
+        "{} errs by {}{as_good}, at {}; {}{}; {own}",
         tier(chosen),
         fraction(chosen.predicted),
         cost(chosen),
-        doubling(points, chosen)
+        doubling(points, chosen),
+        cells(points, chosen, AS_GOOD * chosen.predicted)
     )
 }
 
@@ -84,6 +86,31 @@ fn doubling(points: &[Point], chosen: &Point) -> String {
     } else {
         "more time makes it no better".to_owned()
     }
+}
+
+/// Whether a coarser grid errs by no more than a limit; empty if none was tried. Finer ones
+/// need photographs of their own.
+fn cells(points: &[Point], chosen: &Point, limit: f64) -> String {
+    let grids = || points.iter().filter(|point| point.sweep == Sweep::Grid);
+    let named = |point: &Point| format!("{} cells", point.grid);
+    let fewest = grids()
+        .filter(|point| point.predicted <= limit)
+        .min_by_key(|point| point.grid.cells());
+    if let Some(fewest) = fewest {
+        return format!("; {} would do as well", named(fewest));
+    }
+    let finest = grids().map(|point| point.grid.cells()).max();
+    let best = grids()
+        .filter(|point| Some(point.grid.cells()) == finest)
+        .min_by(|a, b| a.predicted.total_cmp(&b.predicted));
+    best.map_or_else(String::new, |best| {
+        format!(
+            "; {} would err by {}, so {} are not too many, and more may err less",
+            named(best),
+            fraction(best.predicted),
+            named(chosen)
+        )
+    })
 }
 
 /// An error as people say it.
@@ -156,6 +183,35 @@ pub(super) mod tests {
              on the reference device; more time makes it no better; 1/255 is out of reach of any tier, \
              since the inverse itself errs by 1/133"
         );
+    }
+
+    #[test]
+    fn the_fewest_cells_that_are_as_good_are_named() {
+        let on = |cells: (u16, u16), sweep, predicted| Point {
+            grid: Grid::new(cells.0, cells.1).unwrap(),
+            ..point(sweep, 1, predicted, 0.1)
+        };
+        let with_grids = |error: f64, half: f64, quarter: f64| {
+            advice(&[
+                on((16, 24), Sweep::Table, error),
+                // The tiers of a grid: its best one counts.
+                on((8, 12), Sweep::Grid, 2.0 * half),
+                on((8, 12), Sweep::Grid, half),
+                on((4, 6), Sweep::Grid, quarter),
+            ])
+        };
+        let as_good = "; 8 x 12 cells would do as well";
+        assert!(with_grids(0.02, 0.0209, 0.03).contains(as_good));
+        // Beyond the target no accuracy is asked for.
+        assert!(with_grids(0.002, 0.0039, 0.004).ends_with(as_good));
+        let quarter = with_grids(0.002, 0.0039, 0.0039);
+        assert!(
+            quarter.ends_with("; 4 x 6 cells would do as well"),
+            "{quarter}"
+        );
+        let none = with_grids(0.02, 0.0211, 0.03);
+        let words = "; 8 x 12 cells would err by 1/47, so 16 x 24 cells are not too many, and more may err less;";
+        assert!(none.contains(words), "{none}");
     }
 
     #[test]
