@@ -9,7 +9,7 @@ use crate::device::emulator::Board;
 use crate::scene::{CaptureFault, Effect, InjectedFault};
 use crate::solve::Method;
 use crate::video::Fit;
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgGroup, Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
 use std::path::PathBuf;
@@ -213,16 +213,21 @@ pub(super) struct Check {
 }
 
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("cells").required(true)))]
 pub(super) struct Patterns {
     /// Capture folder to make
     #[arg(short, long, value_name = "CAPTURE")]
     pub(super) output: PathBuf,
     /// Rows of cells
-    #[arg(long, value_name = "R")]
-    pub(super) rows: u16,
+    #[arg(long, value_name = "R", requires = "cols", group = "cells")]
+    pub(super) rows: Option<u16>,
     /// Columns of cells
-    #[arg(long, value_name = "C")]
-    pub(super) cols: u16,
+    #[arg(long, value_name = "C", requires = "rows")]
+    pub(super) cols: Option<u16>,
+    /// In place of rows and columns: the size of the camera's photographs. Cells are then as
+    /// small as is of use, about 7 of its pixels a side, and no more than 3072
+    #[arg(long, value_name = "WxH", value_parser = frame_size, group = "cells")]
+    pub(super) camera_size: Option<FrameSize>,
     /// Bernoulli patterns, beside white, black and the Gray code; together with images at least 10
     #[arg(long, value_name = "M", default_value_t = 150, value_parser = clap::value_parser!(u16).range(..=10_000))]
     pub(super) photos: u16,

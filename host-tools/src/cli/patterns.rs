@@ -13,8 +13,17 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     let out = &arguments.output;
     // A folder that is in the way is known before the work, not after it.
     iltm_picture::check_free(out)?;
-    let grid = Grid::new(arguments.rows, arguments.cols).map_err(PatternsError::from)?;
-    let layout = Layout::new(grid, arguments.projector, arguments.border)?;
+    let (projector, border) = (arguments.projector, arguments.border);
+    let layout = match (arguments.camera_size, arguments.rows, arguments.cols) {
+        (Some(camera), ..) => Layout::proposed(projector, border, camera)?,
+        (None, rows, cols) => {
+            // The parser asks for both.
+            let (rows, cols) = (rows.unwrap_or_default(), cols.unwrap_or_default());
+            let grid = Grid::new(rows, cols).map_err(PatternsError::from)?;
+            Layout::new(grid, projector, border)?
+        }
+    };
+    let grid = layout.grid();
     let images = match &arguments.images {
         Some(folder) => session::stills(folder, layout.inner())?,
         None => Vec::new(),
@@ -52,8 +61,12 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
         "seed": arguments.seed,
     });
     let text = format!(
-        "capture     {}: {} slides of {}, {} of them to measure projector and camera, {} fine stripes\n\
+        "cells       {} rows, {} columns, of about {} pixels of the projector a side\n\
+         capture     {}: {} slides of {}, {} of them to measure projector and camera, {} fine stripes\n\
          next        read {}, then `iltm capture {} --display N --camera CMD`\n",
+        grid.rows(),
+        grid.cols(),
+        layout.inner().height() / grid.rows(),
         out.display(),
         made.slides,
         layout.projector(),

@@ -45,6 +45,21 @@ fn a_folder_of_patterns_says_how_many_slides_it_has() {
 }
 
 #[test]
+fn cells_are_proposed_from_the_sizes_of_projector_and_camera() {
+    let user = User::new();
+    let size = "--projector 128x80 --camera-size 60x45";
+    let made = user.run(&format!("patterns -o c --photos 10 {size}"));
+    insta::assert_snapshot!(made.with_code());
+    // Neither, half a grid, and both.
+    let mut text = String::new();
+    for cells in ["", "--rows 3", &format!("--rows 3 --cols 4 {size}")] {
+        text += &user.run(&format!("patterns -o d {cells}")).with_code();
+    }
+    insta::assert_snapshot!(text);
+    assert_eq!(user.names(""), ["c"]);
+}
+
+#[test]
 fn sizes_that_cannot_be_are_refused_before_anything_is_written() {
     let user = User::new();
     let mut text = String::new();

@@ -4,6 +4,16 @@ use super::PatternsError;
 use iltm_picture::{LightPicture, MAX_PIXELS, Picture, Response, Samples};
 use iltm_runtime::{FrameSize, Grid, resample::area::AreaAverage};
 
+/// Pixels of the camera along a cell's side below which smaller cells gain nothing
+/// (docs/accuracy.md).
+const CAMERA_PIXELS: f64 = 7.0;
+/// Pixels of the projector along the side of the smallest cells that were measured.
+const PROJECTOR_PIXELS: f64 = 4.0;
+/// Part of the camera's picture, each way, that a projection fills which it sees with little else.
+const FILLED: f64 = 0.75;
+/// Cells of a proposed grid: a solve takes seconds, and a table 2 MB.
+const MOST_CELLS: u16 = 3072;
+
 /// How pictures of one pixel a cell become pictures of the projector's size: by the
 /// rule by which the runtime averages a frame over the cells, so that a cell is lit
 /// where compensated video will be looked at. Cells need not be of one size.
@@ -47,6 +57,30 @@ impl Layout {
                 projector,
                 border,
             })
+    }
+
+    /// Square cells over all of `projector` but `border` pixels on every side, as small as
+    /// is of use to a camera with pictures of the size `camera`, and no more than are solved in
+    /// seconds.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn proposed(
+        projector: FrameSize,
+        border: u16,
+        camera: FrameSize,
+    ) -> Result<Self, PatternsError> {
+        let whole = Self::new(Grid::new(1, 1)?, projector, border)?;
+        let (width, height) = (whole.inner.width() as f64, whole.inner.height() as f64);
+        let (across, upwards) = (camera.width() as f64, camera.height() as f64);
+        let camera_pixels = FILLED * f64::min(across / width, upwards / height);
+        let side = (CAMERA_PIXELS / camera_pixels)
+            .max(PROJECTOR_PIXELS)
+            .max((width * height / f64::from(MOST_CELLS)).sqrt())
+            // A picture that is no higher than a cell has one row all the same.
+            .max(width.max(height) / f64::from(MOST_CELLS));
+        let cells = |pixels: f64| (pixels / side).floor().max(1.0) as u16;
+        Self::new(Grid::new(cells(height), cells(width))?, projector, border)
     }
 
     /// The cells.
@@ -214,7 +248,44 @@ mod tests {
         assert!(Layout::new(grid, FrameSize::new(30, 30).unwrap(), u16::MAX).is_err());
     }
 
+    /// Cells, projector and camera for rows and columns that are known to be enough.
+    fn proposed(projector: (u16, u16), border: u16, camera: (u16, u16)) -> (usize, usize) {
+        let size = |(width, height)| FrameSize::new(width, height).unwrap();
+        let layout = Layout::proposed(size(projector), border, size(camera)).unwrap();
+        (layout.grid().rows(), layout.grid().cols())
+    }
+
+    #[test]
+    fn proposed_cells_are_as_small_as_a_camera_has_use_for() {
+        // A camera of 384 x 264 pixels sees 52 x 84 cells no better than 26 x 42.
+        assert_eq!(proposed((1344, 832), 0, (384, 264)), (25, 41));
+        // The same cells, whatever the projector's pixels are, and the camera upright or not.
+        assert_eq!(proposed((2688, 1664), 0, (384, 264)), (25, 41));
+        assert_eq!(proposed((832, 1344), 0, (264, 384)), (41, 25));
+        // The height of a wide camera's picture is what the projection fills.
+        assert_eq!(proposed((1344, 832), 0, (4000, 264)), (28, 45));
+        // A phone has use for more cells than are solved in seconds.
+        assert_eq!(proposed((1920, 1080), 0, (4032, 3024)), (41, 73));
+        assert_eq!(proposed((1280, 800), 0, (4032, 3024)), (43, 70));
+        // Cells lie within the border.
+        assert_eq!(proposed((1344, 832), 256, (384, 264)), (15, 41));
+        // Never less than a cell, nor smaller ones than were measured.
+        assert_eq!(proposed((1920, 1080), 0, (5, 5)), (1, 1));
+        assert_eq!(proposed((64, 40), 0, (4032, 3024)), (10, 16));
+        assert_eq!(proposed((3, 9), 0, (4032, 3024)), (2, 1));
+    }
+
     proptest! {
+        #[test]
+        fn a_grid_is_proposed_for_all_sizes(
+            projector in (1_u16.., 1_u16..=8192), camera in (1_u16.., 1_u16..), border in 0_u16..40,
+        ) {
+            let size = |(width, height)| FrameSize::new(width, height).unwrap();
+            if let Ok(layout) = Layout::proposed(size(projector), border, size(camera)) {
+                prop_assert!(layout.grid().cells() <= usize::from(MOST_CELLS));
+            }
+        }
+
         /// Against the runtime's own averages: no cell has more of a pixel than the
         /// one whose colour it gets.
         #[test]
