@@ -106,7 +106,7 @@ use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use joint::Solver;
 use links::{How, Splits, links};
-use options::{MANY_CELLS, MOST_JOINT_CELLS};
+use options::{MANY_CELLS, MOST_INVERTED_CELLS};
 use prepare::Prepared;
 use solution::{Candidate, Solution, drop_dead};
 use std::time::Instant;
@@ -360,9 +360,9 @@ impl<'t> Task<'t> {
         let error = predict(self.prepared, &first.judged).compensated;
         // Written so that what is not a number asks for another answer.
         let good = error <= GOOD;
-        // Few photographs are held out in turns, which takes as many solves; and the transport of
-        // more cells than that takes more memory than most computers have.
-        if good || self.splits.len() > 1 || self.prepared.live_cells() > MOST_JOINT_CELLS {
+        // Few photographs are held out in turns, which takes as many solves; and to invert the
+        // transport of more cells takes minutes.
+        if good || self.splits.len() > 1 || self.prepared.live_cells() > MOST_INVERTED_CELLS {
             return first;
         }
         let spent = *seconds;

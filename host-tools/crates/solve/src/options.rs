@@ -61,7 +61,9 @@ impl GainOnly {
 pub(super) const MANY_CELLS: usize = 2048;
 const MANY_PHOTOGRAPHS: usize = 200;
 /// Cells above which `links` is the default, however few the photographs.
-pub(super) const MOST_JOINT_CELLS: usize = 6144;
+const MOST_JOINT_CELLS: usize = 6144;
+/// Cells up to which the two-stage method is tried where the first one errs.
+pub(super) const MOST_INVERTED_CELLS: usize = 2048;
 
 /// Settings of [`solve`](super::solve). The defaults are the recipe that was
 /// measured best; nothing needs to be set.
