@@ -11,7 +11,7 @@ const CAMERA_PIXELS: f64 = 7.0;
 const PROJECTOR_PIXELS: f64 = 4.0;
 /// Part of the camera's picture, each way, that a projection fills which it sees with little else.
 const FILLED: f64 = 0.75;
-/// Cells of a proposed grid: a solve takes seconds, and a table 2 MB.
+/// Most cells of a proposed grid: a solve takes less than a minute, and a table 2 MB.
 const MOST_CELLS: u16 = 3072;
 
 /// How pictures of one pixel a cell become pictures of the projector's size: by the
@@ -60,8 +60,8 @@ impl Layout {
     }
 
     /// Square cells over all of `projector` but `border` pixels on every side, as small as
-    /// is of use to a camera with pictures of the size `camera`, and no more than are solved in
-    /// seconds.
+    /// is of use to a camera with pictures of the size `camera`, and no more than are solved
+    /// within a minute.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -264,7 +264,7 @@ mod tests {
         assert_eq!(proposed((832, 1344), 0, (264, 384)), (41, 25));
         // The height of a wide camera's picture is what the projection fills.
         assert_eq!(proposed((1344, 832), 0, (4000, 264)), (28, 45));
-        // A phone has use for more cells than are solved in seconds.
+        // A phone has use for more cells than are solved within a minute.
         assert_eq!(proposed((1920, 1080), 0, (4032, 3024)), (41, 73));
         assert_eq!(proposed((1280, 800), 0, (4032, 3024)), (43, 70));
         // Cells lie within the border.
