@@ -14,14 +14,13 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     // A folder that is in the way is known before the work, not after it.
     iltm_picture::check_free(out)?;
     let (projector, border) = (arguments.projector, arguments.border);
-    let layout = match (arguments.camera_size, arguments.rows, arguments.cols) {
-        (Some(camera), ..) => Layout::proposed(projector, border, camera)?,
-        (None, rows, cols) => {
-            // The parser asks for both.
-            let (rows, cols) = (rows.unwrap_or_default(), cols.unwrap_or_default());
-            let grid = Grid::new(rows, cols).map_err(PatternsError::from)?;
-            Layout::new(grid, projector, border)?
-        }
+    let layout = if let Some(camera) = arguments.camera_size {
+        Layout::proposed(projector, border, camera)?
+    } else {
+        // The parser asks for both.
+        let (rows, cols) = (arguments.rows, arguments.cols);
+        let grid = Grid::new(rows.unwrap_or_default(), cols.unwrap_or_default());
+        Layout::new(grid.map_err(PatternsError::from)?, projector, border)?
     };
     let grid = layout.grid();
     let images = match &arguments.images {
@@ -61,11 +60,12 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
         "seed": arguments.seed,
     });
     let text = format!(
-        "cells       {} rows, {} columns, of about {} pixels of the projector a side\n\
+        "cells       {} rows, {} columns, of about {} x {} pixels of the projector\n\
          capture     {}: {} slides of {}, {} of them to measure projector and camera, {} fine stripes\n\
          next        read {}, then `iltm capture {} --display N --camera CMD`\n",
         grid.rows(),
         grid.cols(),
+        layout.inner().width() / grid.cols(),
         layout.inner().height() / grid.rows(),
         out.display(),
         made.slides,

@@ -4,12 +4,12 @@ use super::PatternsError;
 use iltm_picture::{LightPicture, MAX_PIXELS, Picture, Response, Samples};
 use iltm_runtime::{FrameSize, Grid, resample::area::AreaAverage};
 
-/// Pixels of the camera along a cell's side below which smaller cells gain nothing
+/// Pixels of the camera along a cell's side below which smaller cells gain next to nothing
 /// (docs/accuracy.md).
 const CAMERA_PIXELS: f64 = 7.0;
 /// Pixels of the projector along the side of the smallest cells that were measured.
 const PROJECTOR_PIXELS: f64 = 4.0;
-/// Part of the camera's picture, each way, that a projection fills which it sees with little else.
+/// Part of a side of the camera's picture that the projection fills, if it shows little else.
 const FILLED: f64 = 0.75;
 /// Most cells of a proposed grid: a solve takes less than a minute, and a table 2 MB.
 const MOST_CELLS: u16 = 3072;
@@ -248,7 +248,7 @@ mod tests {
         assert!(Layout::new(grid, FrameSize::new(30, 30).unwrap(), u16::MAX).is_err());
     }
 
-    /// Cells, projector and camera for rows and columns that are known to be enough.
+    /// Rows and columns that are proposed for a projector, its border and a camera.
     fn proposed(projector: (u16, u16), border: u16, camera: (u16, u16)) -> (usize, usize) {
         let size = |(width, height)| FrameSize::new(width, height).unwrap();
         let layout = Layout::proposed(size(projector), border, size(camera)).unwrap();
@@ -281,9 +281,11 @@ mod tests {
             projector in (1_u16.., 1_u16..=8192), camera in (1_u16.., 1_u16..), border in 0_u16..40,
         ) {
             let size = |(width, height)| FrameSize::new(width, height).unwrap();
-            if let Ok(layout) = Layout::proposed(size(projector), border, size(camera)) {
-                prop_assert!(layout.grid().cells() <= usize::from(MOST_CELLS));
-            }
+            let proposed = Layout::proposed(size(projector), border, size(camera));
+            let one = Layout::new(Grid::new(1, 1).unwrap(), size(projector), border);
+            prop_assert_eq!(proposed.is_ok(), one.is_ok());
+            let cells = proposed.map_or(1, |layout| layout.grid().cells());
+            prop_assert!(cells <= usize::from(MOST_CELLS));
         }
 
         /// Against the runtime's own averages: no cell has more of a pixel than the
