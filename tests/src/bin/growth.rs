@@ -4,7 +4,7 @@
 
 use iltm::build_table::{TableOptions, build_table};
 use iltm::capture::CaptureOptions;
-use iltm::picture::chart::{Chart, ChartAxis, PALETTE, Series};
+use iltm::picture::chart::{self, Chart};
 use iltm::progress::Silent;
 use iltm::solve::{Method, SolveOptions};
 use iltm_tests::simulated::{photograph, scene};
@@ -120,25 +120,14 @@ fn drawn(curves: &[(Method, Vec<(f64, f64)>)]) -> Chart<'static> {
         [_, first, .., last] => (last.1 / first.1).ln() / (last.0 / first.0).ln(),
         _ => f64::NAN,
     };
-    let series = curves
-        .iter()
-        .zip(PALETTE)
-        .map(|((method, points), colour)| Series {
-            name: method.to_string(),
-            colour,
-            points: points.clone(),
-            line: 2.0,
-            ..Series::default()
-        });
+    let named = curves.iter();
+    let named = named.map(|(method, points)| (method.to_string(), points.clone()));
+    let title = "From photographs to a table: time against cells";
     Chart {
-        title: "From photographs to a table: time against cells",
         notes: vec![format!(
             "M-shaped panels in grey, 12 bits; links grow as N to the power of {power:.2} from 48 x 64 cells on"
         )],
         size: (640.0, 400.0),
-        x: ChartAxis::logarithmic("cells N"),
-        y: ChartAxis::logarithmic("seconds"),
-        series: series.collect(),
-        ..Chart::default()
+        ..chart::curves(title, ("cells N", "seconds"), named.collect())
     }
 }

@@ -1,37 +1,9 @@
-//! Charts of the paper's experiments, over logarithmic axes.
+//! Charts of intervals for the paper's experiments, over a logarithmic axis.
 
-use iltm_picture::chart::{Chart, ChartAxis, PALETTE, RowName, Series};
+use iltm_picture::chart::{Chart, ChartAxis, RowName, Series};
 
-/// Width and height.
-const SIZE: (f64, f64) = (760.0, 440.0);
-
-/// Points with a name, joined by a line.
-pub(super) type ChartCurve = (String, Vec<(f64, f64)>);
-
-/// Curves over two logarithmic axes.
-pub(super) fn curves<'w>(
-    title: &'w str,
-    (x, y): (&'w str, &'w str),
-    curves: Vec<ChartCurve>,
-) -> Chart<'w> {
-    let colours = PALETTE.into_iter().cycle();
-    let series = curves.into_iter().zip(colours);
-    let series = series.map(|((name, points), colour)| Series {
-        name,
-        colour,
-        points,
-        line: 2.0,
-        ..Series::default()
-    });
-    Chart {
-        title,
-        size: SIZE,
-        x: ChartAxis::logarithmic(x),
-        y: ChartAxis::logarithmic(y),
-        series: series.collect(),
-        ..Chart::default()
-    }
-}
+/// Width of a chart.
+const WIDTH: f64 = 760.0;
 
 /// One interval: what it belongs to, its middle and its ends.
 #[derive(Clone, Debug)]
@@ -83,7 +55,7 @@ pub(super) fn intervals<'w>(
     }
     Chart {
         title,
-        size: (SIZE.0, 110.0 + ROW * rows.len() as f64),
+        size: (WIDTH, 110.0 + ROW * rows.len() as f64),
         x: ChartAxis::logarithmic(x),
         y: ChartAxis {
             range: Some((-(rows.len() as f64), 0.0)),

@@ -154,6 +154,35 @@ impl Default for Chart<'_> {
     }
 }
 
+/// Points with a name, joined by a line.
+pub type ChartCurve = (String, Vec<(f64, f64)>);
+
+/// Curves over two logarithmic axes, whose names are `x` and `y`.
+#[must_use]
+pub fn curves<'a>(
+    title: &'a str,
+    (x, y): (&'a str, &'a str),
+    curves: Vec<ChartCurve>,
+) -> Chart<'a> {
+    let colours = PALETTE.into_iter().cycle();
+    let series = curves.into_iter().zip(colours);
+    let series = series.map(|((name, points), colour)| Series {
+        name,
+        colour,
+        points,
+        line: 2.0,
+        ..Series::default()
+    });
+    Chart {
+        title,
+        size: (760.0, 440.0),
+        x: ChartAxis::logarithmic(x),
+        y: ChartAxis::logarithmic(y),
+        series: series.collect(),
+        ..Chart::default()
+    }
+}
+
 /// An axis with its range, from data to places on the page.
 struct Scale {
     logarithmic: bool,

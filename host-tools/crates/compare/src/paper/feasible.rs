@@ -5,8 +5,8 @@
 //! only be further from the region, not nearer.
 
 use super::scenes::{Condition, surface};
-use crate::chart::curves;
 use iltm_capture::{Role, columns, pattern_set};
+use iltm_picture::chart::curves;
 use iltm_solve::{
     Haar,
     restricted_isometry::{LIMIT, Sampling, Sensing, signed},

@@ -7,8 +7,9 @@ use super::seeds::{self, DrawErrors, Mean, SEEDS};
 use super::sparsity::{self, Counted};
 use super::{File, claims, second_bounce, sections};
 use crate::benchmark::BenchmarkRow;
-use crate::chart::{ChartCurve, Interval, curves, intervals};
-use iltm_picture::{Picture, chart::PALETTE, png, progress::Progress};
+use crate::chart::{Interval, intervals};
+use iltm_picture::chart::{ChartCurve, PALETTE, curves};
+use iltm_picture::{Picture, png, progress::Progress};
 use iltm_report::{
     bounces::{self, BouncesOptions},
     tradeoff::Tradeoff,
