@@ -336,18 +336,14 @@ pub(super) struct Photographs {
 impl Photographs {
     pub(super) fn new(prepared: &Prepared, chosen: &[usize]) -> Self {
         let channels = 0..prepared.light.len();
-        let select = |of: &[DMatrix<f64>]| of.iter().map(|c| c.select_columns(chosen)).collect();
+        let patterns = prepared.patterns.iter();
+        let light = prepared.light.iter();
         Self {
             sources: channels.map(|c| prepared.sources(c, chosen)).collect(),
-            patterns: select(&prepared.patterns),
+            patterns: patterns.map(|c| c.select_columns(chosen)).collect(),
             weights: prepared.weights.select_columns(chosen),
-            light: select(&prepared.light),
+            light: light.map(|c| c.select_columns(chosen)).collect(),
         }
-    }
-
-    /// [`Self::fitted_gain`] beside a channel's operator.
-    pub(super) fn gain(&self, channel: usize, operator: &Interreflection) -> DVector<f64> {
-        self.fitted_gain(channel, &(operator * &self.sources[channel]))
     }
 
     /// Number and sources of each channel.
@@ -355,20 +351,43 @@ impl Photographs {
         self.sources.iter().enumerate()
     }
 
-    /// Gains that explain a channel's light best, given the light that the
-    /// operator takes away; zero for a cell without light.
+    /// [`fitted_gain`] of these photographs.
     fn fitted_gain(&self, channel: usize, reflected: &DMatrix<f64>) -> DVector<f64> {
+        let all: Vec<usize> = (0..reflected.ncols()).collect();
         let (light, patterns) = (&self.light[channel], &self.patterns[channel]);
-        DVector::from_fn(light.nrows(), |cell, _| {
-            let (mut both, mut norm) = (0.0, 0.0);
-            for (k, weight) in self.weights.row(cell).iter().enumerate() {
-                let seen = light[(cell, k)];
-                both += weight * seen * (reflected[(cell, k)] + patterns[(cell, k)]);
-                norm += weight * seen * seen;
-            }
-            if norm > 0.0 { both / norm } else { 0.0 }
-        })
+        fitted_gain([light, patterns, &self.weights], &all, reflected)
     }
+}
+
+/// Gains that explain a channel's light in the photographs `chosen` best, beside its operator.
+pub(super) fn gain(
+    prepared: &Prepared,
+    chosen: &[usize],
+    channel: usize,
+    operator: &Interreflection,
+) -> DVector<f64> {
+    let reflected = operator * &prepared.sources(channel, chosen);
+    let (light, patterns) = (&prepared.light[channel], &prepared.patterns[channel]);
+    fitted_gain([light, patterns, &prepared.weights], chosen, &reflected)
+}
+
+/// Gains that explain a channel's light best in the columns `chosen` of `light`, `patterns` and
+/// `weights`, given the light that the operator takes away in these; zero for a cell without light.
+fn fitted_gain(
+    [light, patterns, weights]: [&DMatrix<f64>; 3],
+    chosen: &[usize],
+    reflected: &DMatrix<f64>,
+) -> DVector<f64> {
+    DVector::from_fn(light.nrows(), |cell, _| {
+        let (mut both, mut norm) = (0.0, 0.0);
+        for (k, photograph) in chosen.iter().enumerate() {
+            let at = (cell, *photograph);
+            let (seen, weight) = (light[at], weights[at]);
+            both += weight * seen * (reflected[(cell, k)] + patterns[at]);
+            norm += weight * seen * seen;
+        }
+        if norm > 0.0 { both / norm } else { 0.0 }
+    })
 }
 
 /// The factor on `reflected = K C` with which the photographs are explained best,

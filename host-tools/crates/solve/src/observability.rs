@@ -8,6 +8,7 @@
 use super::observed::{Observed, ObservedChannel};
 use iltm_capture::Role;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// A cell has to give back this much of a typical cell's own light: a step of an
 /// 8-bit code.
@@ -38,7 +39,7 @@ pub enum WhyLeftOut {
 ///
 /// `landed` is the light that falls on each cell, by channel `N x m`: the patterns, blurred
 /// if the projector is.
-pub(super) fn left_out(observed: &Observed<'_>, landed: &[DMatrix<f64>]) -> Vec<LeftOut> {
+pub(super) fn left_out(observed: &Observed<'_>, landed: &[Arc<DMatrix<f64>>]) -> Vec<LeftOut> {
     let cells = observed.grid.cells();
     let chosen = photographs(observed);
     let mut why: Vec<Option<WhyLeftOut>> = observed

@@ -8,6 +8,7 @@ use super::observed::{CellNoise, Observed};
 use iltm_capture::Role;
 use nalgebra::DMatrix;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Weight of a photograph in which a cell is dark, at most: below that noise the
 /// model's own error rules.
@@ -29,10 +30,10 @@ pub(super) struct Prepared {
     /// The others.
     pub(super) left_out: Vec<LeftOut>,
     /// What the projector showed in each channel, `N x m`.
-    pub(super) shown: Vec<DMatrix<f64>>,
+    pub(super) shown: Vec<Arc<DMatrix<f64>>>,
     /// `L` of each channel, `N x m`, after the projector's blur; rows of cells that are
     /// not live are zero.
-    pub(super) patterns: Vec<DMatrix<f64>>,
+    pub(super) patterns: Vec<Arc<DMatrix<f64>>>,
     /// `C_c` with the mean flood light of all channels scaled to 1, `N x m`;
     /// rows of cells that are not live are zero.
     pub(super) light: Vec<DMatrix<f64>>,
@@ -45,7 +46,7 @@ pub(super) struct Prepared {
     /// projected there is, and its column of `K` is as sparse and non-negative as
     /// any other's. Light that it only passes on needs no column: eliminating it
     /// leaves an operator of the same kind between the live cells.
-    pub(super) unseen: Option<Vec<DMatrix<f64>>>,
+    pub(super) unseen: Option<Vec<Arc<DMatrix<f64>>>>,
     /// Standard deviation of an element of `light` by channel and cell.
     pub(super) noise: Vec<Vec<CellNoise>>,
     /// Weight of each squared residual, `N x m`, mean 1 in each row.
@@ -65,11 +66,21 @@ impl Prepared {
         check_sizes(observed)?;
         check_finite(observed)?;
         let blur = (observed.blur > 0.0).then(|| blur(observed.grid, observed.blur));
-        let shown: Vec<DMatrix<f64>> = (observed.channels.iter())
-            .map(|channel| channel.patterns.clone())
-            .collect();
+        // Grey patterns are the same in all channels, which share one matrix then.
+        let of_channels = |make: &dyn Fn(usize) -> DMatrix<f64>| {
+            let mut made: Vec<Arc<DMatrix<f64>>> = Vec::new();
+            for (channel, of) in observed.channels.iter().enumerate() {
+                let mut before = observed.channels[..channel].iter();
+                match before.position(|before| before.patterns == of.patterns) {
+                    Some(same) => made.push(Arc::clone(&made[same])),
+                    None => made.push(Arc::new(make(channel))),
+                }
+            }
+            made
+        };
+        let shown = of_channels(&|channel| observed.channels[channel].patterns.clone());
         let landed = match &blur {
-            Some(blur) => shown.iter().map(|shown| product(blur, shown)).collect(),
+            Some(blur) => of_channels(&|channel| product(blur, &shown[channel])),
             None => shown.clone(),
         };
         let left_out = observability::left_out(observed, &landed);
@@ -85,11 +96,9 @@ impl Prepared {
                 if live[cell] { matrix[(cell, k)] } else { 0.0 }
             })
         };
-        let patterns: Vec<DMatrix<f64>> = landed.iter().map(keep).collect();
-        let unseen = live.contains(&false).then(|| {
-            let pairs = landed.iter().zip(&patterns);
-            pairs.map(|(landed, patterns)| landed - patterns).collect()
-        });
+        let patterns = of_channels(&|channel| keep(&landed[channel]));
+        let unseen = (live.contains(&false))
+            .then(|| of_channels(&|channel| &*landed[channel] - &*patterns[channel]));
         let mut light: Vec<_> = observed
             .channels
             .iter()
@@ -170,7 +179,7 @@ impl Prepared {
 /// gets from others. Every pattern that does not light a cell counts as many
 /// times as its noise variance is smaller than that of those which do. A picture lies between:
 /// the variance of light grows with it.
-fn weights(shown: &[DMatrix<f64>], noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
+fn weights(shown: &[Arc<DMatrix<f64>>], noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
     let (cells, photographs) = shown[0].shape();
     let share = 1.0 / shown.len() as f64;
     let mut weights = DMatrix::from_element(cells, photographs, 1.0);
@@ -200,9 +209,9 @@ fn weights(shown: &[DMatrix<f64>], noise: &[Vec<CellNoise>]) -> DMatrix<f64> {
 
 /// Mean light of all channels where the projector shows white: total light over
 /// total projected share.
-fn flood_level(light: &[DMatrix<f64>], patterns: &[DMatrix<f64>]) -> f64 {
-    let total = |of: &[DMatrix<f64>]| of.iter().map(DMatrix::sum).sum::<f64>();
-    total(light) / total(patterns)
+fn flood_level(light: &[DMatrix<f64>], patterns: &[Arc<DMatrix<f64>>]) -> f64 {
+    let light = light.iter().map(DMatrix::sum).sum::<f64>();
+    light / patterns.iter().map(|patterns| patterns.sum()).sum::<f64>()
 }
 
 fn check_sizes(observed: &Observed<'_>) -> Result<(), SolveError> {

@@ -20,12 +20,12 @@ pub(super) use row::Splits;
 use super::convergence::Convergence;
 use super::group::Processes;
 use super::interreflection::Interreflection;
-use super::joint::Photographs;
+use super::joint::gain;
 use super::prepare::Prepared;
 use super::solution::{Channel, Solution};
 use iltm_picture::progress::{Progress, Silent};
 use iltm_runtime::Grid;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use operator::Link;
 use quadtree::Quadtree;
 use rayon::prelude::*;
@@ -102,10 +102,13 @@ pub(super) fn links(
     let data = Data::new(prepared, grid, chosen, how);
     processes.ask(&data);
     let (state, own) = sweeps(&data, processes, progress);
-    let photographs = Photographs::new(prepared, chosen);
-    let mut found = vec![data.solution(&state, &[], &photographs)];
+    let tree = Arc::new(data.tree.clone());
+    // Answers need the room.
+    drop(data);
+    let gain = |channel: usize, operator: &_| gain(prepared, chosen, channel, operator);
+    let mut found = vec![state.solution(&tree, &[], gain)];
     if !own.is_empty() {
-        found.push(data.solution(&state, &own, &photographs));
+        found.push(state.solution(&tree, &own, gain));
     }
     found
 }
@@ -316,25 +319,32 @@ impl Data {
         }
         Some(target)
     }
+}
 
-    /// The answer, with each channel's deviation from the shared operator.
-    fn solution(&self, state: &State, own: &[Vec<Row>], photographs: &Photographs) -> Solution {
-        let tree = Arc::new(self.tree.clone());
-        let rows = &state.rows[..self.tree.cells()];
-        let shared = operator(&tree, rows);
+impl State {
+    /// The answer, with each channel's deviation from the shared operator; `gain` finds the gains
+    /// beside a channel's operator.
+    fn solution(
+        &self,
+        tree: &Arc<Quadtree>,
+        own: &[Vec<Row>],
+        gain: impl Fn(usize, &Interreflection) -> DVector<f64>,
+    ) -> Solution {
+        let rows = &self.rows[..tree.cells()];
+        let shared = operator(tree, rows);
         let channel = |channel: usize| {
-            let scale = f64::from(state.scales[channel]);
+            let scale = f64::from(self.scales[channel]);
             let even = &shared * scale;
-            let own = own.get(channel).map(|rows| operator(&tree, rows));
+            let own = own.get(channel).map(|rows| operator(tree, rows));
             Channel {
-                gain: photographs.gain(channel, own.as_ref().unwrap_or(&even)),
+                gain: gain(channel, own.as_ref().unwrap_or(&even)),
                 scale,
                 deviation: own.map(|own| &own + &(&even * -1.0)),
             }
         };
         let links = |row: &Row| row.values.iter().filter(|value| **value != 0.0).count();
         Solution {
-            channels: (0..self.channels()).map(channel).collect(),
+            channels: (0..self.scales.len()).map(channel).collect(),
             coefficients: rows.iter().map(links).sum(),
             shared,
             convergence: Convergence::best(),
