@@ -36,9 +36,14 @@ command -v git >/dev/null || missing+=(git)
 command -v qemu-system-arm >/dev/null || missing+=(qemu-system-arm)
 # A desktop without a screen, and what a window on it needs.
 command -v Xvfb >/dev/null || missing+=(xvfb libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 libxrandr2)
+# Players, and Vulkan and OpenGL in software, for tables on a PC.
+command -v ffmpeg >/dev/null || missing+=(ffmpeg)
+command -v mpv >/dev/null || missing+=(mpv)
+ls /usr/share/vulkan/icd.d/lvp_icd.*.json >/dev/null 2>&1 || missing+=(mesa-vulkan-drivers)
+ls /usr/share/glvnd/egl_vendor.d/*mesa.json >/dev/null 2>&1 || missing+=(libegl-mesa0)
 if [ ${#missing[@]} -gt 0 ]; then
     command -v apt-get >/dev/null || {
-        echo "error: this needs Rust $wanted or newer, a C linker, git, qemu-system-arm and Xvfb; missing: ${missing[*]}. Install them and run this again" >&2
+        echo "error: this needs Rust $wanted or newer, a C linker, git, qemu-system-arm, Xvfb, ffmpeg, mpv and Mesa's Vulkan; missing: ${missing[*]}. Install them and run this again" >&2
         exit 1
     }
     install_packages "${missing[@]}"

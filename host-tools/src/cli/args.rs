@@ -11,6 +11,7 @@ use crate::solve::Method;
 use crate::video::Fit;
 use clap::{ArgGroup, Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
+use std::ffi::OsString;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -67,6 +68,10 @@ pub(super) enum Command {
     Inspect(Inspect),
     /// Compensate a picture or a video with a table
     Compensate(Compensate),
+    /// Play films on the projector, compensated, with mpv
+    Play(Play),
+    /// Write a table as files for the players that people use
+    Export(Export),
     /// Separate a photograph's light into direct light, second, third, ... bounce
     Bounces(Bounces),
     /// Every way to photograph and to invert on the same light, or the paper's figures
@@ -625,6 +630,65 @@ pub(super) struct Compensate {
     /// higher ones when there is time, as on the device
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub(super) budget: Option<Duration>,
+}
+
+const PLAY_KEYS: &str = "\
+Keys:
+  c          with compensation or without
+  + -        tier of the table's accuracy ladder
+  w          white everywhere
+  t          test card, as it is
+  i          status line
+  space      pause
+  n p        next and previous film
+  q, escape  end";
+
+#[derive(Debug, Args)]
+#[command(after_help = PLAY_KEYS)]
+pub(super) struct Play {
+    /// Table to compensate with; a new one in its place is used at once
+    pub(super) table: PathBuf,
+    /// Films, pictures, playlists or whatever else mpv plays, in turn and over again; `-` reads
+    /// from standard input
+    #[arg(required = true, value_name = "FILM")]
+    pub(super) films: Vec<OsString>,
+    /// Screen to fill, from 0; it must have as many pixels as the table's projector
+    #[arg(long, value_name = "N")]
+    pub(super) display: Option<u32>,
+    /// Tier of the table's accuracy ladder; the most accurate if left out
+    #[arg(long, value_name = "TIER")]
+    pub(super) tier: Option<u8>,
+    /// End after the last film
+    #[arg(long)]
+    pub(super) once: bool,
+    /// End where something goes wrong: a film that cannot be played, no sound, another display
+    #[arg(long)]
+    pub(super) strict: bool,
+    /// Options for mpv
+    #[arg(last = true, value_name = "MPV")]
+    pub(super) mpv: Vec<OsString>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Export {
+    /// Table to export
+    pub(super) table: PathBuf,
+    /// What for: mpv (a user shader, also for ffmpeg's `libplacebo` filter)
+    #[arg(long = "as", value_name = "PLAYER")]
+    pub(super) player: Player,
+    /// Folder to make
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// Tier of the table's accuracy ladder; the most accurate if left out
+    #[arg(long, value_name = "TIER")]
+    pub(super) tier: Option<u8>,
+}
+
+/// Whom a table is exported for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+pub(super) enum Player {
+    /// A user shader for mpv and libplacebo
+    Mpv,
 }
 
 #[derive(Debug, Args)]

@@ -107,6 +107,8 @@ pub(super) enum Kind {
     NoRight = 36,
     #[strum(message = "photographs or a folder belong to another table")]
     OtherTable = 37,
+    #[strum(message = "the player is missing, or a show went wrong")]
+    Player = 38,
 }
 
 impl From<&Rejected> for Kind {

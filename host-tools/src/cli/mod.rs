@@ -15,6 +15,7 @@ mod connect;
 mod demo;
 #[cfg(unix)]
 mod emulate;
+mod export;
 mod failure;
 mod fit;
 mod flash;
@@ -26,6 +27,7 @@ mod monitor;
 mod named;
 mod output;
 mod patterns;
+mod play;
 mod ports;
 mod progress;
 mod ranks;
@@ -93,6 +95,8 @@ fn run_alone(meter: Option<Meter>, processes: Processes) -> ExitCode {
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),
         Command::Compensate(compensate) => compensate::run(compensate, &output),
+        Command::Play(play) => play::run(play, &output),
+        Command::Export(export) => export::run(export, &output),
         Command::Bounces(bounces) => bounces::run(bounces, &output),
         Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
         Command::Verify(verify) => verify::run(verify, &output),

@@ -55,6 +55,19 @@ pub(super) fn check_sealed<'a>(
     checked.map_err(|error| no_table(path, error))
 }
 
+/// Refuses a tier that a table does not have.
+pub(super) fn table_has(table: &Table<'_>, tier: u8) -> Result<(), Failure> {
+    let top = table.top_tier();
+    if tier <= top {
+        return Ok(());
+    }
+    Err(Failure::new(
+        Kind::Usage,
+        format!("the table has tiers 0 to {top}, not {tier}"),
+        "Give a tier that the table has, or leave --tier away.",
+    ))
+}
+
 /// What a table needs memory for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TableSize {

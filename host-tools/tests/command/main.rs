@@ -5,13 +5,16 @@
 mod check;
 mod cli;
 mod compare;
+mod desktop;
 mod device;
 mod emulate;
+mod export;
 mod flash;
 mod images;
 #[cfg(target_os = "linux")]
 mod interruption;
 mod live;
+mod play;
 mod schema;
 mod session;
 mod simulate;

@@ -2,13 +2,12 @@
 //! photographed by a camera of a few shell commands; where X can be had without a
 //! screen, on a display too.
 
+use super::desktop::Desktop;
 use super::user::{Ended, User, contains, interrupt};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use tempfile::TempDir;
 
 /// With a capture `c` of 3 x 4 cells that nobody has photographed.
 fn patterns(more: &str) -> User {
@@ -159,47 +158,9 @@ fn ctrl_c_ends_a_session_that_can_go_on() {
     assert_eq!(events.last().expect("some")["taken"], slides(&user) - 4);
 }
 
-/// An X server without a screen, its picture in a file.
-struct Desktop {
-    server: Child,
-    display: String,
-    folder: TempDir,
-}
-
-impl Desktop {
-    fn start(size: &str) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", size])
-            .arg("-fbdir")
-            .arg(folder.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("Xvfb is installed: `sudo apt-get install xvfb`");
-        let mut number = String::new();
-        let mut said = BufReader::new(server.stdout.take().expect("piped"));
-        said.read_line(&mut number).expect("a display number");
-        Self {
-            server,
-            display: format!(":{}", number.trim()),
-            folder,
-        }
-    }
-
-    /// Runs `iltm capture c --display ...` on it.
-    fn run(&self, user: &User, display: &str) -> Ended {
-        let mut command = user.iltm(&format!("capture c --display {display}"));
-        let child = command.env("DISPLAY", &self.display).spawn();
-        Ended::of(child.expect("a binary"))
-    }
-}
-
-impl Drop for Desktop {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
+/// Runs `iltm capture c --display ...` on a desktop.
+fn on(desktop: &Desktop, user: &User, display: &str) -> Ended {
+    Ended::of(desktop.spawn(user, &format!("capture c --display {display}")))
 }
 
 /// What an X server shows, `0RGB` a pixel, from its file in the format of `xwd`
@@ -242,7 +203,11 @@ fn slides_fill_a_display_pixel_by_pixel() {
         "cp {} {{index}}.xwd; cp c/slides/000.png {{photo}}",
         screen.display()
     );
-    let shown = desktop.run(&user, &format!("0 --latency 100 --camera '{camera}'"));
+    let shown = on(
+        &desktop,
+        &user,
+        &format!("0 --latency 100 --camera '{camera}'"),
+    );
     assert_eq!(shown.code, 0, "{}", shown.said);
     for index in 0..slides(&user) {
         let slide = user.picture(&format!("c/slides/{index:03}.png")).to_rgb8();
@@ -261,7 +226,11 @@ fn a_display_that_is_not_there_or_of_another_size_is_refused_with_what_there_is(
     let user = patterns("--no-calibration");
     let mut text = String::new();
     for display in ["0", "7"] {
-        let refused = desktop.run(&user, &format!("{display} --camera 'cp now {{photo}}'"));
+        let refused = on(
+            &desktop,
+            &user,
+            &format!("{display} --camera 'cp now {{photo}}'"),
+        );
         text += &refused.with_code();
     }
     insta::assert_snapshot!(text);

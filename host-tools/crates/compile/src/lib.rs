@@ -12,6 +12,8 @@
 //! | gains, also finer than the cells | [`gain`] |
 //! | projector codes by drive | [`response`] |
 //! | bytes | [`image`] |
+//! | the operator of a table, read back from the bytes | [`haar_entries`] |
+//! | a table as a shader, for players | [`shader`] |
 //! | what a viewer would see of natural images | [`ViewerError`] |
 //! | what a frame takes on the board | [`cost`] |
 //! | the same table with other gains | [`refined_table()`] |
@@ -25,6 +27,7 @@ pub mod build_table;
 pub mod clip_thresholds;
 pub mod cost;
 pub mod gain;
+pub mod haar_entries;
 pub mod image;
 pub mod ladder;
 mod provenance;
@@ -32,6 +35,7 @@ pub mod quantise;
 pub mod reference_white;
 mod refined_table;
 pub mod response;
+pub mod shader;
 pub mod sign;
 mod table;
 #[cfg(test)]

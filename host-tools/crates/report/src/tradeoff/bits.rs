@@ -5,7 +5,7 @@
 //! entry any more. Such a table runs on the device in its 16 bits, so its error and its
 //! instructions are real; the bytes are those of a format that there is not.
 
-use super::float_table::values;
+use iltm_compile::haar_entries::row_values;
 use iltm_compile::image::{StoredRow, segment_bytes};
 use iltm_runtime::operator::{Channels, OperatorError, Segment};
 
@@ -27,7 +27,7 @@ pub(super) struct Rounded {
 impl Rounded {
     pub(super) fn new(segment: &Segment<'_>, cells: usize, bits: u32) -> Self {
         let round = |row: iltm_runtime::operator::Row<'_>| {
-            let values = values(row);
+            let values = row_values(row);
             let step = step(values.iter().map(|(_, value)| *value), bits);
             let entries = values
                 .into_iter()
@@ -95,7 +95,7 @@ mod tests {
     }
 
     fn entries(segment: Segment<'_>) -> Vec<(usize, i16)> {
-        segment.rows().flat_map(values).collect()
+        segment.rows().flat_map(row_values).collect()
     }
 
     #[test]

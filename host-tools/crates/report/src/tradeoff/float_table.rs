@@ -4,14 +4,9 @@
 //! Light is relative to reference white, drives to the projector's white. Ambient light
 //! is left out: what is wanted is wanted above it.
 
+use iltm_compile::haar_entries::{HaarEntry, haar_entries};
 use iltm_picture::Lattice;
-use iltm_runtime::{
-    FrameSize, Grid,
-    haar::Function,
-    image::Table,
-    operator::{Channels, Operator, Row, Segment},
-    units::CORRECTION_GUARD_BITS,
-};
+use iltm_runtime::{FrameSize, Grid, image::Table, operator::Segment};
 use iltm_solve::Haar;
 use nalgebra::DMatrix;
 
@@ -21,21 +16,12 @@ const MOST_BOUNCES: usize = 400;
 /// Light that a bounce adds, relative to all, below which it has settled.
 const SETTLED: f64 = 1e-7;
 
-/// One entry of `K^` in the orthonormal Haar domain.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct HaarEntry {
-    pub(super) row: usize,
-    pub(super) col: usize,
-    pub(super) value: f64,
-}
-
 /// The entries of one channel.
 pub(super) type HaarEntries = Vec<HaarEntry>;
 
 /// A table's numbers.
 pub(super) struct FloatTable<'t> {
     table: &'t Table<'t>,
-    functions: Vec<Function>,
     haar: Haar,
     /// Frames of one pixel each of these cells.
     pixels: Grid,
@@ -58,7 +44,6 @@ impl<'t> FloatTable<'t> {
         let gains = DMatrix::from_iterator(grid.cells(), channels, (0..channels).flat_map(gain));
         Self {
             table,
-            functions: table.basis().functions().collect(),
             haar: Haar::new(grid),
             pixels: grid,
             lattice: None,
@@ -111,33 +96,7 @@ impl<'t> FloatTable<'t> {
 
     /// The entries of segments by channel, scales of the channels included.
     pub(super) fn entries(&self, segments: &[Segment<'_>]) -> Vec<HaarEntries> {
-        let scales = self.table.operator().map(Operator::channel_scales);
-        let of_channel = |channel: usize| {
-            let scale = scales.map_or(1.0, |scales| scales[channel].to_num::<f64>());
-            let own = segments.iter().filter(|segment| match segment.channels {
-                Channels::All => true,
-                Channels::One(one) => usize::from(one) == channel,
-            });
-            let rows = own.flat_map(Segment::rows);
-            rows.flat_map(|row| self.row(row, scale)).collect()
-        };
-        (0..self.channels()).map(of_channel).collect()
-    }
-
-    /// The inverse of what [`quantise`](iltm_compile::quantise) does.
-    fn row(&self, row: Row<'_>, scale: f64) -> HaarEntries {
-        let norm = |index: usize| (self.functions[index].squared_norm() as f64).sqrt();
-        let index = usize::from(row.index);
-        let entry = |(col, value): (usize, i16)| {
-            let shift = self.functions[col].input_shift() + CORRECTION_GUARD_BITS;
-            let unit = (-f64::from(shift + u32::from(row.shift))).exp2();
-            HaarEntry {
-                row: index,
-                col,
-                value: scale * f64::from(value) * unit * norm(index) * norm(col),
-            }
-        };
-        values(row).into_iter().map(entry).collect()
+        haar_entries(self.table, segments)
     }
 
     /// `K d` of every column of `wanted`, one a pixel.
@@ -212,15 +171,6 @@ impl<'t> FloatTable<'t> {
         }
         None
     }
-}
-
-/// Index and value of a row's entries that are not zero.
-pub(super) fn values(row: Row<'_>) -> Vec<(usize, i16)> {
-    row.fold(Vec::new(), |mut values, pair| {
-        let both = (usize::from(pair.index)..).zip(pair.values);
-        values.extend(both.filter(|(_, value)| *value != 0));
-        values
-    })
 }
 
 fn by_column(matrix: &DMatrix<f64>, of: impl Fn(&[f64]) -> Vec<f64>) -> DMatrix<f64> {

@@ -1,6 +1,7 @@
 //! Errors of natural images, predicted and true.
 
-use super::float_table::{FloatTable, HaarEntries, HaarEntry};
+use super::float_table::{FloatTable, HaarEntries};
+use iltm_compile::haar_entries::HaarEntry;
 use iltm_compile::ladder::relative_error;
 use iltm_runtime::Grid;
 use iltm_solve::{InverseTransport, natural_images, wanted_images};

@@ -1,0 +1,419 @@
+//! `iltm play`: mpv on a projector, with the table as its shader.
+//!
+//! Decoding, sound and clocks are mpv's, and the compensation is the user shader of
+//! `iltm export`. The script `play.lua` runs within mpv: it has the keys, counts late frames,
+//! and says what happens as JSON lines on standard output.
+
+use super::args::Play;
+use super::failure::{Failure, Kind, cannot_write};
+use super::interrupt;
+use super::output::Output;
+use super::tables::{check, table_has, watch_table};
+use crate::compile::shader::user_shader;
+use crate::video::watch::FileWatch;
+use iltm_picture::Samples;
+use iltm_picture::unfinished::TemporaryFolder;
+use iltm_report::stills::test_card;
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use iltm_runtime::placement::ProjectorPixels;
+use serde_json::{Value, json};
+use std::ffi::OsString;
+use std::fs;
+use std::io::{self, BufRead, BufReader, ErrorKind};
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// The player.
+const MPV: &str = "mpv";
+
+/// Between two looks at the table, the player, and whether the user wants an end.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// How long a player that was asked to end may take.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Exit codes that `play.lua` ends mpv with.
+const STRICT: i32 = 5;
+const WRONG_DISPLAY: i32 = 6;
+const NOTHING_PLAYED: i32 = 7;
+
+/// Codes of a picture in white, wherever there is one.
+const WHITE: &str =
+    "//!HOOK MAIN\n//!BIND HOOKED\n//!DESC iltm: white\nvec4 hook() { return vec4(1.0); }\n";
+
+pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
+    let (image, watch) = watch_table(&arguments.table)?;
+    let table = check(&arguments.table, &image)?;
+    let tier = arguments.tier.unwrap_or_else(|| table.top_tier());
+    table_has(&table, tier)?;
+    let folder = TemporaryFolder::new().map_err(|error| cannot_write(Path::new("."), &error))?;
+    let stage = Stage {
+        folder: folder.path(),
+        projector: table.projector(),
+        tier,
+    };
+    stage.prepare(&table)?;
+    if stage.projector.is_none() {
+        output.people("note        the table does not say the projector's pixels: the display is not checked\n");
+    }
+    interrupt::catch();
+    let start = Instant::now();
+    let mut player = stage.start(arguments, table.top_tier())?;
+    let events = read(player.stdout.take().expect("it is piped"));
+    let mut show = Show {
+        arguments,
+        output,
+        stage: &stage,
+        generation: 0,
+        said: Vec::new(),
+        ended: None,
+    };
+    let status = show.follow(&mut player, &events, &watch)?;
+    show.result(status, start.elapsed())
+}
+
+/// Files for the player, and how it is started.
+struct Stage<'s> {
+    folder: &'s Path,
+    projector: Option<ProjectorPixels>,
+    tier: u8,
+}
+
+impl Stage<'_> {
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<(), Failure> {
+        let path = self.folder.join(name);
+        fs::write(&path, bytes).map_err(|error| cannot_write(&path, &error))
+    }
+
+    fn prepare(&self, table: &Table<'_>) -> Result<(), Failure> {
+        self.write("play.lua", include_str!("play.lua"))?;
+        self.write("white.glsl", WHITE)?;
+        if let Some(projector) = self.projector {
+            self.write("card.bgra", card(projector.size()))?;
+        }
+        self.shaders(table, 0)
+    }
+
+    /// Writes a table's shaders, one a tier.
+    fn shaders(&self, table: &Table<'_>, generation: u32) -> Result<(), Failure> {
+        for tier in 0..=table.top_tier() {
+            self.write(
+                &format!("{generation}-{tier}.glsl"),
+                user_shader(table, tier),
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Takes the place of the table before; `Err` says why it cannot.
+    fn exchange(&self, bytes: &[u8], path: &Path, generation: u32) -> Result<(), String> {
+        let table = check(path, bytes).map_err(|failure| failure.message)?;
+        if table.projector() != self.projector {
+            return Err(format!(
+                "{}: the table is for another projector or border",
+                path.display()
+            ));
+        }
+        let write = || {
+            self.shaders(&table, generation)?;
+            let newest = format!("{generation} {}\n", table.top_tier() + 1);
+            self.write("newest.part", newest)
+        };
+        write().map_err(|failure| failure.message)?;
+        let part = self.folder.join("newest.part");
+        fs::rename(part, self.folder.join("newest")).map_err(|error| error.to_string())
+    }
+
+    fn start(&self, arguments: &Play, top: u8) -> Result<Child, Failure> {
+        let mut command = Command::new(MPV);
+        command
+            .env("ILTM_PLAY", self.folder)
+            .args([
+                "--no-config",
+                "--input-default-bindings=no",
+                "--input-terminal=no",
+            ])
+            .args([
+                "--osc=no",
+                "--osd-bar=no",
+                "--osd-level=1",
+                "--cursor-autohide=always",
+            ])
+            .args(["--quiet", "--msg-level=all=error"])
+            .args([
+                "--vo=gpu",
+                "--fullscreen",
+                "--keepaspect=no",
+                "--force-window=immediate",
+            ])
+            .args([
+                "--idle=yes",
+                "--prefetch-playlist=yes",
+                "--gapless-audio=yes",
+            ])
+            .args([
+                "--audio-fallback-to-null=yes",
+                "--image-display-duration=10",
+            ])
+            .arg(path_option("--script=", &self.folder.join("play.lua")))
+            .arg(self.settings(arguments, top));
+        if let Some(projector) = self.projector {
+            command.arg(format!("--vf=lavfi=[{}]", filled(projector)));
+        }
+        if let Some(display) = arguments.display {
+            command.arg(format!("--screen={display}"));
+            command.arg(format!("--fs-screen={display}"));
+        }
+        if !arguments.once {
+            // One film begins again without a gap.
+            let again = if arguments.films.len() == 1 {
+                "--loop-file=inf"
+            } else {
+                "--loop-playlist=inf"
+            };
+            command.arg(again);
+        }
+        command.args(&arguments.mpv);
+        command.arg("--").args(&arguments.films);
+        command
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|error| match error.kind() {
+                ErrorKind::NotFound => Failure::new(
+                    Kind::Player,
+                    "mpv is not installed",
+                    "Install it: `sudo apt-get install mpv`.",
+                ),
+                _ => Failure::new(
+                    Kind::Player,
+                    format!("mpv cannot be started: {error}"),
+                    "See whether `mpv FILM` plays.",
+                ),
+            })
+    }
+
+    /// What `play.lua` needs to know.
+    fn settings(&self, arguments: &Play, top: u8) -> String {
+        let (width, height) = self.projector.map_or((0, 0), |projector| {
+            let size = projector.size();
+            (size.width(), size.height())
+        });
+        let yes = |set: bool| if set { "yes" } else { "no" };
+        format!(
+            "--script-opts=iltm-width={width},iltm-height={height},iltm-tier={},iltm-tiers={},\
+             iltm-once={},iltm-strict={}",
+            self.tier,
+            u16::from(top) + 1,
+            yes(arguments.once),
+            yes(arguments.strict),
+        )
+    }
+}
+
+fn path_option(option: &str, path: &Path) -> OsString {
+    let mut text = OsString::from(option);
+    text.push(path);
+    text
+}
+
+/// A filter that makes frames of the projector's size: as large as fits inside its border, in
+/// their aspect, black around.
+fn filled(projector: ProjectorPixels) -> String {
+    let (whole, inner) = (projector.size(), projector.inner());
+    format!(
+        "scale={}:{}:force_original_aspect_ratio=decrease:flags=bicubic+accurate_rnd,\
+         pad={}:{}:-1:-1,setsar=1",
+        inner.width(),
+        inner.height(),
+        whole.width(),
+        whole.height(),
+    )
+}
+
+/// The test card as mpv's overlays are: blue, green, red, opaque.
+fn card(size: FrameSize) -> Vec<u8> {
+    let card = test_card(size).picture;
+    let codes: Vec<u8> = match card.samples() {
+        Samples::Eight(samples) => samples.clone(),
+        Samples::Sixteen(samples) => samples.iter().map(|code| (code >> 8) as u8).collect(),
+    };
+    let pixels = codes.chunks_exact(card.channels());
+    let pixel = |codes: &[u8]| {
+        let of = |channel: usize| codes[channel.min(codes.len() - 1)];
+        [of(2), of(1), of(0), u8::MAX]
+    };
+    pixels.flat_map(pixel).collect()
+}
+
+/// Lines of the player, as they come.
+fn read(stdout: ChildStdout) -> Receiver<String> {
+    let (send, lines) = channel();
+    thread::spawn(move || {
+        for line in BufReader::new(stdout).lines().map_while(io::Result::ok) {
+            if send.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    lines
+}
+
+/// What happens while the player runs.
+struct Show<'s> {
+    arguments: &'s Play,
+    output: &'s Output,
+    stage: &'s Stage<'s>,
+    generation: u32,
+    /// What went wrong, in order.
+    said: Vec<String>,
+    /// The counts at the end.
+    ended: Option<Value>,
+}
+
+impl Show<'_> {
+    fn follow(
+        &mut self,
+        player: &mut Child,
+        events: &Receiver<String>,
+        watch: &FileWatch,
+    ) -> Result<ExitStatus, Failure> {
+        let mut asked: Option<Instant> = None;
+        loop {
+            match events.recv_timeout(PERIOD) {
+                Ok(line) => self.take(&line),
+                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout) => (),
+            }
+            if let Some(bytes) = watch.newer() {
+                self.exchange(&bytes);
+            }
+            // The player gets the same signal from a terminal, and ends by itself.
+            if interrupt::stopped() && asked.get_or_insert_with(Instant::now).elapsed() > PATIENCE {
+                let _ = player.kill();
+            }
+        }
+        player.wait().map_err(|error| {
+            Failure::new(
+                Kind::Player,
+                format!("mpv was lost: {error}"),
+                "Run it again.",
+            )
+        })
+    }
+
+    /// A line of the player: an object of `play.lua`, or its own words.
+    fn take(&mut self, line: &str) {
+        let Ok(event) = serde_json::from_str::<Value>(line) else {
+            if !line.trim().is_empty() {
+                self.problem(&format!("mpv: {line}"));
+            }
+            return;
+        };
+        if let Some(counts) = event.get("ended") {
+            self.ended = Some(counts.clone());
+        } else if let Some(display) = event.get("display") {
+            self.problem(&format!(
+                "the display has {} x {} pixels, the table's projector {}",
+                display["width"],
+                display["height"],
+                self.projector(),
+            ));
+        } else if let Some(problem) = event["problem"].as_str() {
+            let film = event["film"].as_str();
+            let text = film.map_or_else(|| problem.to_owned(), |film| format!("{film}: {problem}"));
+            self.problem(&text);
+        } else if event.get("table").is_some() {
+            let path = self.arguments.table.display();
+            self.output.people(&format!(
+                "table       {path} has changed and is used from now on\n"
+            ));
+            let event = json!({ "event": "table", "table": path.to_string() });
+            self.output.event(&event);
+        }
+    }
+
+    fn projector(&self) -> String {
+        self.stage.projector.map_or_else(String::new, |projector| {
+            let size = projector.size();
+            format!("{} x {}", size.width(), size.height())
+        })
+    }
+
+    fn problem(&mut self, text: &str) {
+        self.output.people(&format!("problem     {text}\n"));
+        self.output
+            .event(&json!({ "event": "problem", "problem": text }));
+        self.said.push(text.to_owned());
+    }
+
+    fn exchange(&mut self, bytes: &[u8]) {
+        self.generation += 1;
+        let path = &self.arguments.table;
+        if let Err(why) = self.stage.exchange(bytes, path, self.generation) {
+            self.problem(&format!("{why}; the table before goes on"));
+        }
+    }
+
+    fn result(self, status: ExitStatus, time: Duration) -> Result<(), Failure> {
+        let last = || self.said.last().cloned();
+        let failed = |kind, otherwise: &str, next: &str| {
+            let message = last().unwrap_or_else(|| otherwise.to_owned());
+            Err(Failure::new(kind, message, next))
+        };
+        match status.code() {
+            Some(WRONG_DISPLAY) => {
+                return failed(
+                    Kind::Display,
+                    "the display has another size than the table's projector",
+                    "Set the display to the projector's own mode, or choose another with --display.",
+                );
+            }
+            Some(NOTHING_PLAYED) => {
+                return failed(
+                    Kind::Frames,
+                    "nothing could be played",
+                    "Check the name, and whether `mpv FILM` plays it.",
+                );
+            }
+            Some(STRICT) => {
+                return failed(
+                    Kind::Player,
+                    "the show was ended",
+                    "Mend it, or leave --strict away to let shows go on.",
+                );
+            }
+            _ => (),
+        }
+        let Some(counts) = &self.ended else {
+            return failed(
+                Kind::Player,
+                "mpv ended before the show",
+                "See whether `mpv --vo=gpu FILM` plays.",
+            );
+        };
+        let data = json!({
+            "event": "end",
+            "seconds": time.as_secs_f64(),
+            "films": counts["films"],
+            "failed": counts["failed"],
+            "dropped": counts["dropped"],
+            "late": counts["late"],
+            "problems": self.said,
+        });
+        let text = format!(
+            "played      {} films in {:.0} s, {} of them in vain\n\
+             frames      {} dropped, {} late\n",
+            counts["films"],
+            time.as_secs_f64(),
+            counts["failed"],
+            counts["dropped"],
+            counts["late"],
+        );
+        self.output.result(&data, &text);
+        Ok(())
+    }
+}

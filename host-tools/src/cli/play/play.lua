@@ -1,0 +1,243 @@
+-- Keys, status line, counts and exchange of the table for `iltm play`. mpv runs this; iltm reads
+-- what it prints, a JSON object a line.
+
+local utils = require "mp.utils"
+local settings = { width = 0, height = 0, tier = 0, tiers = 1, once = false, strict = false }
+require("mp.options").read_options(settings, "iltm")
+local folder = os.getenv("ILTM_PLAY")
+
+local state = {
+    generation = 0, tier = settings.tier, tiers = settings.tiers,
+    compensated = true, white = false, card = false, line = false,
+}
+local counts = { dropped = 0, late = 0, films = 0, failed = 0 }
+local played = false
+
+local function say(event)
+    io.stdout:write(utils.format_json(event), "\n")
+    io.stdout:flush()
+end
+
+local function finish(code)
+    mp.commandv("quit", code)
+end
+
+-- What is wrong during a show is said, and ends it only if that is asked for.
+local function trouble(event)
+    say(event)
+    if settings.strict then
+        finish(5)
+    end
+end
+
+local line = mp.create_osd_overlay("ass-events")
+
+local function words()
+    local how = state.card and "test card, as it is" or state.compensated
+        and string.format("compensated, tier %d of %d", state.tier, state.tiers - 1)
+        or "as it is"
+    if state.white and not state.card then
+        how = "white, " .. how
+    end
+    return how
+end
+
+local function show_line()
+    if not state.line then
+        line:remove()
+        return
+    end
+    local name = mp.get_property("filename") or "nothing to play"
+    local held = mp.get_property_native("pause") and "  paused" or ""
+    line.data = string.format(
+        "{\\an1\\fs22\\bord1}%s  %s%s  %d dropped, %d late",
+        name:gsub("[{}\\]", " "), words(), held, counts.dropped, counts.late
+    )
+    line:update()
+end
+
+local function apply()
+    local shaders = {}
+    if state.white then
+        table.insert(shaders, folder .. "/white.glsl")
+    end
+    if state.compensated then
+        table.insert(shaders, string.format("%s/%d-%d.glsl", folder, state.generation, state.tier))
+    end
+    mp.set_property_native("glsl-shaders", shaders)
+    show_line()
+end
+
+local function changed()
+    apply()
+    mp.osd_message(words(), 2)
+end
+
+local function show_card()
+    if state.card then
+        mp.commandv(
+            "overlay-add", 0, 0, 0, folder .. "/card.bgra", 0, "bgra",
+            settings.width, settings.height, 4 * settings.width
+        )
+    else
+        mp.commandv("overlay-remove", 0)
+    end
+end
+
+local function key(name, what, act)
+    mp.add_forced_key_binding(name, "iltm-" .. what, act, { repeatable = false })
+end
+
+local function toggle(name)
+    return function()
+        state[name] = not state[name]
+        changed()
+    end
+end
+
+local function tier(step)
+    return function()
+        state.tier = math.max(0, math.min(state.tiers - 1, state.tier + step))
+        changed()
+    end
+end
+
+key("c", "compensated", toggle("compensated"))
+key("w", "white", toggle("white"))
+key("t", "card", function()
+    if settings.width == 0 then
+        mp.osd_message("no test card: the table does not say the projector's pixels", 2)
+        return
+    end
+    state.card = not state.card
+    show_card()
+    show_line()
+end)
+key("i", "line", function()
+    state.line = not state.line
+    show_line()
+end)
+key("+", "finer", tier(1))
+key("-", "coarser", tier(-1))
+key("SPACE", "pause", function() mp.commandv("cycle", "pause") end)
+key("n", "next", function() mp.commandv("playlist-next", "weak") end)
+key("p", "previous", function() mp.commandv("playlist-prev", "weak") end)
+key("q", "quit", function() finish(0) end)
+key("ESC", "escape", function() finish(0) end)
+
+-- A player's counts begin again with each film.
+local function count(property, name)
+    local before = 0
+    mp.observe_property(property, "number", function(_, now)
+        now = now or 0
+        counts[name] = counts[name] + math.max(0, now < before and now or now - before)
+        before = now
+        show_line()
+    end)
+end
+count("frame-drop-count", "dropped")
+count("vo-delayed-frame-count", "late")
+mp.observe_property("pause", "bool", show_line)
+
+-- The display fits, or nothing is shown; in mid show it may change, as when a cable is pulled.
+local fits = nil
+local function look_at_display()
+    local width, height = mp.get_osd_size()
+    if settings.width == 0 or not width or width == 0 then
+        return
+    end
+    local now = width == settings.width and height == settings.height
+    if now == fits then
+        return
+    end
+    local first = fits == nil
+    fits = now
+    if not now then
+        local event = { display = { width = width, height = height } }
+        if first then
+            say(event)
+            finish(6)
+        else
+            trouble(event)
+        end
+    end
+end
+
+mp.register_event("file-loaded", function()
+    played = true
+    counts.films = counts.films + 1
+    local picture, sound = false, false
+    for _, track in ipairs(mp.get_property_native("track-list")) do
+        picture = picture or track.type == "video" and not track.albumart
+        sound = sound or track.type == "audio" and track.selected
+    end
+    if not picture then
+        counts.failed = counts.failed + 1
+        trouble({ film = mp.get_property("path"), problem = "has no picture" })
+    end
+    -- The window and the sound device take a moment.
+    mp.add_timeout(1, function()
+        look_at_display()
+        mp.observe_property("osd-dimensions", "native", look_at_display)
+        local device = mp.get_property("current-ao")
+        if sound and (not device or device == "null" and mp.get_property("ao") ~= "null") then
+            trouble({ problem = "there is no sound: no device plays it" })
+        end
+    end)
+    show_line()
+end)
+
+mp.register_event("end-file", function(event)
+    if event.reason == "error" then
+        counts.failed = counts.failed + 1
+        local entry = mp.get_property_native("playlist") or {}
+        local film
+        for _, item in ipairs(entry) do
+            if item.id == event.playlist_entry_id then
+                film = item.filename
+            end
+        end
+        trouble({ film = film, problem = event.file_error or "cannot be played" })
+    end
+end)
+
+-- Nothing is left to play: the end, or a film that could not be played and may come back.
+mp.observe_property("idle-active", "bool", function(_, idle)
+    if not idle then
+        return
+    end
+    if not played and counts.failed > 0 then
+        finish(7)
+    elseif settings.once and (played or counts.failed > 0) then
+        finish(0)
+    elseif played then
+        mp.add_timeout(2, function()
+            if mp.get_property_native("idle-active") then
+                mp.commandv("playlist-play-index", 0)
+            end
+        end)
+    end
+end)
+
+-- iltm puts the number of the newest table, and of its tiers, here.
+mp.add_periodic_timer(0.25, function()
+    local file = io.open(folder .. "/newest")
+    if not file then
+        return
+    end
+    local generation, tiers = file:read("*n", "*n")
+    file:close()
+    if generation and tiers and generation ~= state.generation then
+        local top = state.tier == state.tiers - 1
+        state.generation, state.tiers = generation, tiers
+        state.tier = top and tiers - 1 or math.min(state.tier, tiers - 1)
+        apply()
+        say({ table = generation })
+    end
+end)
+
+mp.register_event("shutdown", function()
+    say({ ended = counts })
+end)
+
+apply()

@@ -1,0 +1,100 @@
+//! `iltm export`: another program's shader makes of a frame what the runtime makes of it. ffmpeg's
+//! `libplacebo` filter runs the shader on Mesa's software Vulkan.
+
+use super::user::{User, contains};
+use image::{ImageBuffer, Rgb};
+use std::process::Command;
+
+/// A frame of 16 bits with what natural ones have: ramps, edges, fine stripes, darks, colours.
+fn frame(width: u32, height: u32) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
+    ImageBuffer::from_fn(width, height, |x, y| {
+        let (u, v) = (
+            f64::from(x) / f64::from(width),
+            f64::from(y) / f64::from(height),
+        );
+        let blob = (-20.0 * ((u - 0.7).powi(2) + (v - 0.4).powi(2))).exp();
+        let stripes = if u < 0.4 && v > 0.6 {
+            f64::from(x % 3) / 2.0
+        } else {
+            0.0
+        };
+        let edge = if u + v > 1.3 { 0.5 } else { 0.0 };
+        let level = |share: f64| (65_535.0 * share.clamp(0.0, 1.0)).round() as u16;
+        Rgb([
+            level(0.8 * u * v + 0.3 * stripes + blob),
+            level(0.6 * u * u + edge),
+            level(0.2 * v + 0.7 * blob + 0.1 * stripes),
+        ])
+    })
+}
+
+/// What ffmpeg makes of `in.png` by a shader.
+fn by_ffmpeg(user: &User, shader: &str) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
+    let filter = format!(
+        "format=rgba64le,hwupload,libplacebo=custom_shader_path={shader}:dithering=-1,\
+         hwdownload,format=rgba64le"
+    );
+    let ran = Command::new("ffmpeg")
+        .current_dir(user.path(""))
+        .args(["-hide_banner", "-loglevel", "error", "-y"])
+        .args(["-init_hw_device", "vulkan=gpu", "-filter_hw_device", "gpu"])
+        .args(["-i", "in.png", "-vf", &filter, "out.png"])
+        .output()
+        .expect("tests/run.sh installs ffmpeg");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.success() && said.is_empty(), "{said}");
+    user.picture("out.png").to_rgb16()
+}
+
+/// Largest difference, in steps of 8 bits.
+fn apart(a: &ImageBuffer<Rgb<u16>, Vec<u16>>, b: &ImageBuffer<Rgb<u16>, Vec<u16>>) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let apart = a.iter().zip(b.iter()).map(|(a, b)| a.abs_diff(*b));
+    f64::from(apart.max().unwrap_or(0)) / 257.0
+}
+
+#[test]
+fn a_shader_makes_what_the_runtime_makes_at_every_tier() {
+    for (sample, width, height) in [("m-panels", 336, 208), ("m-panels-colour", 384, 256)] {
+        let user = User::new();
+        let sample = format!("{}/samples/{sample}", env!("CARGO_MANIFEST_DIR"));
+        user.says(&format!("solve {sample} -o t.iltm"));
+        let frame = frame(width, height);
+        frame.save(user.path("in.png")).unwrap();
+        let tiers = user.json("inspect t.iltm --json")["tiers"]
+            .as_array()
+            .unwrap()
+            .len();
+        assert!(tiers > 3);
+        for tier in 0..tiers {
+            user.says(&format!(
+                "compensate t.iltm in.png --tier {tier} -o expected.png"
+            ));
+            let said = user.says(&format!(
+                "export t.iltm --as mpv --tier {tier} -o shader{tier}"
+            ));
+            contains(&said, &["mpv --fullscreen --glsl-shader=", "iltm.glsl"]);
+            let expected = user.picture("expected.png").to_rgb16();
+            let found = by_ffmpeg(&user, &format!("shader{tier}/iltm.glsl"));
+            let apart = apart(&expected, &found);
+            assert!(apart < 1.0, "{sample}, tier {tier}: {apart}");
+            // A frame that nothing was done to would be found out.
+            assert!(self::apart(&frame, &found) > 10.0);
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_and_nothing_is_written() {
+    let user = User::with_table();
+    let mut text = String::new();
+    for line in [
+        "t.iltm --as mpv --tier 99 -o s",
+        "missing.iltm --as mpv -o s",
+        "t.iltm --as vlc -o s",
+    ] {
+        text += &user.run(&format!("export {line}")).with_code();
+    }
+    insta::assert_snapshot!(text);
+    assert!(!user.path("s").exists());
+}

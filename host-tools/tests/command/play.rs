@@ -1,0 +1,287 @@
+//! `iltm play` on a desktop without a screen: mpv shows what the runtime makes of a film, keys do
+//! what they say, and what goes wrong in a show does not end it.
+
+use super::desktop::Desktop;
+use super::schema;
+use super::user::{Ended, User, contains};
+use image::{DynamicImage, RgbImage};
+use serde_json::{Value, json};
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
+use std::process::{Child, Command};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// The projector of [`user`]: 336 x 208 pixels in a border of 8.
+const SIZE: &str = "352x224";
+
+/// Software draws, and no sound device is needed.
+const MPV: &str = "--gpu-context=x11egl --ao=null --input-ipc-server=socket";
+
+/// Light of the codes by which a picture and what is made of it are rounded.
+const ROUNDED: f64 = 3.0 / 255.0;
+
+/// With the table `t.iltm` of a projector of [`SIZE`].
+fn user() -> User {
+    let user = User::with_capture();
+    let settings = user.text("capture/capture.toml");
+    let projector = "[projector]\nsize = [352, 224]\nborder = 8\n";
+    user.write("capture/capture.toml", format!("{settings}\n{projector}"));
+    user.says("solve capture -o t.iltm");
+    user
+}
+
+/// Makes a film of a second and a half, with sound, in which colours move.
+fn film(user: &User, name: &str, rate: u32, format: &str) {
+    let picture = format!("testsrc2=size={SIZE}:rate={rate}");
+    let ran = Command::new("ffmpeg")
+        .current_dir(user.path(""))
+        .args(["-loglevel", "error", "-y", "-f", "lavfi", "-i", &picture])
+        .args(["-f", "lavfi", "-i", "sine=frequency=440", "-t", "1.5"])
+        .args(["-pix_fmt", format, "-c:v", "ffv1", "-c:a", "flac", name])
+        .output()
+        .expect("tests/run.sh installs ffmpeg");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.success() && said.is_empty(), "{said}");
+}
+
+/// A show under way, and its player's socket.
+struct Show<'u> {
+    user: &'u User,
+    child: Child,
+    replies: BufReader<UnixStream>,
+}
+
+impl<'u> Show<'u> {
+    fn start(desktop: &Desktop, user: &'u User, line: &str) -> Self {
+        let child = desktop.spawn(user, &format!("play t.iltm {line} -- {MPV}"));
+        let socket = user.path("socket");
+        let stream = within(20, || UnixStream::connect(&socket).ok());
+        let mut show = Self {
+            user,
+            child,
+            replies: BufReader::new(stream),
+        };
+        within(20, || show.get("time-pos").as_f64());
+        show
+    }
+
+    fn tell(&mut self, command: &[&str]) -> Value {
+        let line = format!("{}\n", json!({ "command": command }));
+        self.replies
+            .get_mut()
+            .write_all(line.as_bytes())
+            .expect("mpv listens");
+        loop {
+            let mut reply = String::new();
+            self.replies.read_line(&mut reply).expect("mpv answers");
+            let reply: Value = serde_json::from_str(&reply).expect("an object");
+            // Others are events.
+            if reply.get("error").is_some() {
+                return reply;
+            }
+        }
+    }
+
+    fn get(&mut self, property: &str) -> Value {
+        self.tell(&["get_property", property])["data"].clone()
+    }
+
+    fn key(&mut self, key: &str) {
+        assert_eq!(self.tell(&["keypress", key])["error"], "success");
+    }
+
+    /// Stands still at a time.
+    fn hold(&mut self, seconds: &str) {
+        self.tell(&["set", "pause", "yes"]);
+        self.tell(&["seek", seconds, "absolute+exact"]);
+        thread::sleep(Duration::from_millis(500));
+    }
+
+    /// What is in the window.
+    fn shown(&mut self, name: &str) -> RgbImage {
+        let path = self.user.path(name);
+        // Until the words after a key are gone.
+        thread::sleep(Duration::from_millis(2300));
+        let told = self.tell(&["screenshot-to-file", path.to_str().expect("text"), "window"]);
+        assert_eq!(told["error"], "success");
+        self.user.picture(name).to_rgb8()
+    }
+
+    fn end(mut self) -> Ended {
+        self.key("q");
+        Ended::of(self.child)
+    }
+}
+
+fn within<T>(seconds: u64, mut of: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(found) = of() {
+            return found;
+        }
+        assert!(
+            start.elapsed() < Duration::from_secs(seconds),
+            "it took too long"
+        );
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Largest difference of two pictures in light, and mean difference in codes: near black a code
+/// is next to no light, and codes of 8 bits that were compensated are several apart there.
+fn apart(a: &RgbImage, b: &RgbImage) -> (f64, f64) {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let light = |code: u8| (f64::from(code) / 255.0).powf(2.2);
+    let (mut most, mut sum) = (0.0_f64, 0.0);
+    for (a, b) in a.iter().zip(b.iter()) {
+        most = most.max((light(*a) - light(*b)).abs());
+        sum += f64::from(a.abs_diff(*b));
+    }
+    (most, sum / a.len() as f64)
+}
+
+/// What the runtime makes of a picture.
+fn compensated(user: &User, picture: &RgbImage, tier: &str) -> RgbImage {
+    picture.save(user.path("wanted.png")).unwrap();
+    user.says(&format!(
+        "compensate t.iltm wanted.png {tier} -o expected.png"
+    ));
+    DynamicImage::to_rgb8(&user.picture("expected.png"))
+}
+
+/// Pixels inside the border.
+fn inside(picture: &RgbImage) -> RgbImage {
+    image::imageops::crop_imm(picture, 8, 8, 336, 208).to_image()
+}
+
+#[test]
+fn a_film_plays_with_what_the_runtime_makes_of_it_and_keys_change_it() {
+    let desktop = Desktop::start(&format!("{SIZE}x24"));
+    let user = user();
+    for (rate, format) in [(24, "yuv420p"), (60, "yuv422p10le"), (30, "bgr0")] {
+        let name = format!("{format}.mkv");
+        film(&user, &name, rate, format);
+        let mut show = Show::start(&desktop, &user, &name);
+        assert_ne!(show.get("current-tracks/audio"), Value::Null);
+        show.hold("1.0");
+        let found = show.shown("found.png");
+        show.key("c");
+        let wanted = show.shown("raw.png");
+        assert!(apart(&wanted, &found).0 > 0.1, "{format}: nothing was done");
+        let expected = compensated(&user, &wanted, "");
+        let (most, mean) = apart(&expected, &found);
+        // With a shader and without mpv makes other colours of a few pixels at edges of chroma.
+        let least = if format == "bgr0" { ROUNDED } else { 0.05 };
+        assert!(most < least && mean < 0.3, "{format}: {most}, mean {mean}");
+        // The border is black in both.
+        assert!(found.enumerate_pixels().all(|(x, y, pixel)| {
+            (8..344).contains(&x) && (8..216).contains(&y) || pixel.0 == [0; 3]
+        }));
+        if format == "bgr0" {
+            show.key("c");
+            show.key("-");
+            let coarser = show.shown("coarser.png");
+            let top = user.json("inspect t.iltm --json")["tiers"]
+                .as_array()
+                .unwrap()
+                .len()
+                - 1;
+            let expected = compensated(&user, &wanted, &format!("--tier {}", top - 1));
+            assert!(apart(&expected, &coarser).0 < ROUNDED);
+            show.key("w");
+            show.key("c");
+            let white = inside(&show.shown("white.png"));
+            assert!(white.iter().all(|code| *code == 255));
+            show.key("t");
+            let card = show.shown("card.png");
+            assert!(apart(&inside(&card), &white).0 > 0.5, "no card");
+        }
+        let ended = show.end();
+        assert_eq!(ended.code, 0, "{}", ended.said);
+        contains(&ended.said, &["played", "dropped", "late"]);
+    }
+}
+
+#[test]
+fn a_show_goes_on_whatever_happens_and_says_it() {
+    let desktop = Desktop::start(&format!("{SIZE}x24"));
+    let user = user();
+    film(&user, "good.mkv", 25, "yuv420p");
+    user.write("damaged.mkv", &user.read("good.mkv")[..600]);
+    let sound = ["-loglevel", "error", "-i", "good.mkv", "-vn", "sound.mkv"];
+    let made = Command::new("ffmpeg")
+        .current_dir(user.path(""))
+        .args(sound)
+        .status();
+    assert!(made.expect("it has made the film").success());
+    let mut show = Show::start(
+        &desktop,
+        &user,
+        "good.mkv damaged.mkv missing.mkv sound.mkv",
+    );
+    // The second time around.
+    within(30, || {
+        show.get("playlist-pos").as_i64().filter(|at| *at != 0)
+    });
+    within(30, || (show.get("playlist-pos") == 0).then_some(()));
+    // Another table, one that is none, and one of another projector.
+    user.says("solve capture --keep-ambient -o other.iltm");
+    fs::rename(user.path("other.iltm"), user.path("t.iltm")).unwrap();
+    within(20, || {
+        let shaders = show.get("glsl-shaders").to_string();
+        shaders.contains("/1-").then_some(())
+    });
+    user.write("t.iltm", "no table");
+    thread::sleep(Duration::from_secs(2));
+    user.write("t.iltm", super::user::table());
+    thread::sleep(Duration::from_secs(2));
+    assert!(show.get("glsl-shaders").to_string().contains("/1-"));
+    let ended = show.end();
+    assert_eq!(ended.code, 0, "{}", ended.said);
+    contains(
+        &ended.said,
+        &[
+            "missing.mkv: ",
+            "damaged.mkv: ",
+            "sound.mkv: has no picture",
+            "t.iltm has changed and is used from now on",
+            "t.iltm: ",
+            "another projector or border; the table before goes on",
+        ],
+    );
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_with_a_code_of_its_own() {
+    let desktop = Desktop::start("320x200x24");
+    let user = user();
+    film(&user, "good.mkv", 25, "yuv420p");
+    let play = |line: &str| {
+        let child = desktop.spawn(&user, &format!("play t.iltm {line} -- {MPV}"));
+        Ended::of(child)
+    };
+    let refused = play("good.mkv");
+    assert_eq!(refused.code, 33, "{}", refused.said);
+    contains(&refused.said, &["320 x 200 pixels", "projector 352 x 224"]);
+    let missing = play("missing.mkv");
+    assert_eq!(missing.code, 8, "{}", missing.said);
+    contains(&missing.said, &["missing.mkv"]);
+    let tier = play("good.mkv --tier 99");
+    assert_eq!(tier.code, 2, "{}", tier.said);
+    let large = Desktop::start(&format!("{SIZE}x24"));
+    let line = format!("play t.iltm good.mkv missing.mkv --strict -- {MPV}");
+    let strict = Ended::of(large.spawn(&user, &line));
+    assert_eq!(strict.code, 38, "{}", strict.said);
+    contains(&strict.said, &["missing.mkv"]);
+    let line = format!("play t.iltm good.mkv --once --json -- {MPV}");
+    let once = Ended::of(large.spawn(&user, &line));
+    assert_eq!(once.code, 0, "{}", once.said);
+    schema::check("play", &once.out);
+    assert_eq!(once.json()["films"], 1);
+    let mut bare = user.iltm("play t.iltm good.mkv");
+    let bare = Ended::of(bare.env("PATH", "").spawn().expect("a binary"));
+    assert_eq!(bare.code, 38, "{}", bare.said);
+    contains(&bare.said, &["mpv is not installed"]);
+}
