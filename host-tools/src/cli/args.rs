@@ -673,7 +673,8 @@ pub(super) struct Play {
 pub(super) struct Export {
     /// Table to export
     pub(super) table: PathBuf,
-    /// What for: mpv (a user shader, also for ffmpeg's `libplacebo` filter)
+    /// What for: mpv (a user shader, also for ffmpeg's `libplacebo` filter), or maps (pictures for
+    /// servers that know alpha and beta maps alone)
     #[arg(long = "as", value_name = "PLAYER")]
     pub(super) player: Player,
     /// Folder to make
@@ -689,6 +690,8 @@ pub(super) struct Export {
 pub(super) enum Player {
     /// A user shader for mpv and libplacebo
     Mpv,
+    /// Pictures for servers that know maps alone
+    Maps,
 }
 
 #[derive(Debug, Args)]

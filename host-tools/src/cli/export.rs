@@ -1,15 +1,21 @@
 //! `iltm export`
 
 use super::args::{Export, Player};
-use super::failure::Failure;
+use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::tables::{check, read_table, table_has};
+use crate::capture::exr;
 use crate::compile::shader::user_shader;
-use iltm_picture::{WholeFolder, check_free};
+use crate::video::{CompensateOptions, Compensator};
+use iltm_picture::{Picture, Response, Samples, WholeFolder, check_free, png};
+use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::Encoding;
+use iltm_runtime::placement::ProjectorPixels;
 use serde_json::json;
 
-/// What the shader's file is called.
-const SHADER: &str = "iltm.glsl";
+/// A file's name and bytes.
+type Named = (String, Vec<u8>);
 
 pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     let out = &arguments.output;
@@ -18,25 +24,120 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     let table = check(&arguments.table, &image)?;
     let tier = arguments.tier.unwrap_or_else(|| table.top_tier());
     table_has(&table, tier)?;
-    let Player::Mpv = arguments.player;
-    let shader = user_shader(&table, tier);
+    let (files, next) = match arguments.player {
+        Player::Mpv => {
+            let shader = user_shader(&table, tier).into_bytes();
+            let next = format!(
+                "mpv --vo=gpu --fullscreen --keepaspect=no --glsl-shader={} FILM",
+                out.join("iltm.glsl").display()
+            );
+            (vec![("iltm.glsl".to_owned(), shader)], next)
+        }
+        Player::Maps => {
+            let next = "load white.png as the alpha map and black.png as the beta map".to_owned();
+            (maps(&table, tier)?, next)
+        }
+    };
     let folder = WholeFolder::create(out)?;
-    folder.file(SHADER, &shader)?;
+    for (name, bytes) in &files {
+        folder.file(name, bytes)?;
+    }
     folder.finish()?;
-    let path = out.join(SHADER);
+    let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
     let data = json!({
         "folder": out.display().to_string(),
-        "files": [SHADER],
+        "files": names,
         "tier": tier,
-        "bytes": shader.len(),
+        "bytes": bytes,
     });
     let text = format!(
-        "written     {}: tier {tier}, {} bytes\n\
-         next        mpv --fullscreen --glsl-shader={} FILM\n",
-        path.display(),
-        shader.len(),
-        path.display(),
+        "written     {} in {}: tier {tier}, {bytes} bytes\n\
+         next        {next}\n",
+        names.join(", "),
+        out.display(),
     );
     output.result(&data, &text);
     Ok(())
+}
+
+/// Maps as large as the projector's picture: what the projector shows where an even grey is wanted,
+/// with gains alone as bright as they allow, with the operator white, and as dark as the room's
+/// light allows. PNG in codes, `OpenEXR` in proportion to light.
+fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<Named>, Failure> {
+    let fine = table.fine_gain().map(|fine| fine.size());
+    let size = table.projector().map(ProjectorPixels::size);
+    let size = size
+        .or(fine)
+        .unwrap_or_else(|| FrameSize::of_grid(table.grid()));
+    let even = |light: f64, encoding: Encoding, tier: u8| {
+        let settings = CompensateOptions {
+            tier: Some(tier),
+            encoding,
+            ..CompensateOptions::default()
+        };
+        let code = match encoding {
+            Encoding::Display => Response::Srgb.value(light),
+            Encoding::Linear => light,
+        };
+        let code = (code * f64::from(u16::MAX)).round() as u16;
+        let even = Samples::Sixteen(vec![code; 3 * size.pixels()]);
+        let even = Picture::new(size, even).expect("three samples a pixel");
+        let (map, _) = Compensator::new(table, settings)?.frame(even)?;
+        Ok::<_, Failure>(map)
+    };
+    // The room's light is taken away too, so that more may be asked for than the largest gain says.
+    let gain = largest_gain(table).max(1.0);
+    let light = light_of(&even(gain.recip(), Encoding::Linear, 0)?);
+    let left = 1.0 - f64::from(light.into_iter().fold(0.0, f32::max));
+    let brightest = ((1.0 + left) / gain).min(1.0);
+    let mut files = Vec::new();
+    for (name, light, tier) in [
+        ("gain", brightest, 0),
+        ("white", 1.0, tier),
+        ("black", brightest_ambient(table), tier),
+    ] {
+        let codes = even(light, Encoding::Display, tier)?;
+        files.push((format!("{name}.png"), png::encode(&codes)));
+        let light = light_of(&even(light, Encoding::Linear, tier)?);
+        let bytes = exr((size.width(), size.height()), light.into_iter());
+        let bytes = bytes.map_err(|error| {
+            let what = format!("a map cannot be written: {error}");
+            Failure::new(Kind::Write, what, "Please report this.")
+        })?;
+        files.push((format!("{name}.exr"), bytes));
+    }
+    Ok(files)
+}
+
+fn largest_gain(table: &Table<'_>) -> f64 {
+    let rows = 0..table.grid().rows();
+    let lines = rows.flat_map(|row| (0..usize::from(table.channels())).map(move |c| (row, c)));
+    let cells = lines.flat_map(|(row, channel)| table.gain_row(row, channel));
+    let fine = table.fine_gain().into_iter().flat_map(|fine| {
+        let rows = 0..fine.size().height();
+        let lines = rows.flat_map(|row| (0..usize::from(table.channels())).map(move |c| (row, c)));
+        lines.flat_map(move |(row, channel)| fine.row(row, channel).collect::<Vec<u16>>())
+    });
+    let largest = cells.chain(fine).max().unwrap_or(0);
+    f64::from(largest) * (-f64::from(table.gain_fraction())).exp2()
+}
+
+/// Light of the brightest cell that the projector does not light, 0 in a dark room.
+fn brightest_ambient(table: &Table<'_>) -> f64 {
+    let rows = 0..table.grid().rows();
+    let lines = rows.flat_map(|row| (0..usize::from(table.channels())).map(move |c| (row, c)));
+    let ambient = lines.filter_map(|(row, channel)| table.ambient_row(row, channel));
+    let light = ambient.flatten().map(|light| light.to_num::<f64>());
+    light.fold(0.0, f64::max).min(1.0)
+}
+
+/// Samples of a picture in proportion to light, from 0 to 1.
+fn light_of(map: &Picture) -> Vec<f32> {
+    match map.samples() {
+        Samples::Eight(codes) => codes.iter().map(|code| f32::from(*code) / 255.0).collect(),
+        Samples::Sixteen(codes) => (codes.iter())
+            .map(|code| f32::from(*code) / f32::from(u16::MAX))
+            .collect(),
+    }
 }

@@ -73,7 +73,7 @@ fn a_shader_makes_what_the_runtime_makes_at_every_tier() {
             let said = user.says(&format!(
                 "export t.iltm --as mpv --tier {tier} -o shader{tier}"
             ));
-            contains(&said, &["mpv --fullscreen --glsl-shader=", "iltm.glsl"]);
+            contains(&said, &["--glsl-shader=", "iltm.glsl"]);
             let expected = user.picture("expected.png").to_rgb16();
             let found = by_ffmpeg(&user, &format!("shader{tier}/iltm.glsl"));
             let apart = apart(&expected, &found);
@@ -82,6 +82,56 @@ fn a_shader_makes_what_the_runtime_makes_at_every_tier() {
             assert!(self::apart(&frame, &found) > 10.0);
         }
     }
+}
+
+/// Makes one picture of two, by ffmpeg.
+fn multiplied(user: &User, a: &str, b: &str) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
+    let filter =
+        "[0]format=gbrp16[a];[1]format=gbrp16[b];[a][b]blend=all_mode=multiply,format=rgb48";
+    let ran = Command::new("ffmpeg")
+        .current_dir(user.path(""))
+        .args(["-loglevel", "error", "-y", "-i", a, "-i", b])
+        .args(["-filter_complex", filter, "multiplied.png"])
+        .output()
+        .expect("tests/run.sh installs ffmpeg");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.success() && said.is_empty(), "{said}");
+    user.picture("multiplied.png").to_rgb16()
+}
+
+#[test]
+fn maps_make_even_pictures_what_the_runtime_makes_of_them() {
+    let user = User::with_table();
+    let said = user.says("export t.iltm --as maps -o maps");
+    contains(&said, &["white.png as the alpha map"]);
+    assert_eq!(user.names("maps").len(), 6);
+    let white = user.picture("maps/white.png").to_rgb16();
+    let (width, height) = white.dimensions();
+    let even = |code: u16| ImageBuffer::from_pixel(width, height, Rgb([code; 3]));
+    even(u16::MAX).save(user.path("in.png")).unwrap();
+    user.says("compensate t.iltm in.png -o expected.png");
+    assert!(white == user.picture("expected.png").to_rgb16());
+    // In proportion to light.
+    user.says("compensate t.iltm in.png --linear -o linear.png");
+    let linear = user.picture("linear.png").to_rgb32f();
+    let map = user.picture("maps/white.exr").to_rgb32f();
+    let apart = |(a, b): (&f32, &f32)| (a - b).abs();
+    assert!(linear.iter().zip(map.iter()).map(apart).fold(0.0, f32::max) < 1e-4);
+    // Gains are not cut off, and the brightest is as bright as can be.
+    let gain = user.picture("maps/gain.exr").to_rgb32f();
+    let full = gain.iter().filter(|gain| **gain > 0.99).count();
+    assert!(full > 0 && full < gain.len() / 20, "{full}");
+    // What a server does with an alpha map.
+    let grey = even(40_000);
+    grey.save(user.path("in.png")).unwrap();
+    user.says("compensate t.iltm in.png -o expected.png");
+    let expected = user.picture("expected.png").to_rgb16();
+    let found = multiplied(&user, "in.png", "maps/white.png");
+    let (found, without) = (
+        self::apart(&expected, &found),
+        self::apart(&expected, &grey),
+    );
+    assert!(found < 6.0 && without > 3.0 * found, "{found}, {without}");
 }
 
 #[test]

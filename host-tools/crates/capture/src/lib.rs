@@ -76,7 +76,7 @@ pub use linear_photograph::LinearPhotograph;
 pub use photographs::grey_view::grey_view;
 pub use photographs::photo_stats::PhotoStats;
 pub use registration::cell_map::{NO_CELL, Registration};
-pub use registration::map_file::MapFormat;
+pub use registration::map_file::{MapFormat, exr};
 pub use registration::projector_map::{MapError, MapSource, ProjectorMap};
 pub use registration::{MIN_REGRESSION, PixelCount, RegistrationMethod};
 pub use remeasure::{CellPlanes, CellReadings, PixelReadings, Remeasured, remeasure};

@@ -52,15 +52,26 @@ impl ProjectorMap {
             MapFormat::Exr => {
                 let pixels = self.position.iter().zip(&self.uncertainty);
                 let values = pixels.flat_map(|([x, y], uncertainty)| [*x, *y, *uncertainty]);
-                let bytes: Vec<u8> = values.flat_map(f32::to_ne_bytes).collect();
-                let mut file = Cursor::new(Vec::new());
-                let size = (width as u32, height as u32);
-                let colours = ExtendedColorType::Rgb32F;
-                OpenExrEncoder::new(&mut file).write_image(&bytes, size.0, size.1, colours)?;
-                Ok(file.into_inner())
+                exr((width, height), values)
             }
         }
     }
+}
+
+/// An `OpenEXR` file of three channels, in 32-bit floats: `values` of each pixel side by side,
+/// row by row.
+///
+/// # Errors
+/// What the encoder says, as of another number of values.
+pub fn exr(
+    (width, height): (usize, usize),
+    values: impl Iterator<Item = f32>,
+) -> ImageResult<Vec<u8>> {
+    let bytes: Vec<u8> = values.flat_map(f32::to_ne_bytes).collect();
+    let mut file = Cursor::new(Vec::new());
+    let colours = ExtendedColorType::Rgb32F;
+    OpenExrEncoder::new(&mut file).write_image(&bytes, width as u32, height as u32, colours)?;
+    Ok(file.into_inner())
 }
 
 #[cfg(test)]
