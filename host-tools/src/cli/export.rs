@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
             (vec![("iltm.glsl".to_owned(), shader)], next)
         }
         Player::Maps => {
-            let next = "load white.png as the alpha map and black.png as the beta map".to_owned();
+            let next = "load alpha.png as the alpha map and beta.png as the beta map".to_owned();
             (maps(&table, tier)?, next)
         }
     };
@@ -61,13 +61,16 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Maps as large as the projector's picture: what the projector shows where an even grey is wanted,
-/// with gains alone as bright as they allow, with the operator white, and as dark as the room's
-/// light allows. PNG in codes, `OpenEXR` in proportion to light.
+/// Maps as large as the projector's picture, by which MPCDI (Video Electronics Standards
+/// Association, *Multiple Projection Common Data Interchange*, 2013) changes a pixel to
+/// `alpha (1 - beta) pixel + beta`. With alpha and beta white becomes what the projector shows for
+/// an even white, and black what it shows for the darkest even grey that the room's light
+/// allows. The gain map is white without the operator, as bright as the gains allow. PNG in codes,
+/// `OpenEXR` in proportion to light.
 fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<Named>, Failure> {
     let fine = table.fine_gain().map(|fine| fine.size());
     let size = table.projector().map(ProjectorPixels::size);
-    let size = size
+    let frame = size
         .or(fine)
         .unwrap_or_else(|| FrameSize::of_grid(table.grid()));
     let even = |light: f64, encoding: Encoding, tier: u8| {
@@ -81,32 +84,50 @@ fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<Named>, Failure> {
             Encoding::Linear => light,
         };
         let code = (code * f64::from(u16::MAX)).round() as u16;
-        let even = Samples::Sixteen(vec![code; 3 * size.pixels()]);
-        let even = Picture::new(size, even).expect("three samples a pixel");
+        let even = Samples::Sixteen(vec![code; 3 * frame.pixels()]);
+        let even = Picture::new(frame, even).expect("three samples a pixel");
         let (map, _) = Compensator::new(table, settings)?.frame(even)?;
         Ok::<_, Failure>(map)
     };
     // The room's light is taken away too, so that more may be asked for than the largest gain says.
     let gain = largest_gain(table).max(1.0);
-    let light = light_of(&even(gain.recip(), Encoding::Linear, 0)?);
+    let light = samples_of(&even(gain.recip(), Encoding::Linear, 0)?);
     let left = 1.0 - f64::from(light.into_iter().fold(0.0, f32::max));
     let brightest = ((1.0 + left) / gain).min(1.0);
+    let black = brightest_ambient(table);
+    let size = (frame.width(), frame.height());
     let mut files = Vec::new();
-    for (name, light, tier) in [
-        ("gain", brightest, 0),
-        ("white", 1.0, tier),
-        ("black", brightest_ambient(table), tier),
-    ] {
-        let codes = even(light, Encoding::Display, tier)?;
-        files.push((format!("{name}.png"), png::encode(&codes)));
-        let light = light_of(&even(light, Encoding::Linear, tier)?);
-        let bytes = exr((size.width(), size.height()), light.into_iter());
-        let bytes = bytes.map_err(|error| {
+    let mut add = |name: &str, codes: &[f32], light: &[f32]| {
+        let codes = codes
+            .iter()
+            .map(|code| (code * f32::from(u16::MAX)).round() as u16);
+        let picture = Picture::new(frame, Samples::Sixteen(codes.collect()));
+        let picture = picture.expect("three samples a pixel");
+        files.push((format!("{name}.png"), png::encode(&picture)));
+        let bytes = exr(size, light.iter().copied()).map_err(|error| {
             let what = format!("a map cannot be written: {error}");
             Failure::new(Kind::Write, what, "Please report this.")
         })?;
         files.push((format!("{name}.exr"), bytes));
-    }
+        Ok::<_, Failure>(())
+    };
+    let both = |light: f64, tier: u8| {
+        let of = |encoding| Ok::<_, Failure>(samples_of(&even(light, encoding, tier)?));
+        Ok::<_, Failure>([of(Encoding::Display)?, of(Encoding::Linear)?])
+    };
+    let [white, black] = [both(1.0, tier)?, both(black, tier)?];
+    let alpha = [0, 1].map(|k| {
+        let pairs = white[k].iter().zip(&black[k]);
+        let alpha = pairs.map(|(white, black)| match white - black {
+            rest if rest > 0.0 => rest / (1.0 - black),
+            _ => 0.0,
+        });
+        alpha.collect::<Vec<f32>>()
+    });
+    let gain = both(brightest, 0)?;
+    add("alpha", &alpha[0], &alpha[1])?;
+    add("beta", &black[0], &black[1])?;
+    add("gain", &gain[0], &gain[1])?;
     Ok(files)
 }
 
@@ -132,8 +153,8 @@ fn brightest_ambient(table: &Table<'_>) -> f64 {
     light.fold(0.0, f64::max).min(1.0)
 }
 
-/// Samples of a picture in proportion to light, from 0 to 1.
-fn light_of(map: &Picture) -> Vec<f32> {
+/// Samples of a picture, from 0 to 1.
+fn samples_of(map: &Picture) -> Vec<f32> {
     match map.samples() {
         Samples::Eight(codes) => codes.iter().map(|code| f32::from(*code) / 255.0).collect(),
         Samples::Sixteen(codes) => (codes.iter())

@@ -3,7 +3,7 @@
 
 use super::desktop::Desktop;
 use super::schema;
-use super::user::{Ended, User, contains};
+use super::user::{Ended, User, contains, interrupt};
 use image::{DynamicImage, RgbImage};
 use serde_json::{Value, json};
 use std::fs;
@@ -102,8 +102,10 @@ impl<'u> Show<'u> {
     /// What is in the window.
     fn shown(&mut self, name: &str) -> RgbImage {
         let path = self.user.path(name);
-        // Until the words after a key are gone.
-        thread::sleep(Duration::from_millis(2300));
+        thread::sleep(Duration::from_millis(500));
+        // Without the words that a key brings.
+        self.tell(&["show-text", "", "1"]);
+        thread::sleep(Duration::from_millis(500));
         let told = self.tell(&["screenshot-to-file", path.to_str().expect("text"), "window"]);
         assert_eq!(told["error"], "success");
         self.user.picture(name).to_rgb8()
@@ -200,8 +202,51 @@ fn a_film_plays_with_what_the_runtime_makes_of_it_and_keys_change_it() {
         }
         let ended = show.end();
         assert_eq!(ended.code, 0, "{}", ended.said);
-        contains(&ended.said, &["played", "dropped", "late"]);
+        contains(
+            &ended.said,
+            &["films       1 begun, 0 that could not be played", "dropped"],
+        );
     }
+}
+
+#[test]
+fn pixels_that_are_not_square_are_shown_as_they_are_meant_and_ctrl_c_ends_a_show() {
+    let desktop = Desktop::start(&format!("{SIZE}x24"));
+    let user = user();
+    let white = "color=white:size=336x208:rate=25,setsar=1/2";
+    let made = Command::new("ffmpeg")
+        .current_dir(user.path(""))
+        .args([
+            "-loglevel",
+            "error",
+            "-f",
+            "lavfi",
+            "-i",
+            white,
+            "-t",
+            "1",
+            "-c:v",
+            "ffv1",
+        ])
+        .arg("narrow.mkv")
+        .status();
+    assert!(made.expect("tests/run.sh installs ffmpeg").success());
+    let mut show = Show::start(&desktop, &user, "narrow.mkv");
+    show.key("c");
+    let shown = show.shown("narrow.png");
+    let line = (0..352).map(|x| shown.get_pixel(x, 112)[0]);
+    let lit: Vec<usize> = line
+        .enumerate()
+        .filter(|(_, code)| *code > 128)
+        .map(|(x, _)| x)
+        .collect();
+    assert_eq!((lit.len(), lit.first()), (168, Some(&92)));
+    interrupt(&show.child);
+    let ended = Ended::of(show.child);
+    assert_eq!(ended.code, 0, "{}", ended.said);
+    contains(&ended.said, &["films       1 begun"]);
+    // A player that outlives `iltm` would still have it.
+    assert!(UnixStream::connect(user.path("socket")).is_err());
 }
 
 #[test]
@@ -275,6 +320,9 @@ fn what_cannot_be_shown_is_refused_with_a_code_of_its_own() {
     let strict = Ended::of(large.spawn(&user, &line));
     assert_eq!(strict.code, 38, "{}", strict.said);
     contains(&strict.said, &["missing.mkv"]);
+    let line = format!("play t.iltm missing.mkv --strict -- {MPV}");
+    let strict = Ended::of(large.spawn(&user, &line));
+    assert_eq!(strict.code, 38, "{}", strict.said);
     let line = format!("play t.iltm good.mkv --once --json -- {MPV}");
     let once = Ended::of(large.spawn(&user, &line));
     assert_eq!(once.code, 0, "{}", once.said);

@@ -95,7 +95,7 @@ pages! {
     };
     the_page_of_the_firmware, "docs/firmware.md", |_| ();
     the_page_of_flashing, "docs/flashing.md", |_| ();
-    the_page_of_players, "docs/players.md", |clone| there(clone, &["SHADER/iltm.glsl", "MAPS/white.png"]);
+    the_page_of_players, "docs/players.md", |clone| there(clone, &["SHADER/iltm.glsl", "MAPS/alpha.png"]);
     the_page_of_scenes, "docs/scenes.md", |_| ();
     the_page_of_figures, "docs/measured.md", |_| ();
     the_results, "docs/results/README.md", |_| ();

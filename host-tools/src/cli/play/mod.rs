@@ -33,8 +33,14 @@ const MPV: &str = "mpv";
 /// Between two looks at the table, the player, and whether the user wants an end.
 const PERIOD: Duration = Duration::from_millis(50);
 
+/// What asks the player to end: a file of this name.
+const STOP: &str = "stop";
+
 /// How long a player that was asked to end may take.
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Different problems that are said in one show.
+const MOST_PROBLEMS: usize = 200;
 
 /// Exit codes that `play.lua` ends mpv with.
 const STRICT: i32 = 5;
@@ -57,18 +63,21 @@ pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
         tier,
     };
     stage.prepare(&table)?;
+    stage.write("settings.lua", stage.settings(arguments, table.top_tier()))?;
     if stage.projector.is_none() {
-        output.people("note        the table does not say the projector's pixels: the display is not checked\n");
+        output.people("note        the table does not say the projector's pixels: the display is not checked, and films are stretched to fill it\n");
     }
     interrupt::catch();
     let start = Instant::now();
-    let mut player = stage.start(arguments, table.top_tier())?;
+    let mut player = stage.start(arguments)?;
     let events = read(player.stdout.take().expect("it is piped"));
     let mut show = Show {
         arguments,
         output,
         stage: &stage,
         generation: 0,
+        used: 0,
+        before: None,
         said: Vec::new(),
         ended: None,
     };
@@ -96,6 +105,16 @@ impl Stage<'_> {
             self.write("card.bgra", card(projector.size()))?;
         }
         self.shaders(table, 0)
+    }
+
+    /// Removes the shaders of a table that is not in use any more.
+    fn forget(&self, generation: u32) {
+        for tier in 0..=u8::MAX {
+            let path = self.folder.join(format!("{generation}-{tier}.glsl"));
+            if fs::remove_file(path).is_err() {
+                break;
+            }
+        }
     }
 
     /// Writes a table's shaders, one a tier.
@@ -128,7 +147,7 @@ impl Stage<'_> {
         fs::rename(part, self.folder.join("newest")).map_err(|error| error.to_string())
     }
 
-    fn start(&self, arguments: &Play, top: u8) -> Result<Child, Failure> {
+    fn start(&self, arguments: &Play) -> Result<Child, Failure> {
         let mut command = Command::new(MPV);
         command
             .env("ILTM_PLAY", self.folder)
@@ -157,10 +176,11 @@ impl Stage<'_> {
             ])
             .args([
                 "--audio-fallback-to-null=yes",
+                "--sid=no",
+                "--video-rotate=no",
                 "--image-display-duration=10",
             ])
-            .arg(path_option("--script=", &self.folder.join("play.lua")))
-            .arg(self.settings(arguments, top));
+            .arg(path_option("--script=", &self.folder.join("play.lua")));
         if let Some(projector) = self.projector {
             command.arg(format!("--vf=lavfi=[{}]", filled(projector)));
         }
@@ -179,6 +199,7 @@ impl Stage<'_> {
         }
         command.args(&arguments.mpv);
         command.arg("--").args(&arguments.films);
+        own_group(&mut command);
         command
             .stdout(Stdio::piped())
             .spawn()
@@ -202,17 +223,24 @@ impl Stage<'_> {
             let size = projector.size();
             (size.width(), size.height())
         });
-        let yes = |set: bool| if set { "yes" } else { "no" };
         format!(
-            "--script-opts=iltm-width={width},iltm-height={height},iltm-tier={},iltm-tiers={},\
-             iltm-once={},iltm-strict={}",
+            "return {{ width = {width}, height = {height}, tier = {}, tiers = {}, once = {}, strict = {} }}\n",
             self.tier,
             u16::from(top) + 1,
-            yes(arguments.once),
-            yes(arguments.strict),
+            arguments.once,
+            arguments.strict,
         )
     }
 }
+
+/// Ctrl-C is for iltm, which asks the player to end.
+#[cfg(unix)]
+fn own_group(command: &mut Command) {
+    std::os::unix::process::CommandExt::process_group(command, 0);
+}
+
+#[cfg(not(unix))]
+fn own_group(_: &mut Command) {}
 
 fn path_option(option: &str, path: &Path) -> OsString {
     let mut text = OsString::from(option);
@@ -221,14 +249,13 @@ fn path_option(option: &str, path: &Path) -> OsString {
 }
 
 /// A filter that makes frames of the projector's size: as large as fits inside its border, in
-/// their aspect, black around.
+/// their aspect on a screen, black around.
 fn filled(projector: ProjectorPixels) -> String {
     let (whole, inner) = (projector.size(), projector.inner());
+    let (width, height) = (inner.width(), inner.height());
     format!(
-        "scale={}:{}:force_original_aspect_ratio=decrease:flags=bicubic+accurate_rnd,\
-         pad={}:{}:-1:-1,setsar=1",
-        inner.width(),
-        inner.height(),
+        "scale=w='round(min({width},{height}*dar))':h='round(min({height},{width}/dar))':\
+         flags=bicubic+accurate_rnd,pad={}:{}:-1:-1,setsar=1",
         whole.width(),
         whole.height(),
     )
@@ -267,7 +294,11 @@ struct Show<'s> {
     arguments: &'s Play,
     output: &'s Output,
     stage: &'s Stage<'s>,
+    /// The number of the newest table that was looked at, of the one in use, and of the one
+    /// before that.
     generation: u32,
+    used: u32,
+    before: Option<u32>,
     /// What went wrong, in order.
     said: Vec<String>,
     /// The counts at the end.
@@ -291,9 +322,13 @@ impl Show<'_> {
             if let Some(bytes) = watch.newer() {
                 self.exchange(&bytes);
             }
-            // The player gets the same signal from a terminal, and ends by itself.
-            if interrupt::stopped() && asked.get_or_insert_with(Instant::now).elapsed() > PATIENCE {
-                let _ = player.kill();
+            if interrupt::stopped() {
+                if asked.is_none() {
+                    self.stage.write(STOP, "")?;
+                }
+                if asked.get_or_insert_with(Instant::now).elapsed() > PATIENCE {
+                    let _ = player.kill();
+                }
             }
         }
         player.wait().map_err(|error| {
@@ -343,7 +378,11 @@ impl Show<'_> {
         })
     }
 
+    /// Each is said once: a loop meets the same ones again and again.
     fn problem(&mut self, text: &str) {
+        if self.said.len() >= MOST_PROBLEMS || self.said.iter().any(|said| said == text) {
+            return;
+        }
         self.output.people(&format!("problem     {text}\n"));
         self.output
             .event(&json!({ "event": "problem", "problem": text }));
@@ -355,7 +394,14 @@ impl Show<'_> {
         let path = &self.arguments.table;
         if let Err(why) = self.stage.exchange(bytes, path, self.generation) {
             self.problem(&format!("{why}; the table before goes on"));
+            self.stage.forget(self.generation);
+            return;
         }
+        // The player may not have seen yet that there is a newer one.
+        if let Some(older) = self.before.replace(self.used) {
+            self.stage.forget(older);
+        }
+        self.used = self.generation;
     }
 
     fn result(self, status: ExitStatus, time: Duration) -> Result<(), Failure> {
@@ -395,23 +441,30 @@ impl Show<'_> {
                 "See whether `mpv --vo=gpu FILM` plays.",
             );
         };
+        let count = |name: &str| counts[name].as_u64().unwrap_or(0);
+        if count("failed") > 0 && count("failed") >= count("films") {
+            return failed(
+                Kind::Frames,
+                "nothing could be played",
+                "Check the films, and whether `mpv FILM` plays them.",
+            );
+        }
         let data = json!({
             "event": "end",
             "seconds": time.as_secs_f64(),
             "films": counts["films"],
             "failed": counts["failed"],
             "dropped": counts["dropped"],
-            "late": counts["late"],
             "problems": self.said,
         });
         let text = format!(
-            "played      {} films in {:.0} s, {} of them in vain\n\
-             frames      {} dropped, {} late\n",
-            counts["films"],
+            "played      {:.0} s\n\
+             films       {} begun, {} that could not be played\n\
+             frames      {} dropped\n",
             time.as_secs_f64(),
+            counts["films"],
             counts["failed"],
             counts["dropped"],
-            counts["late"],
         );
         self.output.result(&data, &text);
         Ok(())

@@ -2,16 +2,15 @@
 -- what it prints, a JSON object a line.
 
 local utils = require "mp.utils"
-local settings = { width = 0, height = 0, tier = 0, tiers = 1, once = false, strict = false }
-require("mp.options").read_options(settings, "iltm")
 local folder = os.getenv("ILTM_PLAY")
+local settings = dofile(folder .. "/settings.lua")
 
 local state = {
     generation = 0, tier = settings.tier, tiers = settings.tiers,
     compensated = true, white = false, card = false, line = false,
 }
-local counts = { dropped = 0, late = 0, films = 0, failed = 0 }
-local played = false
+local counts = { dropped = 0, films = 0, failed = 0 }
+local played, loaded, ending = false, false, false
 
 local function say(event)
     io.stdout:write(utils.format_json(event), "\n")
@@ -19,7 +18,10 @@ local function say(event)
 end
 
 local function finish(code)
-    mp.commandv("quit", code)
+    if not ending then
+        ending = true
+        mp.commandv("quit", code)
+    end
 end
 
 -- What is wrong during a show is said, and ends it only if that is asked for.
@@ -50,8 +52,8 @@ local function show_line()
     local name = mp.get_property("filename") or "nothing to play"
     local held = mp.get_property_native("pause") and "  paused" or ""
     line.data = string.format(
-        "{\\an1\\fs22\\bord1}%s  %s%s  %d dropped, %d late",
-        name:gsub("[{}\\]", " "), words(), held, counts.dropped, counts.late
+        "{\\an1\\fs22\\bord1}%s  %s%s  %d dropped",
+        (name:gsub("[{}\\]", " ")), words(), held, counts.dropped
     )
     line:update()
 end
@@ -126,21 +128,21 @@ key("q", "quit", function() finish(0) end)
 key("ESC", "escape", function() finish(0) end)
 
 -- A player's counts begin again with each film.
-local function count(property, name)
+local function count(property)
     local before = 0
     mp.observe_property(property, "number", function(_, now)
         now = now or 0
-        counts[name] = counts[name] + math.max(0, now < before and now or now - before)
+        counts.dropped = counts.dropped + math.max(0, now < before and now or now - before)
         before = now
         show_line()
     end)
 end
-count("frame-drop-count", "dropped")
-count("vo-delayed-frame-count", "late")
+count("frame-drop-count")
+count("decoder-frame-drop-count")
 mp.observe_property("pause", "bool", show_line)
 
 -- The display fits, or nothing is shown; in mid show it may change, as when a cable is pulled.
-local fits = nil
+local fits, watched = nil, false
 local function look_at_display()
     local width, height = mp.get_osd_size()
     if settings.width == 0 or not width or width == 0 then
@@ -163,42 +165,76 @@ local function look_at_display()
     end
 end
 
-mp.register_event("file-loaded", function()
-    played = true
-    counts.films = counts.films + 1
-    local picture, sound = false, false
-    for _, track in ipairs(mp.get_property_native("track-list")) do
-        picture = picture or track.type == "video" and not track.albumart
-        sound = sound or track.type == "audio" and track.selected
+-- A window takes a moment to fill the display, on a slow computer a few seconds.
+local function wait_for_display(rest)
+    local width, height = mp.get_osd_size()
+    if rest > 0 and not (width == settings.width and height == settings.height) then
+        mp.add_timeout(0.5, function() wait_for_display(rest - 1) end)
+        return
     end
-    if not picture then
-        counts.failed = counts.failed + 1
-        trouble({ film = mp.get_property("path"), problem = "has no picture" })
-    end
-    -- The window and the sound device take a moment.
-    mp.add_timeout(1, function()
-        look_at_display()
-        mp.observe_property("osd-dimensions", "native", look_at_display)
+    look_at_display()
+    mp.observe_property("osd-dimensions", "native", look_at_display)
+end
+
+-- Whether what plays now is heard: a sound device takes a moment as well.
+local listening = nil
+local function listen()
+    listening = mp.add_timeout(2, function()
         local device = mp.get_property("current-ao")
-        if sound and (not device or device == "null" and mp.get_property("ao") ~= "null") then
+        local silent = mp.get_property("ao") == "null"
+        if not device or device == "null" and not silent then
             trouble({ problem = "there is no sound: no device plays it" })
         end
     end)
+end
+
+mp.register_event("file-loaded", function()
+    played, loaded = true, true
+    counts.films = counts.films + 1
+    local picture, sound, turned = false, false, 0
+    for _, track in ipairs(mp.get_property_native("track-list")) do
+        if track.type == "video" and not track.albumart then
+            picture = true
+            turned = track["demux-rotation"] or 0
+        end
+        sound = sound or track.type == "audio" and track.selected
+    end
+    local film = mp.get_property("path")
+    if not picture then
+        counts.failed = counts.failed + 1
+        trouble({ film = film, problem = "has no picture" })
+    elseif turned ~= 0 then
+        trouble({ film = film, problem = "lies on its side: turn it by " .. turned .. " degrees beforehand" })
+    end
+    if not watched then
+        watched = true
+        wait_for_display(8)
+    end
+    if sound then
+        listen()
+    end
     show_line()
 end)
 
 mp.register_event("end-file", function(event)
+    if listening then
+        listening:kill()
+        listening = nil
+    end
     if event.reason == "error" then
+        if not loaded then
+            counts.films = counts.films + 1
+        end
         counts.failed = counts.failed + 1
-        local entry = mp.get_property_native("playlist") or {}
         local film
-        for _, item in ipairs(entry) do
+        for _, item in ipairs(mp.get_property_native("playlist") or {}) do
             if item.id == event.playlist_entry_id then
                 film = item.filename
             end
         end
         trouble({ film = film, problem = event.file_error or "cannot be played" })
     end
+    loaded = false
 end)
 
 -- Nothing is left to play: the end, or a film that could not be played and may come back.
@@ -219,8 +255,16 @@ mp.observe_property("idle-active", "bool", function(_, idle)
     end
 end)
 
--- iltm puts the number of the newest table, and of its tiers, here.
+-- iltm puts the number of the newest table, and of its tiers, in a file, and another one where the
+-- user wants an end. If iltm itself is gone, so is the folder.
+local function there(name)
+    local file = io.open(folder .. "/" .. name)
+    return file and file:close()
+end
 mp.add_periodic_timer(0.25, function()
+    if there("stop") or not there("settings.lua") then
+        finish(0)
+    end
     local file = io.open(folder .. "/newest")
     if not file then
         return
