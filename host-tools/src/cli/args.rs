@@ -807,6 +807,12 @@ pub(super) struct Emulate {
     /// Frames a second; by default the video's own rate, or 25
     #[arg(long, value_name = "RATE", value_parser = rate)]
     pub(super) fps: Option<f64>,
+    /// Show what the board receives and what it sends to its projector in a window, by mpv
+    #[arg(long)]
+    pub(super) window: bool,
+    /// Y4M file to make of the frames that it sends, as long as they have the size of the first
+    #[arg(long, value_name = "VIDEO")]
+    pub(super) save: Option<PathBuf>,
     /// File that holds the board's memory and keeps it for the next time
     #[arg(long, value_name = "FILE")]
     pub(super) memory: Option<PathBuf>,

@@ -6,7 +6,7 @@ use super::output::Output;
 use super::progress::progress;
 use super::summary;
 use super::table_words;
-use super::tables::check;
+use super::tables::{check, check_date};
 use crate::demo::{self, DemoOutcome};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -15,6 +15,7 @@ use std::time::Instant;
 
 pub(super) fn run(arguments: &Demo, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
+    check_date()?;
     let bars = progress(output);
     let outcome = demo::run(&arguments.out, bars.as_ref());
     bars.end();

@@ -24,6 +24,7 @@ mod interrupt;
 mod key;
 mod man;
 mod monitor;
+mod mpv;
 mod named;
 mod output;
 mod patterns;

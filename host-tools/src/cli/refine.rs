@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::output::{Output, write_file};
 use super::progress::progress;
 use super::solve::check_place;
-use super::tables::{check_sealed, read_table, seal};
+use super::tables::{check_date, check_sealed, read_table, seal};
 use crate::compile::sign::read_key;
 use crate::verify::{Readings, refine};
 use iltm_picture::numbers::percent;
@@ -13,6 +13,7 @@ use iltm_runtime::image::unseal;
 use serde_json::json;
 
 pub(super) fn run(arguments: &Refine, output: &Output) -> Result<(), Failure> {
+    check_date()?;
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     check_place(&arguments.output)?;
     let file = read_table(&arguments.table)?;

@@ -6,7 +6,7 @@ use super::output::{Output, pictures, write_file, write_files};
 use super::progress::progress;
 use super::summary::{self, remarks, summary};
 use super::table_words;
-use super::tables::{check, seal};
+use super::tables::{check, check_date, seal};
 use crate::build_table::{BuiltTable, TableOptions, build_table_from};
 use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
@@ -26,6 +26,7 @@ const FRAMES: usize = 48;
 
 pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
+    check_date()?;
     if let (Some(method), Some(_)) = (arguments.method, arguments.lambda)
         && method != Method::Joint
     {

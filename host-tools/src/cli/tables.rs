@@ -2,12 +2,14 @@
 
 use super::args::SealTerms as Given;
 use super::failure::{Failure, Kind, cannot_read};
+use crate::compile::Provenance;
 use crate::compile::sign::{self, SealTerms};
 use crate::video::watch::FileWatch;
 use ed25519_dalek::SigningKey;
 use iltm_picture::foreign_file;
 use iltm_runtime::image::{Seal, Table, unseal};
 use iltm_runtime::{FrameSize, Grid};
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::io;
 use std::path::Path;
@@ -66,6 +68,21 @@ pub(super) fn table_has(table: &Table<'_>, tier: u8) -> Result<(), Failure> {
         format!("the table has tiers 0 to {top}, not {tier}"),
         "Give a tier that the table has, or leave --tier away.",
     ))
+}
+
+/// Refuses a date for new tables that is none, before the work.
+pub(super) fn check_date() -> Result<(), Failure> {
+    let refused = |given: OsString| {
+        Failure::new(
+            Kind::Usage,
+            format!(
+                "the variable SOURCE_DATE_EPOCH is `{}`, which is no number of seconds",
+                given.display()
+            ),
+            "Set it to seconds since 1970, or unset it.",
+        )
+    };
+    Provenance::given_date().map(|_| ()).map_err(refused)
 }
 
 /// What a table needs memory for.

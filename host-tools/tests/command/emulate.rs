@@ -1,5 +1,6 @@
 //! `iltm emulate` with a key: what a technician can try of refusals without hardware.
 
+use super::desktop::{Desktop, on_the_screen};
 use super::user::{User, contains, interrupt};
 use iltm::compile::sign::new_key;
 use iltm::device::emulator::Board;
@@ -8,7 +9,7 @@ use iltm_tests::firmware::elf;
 use iltm_tests::{signed, wedge_table};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// A running `iltm emulate`, and the port that it said.
@@ -19,7 +20,10 @@ struct Emulated {
 
 impl Emulated {
     fn start(user: &User, arguments: &str) -> Self {
-        let mut command = user.iltm(&format!("--json emulate {arguments}"));
+        Self::of(user.iltm(&format!("--json emulate {arguments}")))
+    }
+
+    fn of(mut command: Command) -> Self {
         command.arg("--firmware").arg(elf(Board::An500, "firmware"));
         let mut child = command.stderr(Stdio::null()).spawn().expect("a binary");
         let mut line = String::new();
@@ -121,4 +125,65 @@ fn a_firmware_that_is_none_is_an_error() {
     user.write("notes.txt", "no firmware at all");
     let said = user.fails(13, "emulate --firmware notes.txt");
     contains(&said, &["notes.txt", "not an ELF file for Arm"]);
+}
+
+#[test]
+fn what_a_board_gets_and_sends_is_in_a_window_and_in_a_video() {
+    let desktop = Desktop::start("640x320x24");
+    let user = User::new();
+    user.write("t.iltm", wedge_table(4, 6, 3));
+    let still = image::RgbImage::from_fn(128, 96, |x, y| {
+        image::Rgb([60 + x as u8, 250 - y as u8, 100 + (x / 16 * 10) as u8])
+    });
+    still.save(user.path("still.png")).unwrap();
+    user.says("compensate t.iltm still.png -o expected.png");
+    let expected = user.picture("expected.png").to_rgb8();
+    let line = "--json emulate t.iltm --frames still.png --window --save sent.y4m";
+    let mut command = user.iltm(line);
+    command.env("DISPLAY", &desktop.display);
+    let board = Emulated::of(command);
+    let screen = desktop.folder.path().join("Xvfb_screen0");
+    // Two pictures and a gap, as large as they are or larger: colours of both are there.
+    let end = Instant::now() + Duration::from_mins(1);
+    let shows = |picture: &image::RgbImage| {
+        let (_, pixels) = on_the_screen(&screen);
+        let near = |wanted: &image::Rgb<u8>| {
+            pixels.iter().any(|pixel| {
+                let [_, codes @ ..] = pixel.to_be_bytes();
+                codes.iter().zip(wanted.0).all(|(a, b)| a.abs_diff(b) <= 2)
+            })
+        };
+        picture.pixels().step_by(97).all(near)
+    };
+    while !(shows(&still) && shows(&expected)) {
+        assert!(Instant::now() < end, "the window does not show both");
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    drop(board);
+    let ran = Command::new("ffmpeg")
+        .current_dir(user.path(""))
+        .args([
+            "-loglevel",
+            "error",
+            "-i",
+            "sent.y4m",
+            "-update",
+            "1",
+            "sent.png",
+        ])
+        .output()
+        .expect("tests/run.sh installs ffmpeg");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.success() && said.is_empty(), "{said}");
+    let sent = user.picture("sent.png").to_rgb8();
+    assert_eq!(sent.dimensions(), (128, 96));
+    let apart = sent
+        .iter()
+        .zip(expected.iter())
+        .map(|(a, b)| a.abs_diff(*b));
+    assert!(
+        apart.max() <= Some(2),
+        "the video is not what the board sends"
+    );
+    assert!(still != expected, "nothing was done");
 }

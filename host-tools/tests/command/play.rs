@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 /// The projector of [`user`]: 336 x 208 pixels in a border of 8.
 const SIZE: &str = "352x224";
 
-/// Software draws, and no sound device is needed.
-const MPV: &str = "--gpu-context=x11egl --ao=null --input-ipc-server=socket";
+/// No sound device is needed.
+const MPV: &str = "--ao=null --input-ipc-server=socket";
 
 /// Light of the codes by which a picture and what is made of it are rounded.
 const ROUNDED: f64 = 3.0 / 255.0;
@@ -57,13 +57,13 @@ impl<'u> Show<'u> {
     fn start(desktop: &Desktop, user: &'u User, line: &str) -> Self {
         let child = desktop.spawn(user, &format!("play t.iltm {line} -- {MPV}"));
         let socket = user.path("socket");
-        let stream = within(20, || UnixStream::connect(&socket).ok());
+        let stream = within(60, || UnixStream::connect(&socket).ok());
         let mut show = Self {
             user,
             child,
             replies: BufReader::new(stream),
         };
-        within(20, || show.get("time-pos").as_f64());
+        within(60, || show.get("time-pos").as_f64());
         show
     }
 
@@ -96,19 +96,24 @@ impl<'u> Show<'u> {
     fn hold(&mut self, seconds: &str) {
         self.tell(&["set", "pause", "yes"]);
         self.tell(&["seek", seconds, "absolute+exact"]);
-        thread::sleep(Duration::from_millis(500));
+        within(60, || (self.get("seeking") == false).then_some(()));
     }
 
-    /// What is in the window.
+    /// What is in the window, once it stands still.
     fn shown(&mut self, name: &str) -> RgbImage {
         let path = self.user.path(name);
-        thread::sleep(Duration::from_millis(500));
         // Without the words that a key brings.
-        self.tell(&["show-text", "", "1"]);
         thread::sleep(Duration::from_millis(500));
-        let told = self.tell(&["screenshot-to-file", path.to_str().expect("text"), "window"]);
-        assert_eq!(told["error"], "success");
-        self.user.picture(name).to_rgb8()
+        self.tell(&["show-text", "", "1"]);
+        let mut before = None;
+        within(60, || {
+            thread::sleep(Duration::from_millis(500));
+            let told = self.tell(&["screenshot-to-file", path.to_str().expect("text"), "window"]);
+            assert_eq!(told["error"], "success");
+            let now = self.user.picture(name).to_rgb8();
+            let still = before.replace(now.clone()) == Some(now.clone());
+            still.then_some(now)
+        })
     }
 
     fn end(mut self) -> Ended {

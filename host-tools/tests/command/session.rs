@@ -2,12 +2,10 @@
 //! photographed by a camera of a few shell commands; where X can be had without a
 //! screen, on a display too.
 
-use super::desktop::Desktop;
+use super::desktop::{Desktop, on_the_screen};
 use super::user::{Ended, User, contains, interrupt};
 use serde_json::Value;
-use std::fs;
-use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::io::{BufRead, BufReader};
 
 /// With a capture `c` of 3 x 4 cells that nobody has photographed.
 fn patterns(more: &str) -> User {
@@ -161,36 +159,6 @@ fn ctrl_c_ends_a_session_that_can_go_on() {
 /// Runs `iltm capture c --display ...` on a desktop.
 fn on(desktop: &Desktop, user: &User, display: &str) -> Ended {
     Ended::of(desktop.spawn(user, &format!("capture c --display {display}")))
-}
-
-/// What an X server shows, `0RGB` a pixel, from its file in the format of `xwd`
-/// (`XWDFile.h`): 25 big-endian words, the second pair of which are sizes, a colour map
-/// of 12 bytes an entry, the pixels.
-fn on_the_screen(file: &Path) -> (usize, Vec<u32>) {
-    let mut bytes = Vec::new();
-    let mut opened = fs::File::open(file).expect("kept");
-    opened.read_to_end(&mut bytes).expect("readable");
-    let word = |at: usize| {
-        let word: [u8; 4] = bytes[4 * at..4 * at + 4].try_into().expect("four bytes");
-        u32::from_be_bytes(word) as usize
-    };
-    let (header, width, height, line, colours) = (word(0), word(4), word(5), word(12), word(19));
-    let little = word(7) == 0;
-    let from = header + 12 * colours;
-    let mut pixels = Vec::new();
-    for y in 0..height {
-        let row = &bytes[from + y * line..][..4 * width];
-        for pixel in row.chunks_exact(4) {
-            let pixel: [u8; 4] = pixel.try_into().expect("four bytes");
-            let value = if little {
-                u32::from_le_bytes(pixel)
-            } else {
-                u32::from_be_bytes(pixel)
-            };
-            pixels.push(value & 0xff_ff_ff);
-        }
-    }
-    (width, pixels)
 }
 
 #[test]

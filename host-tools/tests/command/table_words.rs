@@ -1,7 +1,7 @@
 //! What a table is said to be, and where its frames go: the words and the pixels that a
 //! technician gets.
 
-use super::user::{User, contains};
+use super::user::{Ended, User, contains};
 use image::{GrayImage, Luma};
 use std::fs;
 use std::process::Command;
@@ -301,4 +301,26 @@ fn a_table_of_an_even_wall_leaves_pictures_as_they_are() {
     // Who asks for a white does not want pictures as they are.
     let said = user.says("solve c -o w.iltm --white 0.3");
     assert!(!said.contains("pictures are left"), "{said}");
+}
+
+#[test]
+fn a_date_that_is_given_is_the_tables_and_one_that_is_none_is_refused() {
+    let user = User::with_capture();
+    let solved = |date: &str| {
+        let mut command = user.iltm("solve capture -o dated.iltm");
+        let child = command.env("SOURCE_DATE_EPOCH", date).spawn();
+        Ended::of(child.expect("a binary"))
+    };
+    for wrong in ["", "yesterday", "1e9", "99999999999999999"] {
+        let refused = solved(wrong);
+        assert_eq!(refused.code, 2, "{}", refused.said);
+        contains(
+            &refused.said,
+            &["SOURCE_DATE_EPOCH", "no number of seconds"],
+        );
+    }
+    assert!(!user.path("dated.iltm").exists());
+    assert_eq!(solved("1000000000").code, 0);
+    let date = user.json("inspect dated.iltm")["date"].to_string();
+    assert!(date.contains("2001-09-09"), "{date}");
 }

@@ -9,6 +9,7 @@ use iltm_runtime::image::Label;
 use iltm_solve::{Compensation, Recovery, SolveReport};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
+use std::ffi::OsString;
 use std::path::Path;
 
 /// What a table says about where it comes from.
@@ -218,13 +219,24 @@ impl Provenance {
         toml::from_str(text).unwrap_or_default()
     }
 
-    /// Now, as a table says it, or the second that `SOURCE_DATE_EPOCH` is: who makes a table twice
-    /// gets the same bytes (<https://reproducible-builds.org/specs/source-date-epoch/>).
+    /// The second that `SOURCE_DATE_EPOCH` is, for who makes a table twice and wants the same bytes
+    /// (<https://reproducible-builds.org/specs/source-date-epoch/>); `None` if it is not set.
+    ///
+    /// # Errors
+    /// What it is, if that is no second.
+    pub fn given_date() -> Result<Option<chrono::DateTime<chrono::Utc>>, OsString> {
+        let Some(given) = std::env::var_os("SOURCE_DATE_EPOCH") else {
+            return Ok(None);
+        };
+        let seconds = given.to_str().and_then(|text| text.parse().ok());
+        let time = seconds.and_then(|seconds| chrono::DateTime::from_timestamp(seconds, 0));
+        time.map(Some).ok_or(given)
+    }
+
+    /// Now, or [the date that is given](Self::given_date), as a table says it.
     pub(crate) fn now() -> String {
-        let given = std::env::var("SOURCE_DATE_EPOCH").ok();
-        let given = given.and_then(|seconds| seconds.parse().ok());
-        let time = given.and_then(|seconds| chrono::DateTime::from_timestamp(seconds, 0));
-        let time = time.unwrap_or_else(chrono::Utc::now);
+        let given = Self::given_date().ok().flatten();
+        let time = given.unwrap_or_else(chrono::Utc::now);
         time.format("%Y-%m-%d %H:%M:%S UTC").to_string()
     }
 

@@ -5,6 +5,7 @@
 //! for, as somebody would who plugs another player in.
 
 use super::super::failure::Failure;
+use super::screen::{Kind, Screen};
 use super::{format, playback_failure, scene_size};
 use crate::device::frame_source::FrameFeed;
 use crate::device::memory::BoardMemory;
@@ -78,21 +79,36 @@ impl<'m> Film<'m> {
         }
     }
 
+    /// What its frames are now.
+    pub(super) const fn kind(&self) -> Kind {
+        Kind {
+            size: self.frames.size(),
+            channels: self.frames.channels(),
+            rate: self.frames.rate(),
+        }
+    }
+
     /// Gives the next frame and takes what the board shows.
-    pub(super) fn turn(&mut self) -> Result<(), Failure> {
+    pub(super) fn turn(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+        let kind = self.kind();
         let frame = self.frames.next_frame()?;
         if self.given.len() == REMEMBERED {
             self.given.pop_front();
         }
         self.given.push_back(hash(&frame));
         let (given, unchanged) = (&self.given, &mut self.unchanged);
+        let mut taken = Ok(());
         let passed = self.playback.give(&frame).and_then(|()| {
             self.playback.show(|_, pixels| {
                 let same = given.contains(&hash(pixels));
                 *unchanged = if same { *unchanged + 1 } else { 0 };
+                if taken.is_ok() {
+                    taken = screen.take(kind, &frame, pixels);
+                }
             })
         });
         passed.map_err(|error| playback_failure(&error))?;
+        taken?;
         if self.follows && self.unchanged >= UNCHANGED && self.changed.elapsed() >= PAUSE {
             self.unchanged = 0;
             self.changed = Instant::now();

@@ -4,8 +4,10 @@
 //! |---|---|
 //! | the board: its memory, firmware and port | here |
 //! | frames that go through it | [`film`] |
+//! | a window and a video of them | [`screen`] |
 
 mod film;
+mod screen;
 
 use super::args::Emulate;
 use super::failure::{Failure, Kind, cannot_write};
@@ -26,6 +28,7 @@ use iltm_runtime::{
     image::Table,
     pipeline::Encoding,
 };
+use screen::Screen;
 use serde_json::json;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -59,6 +62,7 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     };
     let follows = arguments.frames.is_none() && arguments.size.is_none();
     let mut film = Film::new(&memory, frames, follows)?;
+    let mut screen = Screen::new(arguments, film.kind())?;
     interrupt::catch();
     let started = Emulator::start(arguments.board, &firmware, &memory);
     let mut emulator = started.map_err(|error| emulator_failure(&error))?;
@@ -69,15 +73,21 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
         output.remark(&format!("`iltm ports` will not find this board: {error}"));
     }
     report(arguments, &emulator, &firmware, output);
-    let played = play(&mut emulator, &mut film);
+    let played = play(&mut emulator, &mut film, &mut screen);
+    let saved = screen.finish();
     // Ctrl-C goes to the emulator as well, which may be the first to notice.
     if !interrupt::stopped() {
         thread::sleep(Duration::from_millis(100));
     }
     if interrupt::stopped() {
+        let saved = saved?;
         let counts = film.counts();
-        let data = json!({ "event": "end", "given": counts.given, "shown": counts.shown });
-        let text = format!("{} frames given, {} shown\n", counts.given, counts.shown);
+        let mut data = json!({ "event": "end", "given": counts.given, "shown": counts.shown });
+        let mut text = format!("{} frames given, {} shown\n", counts.given, counts.shown);
+        if let (Some(frames), Some(path)) = (saved, &arguments.save) {
+            data["saved"] = json!(frames);
+            text = format!("{text}{frames} frames in {}\n", path.display());
+        }
         output.result(&data, &text);
         return Ok(());
     }
@@ -253,7 +263,7 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 }
 
 /// Frames at their rate, until somebody stops it or the board ends.
-fn play(emulator: &mut Emulator, film: &mut Film<'_>) -> Result<(), Failure> {
+fn play(emulator: &mut Emulator, film: &mut Film<'_>, screen: &mut Screen) -> Result<(), Failure> {
     let period = Duration::from_secs_f64(1.0 / film.rate());
     let mut due = Instant::now();
     while !interrupt::stopped() {
@@ -261,7 +271,7 @@ fn play(emulator: &mut Emulator, film: &mut Film<'_>) -> Result<(), Failure> {
         wait_until(due);
         // After a pause, go on from now rather than make up for it in a burst.
         due = (due + period).max(Instant::now());
-        film.turn()?;
+        film.turn(screen)?;
     }
     Ok(())
 }

@@ -7,6 +7,7 @@
 use super::args::Play;
 use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
+use super::mpv::{mpv, start};
 use super::output::Output;
 use super::tables::{check, table_has, watch_table};
 use crate::compile::shader::user_shader;
@@ -20,15 +21,12 @@ use iltm_runtime::placement::ProjectorPixels;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::fs;
-use std::io::{self, BufRead, BufReader, ErrorKind};
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdout, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
-
-/// The player.
-const MPV: &str = "mpv";
 
 /// Between two looks at the table, the player, and whether the user wants an end.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -148,38 +146,19 @@ impl Stage<'_> {
     }
 
     fn start(&self, arguments: &Play) -> Result<Child, Failure> {
-        let mut command = Command::new(MPV);
+        let mut command = mpv();
         command
             .env("ILTM_PLAY", self.folder)
-            .args([
-                "--no-config",
-                "--input-default-bindings=no",
-                "--input-terminal=no",
-            ])
-            .args([
-                "--osc=no",
-                "--osd-bar=no",
-                "--osd-level=1",
-                "--cursor-autohide=always",
-            ])
+            .stdout(Stdio::piped())
+            .args(["--fullscreen", "--keepaspect=no"])
+            .args(["--force-window=immediate", "--cursor-autohide=always"])
+            .args(["--input-default-bindings=no", "--osd-bar=no"])
             .args(["--quiet", "--msg-level=all=error"])
-            .args([
-                "--vo=gpu",
-                "--fullscreen",
-                "--keepaspect=no",
-                "--force-window=immediate",
-            ])
-            .args([
-                "--idle=yes",
-                "--prefetch-playlist=yes",
-                "--gapless-audio=yes",
-            ])
-            .args([
-                "--audio-fallback-to-null=yes",
-                "--sid=no",
-                "--video-rotate=no",
-                "--image-display-duration=10",
-            ])
+            .args(["--idle=yes", "--image-display-duration=10"])
+            .args(["--prefetch-playlist=yes", "--gapless-audio=yes"])
+            .args(["--audio-fallback-to-null=yes"])
+            // Subtitles would be drawn over the compensated picture, and turned films stretched.
+            .args(["--sid=no", "--video-rotate=no"])
             .arg(path_option("--script=", &self.folder.join("play.lua")));
         if let Some(projector) = self.projector {
             command.arg(format!("--vf=lavfi=[{}]", filled(projector)));
@@ -189,32 +168,11 @@ impl Stage<'_> {
             command.arg(format!("--fs-screen={display}"));
         }
         if !arguments.once {
-            // One film begins again without a gap.
-            let again = if arguments.films.len() == 1 {
-                "--loop-file=inf"
-            } else {
-                "--loop-playlist=inf"
-            };
-            command.arg(again);
+            command.arg("--loop-playlist=inf");
         }
         command.args(&arguments.mpv);
         command.arg("--").args(&arguments.films);
-        own_group(&mut command);
-        command
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(|error| match error.kind() {
-                ErrorKind::NotFound => Failure::new(
-                    Kind::Player,
-                    "mpv is not installed",
-                    "Install it: `sudo apt-get install mpv`.",
-                ),
-                _ => Failure::new(
-                    Kind::Player,
-                    format!("mpv cannot be started: {error}"),
-                    "See whether `mpv FILM` plays.",
-                ),
-            })
+        start(&mut command)
     }
 
     /// What `play.lua` needs to know.
@@ -232,15 +190,6 @@ impl Stage<'_> {
         )
     }
 }
-
-/// Ctrl-C is for iltm, which asks the player to end.
-#[cfg(unix)]
-fn own_group(command: &mut Command) {
-    std::os::unix::process::CommandExt::process_group(command, 0);
-}
-
-#[cfg(not(unix))]
-fn own_group(_: &mut Command) {}
 
 fn path_option(option: &str, path: &Path) -> OsString {
     let mut text = OsString::from(option);

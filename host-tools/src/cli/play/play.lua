@@ -199,6 +199,9 @@ mp.register_event("file-loaded", function()
         end
         sound = sound or track.type == "audio" and track.selected
     end
+    -- One film begins again without a gap.
+    local alone = mp.get_property_native("playlist-count") == 1 and not settings.once
+    mp.set_property("loop-file", alone and "inf" or "no")
     local film = mp.get_property("path")
     if not picture then
         counts.failed = counts.failed + 1
