@@ -304,6 +304,22 @@ fn a_show_goes_on_whatever_happens_and_says_it() {
 }
 
 #[test]
+fn a_playlist_is_all_of_its_films_and_one_film_begins_again() {
+    let desktop = Desktop::start(&format!("{SIZE}x24"));
+    let user = user();
+    film(&user, "good.mkv", 25, "yuv420p");
+    user.write("list.m3u", "good.mkv\ngood.mkv\n");
+    let mut show = Show::start(&desktop, &user, "list.m3u");
+    within(60, || (show.get("playlist-pos") == 1).then_some(()));
+    within(60, || (show.get("playlist-pos") == 0).then_some(()));
+    assert_eq!(show.end().code, 0);
+    let mut show = Show::start(&desktop, &user, "good.mkv");
+    within(60, || (show.get("loop-file") == "inf").then_some(()));
+    let ended = show.end();
+    contains(&ended.said, &["films       1 begun"]);
+}
+
+#[test]
 fn what_cannot_be_shown_is_refused_with_a_code_of_its_own() {
     let desktop = Desktop::start("320x200x24");
     let user = user();
