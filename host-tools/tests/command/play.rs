@@ -47,13 +47,13 @@ fn film(user: &User, name: &str, rate: u32, format: &str) {
 }
 
 /// A show under way, and its player's socket.
-struct Show<'u> {
+struct Playing<'u> {
     user: &'u User,
     child: Child,
     replies: BufReader<UnixStream>,
 }
 
-impl<'u> Show<'u> {
+impl<'u> Playing<'u> {
     fn start(desktop: &Desktop, user: &'u User, line: &str) -> Self {
         let child = desktop.spawn(user, &format!("play t.iltm {line} -- {MPV}"));
         let socket = user.path("socket");
@@ -170,7 +170,7 @@ fn a_film_plays_with_what_the_runtime_makes_of_it_and_keys_change_it() {
     for (rate, format) in [(24, "yuv420p"), (60, "yuv422p10le"), (30, "bgr0")] {
         let name = format!("{format}.mkv");
         film(&user, &name, rate, format);
-        let mut show = Show::start(&desktop, &user, &name);
+        let mut show = Playing::start(&desktop, &user, &name);
         assert_ne!(show.get("current-tracks/audio"), Value::Null);
         show.hold("1.0");
         let found = show.shown("found.png");
@@ -236,7 +236,7 @@ fn pixels_that_are_not_square_are_shown_as_they_are_meant_and_ctrl_c_ends_a_show
         .arg("narrow.mkv")
         .status();
     assert!(made.expect("tests/run.sh installs ffmpeg").success());
-    let mut show = Show::start(&desktop, &user, "narrow.mkv");
+    let mut show = Playing::start(&desktop, &user, "narrow.mkv");
     show.key("c");
     let shown = show.shown("narrow.png");
     let line = (0..352).map(|x| shown.get_pixel(x, 112)[0]);
@@ -266,7 +266,7 @@ fn a_show_goes_on_whatever_happens_and_says_it() {
         .args(sound)
         .status();
     assert!(made.expect("it has made the film").success());
-    let mut show = Show::start(
+    let mut show = Playing::start(
         &desktop,
         &user,
         "good.mkv damaged.mkv missing.mkv sound.mkv",
@@ -309,11 +309,11 @@ fn a_playlist_is_all_of_its_films_and_one_film_begins_again() {
     let user = user();
     film(&user, "good.mkv", 25, "yuv420p");
     user.write("list.m3u", "good.mkv\ngood.mkv\n");
-    let mut show = Show::start(&desktop, &user, "list.m3u");
+    let mut show = Playing::start(&desktop, &user, "list.m3u");
     within(60, || (show.get("playlist-pos") == 1).then_some(()));
     within(60, || (show.get("playlist-pos") == 0).then_some(()));
     assert_eq!(show.end().code, 0);
-    let mut show = Show::start(&desktop, &user, "good.mkv");
+    let mut show = Playing::start(&desktop, &user, "good.mkv");
     within(60, || (show.get("loop-file") == "inf").then_some(()));
     let ended = show.end();
     contains(&ended.said, &["films       1 begun"]);

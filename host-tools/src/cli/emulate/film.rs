@@ -5,7 +5,7 @@
 //! for, as somebody would who plugs another player in.
 
 use super::super::failure::Failure;
-use super::screen::{Kind, Screen};
+use super::screen::{BoardScreen, PictureKind};
 use super::{format, playback_failure, scene_size};
 use crate::device::frame_source::FrameFeed;
 use crate::device::memory::BoardMemory;
@@ -80,8 +80,8 @@ impl<'m> Film<'m> {
     }
 
     /// What its frames are now.
-    pub(super) const fn kind(&self) -> Kind {
-        Kind {
+    pub(super) const fn kind(&self) -> PictureKind {
+        PictureKind {
             size: self.frames.size(),
             channels: self.frames.channels(),
             rate: self.frames.rate(),
@@ -89,7 +89,7 @@ impl<'m> Film<'m> {
     }
 
     /// Gives the next frame and takes what the board shows.
-    pub(super) fn turn(&mut self, screen: &mut Screen) -> Result<(), Failure> {
+    pub(super) fn turn(&mut self, screen: &mut BoardScreen) -> Result<(), Failure> {
         let kind = self.kind();
         let frame = self.frames.next_frame()?;
         if self.given.len() == REMEMBERED {

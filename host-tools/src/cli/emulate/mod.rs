@@ -28,7 +28,7 @@ use iltm_runtime::{
     image::Table,
     pipeline::Encoding,
 };
-use screen::Screen;
+use screen::BoardScreen;
 use serde_json::json;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     };
     let follows = arguments.frames.is_none() && arguments.size.is_none();
     let mut film = Film::new(&memory, frames, follows)?;
-    let mut screen = Screen::new(arguments, film.kind())?;
+    let mut screen = BoardScreen::new(arguments, film.kind())?;
     interrupt::catch();
     let started = Emulator::start(arguments.board, &firmware, &memory);
     let mut emulator = started.map_err(|error| emulator_failure(&error))?;
@@ -263,7 +263,11 @@ fn report(arguments: &Emulate, emulator: &Emulator, firmware: &Path, output: &Ou
 }
 
 /// Frames at their rate, until somebody stops it or the board ends.
-fn play(emulator: &mut Emulator, film: &mut Film<'_>, screen: &mut Screen) -> Result<(), Failure> {
+fn play(
+    emulator: &mut Emulator,
+    film: &mut Film<'_>,
+    screen: &mut BoardScreen,
+) -> Result<(), Failure> {
     let period = Duration::from_secs_f64(1.0 / film.rate());
     let mut due = Instant::now();
     while !interrupt::stopped() {

@@ -20,7 +20,7 @@ const GAP: usize = 8;
 
 /// What frames are: their size, samples of a pixel, and frames a second.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Kind {
+pub(super) struct PictureKind {
     pub(super) size: FrameSize,
     pub(super) channels: u8,
     pub(super) rate: f64,
@@ -28,24 +28,32 @@ pub(super) struct Kind {
 
 /// Shows and keeps frames, as far as it was asked for.
 #[derive(Default)]
-pub(super) struct Screen {
-    window: Option<Window>,
+pub(super) struct BoardScreen {
+    window: Option<MpvWindow>,
     video: Option<Video>,
 }
 
-impl Screen {
-    pub(super) fn new(arguments: &Emulate, kind: Kind) -> Result<Self, Failure> {
-        let window = arguments.window.then(|| Window::open(kind)).transpose()?;
+impl BoardScreen {
+    pub(super) fn new(arguments: &Emulate, kind: PictureKind) -> Result<Self, Failure> {
+        let window = arguments
+            .window
+            .then(|| MpvWindow::open(kind))
+            .transpose()?;
         let video = arguments.save.as_deref();
         let video = video.map(|path| Video::create(path, kind)).transpose()?;
         Ok(Self { window, video })
     }
 
     /// Takes a frame that the board has sent, and the newest one that it was given.
-    pub(super) fn take(&mut self, kind: Kind, given: &[u8], sent: &[u8]) -> Result<(), Failure> {
+    pub(super) fn take(
+        &mut self,
+        kind: PictureKind,
+        given: &[u8],
+        sent: &[u8],
+    ) -> Result<(), Failure> {
         if let Some(window) = &mut self.window {
             if window.kind != kind {
-                *window = Window::open(kind)?;
+                *window = MpvWindow::open(kind)?;
             }
             if !window.show(given, sent) {
                 // It was closed, and nothing else ends by that.
@@ -66,14 +74,14 @@ impl Screen {
 }
 
 /// A window of mpv, gone when it is dropped.
-struct Window {
-    kind: Kind,
+struct MpvWindow {
+    kind: PictureKind,
     player: Child,
     frames: SyncSender<Vec<u8>>,
 }
 
-impl Window {
-    fn open(kind: Kind) -> Result<Self, Failure> {
+impl MpvWindow {
+    fn open(kind: PictureKind) -> Result<Self, Failure> {
         let (width, height) = (2 * kind.size.width() + GAP, kind.size.height());
         let mut command = mpv();
         command
@@ -123,7 +131,7 @@ impl Window {
     }
 }
 
-impl Drop for Window {
+impl Drop for MpvWindow {
     fn drop(&mut self) {
         let _ = self.player.kill();
         let _ = self.player.wait();
@@ -138,7 +146,7 @@ fn coloured(samples: &[u8], channels: usize) -> impl Iterator<Item = u8> {
 
 /// A video that is written while the board runs, whole when it ends.
 struct Video {
-    kind: Kind,
+    kind: PictureKind,
     header: Header,
     whole: WholeFile,
     writer: Writer<BufWriter<File>>,
@@ -146,7 +154,7 @@ struct Video {
 }
 
 impl Video {
-    fn create(path: &Path, kind: Kind) -> Result<Self, Failure> {
+    fn create(path: &Path, kind: PictureKind) -> Result<Self, Failure> {
         let sampling = match kind.channels {
             1 => ChromaSampling::Mono,
             _ => ChromaSampling::Chroma444,
@@ -167,7 +175,7 @@ impl Video {
     }
 
     /// Frames of another kind, as a table of another size asks for, have no place in it.
-    fn keep(&mut self, kind: Kind, sent: &[u8]) -> Result<(), Failure> {
+    fn keep(&mut self, kind: PictureKind, sent: &[u8]) -> Result<(), Failure> {
         if kind != self.kind {
             return Ok(());
         }

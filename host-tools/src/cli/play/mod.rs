@@ -55,24 +55,24 @@ pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
     let tier = arguments.tier.unwrap_or_else(|| table.top_tier());
     table_has(&table, tier)?;
     let folder = TemporaryFolder::new().map_err(|error| cannot_write(Path::new("."), &error))?;
-    let stage = Stage {
+    let files = ShowFiles {
         folder: folder.path(),
         projector: table.projector(),
         tier,
     };
-    stage.prepare(&table)?;
-    stage.write("settings.lua", stage.settings(arguments, table.top_tier()))?;
-    if stage.projector.is_none() {
+    files.prepare(&table)?;
+    files.write("settings.lua", files.settings(arguments, table.top_tier()))?;
+    if files.projector.is_none() {
         output.people("note        the table does not say the projector's pixels: the display is not checked, and films are stretched to fill it\n");
     }
     interrupt::catch();
     let start = Instant::now();
-    let mut player = stage.start(arguments)?;
+    let mut player = files.start(arguments)?;
     let events = read(player.stdout.take().expect("it is piped"));
-    let mut show = Show {
+    let mut show = FilmShow {
         arguments,
         output,
-        stage: &stage,
+        files: &files,
         generation: 0,
         used: 0,
         before: None,
@@ -84,13 +84,13 @@ pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
 }
 
 /// Files for the player, and how it is started.
-struct Stage<'s> {
+struct ShowFiles<'s> {
     folder: &'s Path,
     projector: Option<ProjectorPixels>,
     tier: u8,
 }
 
-impl Stage<'_> {
+impl ShowFiles<'_> {
     fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<(), Failure> {
         let path = self.folder.join(name);
         fs::write(&path, bytes).map_err(|error| cannot_write(&path, &error))
@@ -239,10 +239,10 @@ fn read(stdout: ChildStdout) -> Receiver<String> {
 }
 
 /// What happens while the player runs.
-struct Show<'s> {
+struct FilmShow<'s> {
     arguments: &'s Play,
     output: &'s Output,
-    stage: &'s Stage<'s>,
+    files: &'s ShowFiles<'s>,
     /// The number of the newest table that was looked at, of the one in use, and of the one
     /// before that.
     generation: u32,
@@ -254,7 +254,7 @@ struct Show<'s> {
     ended: Option<Value>,
 }
 
-impl Show<'_> {
+impl FilmShow<'_> {
     fn follow(
         &mut self,
         player: &mut Child,
@@ -273,7 +273,7 @@ impl Show<'_> {
             }
             if interrupt::stopped() {
                 if asked.is_none() {
-                    self.stage.write(STOP, "")?;
+                    self.files.write(STOP, "")?;
                 }
                 if asked.get_or_insert_with(Instant::now).elapsed() > PATIENCE {
                     let _ = player.kill();
@@ -321,7 +321,7 @@ impl Show<'_> {
     }
 
     fn projector(&self) -> String {
-        self.stage.projector.map_or_else(String::new, |projector| {
+        self.files.projector.map_or_else(String::new, |projector| {
             let size = projector.size();
             format!("{} x {}", size.width(), size.height())
         })
@@ -341,14 +341,14 @@ impl Show<'_> {
     fn exchange(&mut self, bytes: &[u8]) {
         self.generation += 1;
         let path = &self.arguments.table;
-        if let Err(why) = self.stage.exchange(bytes, path, self.generation) {
+        if let Err(why) = self.files.exchange(bytes, path, self.generation) {
             self.problem(&format!("{why}; the table before goes on"));
-            self.stage.forget(self.generation);
+            self.files.forget(self.generation);
             return;
         }
         // The player may not have seen yet that there is a newer one.
         if let Some(older) = self.before.replace(self.used) {
-            self.stage.forget(older);
+            self.files.forget(older);
         }
         self.used = self.generation;
     }

@@ -27,7 +27,7 @@ const COMMON: &str = include_str!("common.glsl");
 /// Frames are sRGB, full screen on the projector that the table was made with.
 #[must_use]
 pub fn user_shader(table: &Table<'_>, tier: u8) -> String {
-    let mut shader = Writer::new(table);
+    let mut shader = ShaderText::new(table);
     shader.gains();
     shader.ambient();
     shader.response();
@@ -41,7 +41,7 @@ pub fn user_shader(table: &Table<'_>, tier: u8) -> String {
     shader.text
 }
 
-struct Writer<'t, 'a> {
+struct ShaderText<'t, 'a> {
     table: &'t Table<'a>,
     /// What every pass begins with.
     constants: String,
@@ -49,7 +49,7 @@ struct Writer<'t, 'a> {
     textures: Vec<&'static str>,
 }
 
-impl<'t, 'a> Writer<'t, 'a> {
+impl<'t, 'a> ShaderText<'t, 'a> {
     fn new(table: &'t Table<'a>) -> Self {
         let grid = table.grid();
         let (projector, border) = table.projector().map_or_else(
@@ -254,7 +254,7 @@ impl<'t, 'a> Writer<'t, 'a> {
         let grid = self.table.grid();
         let cells = (2 * grid.cols(), grid.rows());
         let functions: Vec<Function> = self.table.basis().functions().collect();
-        let shapes: Vec<Shape> = functions.iter().map(Shape::new).collect();
+        let shapes: Vec<StepFunction> = functions.iter().map(StepFunction::new).collect();
         let mut rows: Vec<BTreeMap<usize, [f64; 3]>> = vec![BTreeMap::new(); functions.len()];
         let entries = haar_entries(self.table, segments);
         for channel in 0..3 {
@@ -286,7 +286,10 @@ impl<'t, 'a> Writer<'t, 'a> {
         }
         self.list(
             "ILTM_FUNCTIONS",
-            &shapes.iter().flat_map(Shape::texels).collect::<Vec<_>>(),
+            &shapes
+                .iter()
+                .flat_map(StepFunction::texels)
+                .collect::<Vec<_>>(),
         );
         self.list("ILTM_ROWS", &starts);
         self.list("ILTM_ENTRIES", &list);
@@ -347,7 +350,7 @@ impl<'t, 'a> Writer<'t, 'a> {
 }
 
 /// A Haar function as a product of two steps.
-struct Shape {
+struct StepFunction {
     start: (usize, usize),
     extent: (usize, usize),
     first: (usize, usize),
@@ -356,7 +359,7 @@ struct Shape {
     value: f64,
 }
 
-impl Shape {
+impl StepFunction {
     fn new(function: &Function) -> Self {
         let start = (usize::from(function.row), usize::from(function.col));
         let extent = function.extent();
