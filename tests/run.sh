@@ -41,6 +41,7 @@ command -v ffmpeg >/dev/null || missing+=(ffmpeg)
 command -v mpv >/dev/null || missing+=(mpv)
 ls /usr/share/vulkan/icd.d/lvp_icd.*.json >/dev/null 2>&1 || missing+=(mesa-vulkan-drivers)
 ls /usr/share/glvnd/egl_vendor.d/*mesa.json >/dev/null 2>&1 || missing+=(libegl-mesa0)
+ls /usr/lib/*/dri/swrast_dri.so >/dev/null 2>&1 || missing+=(libgl1-mesa-dri)
 if [ ${#missing[@]} -gt 0 ]; then
     command -v apt-get >/dev/null || {
         echo "error: this needs Rust $wanted or newer, a C linker, git, qemu-system-arm, Xvfb, ffmpeg, mpv and Mesa's Vulkan; missing: ${missing[*]}. Install them and run this again" >&2
