@@ -3,7 +3,7 @@
 use super::args::{Export, Player};
 use super::failure::{Failure, Kind};
 use super::output::Output;
-use super::tables::{check, read_table, table_has};
+use super::tables::{check, chosen_tier, read_table};
 use crate::capture::exr;
 use crate::compile::shader::user_shader;
 use crate::video::{CompensateOptions, Compensator};
@@ -22,8 +22,7 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     check_free(out)?;
     let image = read_table(&arguments.table)?;
     let table = check(&arguments.table, &image)?;
-    let tier = arguments.tier.unwrap_or_else(|| table.top_tier());
-    table_has(&table, tier)?;
+    let tier = chosen_tier(&table, arguments.tier)?;
     let (files, next) = match arguments.player {
         Player::Mpv => {
             let shader = user_shader(&table, tier).into_bytes();
@@ -131,14 +130,18 @@ fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<Named>, Failure> {
     Ok(files)
 }
 
+/// Rows of a table's maps, a channel each.
+fn lines(rows: usize, table: &Table<'_>) -> impl Iterator<Item = (usize, usize)> {
+    let channels = usize::from(table.channels());
+    (0..rows).flat_map(move |row| (0..channels).map(move |channel| (row, channel)))
+}
+
 fn largest_gain(table: &Table<'_>) -> f64 {
-    let rows = 0..table.grid().rows();
-    let lines = rows.flat_map(|row| (0..usize::from(table.channels())).map(move |c| (row, c)));
-    let cells = lines.flat_map(|(row, channel)| table.gain_row(row, channel));
+    let cells = lines(table.grid().rows(), table);
+    let cells = cells.filter_map(|(row, channel)| table.gain_row(row, channel).max());
     let fine = table.fine_gain().into_iter().flat_map(|fine| {
-        let rows = 0..fine.size().height();
-        let lines = rows.flat_map(|row| (0..usize::from(table.channels())).map(move |c| (row, c)));
-        lines.flat_map(move |(row, channel)| fine.row(row, channel).collect::<Vec<u16>>())
+        let lines = lines(fine.size().height(), table);
+        lines.filter_map(move |(row, channel)| fine.row(row, channel).max())
     });
     let largest = cells.chain(fine).max().unwrap_or(0);
     f64::from(largest) * (-f64::from(table.gain_fraction())).exp2()
@@ -146,8 +149,7 @@ fn largest_gain(table: &Table<'_>) -> f64 {
 
 /// Light of the brightest cell that the projector does not light, 0 in a dark room.
 fn brightest_ambient(table: &Table<'_>) -> f64 {
-    let rows = 0..table.grid().rows();
-    let lines = rows.flat_map(|row| (0..usize::from(table.channels())).map(move |c| (row, c)));
+    let lines = lines(table.grid().rows(), table);
     let ambient = lines.filter_map(|(row, channel)| table.ambient_row(row, channel));
     let light = ambient.flatten().map(|light| light.to_num::<f64>());
     light.fold(0.0, f64::max).min(1.0)

@@ -4,6 +4,7 @@ use super::args::SealTerms as Given;
 use super::failure::{Failure, Kind, cannot_read};
 use crate::compile::Provenance;
 use crate::compile::sign::{self, SealTerms};
+use crate::video::VideoError;
 use crate::video::watch::FileWatch;
 use ed25519_dalek::SigningKey;
 use iltm_picture::foreign_file;
@@ -57,17 +58,13 @@ pub(super) fn check_sealed<'a>(
     checked.map_err(|error| no_table(path, error))
 }
 
-/// Refuses a tier that a table does not have.
-pub(super) fn table_has(table: &Table<'_>, tier: u8) -> Result<(), Failure> {
+/// The tier that is asked for, or the most accurate one.
+pub(super) fn chosen_tier(table: &Table<'_>, asked: Option<u8>) -> Result<u8, Failure> {
     let top = table.top_tier();
-    if tier <= top {
-        return Ok(());
+    match asked {
+        Some(tier) if tier > top => Err(VideoError::NoSuchTier { tier, top }.into()),
+        tier => Ok(tier.unwrap_or(top)),
     }
-    Err(Failure::new(
-        Kind::Usage,
-        format!("the table has tiers 0 to {top}, not {tier}"),
-        "Give a tier that the table has, or leave --tier away.",
-    ))
 }
 
 /// Refuses a date for new tables that is none, before the work.

@@ -160,21 +160,7 @@ fn what_a_board_gets_and_sends_is_in_a_window_and_in_a_video() {
         std::thread::sleep(Duration::from_millis(500));
     }
     drop(board);
-    let ran = Command::new("ffmpeg")
-        .current_dir(user.path(""))
-        .args([
-            "-loglevel",
-            "error",
-            "-i",
-            "sent.y4m",
-            "-update",
-            "1",
-            "sent.png",
-        ])
-        .output()
-        .expect("tests/run.sh installs ffmpeg");
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(ran.status.success() && said.is_empty(), "{said}");
+    user.ffmpeg("-i sent.y4m -update 1 sent.png");
     let sent = user.picture("sent.png").to_rgb8();
     assert_eq!(sent.dimensions(), (128, 96));
     let apart = sent

@@ -3,7 +3,6 @@
 
 use super::user::{User, contains};
 use image::{ImageBuffer, Rgb};
-use std::process::Command;
 
 /// A frame of 16 bits with what natural ones have: ramps, edges, fine stripes, darks, colours.
 fn frame(width: u32, height: u32) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
@@ -34,15 +33,9 @@ fn by_ffmpeg(user: &User, shader: &str) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
         "format=rgba64le,hwupload,libplacebo=custom_shader_path={shader}:dithering=-1,\
          hwdownload,format=rgba64le"
     );
-    let ran = Command::new("ffmpeg")
-        .current_dir(user.path(""))
-        .args(["-hide_banner", "-loglevel", "error", "-y"])
-        .args(["-init_hw_device", "vulkan=gpu", "-filter_hw_device", "gpu"])
-        .args(["-i", "in.png", "-vf", &filter, "out.png"])
-        .output()
-        .expect("tests/run.sh installs ffmpeg");
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(ran.status.success() && said.is_empty(), "{said}");
+    user.ffmpeg(&format!(
+        "-init_hw_device vulkan=gpu -filter_hw_device gpu -i in.png -vf '{filter}' out.png"
+    ));
     user.picture("out.png").to_rgb16()
 }
 
@@ -90,15 +83,8 @@ fn mapped(user: &User) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
     let filter = "[0]format=gbrp16[p];[1]format=gbrp16[a];[2]format=gbrp16,split[b][b2];\
                   [b2]negate[nb];[p][a]blend=all_mode=multiply[pa];[pa][nb]blend=all_mode=multiply[pab];\
                   [pab][b]blend=all_mode=addition,format=rgb48";
-    let ran = Command::new("ffmpeg")
-        .current_dir(user.path(""))
-        .args(["-loglevel", "error", "-y", "-i", "in.png"])
-        .args(["-i", "maps/alpha.png", "-i", "maps/beta.png"])
-        .args(["-filter_complex", filter, "mapped.png"])
-        .output()
-        .expect("tests/run.sh installs ffmpeg");
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(ran.status.success() && said.is_empty(), "{said}");
+    let files = "-i in.png -i maps/alpha.png -i maps/beta.png";
+    user.ffmpeg(&format!("{files} -filter_complex '{filter}' mapped.png"));
     user.picture("mapped.png").to_rgb16()
 }
 

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
-use std::process::{Child, Command};
+use std::process::Child;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -34,16 +34,10 @@ fn user() -> User {
 
 /// Makes a film of a second and a half, with sound, in which colours move.
 fn film(user: &User, name: &str, rate: u32, format: &str) {
-    let picture = format!("testsrc2=size={SIZE}:rate={rate}");
-    let ran = Command::new("ffmpeg")
-        .current_dir(user.path(""))
-        .args(["-loglevel", "error", "-y", "-f", "lavfi", "-i", &picture])
-        .args(["-f", "lavfi", "-i", "sine=frequency=440", "-t", "1.5"])
-        .args(["-pix_fmt", format, "-c:v", "ffv1", "-c:a", "flac", name])
-        .output()
-        .expect("tests/run.sh installs ffmpeg");
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(ran.status.success() && said.is_empty(), "{said}");
+    user.ffmpeg(&format!(
+        "-f lavfi -i testsrc2=size={SIZE}:rate={rate} -f lavfi -i sine=frequency=440 -t 1.5 \
+         -pix_fmt {format} -c:v ffv1 -c:a flac {name}"
+    ));
 }
 
 /// A show under way, and its player's socket.
@@ -219,23 +213,7 @@ fn pixels_that_are_not_square_are_shown_as_they_are_meant_and_ctrl_c_ends_a_show
     let desktop = Desktop::start(&format!("{SIZE}x24"));
     let user = user();
     let white = "color=white:size=336x208:rate=25,setsar=1/2";
-    let made = Command::new("ffmpeg")
-        .current_dir(user.path(""))
-        .args([
-            "-loglevel",
-            "error",
-            "-f",
-            "lavfi",
-            "-i",
-            white,
-            "-t",
-            "1",
-            "-c:v",
-            "ffv1",
-        ])
-        .arg("narrow.mkv")
-        .status();
-    assert!(made.expect("tests/run.sh installs ffmpeg").success());
+    user.ffmpeg(&format!("-f lavfi -i {white} -t 1 -c:v ffv1 narrow.mkv"));
     let mut show = Playing::start(&desktop, &user, "narrow.mkv");
     show.key("c");
     let shown = show.shown("narrow.png");
@@ -260,12 +238,7 @@ fn a_show_goes_on_whatever_happens_and_says_it() {
     let user = user();
     film(&user, "good.mkv", 25, "yuv420p");
     user.write("damaged.mkv", &user.read("good.mkv")[..600]);
-    let sound = ["-loglevel", "error", "-i", "good.mkv", "-vn", "sound.mkv"];
-    let made = Command::new("ffmpeg")
-        .current_dir(user.path(""))
-        .args(sound)
-        .status();
-    assert!(made.expect("it has made the film").success());
+    user.ffmpeg("-i good.mkv -vn sound.mkv");
     let mut show = Playing::start(
         &desktop,
         &user,

@@ -112,6 +112,19 @@ impl User {
         command
     }
 
+    /// Runs ffmpeg here, which has nothing to complain of.
+    #[track_caller]
+    pub(crate) fn ffmpeg(&self, line: &str) {
+        let ran = Command::new("ffmpeg")
+            .current_dir(self.path(""))
+            .args(["-loglevel", "error", "-y"])
+            .args(shlex::split(line).expect("a shell's line"))
+            .output()
+            .expect("tests/run.sh installs ffmpeg");
+        let said = String::from_utf8_lossy(&ran.stderr);
+        assert!(ran.status.success() && said.is_empty(), "{said}");
+    }
+
     pub(crate) fn spawn(&self, line: &str) -> Child {
         self.iltm(line).spawn().expect("the binary is there")
     }

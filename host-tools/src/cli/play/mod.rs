@@ -9,7 +9,7 @@ use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
 use super::mpv::{mpv, start};
 use super::output::Output;
-use super::tables::{check, table_has, watch_table};
+use super::tables::{check, chosen_tier, watch_table};
 use crate::compile::shader::user_shader;
 use crate::video::watch::FileWatch;
 use iltm_picture::Samples;
@@ -43,7 +43,6 @@ const MOST_PROBLEMS: usize = 200;
 /// Exit codes that `play.lua` ends mpv with.
 const STRICT: i32 = 5;
 const WRONG_DISPLAY: i32 = 6;
-const NOTHING_PLAYED: i32 = 7;
 
 /// Codes of a picture in white, wherever there is one.
 const WHITE: &str =
@@ -52,8 +51,7 @@ const WHITE: &str =
 pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
     let (image, watch) = watch_table(&arguments.table)?;
     let table = check(&arguments.table, &image)?;
-    let tier = arguments.tier.unwrap_or_else(|| table.top_tier());
-    table_has(&table, tier)?;
+    let tier = chosen_tier(&table, arguments.tier)?;
     let folder = TemporaryFolder::new().map_err(|error| cannot_write(Path::new("."), &error))?;
     let files = ShowFiles {
         folder: folder.path(),
@@ -367,13 +365,6 @@ impl FilmShow<'_> {
                     "Set the display to the projector's own mode, or choose another with --display.",
                 );
             }
-            Some(NOTHING_PLAYED) => {
-                return failed(
-                    Kind::Frames,
-                    "nothing could be played",
-                    "Check the name, and whether `mpv FILM` plays it.",
-                );
-            }
             Some(STRICT) => {
                 return failed(
                     Kind::Player,
@@ -390,8 +381,7 @@ impl FilmShow<'_> {
                 "See whether `mpv --vo=gpu FILM` plays.",
             );
         };
-        let count = |name: &str| counts[name].as_u64().unwrap_or(0);
-        if count("failed") > 0 && count("failed") >= count("films") {
+        if counts["shown"] == false && counts["failed"] != 0 {
             return failed(
                 Kind::Frames,
                 "nothing could be played",

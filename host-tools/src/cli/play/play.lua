@@ -9,8 +9,8 @@ local state = {
     generation = 0, tier = settings.tier, tiers = settings.tiers,
     compensated = true, white = false, card = false, line = false,
 }
-local counts = { dropped = 0, films = 0, failed = 0 }
-local played, loaded, ending = false, false, false
+local counts = { dropped = 0, films = 0, failed = 0, shown = false }
+local loaded, pictured, ending = false, false, false
 
 local function say(event)
     io.stdout:write(utils.format_json(event), "\n")
@@ -189,7 +189,7 @@ local function listen()
 end
 
 mp.register_event("file-loaded", function()
-    played, loaded = true, true
+    loaded = true
     counts.films = counts.films + 1
     local picture, sound, turned = false, false, 0
     for _, track in ipairs(mp.get_property_native("track-list")) do
@@ -203,6 +203,7 @@ mp.register_event("file-loaded", function()
     local alone = mp.get_property_native("playlist-count") == 1 and not settings.once
     mp.set_property("loop-file", alone and "inf" or "no")
     local film = mp.get_property("path")
+    pictured = picture
     if not picture then
         counts.failed = counts.failed + 1
         trouble({ film = film, problem = "has no picture" })
@@ -217,6 +218,10 @@ mp.register_event("file-loaded", function()
         listen()
     end
     show_line()
+end)
+
+mp.register_event("playback-restart", function()
+    counts.shown = counts.shown or pictured
 end)
 
 mp.register_event("end-file", function(event)
@@ -237,7 +242,7 @@ mp.register_event("end-file", function(event)
         end
         trouble({ film = film, problem = event.file_error or "cannot be played" })
     end
-    loaded = false
+    loaded, pictured = false, false
 end)
 
 -- Nothing is left to play: the end, or a film that could not be played and may come back.
@@ -245,11 +250,9 @@ mp.observe_property("idle-active", "bool", function(_, idle)
     if not idle then
         return
     end
-    if not played and counts.failed > 0 then
-        finish(7)
-    elseif settings.once and (played or counts.failed > 0) then
+    if counts.films > 0 and (settings.once or not counts.shown) then
         finish(0)
-    elseif played then
+    elseif counts.shown then
         mp.add_timeout(2, function()
             if mp.get_property_native("idle-active") then
                 mp.commandv("playlist-play-index", 0)
