@@ -61,9 +61,7 @@ pub(crate) struct Sums<'s> {
 pub(crate) struct GroupRows<'a> {
     /// Pairs of each row; 0 if every row says how many it has.
     pub(crate) pairs: u16,
-    /// Number of rows.
-    pub(crate) count: u16,
-    /// The rows as they lie in the table.
+    /// The rows as they lie in the table, at least one.
     pub(crate) words: &'a [[u8; 4]],
 }
 

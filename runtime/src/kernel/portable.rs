@@ -5,6 +5,12 @@ pub(crate) mod gather {
     use crate::kernel::{GroupRows, Sums};
     use fixed::types::I2F30;
 
+    /// Makes all values zero. `false`, and nothing done, if that has to be done the plain
+    /// way.
+    pub(crate) const fn clear(_values: &mut [i32]) -> bool {
+        false
+    }
+
     /// Adds rows to the sums of each scale's channel. `false`, and nothing done, if that
     /// has to be done the plain way ([`operator`](crate::operator)).
     ///

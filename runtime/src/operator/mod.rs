@@ -172,7 +172,9 @@ impl<'a> Operator<'a> {
         let needed = usize::from(channels).saturating_mul(self.cells);
         let given = sums.len();
         let sums = sums.get_mut(..needed.min(given)).unwrap_or_default();
-        sums.fill(0);
+        if !kernel::gather::clear(sums) {
+            sums.fill(0);
+        }
         let mut scales = [I2F30::ZERO; 3];
         for (wide, scale) in scales.iter_mut().zip(self.channel_scales) {
             *wide = I2F30::from(scale);
@@ -224,7 +226,6 @@ fn add<const C: usize>(
     }
     let rows = segment.groups().map(|group| kernel::GroupRows {
         pairs: group.pairs.unwrap_or(0),
-        count: group.count,
         words: group.words(),
     });
     // A tier's segment for all channels is its first, so the assembler has a loop for

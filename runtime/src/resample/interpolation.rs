@@ -12,7 +12,7 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use crate::kernel::{Between, lines};
+use crate::kernel::{self, Between, lines};
 
 /// One axis of an interpolation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -156,7 +156,8 @@ fn progression(begin: i32, step: i32, run: &mut [i32]) {
 
 /// [`blend`] of every element of two rows into `line`.
 pub fn blend_rows(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) {
-    if lines::blend(before, after, fraction, line) {
+    // The assembler takes every fraction of 31 bits.
+    if lines::blend(before, after, fraction, line) || !kernel::IS_PLAIN {
         return;
     }
     for (slot, (before, after)) in line.iter_mut().zip(before.iter().zip(after)) {

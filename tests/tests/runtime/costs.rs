@@ -14,9 +14,9 @@ const INSTRUCTIONS: &str = include_str!("../../../docs/instructions.csv");
 const COSTS: &str = include_str!("../../../docs/costs.csv");
 const STAGES: &str = include_str!("../../../docs/stages.csv");
 
-/// Instructions of a clipped sample. How many there are depends on the picture, so that the model does
+/// Instructions of a sample clipped at black, as most are. How many there are depends on the picture, so that the model does
 /// not count them.
-const CLIPPED_SAMPLE: f64 = 7.0;
+const CLIPPED_SAMPLE: f64 = 2.0;
 
 /// Largest deviation of a frame.
 const MOST: f64 = 0.02;

@@ -15,11 +15,13 @@
 //! --bin counts -- costs`) and to `docs/instructions.csv`: no frame there is off by more than
 //! 2 %. Those of `docs/stages.csv`, to which nothing was fitted, are off by up to
 //! 1.9 %. `tests/tests/runtime/costs.rs` holds the model to 2 % of every one. Clipped
-//! samples are not in it: how many there are depends on the picture. Each takes 7 instructions more.
+//! samples are not in it: how many there are depends on the picture. Each takes two
+//! instructions more at black, eight at white.
 //!
 //! Instructions are not cycles: a Cortex-M7 can do two at once, and waits for memory.
 //! [`BUDGET`] takes one cycle for each.
 
+use crate::ladder::Part;
 use iltm_runtime::{
     FrameSize, Grid,
     image::Table,
@@ -45,6 +47,8 @@ pub struct Shape {
     pub channels: u8,
     /// Whether there is ambient light.
     pub ambient: bool,
+    /// Whether codes are in proportion to drives: the projector is linear.
+    pub linear: bool,
     /// Size of the frame.
     pub size: FrameSize,
 }
@@ -77,6 +81,7 @@ impl Shape {
             grid: table.grid(),
             channels: table.channels(),
             ambient: table.ambient_row(0, 0).is_some(),
+            linear: table.codes(0).is_none(),
             size,
         }
     }
@@ -94,7 +99,7 @@ impl Shape {
         if segments.is_empty() {
             // Both are asked for and have nothing to do.
             return Stages {
-                first: 80.0,
+                first: 100.0,
                 operator: 40.0,
                 last: pixels,
             };
@@ -120,15 +125,20 @@ impl Shape {
     fn own_pixels(&self) -> f64 {
         let channels = f64::from(self.channels);
         let sample = if self.channels == 1 { 13.99 } else { 12.99 };
-        let sample = sample + if self.ambient { 2.01 } else { 0.0 };
+        let sample = sample + if self.ambient { 2.01 } else { 0.0 } + self.turns();
         118.0 + channels * (146.0 + sample * self.grid.cells() as f64)
+    }
+
+    /// More a sample of what a linear projector shows: its loop takes two a turn, not four.
+    fn turns(&self) -> f64 {
+        if self.linear { 0.5 } else { 0.0 }
     }
 
     /// The same of a larger one.
     fn larger_pixels(&self) -> f64 {
         let channels = f64::from(self.channels);
         let sample = if self.channels == 1 { 12.59 } else { 12.28 };
-        let sample = sample + if self.ambient { 2.04 } else { 0.0 };
+        let sample = sample + if self.ambient { 2.04 } else { 0.0 } + self.turns();
         let rows = 220.0 * self.size.height() as f64;
         channels * (552.0 + rows + sample * self.size.pixels() as f64)
     }
@@ -139,6 +149,8 @@ impl Shape {
             return 0.0;
         };
         let node = if self.ambient { 34.5 } else { 26.6 };
+        // In colour the loop takes two nodes a turn.
+        let node = if self.channels == 1 { node } else { node - 1.0 };
         let finest = node * finest.plain
             + 135.4 * finest.halves
             + 304.2 * finest.weighted
@@ -159,7 +171,7 @@ impl Shape {
         let copies = if self.channels == 1 { 0.0 } else { 1.0 };
         let level = |level: &LevelCost| {
             156.6
-                + 9.71 * level.plain
+                + 8.71 * level.plain
                 + 58.1 * level.halves
                 + 99.3 * level.weighted
                 + 76.3 * level.calls
@@ -177,7 +189,7 @@ impl Shape {
             let rows = segment.rows().map(|rows| row(rows.pairs()));
             258.5 + 61.8 * groups + rows.sum::<f64>()
         };
-        let sums = 1.5 * f64::from(self.channels) * self.grid.cells() as f64;
+        let sums = 0.375 * f64::from(self.channels) * self.grid.cells() as f64;
         223.2 + sums + segments.iter().map(of_segment).sum::<f64>()
     }
 
@@ -211,9 +223,9 @@ impl Shape {
         let (width, cols) = (self.size.width(), self.grid.cols());
         // Runs between centres are of two lengths where cells do not end with pixels.
         let run = if width.is_multiple_of(cols) {
-            39.3
+            36.8
         } else {
-            44.8
+            42.3
         };
         let row = 307.6 + 1.78 * width as f64 + run * cols as f64;
         self.size.height() as f64 * row
@@ -325,6 +337,30 @@ fn levels(grid: Grid) -> Vec<LevelCost> {
     levels
 }
 
+/// Instructions that entries of an operator cost, about.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Price {
+    /// A row that has any.
+    pub(crate) row: f64,
+    /// A pair of neighbours, or an entry without one.
+    pub(crate) pair: f64,
+}
+
+impl Price {
+    /// That of a part of the operator of a table of 1 or 3 channels.
+    pub(crate) fn of(part: Part, of_table: u8) -> Self {
+        let channels = match part {
+            Part::Shared => Channels::All,
+            Part::Channel(channel) => Channels::One(channel),
+        };
+        let row = row_instructions(0, channels, of_table);
+        Self {
+            row,
+            pair: (row_instructions(8, channels, of_table) - row) / 8.0,
+        }
+    }
+}
+
 /// Instructions of the kernel's loop for one row of so many pairs: its head and its
 /// end, loads of several words, three (seven) for each pair.
 fn row_instructions(pairs: u16, channels: Channels, of_table: u8) -> f64 {
@@ -332,8 +368,8 @@ fn row_instructions(pairs: u16, channels: Channels, of_table: u8) -> f64 {
     let odd = |bit: u32| p >> bit & 1;
     let long = pairs > 8;
     let instructions = match (channels, of_table) {
-        (Channels::All, 3) if long => 30 + 32 * (p / 4) + 15 * odd(1) + 8 * odd(0),
-        (Channels::All, 3) => 20 + 7 * p + p.div_ceil(2),
+        (Channels::All, 3) if long => 28 + 32 * (p / 4) + 15 * odd(1) + 8 * odd(0),
+        (Channels::All, 3) => 17 + 7 * p + p.div_ceil(2),
         (channels, _) => {
             // A channel's own part is scaled and added to what is there.
             let end = if channels == Channels::All { 6 } else { 11 };
@@ -401,8 +437,8 @@ mod tests {
         assert_eq!(row_instructions(8, Channels::All, 1), 32.0);
         // Ten pairs: two words, a zero, a count; eight at once, two at once.
         assert_eq!(row_instructions(10, Channels::All, 1), 17.0 + 28.0 + 7.0);
-        // Three channels, two pairs: `ldr`, `ldmia`, seven each, 19 to end the row.
-        assert_eq!(row_instructions(2, Channels::All, 3), 35.0);
+        // Three channels, two pairs: two `ldrh`, `ldmia`, seven each, 15 to end the row.
+        assert_eq!(row_instructions(2, Channels::All, 3), 32.0);
         // A channel's own row is scaled and added: five more.
         assert_eq!(row_instructions(1, Channels::One(2), 3), 15.0);
     }

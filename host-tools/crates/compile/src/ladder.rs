@@ -2,15 +2,17 @@
 //!
 //! Entry `(i, j)` of `K^ = W^T K W` changes the light of a frame by about
 //! `|K^_ij| sigma_j`, with `sigma_j` the root mean square of input coefficient
-//! `j` over [natural images](iltm_solve::natural_images). In that order, the first tier takes
-//! as many entries as its error needs, the next one adds to it, and so on. The
-//! entries of the shared operator and those that one channel adds stand in one
-//! queue: an entry is worth what it changes per multiplication.
+//! `j` over [natural images](iltm_solve::natural_images). Entries stand in one queue, by the
+//! squares of that per instruction: neighbours in a row are stored in pairs, which take one
+//! multiplication each, and the first pair of a row takes what it costs to end the row. The
+//! first tier takes as many entries as its error needs, the next one adds to it, and so on.
 
+use crate::cost::Price;
 use iltm_solve::{Coefficient, Haar, IMAGES, Interreflection, Inverse, InverseTransport};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 /// Errors that tiers aim for, each about half the one before. The third is one
 /// step of an 8-bit code.
@@ -30,7 +32,7 @@ const MANY: usize = 1 << 22;
 const ASIDE: f64 = 0.05;
 
 /// Which operator an entry belongs to.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Part {
     /// The operator that all channels share.
     Shared,
@@ -118,7 +120,7 @@ fn queue(
     finest: f64,
     judge: &mut Judge<'_>,
 ) -> Vec<Entry> {
-    let mut entries = Vec::new();
+    let mut ranked: Vec<Ranked> = Vec::new();
     let gains = inverse.channels.iter().flat_map(|channel| &channel.gain);
     let gain = gains.clone().sum::<f64>() / gains.count().max(1) as f64;
     let least = ASIDE * finest * gain * sigma.norm();
@@ -132,11 +134,14 @@ fn queue(
             judge.leave_out(part, found.iter().filter(|c| worth(c) < needed));
             found.retain(|coefficient| worth(coefficient) >= needed);
         }
-        entries.extend(found.into_iter().map(|coefficient| Entry {
-            part,
-            row: coefficient.row,
-            col: coefficient.col,
-            value: coefficient.value,
+        ranked.extend(found.into_iter().map(|coefficient| Ranked {
+            worth: 0.0,
+            entry: Entry {
+                part,
+                row: coefficient.row,
+                col: coefficient.col,
+                value: coefficient.value,
+            },
         }));
     };
     add(Part::Shared, &inverse.shared);
@@ -145,14 +150,85 @@ fn queue(
             add(Part::Channel(index as u8), deviation);
         }
     }
-    let worth = |entry: &Entry| entry.value.abs() * sigma[entry.col as usize];
-    entries.sort_by(|a, b| {
-        let place = |e: &Entry| (e.row, e.col);
-        worth(b)
-            .total_cmp(&worth(a))
-            .then_with(|| place(a).cmp(&place(b)))
+    let scales = inverse.channels.iter().map(|channel| channel.scale);
+    let squares: f64 = scales.map(|scale| scale * scale).sum();
+    let worth = |entry: &Entry| {
+        let weight = match entry.part {
+            Part::Shared => squares,
+            Part::Channel(_) => 1.0,
+        };
+        weight * (entry.value * sigma[entry.col as usize]).powi(2)
+    };
+    let channels = inverse.channels.len() as u8;
+    let place = |ranked: &Ranked| (ranked.entry.part, ranked.entry.row, ranked.entry.col);
+    let row = |ranked: &Ranked| (ranked.entry.part, ranked.entry.row);
+    ranked.par_sort_unstable_by_key(place);
+    let rows = ranked.par_chunk_by_mut(|a, b| row(a) == row(b));
+    rows.for_each(|row| rank(row, worth, Price::of(row[0].entry.part, channels)));
+    ranked.par_sort_unstable_by(|a, b| {
+        let worth = b.worth.total_cmp(&a.worth);
+        worth.then_with(|| place(a).cmp(&place(b)))
     });
-    entries
+    ranked.into_iter().map(|ranked| ranked.entry).collect()
+}
+
+/// An entry, and what it is worth per instruction with those that join a tier together with it.
+#[derive(Clone, Copy)]
+struct Ranked {
+    worth: f64,
+    entry: Entry,
+}
+
+/// Ranks the entries of one row. Pairs join one by one, each worth no more than the one before: the
+/// concave hull of what they are worth over what they cost. Where the first ones do not pay for the
+/// row, several join together.
+fn rank(row: &mut [Ranked], worth: impl Fn(&Entry) -> f64, price: Price) {
+    let pairs = pairs(row, worth);
+    // Worth, price and number of the pairs that join together.
+    let mut hull: Vec<(f64, f64, usize)> = Vec::new();
+    for (index, (worth, _)) in pairs.iter().enumerate() {
+        let first = if index == 0 { price.row } else { 0.0 };
+        let mut step = (*worth, first + price.pair, 1);
+        while let Some(before) = hull.pop_if(|before| before.0 * step.1 < step.0 * before.1) {
+            step = (before.0 + step.0, before.1 + step.1, before.2 + step.2);
+        }
+        hull.push(step);
+    }
+    let mut pairs = pairs.into_iter();
+    for (worth, price, count) in hull {
+        for (_, pair) in pairs.by_ref().take(count) {
+            for ranked in &mut row[pair] {
+                ranked.worth = worth / price;
+            }
+        }
+    }
+}
+
+/// Places in a row of entries with the neighbours that they are stored with, and what both are worth,
+/// most first: the entry that is worth most takes the better one of its neighbours, and so on.
+fn pairs(row: &[Ranked], worth: impl Fn(&Entry) -> f64) -> Vec<(f64, RangeInclusive<usize>)> {
+    let worths: Vec<f64> = row.iter().map(|ranked| worth(&ranked.entry)).collect();
+    let mut order: Vec<usize> = (0..row.len()).collect();
+    order.sort_by(|a, b| worths[*b].total_cmp(&worths[*a]));
+    let mut taken = vec![false; row.len()];
+    let mut pairs = Vec::new();
+    for index in order {
+        if taken[index] {
+            continue;
+        }
+        let neighbours = [index.wrapping_sub(1), index + 1]
+            .into_iter()
+            .filter(|&other| {
+                let column = |index: usize| row[index].entry.col;
+                other < row.len() && !taken[other] && column(other).abs_diff(column(index)) == 1
+            });
+        let other = neighbours.max_by(|a, b| worths[*a].total_cmp(&worths[*b]));
+        let pair = other.map_or(index..=index, |other| index.min(other)..=index.max(other));
+        taken[pair.clone()].fill(true);
+        pairs.push((worths[pair.clone()].iter().sum(), pair));
+    }
+    pairs.sort_by(|a: &(f64, _), b| b.0.total_cmp(&a.0));
+    pairs
 }
 
 /// The worth from which coefficients are needed: the squares of all that are worth less sum up to
@@ -397,6 +473,47 @@ mod tests {
     use crate::test_scene::inverse;
     use iltm_runtime::Grid;
     use iltm_solve::natural_images;
+
+    #[test]
+    fn neighbours_join_together_and_the_first_pair_of_a_row_pays_for_it() {
+        let ranked = |col, value: f64| Ranked {
+            worth: 0.0,
+            entry: Entry {
+                part: Part::Shared,
+                row: 7,
+                col,
+                value: value.sqrt(),
+            },
+        };
+        // The second takes the third, not the first; the last has no neighbour.
+        let columns = [0, 1, 2, 3, 6];
+        let mut row: Vec<Ranked> = columns
+            .into_iter()
+            .zip([1.0, 3.0, 2.0, 0.5, 2.5])
+            .map(|(col, value)| ranked(col, value))
+            .collect();
+        let worth = |entry: &Entry| entry.value * entry.value;
+        let found: Vec<_> = pairs(&row, worth).into_iter().map(|pair| pair.1).collect();
+        assert_eq!(found, [1..=2, 4..=4, 0..=0, 3..=3]);
+        let mut thousandths = |price| {
+            rank(&mut row, worth, price);
+            row.iter()
+                .map(|ranked| (1e3 * ranked.worth).round())
+                .collect::<Vec<_>>()
+        };
+        // A row for nothing: each pair joins alone.
+        let free = Price {
+            row: 0.0,
+            pair: 2.0,
+        };
+        assert_eq!(thousandths(free), [500.0, 2500.0, 2500.0, 250.0, 1250.0]);
+        // One that costs three: 5 for 5 alone, 7.5 for 7 with the second pair, which joins it.
+        let dear = Price {
+            row: 3.0,
+            pair: 2.0,
+        };
+        assert_eq!(thousandths(dear), [500.0, 1071.0, 1071.0, 250.0, 1071.0]);
+    }
 
     #[test]
     fn entries_that_stand_in_no_queue_err_as_if_they_did_and_by_no_more_than_asked() {

@@ -25,8 +25,25 @@ struct Context {
     scales: [i32; 3],
 }
 
-/// Runs `rows` rows of one number of pairs (or of any) from `words`.
-type Loop = unsafe extern "C" fn(words: *const c_void, context: *const Context, rows: u32);
+/// Runs the rows of one number of pairs (or of any) from `words` to `end`.
+type Loop = unsafe extern "C" fn(words: *const c_void, context: *const Context, end: *const c_void);
+
+unsafe extern "C" {
+    fn iltm_clear(values: *mut [i32; 8], end: *const [i32; 8]);
+}
+
+/// Makes all values zero, as `portable.rs` says.
+pub(crate) fn clear(values: &mut [i32]) -> bool {
+    let (eights, rest) = values.as_chunks_mut::<8>();
+    if !eights.is_empty() {
+        let eights = eights.as_mut_ptr_range();
+        // SAFETY: the loop writes whole eights from the start of `eights` to its end, of
+        // which there is one at least.
+        unsafe { iltm_clear(eights.start, eights.end) };
+    }
+    rest.fill(0);
+    true
+}
 
 /// Adds rows to the sums; `false`, and nothing done, if there is no loop for them: rows
 /// for all channels behind others.
@@ -60,17 +77,14 @@ pub(crate) fn gather<'a>(
         let Some(run) = loops.get(usize::from(rows.pairs)) else {
             continue;
         };
-        // SAFETY: the segment was checked, so `words` is aligned and holds `count` rows as
-        // the loop reads them, every row's index is below `sums.cells` and every pair's below
+        let words = rows.words.as_ptr_range();
+        // SAFETY: the segment was checked, so `words` is aligned and holds whole rows as
+        // the loop reads them, at least one, every row's index is below `sums.cells` and every pair's below
         // `sums.cells - 1`; the caller made sure that `inputs` and `sums` have
         // `sums.cells` elements for each scale. The table lies in flash that nobody
         // writes while a `Table` borrows it. Words of two inputs need no alignment.
         unsafe {
-            run(
-                rows.words.as_ptr().cast(),
-                &raw const context,
-                rows.count.into(),
-            );
+            run(words.start.cast(), &raw const context, words.end.cast());
         };
     }
     true
@@ -82,7 +96,7 @@ type Loops = [Loop; 9];
 macro_rules! loops {
     ($name:ident: $($function:ident)*) => {
         unsafe extern "C" {
-            $(fn $function(words: *const c_void, context: *const Context, rows: u32);)*
+            $(fn $function(words: *const c_void, context: *const Context, end: *const c_void);)*
         }
         static $name: Loops = [$($function),*];
     };
@@ -95,10 +109,34 @@ loops!(ADD_ONE: iltm_add_one_0 iltm_add_one_1 iltm_add_one_2 iltm_add_one_3
 loops!(STORE_THREE: iltm_store_three_0 iltm_store_three_1 iltm_store_three_2 iltm_store_three_3
     iltm_store_three_4 iltm_store_three_5 iltm_store_three_6 iltm_store_three_7 iltm_store_three_8);
 
+// r0 values, r1 their end, r2 to r9 zero.
+global_asm!(
+    r#"
+    .syntax unified
+    .section .text.iltm_clear, "ax", %progbits
+    .global iltm_clear
+    .type iltm_clear, %function
+    .thumb_func
+    iltm_clear:
+        push {{r4-r9}}
+    .irp zero, r2, r3, r4, r5, r6, r7, r8, r9
+        mov \zero, #0
+    .endr
+    1:
+        stmia r0!, {{r2-r9}}
+        cmp r0, r1
+        bne 1b
+        pop {{r4-r9}}
+        bx lr
+    .size iltm_clear, . - iltm_clear
+    .text
+    "#
+);
+
 // One channel.
 //
-// r0 words, r1 inputs, r2 sums, r3 rows left, r4 first word of the row, r5 and r6
-// values, r7 indices, r8 to r10 the next two pairs, r11 inputs of a pair, r12 sum,
+// r0 words, r1 inputs, r2 sums, r3 end of the words, r4 first word of the row, r5
+// and r6 values, r7 indices, r8 to r10 the next two pairs, r11 inputs of a pair, r12 sum,
 // lr pairs left in a long row.
 global_asm!(
     r#"
@@ -148,7 +186,7 @@ global_asm!(
     .else
         asr r12, r11
     .endif
-        subs r3, #1
+        cmp r0, r3
         str r12, [r2, r4, lsl #2]
         bne 1b
         add sp, #4
@@ -264,8 +302,9 @@ global_asm!(
 // Three channels.
 //
 // r0 words, r1-r3 inputs by channel, r4-r6 sums by channel, r7 and r8 values, r9
-// indices, r10 index, r11 inputs of a pair, r12 pairs left in a long row, lr first
-// word of the row. On the stack: rows left, then the context from `sums` on.
+// indices, r10 index, r11 inputs of a pair, r12 shift of a short row or pairs left in a
+// long one, lr index of a short row or first word of a long one. On the stack: the
+// context from `sums` on, then the end of the words.
 global_asm!(
     r#"
     .macro iltm_pair_three values
@@ -307,33 +346,28 @@ global_asm!(
         sub sp, #28
         ldmia r1, {{r3-r8}}
         lsl r9, r5, #1
-        add r12, sp, #8
-        stmia r12, {{r4, r6-r9}}
-        str r2, [sp, #4]
+        str r2, [sp, #20]
+        stmia sp, {{r4, r6-r9}}
         mov r1, r3
         add r2, r1, r5
         add r3, r2, r5
     .endm
 
     .macro iltm_finish_three name
-        add r12, sp, #8
-        ldmia r12, {{r7-r11}}
+        ldmia sp, {{r7-r11}}
         smmul r4, r4, r8
         smmul r5, r5, r9
         smmul r6, r6, r10
-        uxth r12, lr
-        add r7, r7, r12, lsl #2
-        lsr r12, lr, #16
+        ldr r8, [sp, #20]
+        add r7, r7, lr, lsl #2
         sub r12, #2
         asr r4, r12
         asr r5, r12
         asr r6, r12
-        ldr r8, [sp, #4]
         str r4, [r7]
         str r5, [r7, r11]
         str r6, [r7, r11, lsl #1]
-        subs r8, #1
-        str r8, [sp, #4]
+        cmp r0, r8
         bne 1b
         add sp, #28
         pop {{r4-r11, pc}}
@@ -343,7 +377,8 @@ global_asm!(
     .macro iltm_short_three name, pairs
     iltm_begin_three \name
     1:
-        ldr lr, [r0], #4
+        ldrh lr, [r0], #2
+        ldrh r12, [r0], #2
     .if \pairs == 1
         ldmia r0!, {{r7, r9}}
     .else
@@ -397,6 +432,8 @@ global_asm!(
         ldmia r0!, {{r7, r9}}
         iltm_low_three r7, r9
     5:
+        lsr r12, lr, #16
+        uxth lr, lr
     iltm_finish_three \name
     .endm
 

@@ -164,22 +164,12 @@ global_asm!(
     "#
 );
 
-// r0 values, r1 details, r2 top, r3 bottom, r4 nodes left in the row, r5 stride, r6
-// value, r7-r9 details, r10 to lr quarters. On the stack: nodes of a row, rows left.
+// r0 values, r1 details, r2 top, r3 bottom, r4 nodes left in the row (two a turn, an
+// odd one alone), r5 stride, r6 value, r7-r9 details, r10 to lr quarters. On the
+// stack: nodes of a row, rows left.
 global_asm!(
     r#"
-    .section .text.iltm_split_values, "ax", %progbits
-    .global iltm_split_values
-    .type iltm_split_values, %function
-    .thumb_func
-    iltm_split_values:
-        push {{r4-r11, lr}}
-        ldmia r0, {{r0-r5}}
-        push {{r3, r4}}
-    1:
-        add r3, r2, r5
-        ldr r4, [sp]
-    2:
+    .macro iltm_split
         ldr r6, [r0], #4
         ldmia r1!, {{r7-r9}}
         add r10, r6, r8
@@ -192,7 +182,28 @@ global_asm!(
         sub lr, r6, r7
         strd r11, r12, [r2], #8
         strd r9, lr, [r3], #8
-        subs r4, #1
+    .endm
+
+    .section .text.iltm_split_values, "ax", %progbits
+    .global iltm_split_values
+    .type iltm_split_values, %function
+    .thumb_func
+    iltm_split_values:
+        push {{r4-r11, lr}}
+        ldmia r0, {{r0-r5}}
+        push {{r3, r4}}
+    1:
+        add r3, r2, r5
+        ldr r4, [sp]
+        tst r4, #1
+        it ne
+        addne r4, #1
+        bne 3f
+    2:
+        iltm_split
+    3:
+        iltm_split
+        subs r4, #2
         bne 2b
         mov r2, r3
         ldr r6, [sp, #4]

@@ -62,11 +62,11 @@ pub(crate) fn expand(between: &Between, values: &[i32], pixels: &mut [i32]) -> b
 
 /// Two rows to one between, as `portable.rs` says.
 pub(crate) fn blend(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]) -> bool {
-    let count = line.len();
-    if count == 0 || before.len() < count || after.len() < count || fraction >> 31 != 0 {
+    let count = line.len().min(before.len()).min(after.len());
+    if fraction >> 31 != 0 {
         return false;
     }
-    // SAFETY: all three have `count` elements.
+    // SAFETY: all three have at least `count` elements, which may be none.
     unsafe {
         iltm_blend(
             before.as_ptr(),
@@ -79,29 +79,44 @@ pub(crate) fn blend(before: &[i32], after: &[i32], fraction: u32, line: &mut [i3
     true
 }
 
-// r0 before, r1 after, r2 fraction, r3 line, r4 elements left, r5 and r6 values, r7
-// and r8 low and high half of the product.
+// r0 before, r1 after, r2 fraction, r3 line, r4 elements left, r5 and r6 values before, r7
+// and r8 after, r9 and r10 low and high half of the product.
 global_asm!(
     r#"
     .syntax unified
+    .macro iltm_between before, after
+        sub \after, \after, \before
+        smull r9, r10, \after, r2
+        add \before, \before, r10, lsl #1
+        add \before, \before, r9, lsr #31
+    .endm
+
     .section .text.iltm_blend, "ax", %progbits
     .global iltm_blend
     .type iltm_blend, %function
     .thumb_func
     iltm_blend:
-        push {{r4-r8, lr}}
-        ldr r4, [sp, #24]
+        push {{r4-r10, lr}}
+        ldr r4, [sp, #32]
+        subs r4, #2
+        blt 2f
     1:
-        ldr r5, [r0], #4
-        ldr r6, [r1], #4
-        sub r6, r6, r5
-        smull r7, r8, r6, r2
-        add r5, r5, r8, lsl #1
-        add r5, r5, r7, lsr #31
-        str r5, [r3], #4
-        subs r4, #1
-        bne 1b
-        pop {{r4-r8, pc}}
+        ldrd r5, r6, [r0], #8
+        ldrd r7, r8, [r1], #8
+        iltm_between r5, r7
+        iltm_between r6, r8
+        strd r5, r6, [r3], #8
+        subs r4, #2
+        bge 1b
+    2:
+        adds r4, #2
+        beq 3f
+        ldr r5, [r0]
+        ldr r7, [r1]
+        iltm_between r5, r7
+        str r5, [r3]
+    3:
+        pop {{r4-r10, pc}}
     .size iltm_blend, . - iltm_blend
     .text
     "#

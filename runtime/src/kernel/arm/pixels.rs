@@ -305,30 +305,13 @@ global_asm!(
     "#
 );
 
-// r0 top, r1 bottom, r2 light, r3 sums, r4 details, r5 nodes left in the row, r6-r9
-// the four values of a node, r10 and r11 ambient light of top and bottom, r12 and lr
-// what comes of them. On the stack: nodes of a row, rows left, stride.
+// r0 top, r1 bottom, r2 light, r3 sums, r4 details, r5 nodes left in the row (in colour
+// two a turn, an odd one alone), r6-r9 the four values of a node, r10 and r11 ambient
+// light of top and bottom, r12 and lr what comes of them. On the stack: nodes of a row, rows left, stride.
 global_asm!(
     r#"
     .syntax unified
-    .macro iltm_merge name, channels, lit
-    .section .text.\name, "ax", %progbits
-    .global \name
-    .type \name, %function
-    .thumb_func
-    \name:
-        push {{r4-r11, lr}}
-        ldr r10, [r0, #24]
-        ldr r7, [r0, #28]
-        ldmia r0, {{r1-r6}}
-        mov r0, r1
-        push {{r5, r6, r7}}
-    1:
-        ldr r6, [sp, #8]
-        ldr r5, [sp]
-        add r1, r0, r6
-        add r11, r10, r6, lsl #1
-    2:
+    .macro iltm_merge_node channels, lit
         ldrb r6, [r0], #\channels
         ldrb r7, [r0], #\channels
         ldrb r8, [r1], #\channels
@@ -363,7 +346,40 @@ global_asm!(
         pkhbt r7, r7, r12, lsl #14
         strh r6, [r4, #4]
         str r7, [r4], #6
+    .endm
+
+    .macro iltm_merge name, channels, lit
+    .section .text.\name, "ax", %progbits
+    .global \name
+    .type \name, %function
+    .thumb_func
+    \name:
+        push {{r4-r11, lr}}
+        ldr r10, [r0, #24]
+        ldr r7, [r0, #28]
+        ldmia r0, {{r1-r6}}
+        mov r0, r1
+        push {{r5, r6, r7}}
+    1:
+        ldr r6, [sp, #8]
+        ldr r5, [sp]
+        add r1, r0, r6
+        add r11, r10, r6, lsl #1
+    .if \channels == 3
+        tst r5, #1
+        it ne
+        addne r5, #1
+        bne 3f
+    2:
+        iltm_merge_node \channels, \lit
+    3:
+        iltm_merge_node \channels, \lit
+        subs r5, #2
+    .else
+    2:
+        iltm_merge_node \channels, \lit
         subs r5, #1
+    .endif
         bne 2b
         mov r0, r1
         mov r10, r11
@@ -420,6 +436,21 @@ global_asm!(
         strb r10, [r3], #\channels
     .endm
 
+    .macro iltm_slot slot, channels, lit, linear
+        iltm_drive \channels, \lit, \linear
+        bne 1\slot\()f
+    2\slot:
+        iltm_code \channels, \linear
+    .endm
+
+    @ Samples clipped at black, most of all, say `gt` and are counted on the spot.
+    .macro iltm_clipped back
+        add lr, lr, r9, lsr #31
+        bgt \back
+        adr.w r12, \back
+        b 8f
+    .endm
+
     .macro iltm_finish name, channels, lit, linear
     .section .text.\name, "ax", %progbits
     @ In code aligned to halfwords `adr` would be two bytes off.
@@ -432,56 +463,49 @@ global_asm!(
         mov lr, #0
         ldr r11, [r0, #36]
         ldmia r0, {{r0-r8}}
+    .if \linear
+        subs r8, #2
+    .else
         subs r8, #4
+    .endif
         blt 5f
     1:
-        iltm_drive \channels, \lit, \linear
-        bne 11f
-    21:
-        iltm_code \channels, \linear
-        iltm_drive \channels, \lit, \linear
-        bne 12f
-    22:
-        iltm_code \channels, \linear
-        iltm_drive \channels, \lit, \linear
-        bne 13f
-    23:
-        iltm_code \channels, \linear
-        iltm_drive \channels, \lit, \linear
-        bne 14f
-    24:
-        iltm_code \channels, \linear
+        iltm_slot 1, \channels, \lit, \linear
+        iltm_slot 2, \channels, \lit, \linear
+    .if \linear
+        subs r8, #2
+        bge 1b
+    5:
+        adds r8, #2
+    .else
+        iltm_slot 3, \channels, \lit, \linear
+        iltm_slot 4, \channels, \lit, \linear
         subs r8, #4
         bge 1b
     5:
         adds r8, #4
+    .endif
         beq 7f
     6:
-        iltm_drive \channels, \lit, \linear
-        bne 16f
-    26:
-        iltm_code \channels, \linear
+        iltm_slot 6, \channels, \lit, \linear
         subs r8, #1
         bne 6b
     7:
         mov r0, lr
         pop {{r4-r11, pc}}
     11:
-        adr.w r12, 21b
-        b 8f
+        iltm_clipped 21b
     12:
-        adr.w r12, 22b
-        b 8f
+        iltm_clipped 22b
+    .if \linear == 0
     13:
-        adr.w r12, 23b
-        b 8f
+        iltm_clipped 23b
     14:
-        adr.w r12, 24b
-        b 8f
+        iltm_clipped 24b
+    .endif
     16:
-        adr.w r12, 26b
+        iltm_clipped 26b
     8:
-        add lr, lr, r9, lsr #31
         cmp r9, #32768
         it gt
         addgt lr, #0x10000
