@@ -53,7 +53,7 @@ fn disc_pattern(along: f64, y: f64) -> LinearColour {
 /// A test card: fine lines, pure colours, a ramp and words.
 #[must_use]
 pub fn test_card(size: FrameSize) -> Wanted {
-    let picture = paint(size, card);
+    let picture = card(size);
     Wanted {
         name: "card",
         title: "Test card".to_owned(),
@@ -64,7 +64,19 @@ pub fn test_card(size: FrameSize) -> Wanted {
     }
 }
 
-fn card(x: f64, y: f64) -> LinearColour {
+/// The card without its name: circles are round and fields square on square pixels.
+fn card(size: FrameSize) -> Picture {
+    let (width, height) = (size.width() as f64, size.height() as f64);
+    let shorter = width.min(height);
+    paint(size, |x, y| {
+        let (dx, dy) = ((x - 0.5) * width / shorter, (y - 0.5) * height / shorter);
+        card_at((x, y), (dx, dy))
+    })
+}
+
+/// The card's light at a place, which is in parts of the picture and, from its middle, in units of
+/// the shorter side.
+fn card_at((x, y): (f64, f64), (dx, dy): (f64, f64)) -> LinearColour {
     const BARS: [LinearColour; 8] = [
         [0.75, 0.75, 0.75],
         [0.75, 0.75, 0.14],
@@ -75,14 +87,12 @@ fn card(x: f64, y: f64) -> LinearColour {
         [0.14, 0.14, 0.75],
         [0.14, 0.14, 0.14],
     ];
-    // Distance from the middle in units of the height, for a frame of 3 : 2.
-    let (dx, dy) = ((x - 0.5) * 1.5, y - 0.5);
     let radius = dx.hypot(dy);
     if radius < 0.44 && (radius - 0.43).abs() < 0.007 {
         return [0.9; 3];
     }
     if radius < 0.43 {
-        return inner_card(x, y, radius, dx.atan2(dy));
+        return inner_card((dx, dy), radius);
     }
     if y > 0.78 {
         return BARS[((x * 8.0) as usize).min(7)];
@@ -97,34 +107,35 @@ fn card(x: f64, y: f64) -> LinearColour {
         };
     }
     let line = |place: f64| (place - place.round()).abs() < 0.02;
-    if line(x * 24.0) || line(y * 16.0) {
+    if line(dx * 16.0) || line(dy * 16.0) {
         [0.5; 3]
     } else {
         [0.22, 0.24, 0.28]
     }
 }
 
-/// What lies in the card's circle.
-fn inner_card(x: f64, y: f64, radius: f64, angle: f64) -> LinearColour {
-    if y < 0.30 {
+/// What lies in the card's circle, from its middle.
+fn inner_card((dx, dy): (f64, f64), radius: f64) -> LinearColour {
+    if dy < -0.20 {
         return [0.85; 3];
     }
-    if y < 0.42 {
-        let share = ((x - 0.2) / 0.6).clamp(0.0, 1.0);
+    if dy < -0.08 {
+        let share = (dx / 0.9 + 0.5).clamp(0.0, 1.0);
         return [0.1 + 0.9 * share * share; 3];
     }
-    if y < 0.58 {
+    if dy < 0.08 {
         return [0.16; 3];
     }
-    if y < 0.76 {
-        let (column, row) = ((x * 36.0) as usize, (y * 24.0) as usize);
-        return if (column + row).is_multiple_of(2) {
+    let row = (dy - 0.08) * 24.0;
+    if row < 4.0 {
+        let fields = (dx * 24.0).floor() + row.floor();
+        return if fields.rem_euclid(2.0) < 0.5 {
             [0.75; 3]
         } else {
             [0.16; 3]
         };
     }
-    if radius < 0.43 && (angle * 24.0 / TAU).rem_euclid(1.0) < 0.5 {
+    if radius < 0.43 && (dx.atan2(dy) * 24.0 / TAU).rem_euclid(1.0) < 0.5 {
         [0.75, 0.2, 0.14]
     } else {
         [0.7, 0.58, 0.25]
@@ -198,6 +209,25 @@ mod tests {
     #[test]
     fn words_are_on_the_card() {
         let size = FrameSize::new(480, 320).unwrap();
-        assert_ne!(test_card(size).picture, paint(size, card));
+        assert_ne!(test_card(size).picture, card(size));
+    }
+
+    #[test]
+    fn the_circle_is_round_on_pictures_of_every_aspect() {
+        for (width, height) in [(480, 320), (640, 360), (360, 640), (300, 300)] {
+            let card = card(FrameSize::new(width, height).unwrap());
+            let Samples::Eight(samples) = card.samples() else {
+                panic!("8 bits");
+            };
+            let (width, height) = (usize::from(width), usize::from(height));
+            let radius = 0.435 * width.min(height) as f64;
+            for angle in [0.0_f64, 0.1, 0.25, 0.4, 0.5, 0.75, 0.9] {
+                let (sin, cos) = (angle * TAU).sin_cos();
+                let col = (width as f64 / 2.0 + radius * cos) as usize;
+                let row = (height as f64 / 2.0 + radius * sin) as usize;
+                let red = samples[3 * (row * width + col)];
+                assert!(red > 235, "{width} x {height}, {angle}: {red}");
+            }
+        }
     }
 }
