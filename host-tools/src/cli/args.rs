@@ -669,11 +669,16 @@ pub(super) struct Play {
     pub(super) mpv: Vec<OsString>,
 }
 
+#[allow(
+    clippy::doc_markdown,
+    reason = "help has no marks around names of programs"
+)]
 #[derive(Debug, Args)]
 pub(super) struct Export {
     /// Table to export
     pub(super) table: PathBuf,
-    /// What for: mpv (a user shader, also for ffmpeg's `libplacebo` filter), or maps (pictures for
+    /// What for: mpv (a user shader, also for ffmpeg's `libplacebo` filter), isf (a shader for
+    /// MadMapper, VDMX, ossia score and others), glsl (shaders for TouchDesigner), or maps (pictures for
     /// servers that know alpha and beta maps alone)
     #[arg(long = "as", value_name = "PLAYER")]
     pub(super) player: Player,
@@ -686,10 +691,18 @@ pub(super) struct Export {
 }
 
 /// Whom a table is exported for.
+#[allow(
+    clippy::doc_markdown,
+    reason = "help has no marks around names of programs"
+)]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
 pub(super) enum Player {
     /// A user shader for mpv and libplacebo
     Mpv,
+    /// An ISF shader and its pictures
+    Isf,
+    /// GLSL shaders and pictures for TouchDesigner
+    Glsl,
     /// Pictures for servers that know maps alone
     Maps,
 }

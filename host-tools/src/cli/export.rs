@@ -5,7 +5,7 @@ use super::failure::{Failure, Kind};
 use super::output::Output;
 use super::tables::{check, chosen_tier, read_table};
 use crate::capture::exr;
-use crate::compile::shader::user_shader;
+use crate::compile::shader::{glsl_files, isf_files, user_shader};
 use crate::video::{CompensateOptions, Compensator};
 use iltm_picture::{Picture, Response, Samples, WholeFolder, check_free, png};
 use iltm_runtime::FrameSize;
@@ -31,6 +31,17 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
                 out.join("iltm.glsl").display()
             );
             (vec![("iltm.glsl".to_owned(), shader)], next)
+        }
+        Player::Isf => {
+            let files = isf_files(&table, tier).ok_or_else(|| too_large(tier))?;
+            let next =
+                "load iltm.fs, with the pictures beside it, as an effect on the film".to_owned();
+            (files, next)
+        }
+        Player::Glsl => {
+            let files = glsl_files(&table, tier).ok_or_else(|| too_large(tier))?;
+            let next = "connect the shaders as README.md beside them says".to_owned();
+            (files, next)
         }
         Player::Maps => {
             let next = "load alpha.png as the alpha map and beta.png as the beta map".to_owned();
@@ -58,6 +69,11 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     );
     output.result(&data, &text);
     Ok(())
+}
+
+fn too_large(tier: u8) -> Failure {
+    let what = format!("tier {tier} has more entries than a texture holds");
+    Failure::new(Kind::Usage, what, "Choose a lower tier with --tier.")
 }
 
 /// Maps as large as the projector's picture, by which MPCDI (Video Electronics Standards

@@ -1,8 +1,10 @@
 //! `iltm export`: another program's shader makes of a frame what the runtime makes of it. ffmpeg's
-//! `libplacebo` filter runs the shader on Mesa's software Vulkan.
+//! `libplacebo` filter runs the shader on Mesa's software Vulkan, and those for other programs too, with
+//! the names that these give.
 
 use super::user::{User, contains};
 use image::{ImageBuffer, Rgb};
+use std::fmt::Write;
 
 /// A frame of 16 bits with what natural ones have: ramps, edges, fine stripes, darks, colours.
 fn frame(width: u32, height: u32) -> ImageBuffer<Rgb<u16>, Vec<u16>> {
@@ -74,6 +76,230 @@ fn a_shader_makes_what_the_runtime_makes_at_every_tier() {
             // A frame that nothing was done to would be found out.
             assert!(self::apart(&frame, &found) > 10.0);
         }
+    }
+}
+
+/// A pass of a shader that another program than mpv is to run. It reads an image `NAME` by
+/// `NAME_norm(place)`, the film among them, which is `film`; images begin at the bottom left.
+struct HostedPass {
+    /// Name and size of its result.
+    target: Option<(String, String, String)>,
+    code: String,
+}
+
+/// libplacebo as that program, with these pictures.
+fn hosted(user: &User, pictures: &[(String, String)], passes: &[HostedPass]) -> String {
+    let mut text = String::new();
+    let mut names = String::from(
+        "#define upright(p) vec2((p).x, 1.0 - (p).y)\n\
+         #define place_norm upright(HOOKED_pos)\n\
+         #define film_norm(p) HOOKED_tex(upright(p))\n\
+         #define film_size HOOKED_size\n",
+    );
+    let mut bound = Vec::new();
+    for (name, path) in pictures {
+        let picture = user.picture(path);
+        assert_eq!(picture.color(), image::ColorType::Rgb8, "{path}");
+        let picture = picture.to_rgba8();
+        let (width, height) = picture.dimensions();
+        write!(
+            text,
+            "//!TEXTURE {name}\n//!SIZE {width} {height}\n//!FORMAT rgba8\n//!FILTER LINEAR\n"
+        )
+        .unwrap();
+        for byte in picture.iter() {
+            write!(text, "{byte:02x}").unwrap();
+        }
+        text.push_str("\n\n");
+        writeln!(names, "#define {name}_norm(p) texture({name}, upright(p))").unwrap();
+        bound.push(name);
+    }
+    for pass in passes {
+        text += "//!HOOK MAIN\n//!BIND HOOKED\n";
+        for name in &bound {
+            writeln!(text, "//!BIND {name}").unwrap();
+        }
+        let mut own = names.clone();
+        for (target, ..) in passes.iter().filter_map(|pass| pass.target.as_ref()) {
+            // What later passes make is not there yet.
+            let read = if bound.contains(&target) {
+                format!("{target}_tex(upright(p))")
+            } else {
+                "vec4(0.0)".to_owned()
+            };
+            writeln!(own, "#define {target}_norm(p) {read}").unwrap();
+        }
+        if let Some((target, width, height)) = &pass.target {
+            write!(
+                text,
+                "//!SAVE {target}\n//!WIDTH {width}\n//!HEIGHT {height}\n//!COMPONENTS 4\n"
+            )
+            .unwrap();
+            bound.push(target);
+        }
+        let code = pass.code.replace("void main()", "void hosted()");
+        write!(
+            text,
+            "{own}vec4 shown;\n{code}\n\
+             vec4 hook() {{\n    hosted();\n    return shown;\n}}\n\n"
+        )
+        .unwrap();
+    }
+    text
+}
+
+/// An ISF shader as a host runs it by the format's reference: the JSON says what there is.
+fn isf(user: &User, folder: &str, compensate: bool) -> String {
+    let shader = std::fs::read_to_string(user.path(&format!("{folder}/iltm.fs"))).unwrap();
+    let (json, code) = shader.strip_prefix("/*").unwrap().split_once("*/").unwrap();
+    let json: serde_json::Value = serde_json::from_str(json).unwrap();
+    assert_eq!(json["ISFVSN"], "2");
+    assert_eq!(json["INPUTS"][0]["NAME"], "inputImage");
+    assert_eq!(json["INPUTS"][1]["DEFAULT"], true);
+    let said = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+    let pictures = json["IMPORTED"].as_object().unwrap().iter();
+    let pictures: Vec<_> = pictures
+        .map(|(name, picture)| (name.clone(), format!("{folder}/{}", said(&picture["PATH"]))))
+        .collect();
+    let targets: Vec<Option<(String, String, String)>> = json["PASSES"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|pass| {
+            pass.get("TARGET").map(|target| {
+                assert_eq!(pass["FLOAT"], true);
+                (said(target), said(&pass["WIDTH"]), said(&pass["HEIGHT"]))
+            })
+        })
+        .collect();
+    let mut code = code
+        .replace("IMG_SIZE(inputImage)", "film_size")
+        .replace("IMG_NORM_PIXEL(inputImage, ", "film_norm(")
+        .replace("isf_FragNormCoord", "place_norm")
+        .replace("gl_FragColor", "shown");
+    let names = targets.iter().flatten().map(|target| &target.0);
+    for name in names.chain(pictures.iter().map(|picture| &picture.0)) {
+        code = code.replace(
+            &format!("IMG_NORM_PIXEL({name}, "),
+            &format!("{name}_norm("),
+        );
+    }
+    assert!(!code.contains("IMG_"), "{code}");
+    let pass = |(index, target): (usize, &Option<_>)| HostedPass {
+        target: target.clone(),
+        code: format!("#define compensate {compensate}\n#define PASSINDEX {index}\n{code}"),
+    };
+    let passes: Vec<HostedPass> = targets.iter().enumerate().map(pass).collect();
+    hosted(user, &pictures, &passes)
+}
+
+/// Shaders for `TouchDesigner`, connected as their `README.md` says.
+fn touch_designer(user: &User, folder: &str) -> String {
+    let read =
+        |name: &str| std::fs::read_to_string(user.path(&format!("{folder}/{name}"))).unwrap();
+    let readme = read("README.md");
+    let rows: Vec<Vec<&str>> = readme
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .map(|line| line.split('|').map(str::trim).collect())
+        .collect();
+    let mut pictures: Vec<(String, String)> = Vec::new();
+    let mut passes = Vec::new();
+    for row in &rows {
+        let [_, file, size, images, _] = row[..] else {
+            panic!("{row:?}");
+        };
+        let file = file.trim_matches('`');
+        let mut code = read(file)
+            .replace("uTD2DInfos[0].res.zw", "film_size")
+            .replace("vUV.s", "place_norm.x")
+            .replace("vUV.t", "place_norm.y")
+            .replace("out vec4 fragColor;", "")
+            .replace("fragColor = TDOutputSwizzle(", "shown = (");
+        for (place, image) in images.split(", ").enumerate() {
+            // The name that the file gives to the image of this place.
+            let end = format!(" sTD2DInputs[{place}] // {image}");
+            let line = code
+                .lines()
+                .find(|line| line.ends_with(&end))
+                .unwrap()
+                .to_owned();
+            let name = line
+                .strip_prefix("#define ")
+                .unwrap()
+                .split(' ')
+                .next()
+                .unwrap();
+            code = code.replace(&line, "");
+            let by = if image == "the film" {
+                assert_eq!(place, 0);
+                "film".to_owned()
+            } else if let Some(by) = image.strip_suffix(".frag") {
+                format!("MADE_{}", by.split('-').next().unwrap())
+            } else {
+                let picture = (name.to_owned(), format!("{folder}/{image}"));
+                if !pictures.contains(&picture) {
+                    pictures.push(picture);
+                }
+                name.to_owned()
+            };
+            code = code.replace(&format!("texture({name}, "), &format!("{by}_norm("));
+        }
+        assert!(
+            !code.contains("sTD2DInputs") && !code.contains("texture("),
+            "{code}"
+        );
+        let target = size.strip_suffix(", 32-bit float (RGBA)").map(|size| {
+            let (width, height) = size.split_once(" x ").unwrap();
+            let name = format!("MADE_{}", file.split('-').next().unwrap());
+            (name, width.to_owned(), height.to_owned())
+        });
+        passes.push(HostedPass { target, code });
+    }
+    hosted(user, &pictures, &passes)
+}
+
+#[test]
+fn shaders_for_other_programs_make_what_the_runtime_makes_at_every_tier() {
+    for (sample, width, height) in [("m-panels", 336, 208), ("m-panels-colour", 384, 256)] {
+        let user = User::new();
+        let sample = format!("{}/samples/{sample}", env!("CARGO_MANIFEST_DIR"));
+        user.says(&format!("solve {sample} -o t.iltm"));
+        let frame = frame(width, height);
+        frame.save(user.path("in.png")).unwrap();
+        let shown_by = |shader: &str| {
+            std::fs::write(user.path("hosted.glsl"), shader).unwrap();
+            by_ffmpeg(&user, "hosted.glsl")
+        };
+        let tiers = user.json("inspect t.iltm --json")["tiers"]
+            .as_array()
+            .unwrap()
+            .len();
+        for tier in 0..tiers {
+            user.says(&format!(
+                "compensate t.iltm in.png --tier {tier} -o expected.png"
+            ));
+            let expected = user.picture("expected.png").to_rgb16();
+            let said = user.says(&format!(
+                "export t.iltm --as isf --tier {tier} -o isf{tier}"
+            ));
+            contains(&said, &["iltm.fs", "iltm-gains.png", "load iltm.fs"]);
+            let said = user.says(&format!(
+                "export t.iltm --as glsl --tier {tier} -o td{tier}"
+            ));
+            contains(&said, &["README.md", "iltm-gains.png", "-pixels.frag"]);
+            let isf = isf(&user, &format!("isf{tier}"), true);
+            for shader in [isf, touch_designer(&user, &format!("td{tier}"))] {
+                let found = shown_by(&shader);
+                let apart = apart(&expected, &found);
+                assert!(apart < 1.0, "{sample}, tier {tier}: {apart}");
+                assert!(self::apart(&frame, &found) > 10.0);
+            }
+        }
+        // Switched off, the film is as it was, but for the filter's half floats.
+        let found = shown_by(&isf(&user, "isf1", false));
+        let apart = apart(&frame, &found);
+        assert!(apart < 0.3, "{apart}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Shader: a table as a user shader for mpv and libplacebo, with its numbers as textures.
+//! Shader: a table as passes over a frame, with its numbers as textures, for players.
 //!
 //! The frame passes as in the runtime's pipeline: light of the pixels is averaged over the cells,
 //! Haar coefficients are taken, the operator makes coefficients of the correction, and those
@@ -6,57 +6,119 @@
 //! pixels, is `gain * light - correction` and the projector's response.
 //!
 //! Between passes numbers lie between 0 and 1 and have two texels each, since players keep 16 bits.
+//!
+//! The passes are the same for all players. How a player names the frame, reads a texel and is
+//! told of passes, `mpv.rs`, `isf.rs` and `glsl.rs` say.
+
+mod glsl;
+mod isf;
+mod mpv;
+mod pictures;
 
 use crate::haar_entries::haar_entries;
+pub use glsl::glsl_files;
 use iltm_runtime::FrameSize;
 use iltm_runtime::haar::Function;
 use iltm_runtime::image::Table;
 use iltm_runtime::operator::Segment;
 use iltm_runtime::response::{RESPONSE_KNOTS, knot_drive};
+pub use isf::isf_files;
+pub use mpv::user_shader;
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 /// Texels in a line of a list.
 const LINE: usize = 2048;
 
-/// Functions that all passes share.
+/// Functions that need no texture, which all passes have.
 const COMMON: &str = include_str!("common.glsl");
 
-/// The user shader of a tier of a table.
+/// What a pass may need. It needs those before it too that its text names.
+enum Piece {
+    /// Numbers of the table, `NAME_at(ivec2)`.
+    Texture(ShaderTexture),
+    /// What an earlier pass made of each cell, `NAME_at(ivec2)`, from texels `NAME_texel(ivec2)`.
+    Target(&'static str),
+    /// Functions.
+    Text(String),
+}
+
+/// Numbers of a table.
+struct ShaderTexture {
+    name: &'static str,
+    /// Width and height.
+    size: (usize, usize),
+    texels: Texels,
+}
+
+enum Texels {
+    /// 65,535 is 1.
+    Sixteen(Vec<[u16; 3]>),
+    Float(Vec<[f32; 4]>),
+}
+
+/// One pass over the cells, or the last one over the pixels.
+struct Pass {
+    about: &'static str,
+    /// What its result is called, which has two texels for each cell; the last one has none.
+    target: Option<&'static str>,
+    /// Function `PASS`.
+    body: String,
+}
+
+/// The passes of a tier of a table.
 ///
 /// Frames are sRGB, full screen on the projector that the table was made with.
-#[must_use]
-pub fn user_shader(table: &Table<'_>, tier: u8) -> String {
-    let mut shader = ShaderText::new(table);
-    shader.gains();
-    shader.ambient();
-    shader.response();
-    let operator = table.operator().filter(|_| tier > 0);
-    if let Some(operator) = operator {
-        let own = operator.segments().iter();
-        let own: Vec<_> = own.filter(|s| s.tier == tier).copied().collect();
-        shader.operator(&own);
-    }
-    shader.pixels(operator.is_some());
-    shader.text
-}
-
-struct ShaderText<'t, 'a> {
+struct Shader<'t, 'a> {
     table: &'t Table<'a>,
-    /// What every pass begins with.
-    constants: String,
-    text: String,
-    textures: Vec<&'static str>,
+    pieces: Vec<Piece>,
+    passes: Vec<Pass>,
 }
 
-impl<'t, 'a> ShaderText<'t, 'a> {
-    fn new(table: &'t Table<'a>) -> Self {
-        let grid = table.grid();
-        let (projector, border) = table.projector().map_or_else(
+impl Piece {
+    /// Whether `text` needs it.
+    fn is_needed(&self, text: &str) -> bool {
+        let functions = match self {
+            Self::Texture(ShaderTexture { name, .. }) | Self::Target(name) => {
+                return text.contains(&format!("{name}_at("));
+            }
+            Self::Text(functions) => functions,
+        };
+        let names = functions
+            .lines()
+            .filter(|line| !line.starts_with([' ', '}', '#']));
+        let mut names = names.filter_map(|line| line.split(['(', ' ']).nth(1));
+        names.any(|name| text.contains(&format!("{name}(")))
+    }
+}
+
+impl<'t, 'a> Shader<'t, 'a> {
+    fn new(table: &'t Table<'a>, tier: u8) -> Self {
+        let mut shader = Self {
+            table,
+            pieces: Vec::new(),
+            passes: Vec::new(),
+        };
+        shader.gains();
+        shader.ambient();
+        shader.response();
+        let operator = table.operator().filter(|_| tier > 0);
+        if let Some(operator) = operator {
+            let own = operator.segments().iter();
+            let own: Vec<_> = own.filter(|s| s.tier == tier).copied().collect();
+            shader.operator(&own);
+        }
+        shader.pixels(operator.is_some());
+        shader
+    }
+
+    /// What every pass begins with.
+    fn constants(&self) -> String {
+        let grid = self.table.grid();
+        let (projector, border) = self.table.projector().map_or_else(
             || (FrameSize::of_grid(grid), 0),
             |projector| (projector.size(), projector.border()),
         );
-        let constants = format!(
+        format!(
             "const ivec2 CELLS = ivec2({}, {});\n\
              const vec2 PROJECTOR = vec2({}, {});\n\
              const float BORDER = float({border});\n\
@@ -65,13 +127,29 @@ impl<'t, 'a> ShaderText<'t, 'a> {
             grid.rows(),
             projector.width(),
             projector.height(),
-        );
-        Self {
-            table,
-            constants,
-            text: String::new(),
-            textures: Vec::new(),
+        )
+    }
+
+    /// What a pass needs, in its order.
+    fn needed(&self, body: &str) -> Vec<&Piece> {
+        let mut text = body.to_owned();
+        let mut needed = Vec::new();
+        for piece in self.pieces.iter().rev() {
+            if piece.is_needed(&text) {
+                if let Piece::Text(functions) = piece {
+                    text.push_str(functions);
+                }
+                needed.push(piece);
+            }
         }
+        needed.reverse();
+        needed
+    }
+
+    /// Texels of a target, two for each cell.
+    const fn target_size(&self) -> (usize, usize) {
+        let grid = self.table.grid();
+        (2 * grid.cols(), grid.rows())
     }
 
     /// Value of each channel of a texel; a grey table does the same to all.
@@ -80,65 +158,25 @@ impl<'t, 'a> ShaderText<'t, 'a> {
         [0, 1, 2].map(|channel| of(channel.min(channels - 1)))
     }
 
-    fn texture(&mut self, name: &'static str, size: (usize, usize), format: &str, bytes: &[u8]) {
-        let (width, height) = size;
-        let _ = write!(
-            self.text,
-            "//!TEXTURE {name}\n//!SIZE {width} {height}\n//!FORMAT {format}\n\
-             //!FILTER NEAREST\n//!BORDER CLAMP\n"
-        );
-        for byte in bytes {
-            let _ = write!(self.text, "{byte:02x}");
-        }
-        self.text.push_str("\n\n");
-        self.textures.push(name);
+    fn texture(&mut self, name: &'static str, size: (usize, usize), texels: Texels) {
+        let texture = ShaderTexture { name, size, texels };
+        self.pieces.push(Piece::Texture(texture));
     }
 
     /// A list of texels in lines of [`LINE`].
-    fn list(&mut self, name: &'static str, texels: &[[f32; 4]]) {
+    fn list(&mut self, name: &'static str, mut texels: Vec<[f32; 4]>) {
         let lines = texels.len().div_ceil(LINE).max(1);
-        let mut bytes: Vec<u8> = texels
-            .iter()
-            .flatten()
-            .flat_map(|value| value.to_le_bytes())
-            .collect();
-        bytes.resize(lines * LINE * 16, 0);
-        self.texture(name, (LINE, lines), "rgba32f", &bytes);
+        texels.resize(lines * LINE, [0.0; 4]);
+        self.texture(name, (LINE, lines), Texels::Float(texels));
     }
 
-    fn sixteen(&mut self, name: &'static str, size: (usize, usize), texels: &[[u16; 3]]) {
-        let bytes: Vec<u8> = texels
-            .iter()
-            .flat_map(|[red, green, blue]| [*red, *green, *blue, u16::MAX])
-            .flat_map(u16::to_le_bytes)
-            .collect();
-        self.texture(name, size, "rgba16", &bytes);
-    }
-
-    fn pass(
-        &mut self,
-        name: &str,
-        inputs: &[&str],
-        saved: Option<(&str, (usize, usize))>,
-        body: &str,
-    ) {
-        self.text.push_str("//!HOOK MAIN\n//!BIND HOOKED\n");
-        for input in self.textures.iter().chain(inputs) {
-            if body.contains(input) || self.constants.contains(input) {
-                let _ = writeln!(self.text, "//!BIND {input}");
-            }
-        }
-        if let Some((save, (width, height))) = saved {
-            let _ = write!(
-                self.text,
-                "//!SAVE {save}\n//!WIDTH {width}\n//!HEIGHT {height}\n//!COMPONENTS 4\n"
-            );
-        }
-        let _ = write!(
-            self.text,
-            "//!DESC iltm: {name}\n{}{body}\n\n",
-            self.constants
-        );
+    /// Values between the texels of a texture or of a target.
+    fn between(&mut self, name: &str, (width, height): (usize, usize)) {
+        let text = include_str!("between.glsl")
+            .replace("NAME", name)
+            .replace("WIDTH", &width.to_string())
+            .replace("HEIGHT", &height.to_string());
+        self.pieces.push(Piece::Text(text));
     }
 
     /// Gains of the cells and, for frames that have as many pixels, the finer ones.
@@ -146,20 +184,25 @@ impl<'t, 'a> ShaderText<'t, 'a> {
         let table = self.table;
         let size = FrameSize::of_grid(table.grid());
         let cells = self.rows(size, |row, channel| table.gain_row(row, channel).collect());
-        self.sixteen("ILTM_GAINS", (size.width(), size.height()), &cells);
+        let size = (size.width(), size.height());
+        self.texture("ILTM_GAINS", size, Texels::Sixteen(cells));
+        self.between("ILTM_GAINS", size);
         let unit = 65_535.0 * (-f64::from(table.gain_fraction())).exp2();
-        let mut gain = format!("{unit:.9} * between(ILTM_GAINS, CELLS, part)");
+        let mut finer = String::new();
         if let Some(fine) = table.fine_gain() {
             let size = fine.size();
-            let (width, height) = (size.width(), size.height());
             let texels = self.rows(size, |row, channel| fine.row(row, channel).collect());
-            self.sixteen("ILTM_FINE_GAINS", (width, height), &texels);
-            gain = format!(
-                "all(greaterThanEqual(area_of(HOOKED_size).zw, vec2({width}, {height}))) \\\n    \
-                 ? {unit:.9} * between(ILTM_FINE_GAINS, ivec2({width}, {height}), part) : {gain}"
+            let (width, height) = (size.width(), size.height());
+            self.texture("ILTM_FINE_GAINS", (width, height), Texels::Sixteen(texels));
+            self.between("ILTM_FINE_GAINS", (width, height));
+            finer = format!(
+                "    if (all(greaterThanEqual(area_of(FRAME).zw, vec2({width}, {height})))) {{\n\
+                 \x20       return {unit:.9} * ILTM_FINE_GAINS_between(part);\n    }}\n"
             );
         }
-        let _ = writeln!(self.constants, "#define GAIN(part) ({gain})");
+        self.pieces.push(Piece::Text(format!(
+            "vec3 gain_of(vec2 part) {{\n{finer}    return {unit:.9} * ILTM_GAINS_between(part);\n}}\n"
+        )));
     }
 
     /// Texels of a picture of three channels; a grey table does the same to all.
@@ -175,52 +218,44 @@ impl<'t, 'a> ShaderText<'t, 'a> {
     /// Ambient light times gain, by cell.
     fn ambient(&mut self) {
         let (grid, table) = (self.table.grid(), self.table);
-        if table.ambient_row(0, 0).is_none() {
-            self.constants
-                .push_str("#define ABOVE_AMBIENT(light, part) (light)\n");
-            return;
+        let mut above = "light".to_owned();
+        if table.ambient_row(0, 0).is_some() {
+            let unit = (-f64::from(table.gain_fraction())).exp2();
+            let mut texels = Vec::new();
+            for row in 0..grid.rows() {
+                let lines: Vec<Vec<f32>> = (0..usize::from(table.channels()))
+                    .map(|channel| {
+                        let ambient = table.ambient_row(row, channel).into_iter().flatten();
+                        let cells = table.gain_row(row, channel).zip(ambient);
+                        let driven = cells.map(|(gain, ambient)| {
+                            let light = ambient.to_num::<f64>();
+                            let gain = f64::from(gain) * unit;
+                            (if gain > 0.0 { gain * light } else { light }) as f32
+                        });
+                        driven.collect()
+                    })
+                    .collect();
+                texels.extend((0..grid.cols()).map(|col| {
+                    let [red, green, blue] = self.colours(|channel| lines[channel][col]);
+                    [red, green, blue, 1.0]
+                }));
+            }
+            let size = (grid.cols(), grid.rows());
+            self.texture("ILTM_AMBIENT", size, Texels::Float(texels));
+            self.between("ILTM_AMBIENT", size);
+            "max(light - ILTM_AMBIENT_between(part) / max(gain_of(part), vec3(1e-6)), vec3(0.0))"
+                .clone_into(&mut above);
         }
-        let unit = (-f64::from(table.gain_fraction())).exp2();
-        let mut texels = Vec::new();
-        for row in 0..grid.rows() {
-            let lines: Vec<Vec<f32>> = (0..usize::from(table.channels()))
-                .map(|channel| {
-                    let ambient = table.ambient_row(row, channel).into_iter().flatten();
-                    let cells = table.gain_row(row, channel).zip(ambient);
-                    let driven = cells.map(|(gain, ambient)| {
-                        let light = ambient.to_num::<f64>();
-                        let gain = f64::from(gain) * unit;
-                        (if gain > 0.0 { gain * light } else { light }) as f32
-                    });
-                    driven.collect()
-                })
-                .collect();
-            texels.extend((0..grid.cols()).map(|col| {
-                let [red, green, blue] = self.colours(|channel| lines[channel][col]);
-                [red, green, blue, 1.0]
-            }));
-        }
-        let bytes: Vec<u8> = texels
-            .iter()
-            .flatten()
-            .flat_map(|v: &f32| v.to_le_bytes())
-            .collect();
-        self.texture(
-            "ILTM_AMBIENT",
-            (grid.cols(), grid.rows()),
-            "rgba32f",
-            &bytes,
-        );
-        self.constants.push_str(
-            "#define ABOVE_AMBIENT(light, part) max((light) - between(ILTM_AMBIENT, CELLS, part) \
-             / max(GAIN(part), vec3(1e-6)), vec3(0.0))\n",
-        );
+        self.pieces.push(Piece::Text(format!(
+            "vec3 above_ambient(vec3 light, vec2 part) {{\n    return {above};\n}}\n"
+        )));
     }
 
     /// Codes by drive, at the runtime's knots.
     fn response(&mut self) {
         if !self.table.has_response() {
-            self.constants.push_str("#define CODE(drive) (drive)\n");
+            let same = "vec3 code_of(vec3 drive) {\n    return drive;\n}\n";
+            self.pieces.push(Piece::Text(same.to_owned()));
             return;
         }
         let channels = usize::from(self.table.channels());
@@ -230,29 +265,17 @@ impl<'t, 'a> ShaderText<'t, 'a> {
             .collect();
         let lines = texels.len().div_ceil(LINE);
         texels.resize(lines * LINE, [u16::MAX; 3]);
-        self.sixteen("ILTM_CODES", (LINE, lines), &texels);
+        self.texture("ILTM_CODES", (LINE, lines), Texels::Sixteen(texels));
         let dense =
             (1..RESPONSE_KNOTS).take_while(|knot| knot_drive(*knot).to_bits() == *knot as u16);
-        let dense = dense.count() as u32;
-        let _ = write!(
-            self.constants,
-            "float code_of(float drive, int channel) {{\n\
-             \x20   float bits = drive * 32768.0;\n\
-             \x20   float at = bits < {dense}.0 ? bits : {dense}.0 + (bits - {dense}.0) / 16.0;\n\
-             \x20   int knot = min(int(floor(at)), {last});\n\
-             \x20   int next = min(knot + 1, {last});\n\
-             \x20   float below = texelFetch(ILTM_CODES, ivec2(knot % LINE, knot / LINE), 0)[channel];\n\
-             \x20   float above = texelFetch(ILTM_CODES, ivec2(next % LINE, next / LINE), 0)[channel];\n\
-             \x20   return mix(below, above, clamp(at - float(knot), 0.0, 1.0));\n\
-             }}\n\
-             #define CODE(drive) vec3(code_of(drive.r, 0), code_of(drive.g, 1), code_of(drive.b, 2))\n",
-            last = RESPONSE_KNOTS - 1
-        );
+        let text = include_str!("code.glsl")
+            .replace("DENSE", &format!("{}.0", dense.count()))
+            .replace("LAST", &format!("{}.0", RESPONSE_KNOTS - 1));
+        self.pieces.push(Piece::Text(text));
     }
 
     fn operator(&mut self, segments: &[Segment<'_>]) {
         let grid = self.table.grid();
-        let cells = (2 * grid.cols(), grid.rows());
         let functions: Vec<Function> = self.table.basis().functions().collect();
         let shapes: Vec<StepFunction> = functions.iter().map(StepFunction::new).collect();
         let mut rows: Vec<BTreeMap<usize, [f64; 3]>> = vec![BTreeMap::new(); functions.len()];
@@ -284,15 +307,14 @@ impl<'t, 'a> ShaderText<'t, 'a> {
             }
             starts.push([start as f32, list.len() as f32, 0.0, 0.0]);
         }
+        let places = shapes.iter().flat_map(StepFunction::places).collect();
+        self.list("ILTM_FUNCTIONS", places);
         self.list(
-            "ILTM_FUNCTIONS",
-            &shapes
-                .iter()
-                .flat_map(StepFunction::texels)
-                .collect::<Vec<_>>(),
+            "ILTM_STEPS",
+            shapes.iter().map(StepFunction::values).collect(),
         );
-        self.list("ILTM_ROWS", &starts);
-        self.list("ILTM_ENTRIES", &list);
+        self.list("ILTM_ROWS", starts);
+        self.list("ILTM_ENTRIES", list);
         // What covers each cell.
         let mut covering: Vec<Vec<[f32; 4]>> = vec![Vec::new(); grid.cells()];
         for (index, function) in functions.iter().enumerate() {
@@ -310,42 +332,43 @@ impl<'t, 'a> ShaderText<'t, 'a> {
         for list in &mut covering {
             list.resize(most, [0.0; 4]);
         }
-        self.list("ILTM_COVERING", &covering.concat());
-        self.pass(
-            "light of the cells",
-            &[],
-            Some(("ILTM_CELLS", cells)),
-            include_str!("cells.glsl"),
-        );
-        self.pass(
-            "Haar coefficients",
-            &["ILTM_CELLS"],
-            Some(("ILTM_INPUTS", cells)),
-            include_str!("analysis.glsl"),
-        );
-        self.pass(
-            "operator",
-            &["ILTM_INPUTS"],
-            Some(("ILTM_OUTPUTS", cells)),
-            include_str!("operator.glsl"),
-        );
-        let body = include_str!("synthesis.glsl").replace("MOST", &most.to_string());
-        self.pass(
-            "corrections",
-            &["ILTM_OUTPUTS"],
-            Some(("ILTM_CORRECTIONS", cells)),
-            &body,
-        );
+        self.list("ILTM_COVERING", covering.concat());
+        let synthesis = include_str!("synthesis.glsl").replace("MOST", &most.to_string());
+        for (about, target, body) in [
+            (
+                "light of the cells",
+                "ILTM_CELLS",
+                include_str!("cells.glsl"),
+            ),
+            (
+                "Haar coefficients",
+                "ILTM_INPUTS",
+                include_str!("analysis.glsl"),
+            ),
+            ("operator", "ILTM_OUTPUTS", include_str!("operator.glsl")),
+            ("corrections", "ILTM_CORRECTIONS", &*synthesis),
+        ] {
+            self.pieces.push(Piece::Target(target));
+            self.passes.push(Pass {
+                about,
+                target: Some(target),
+                body: body.to_owned(),
+            });
+        }
+        self.between("ILTM_CORRECTIONS", (grid.cols(), grid.rows()));
     }
 
     fn pixels(&mut self, operates: bool) {
         let correction = if operates {
-            "(2.0 * kept_between(ILTM_CORRECTIONS_raw, part) - 1.0)"
+            "(2.0 * ILTM_CORRECTIONS_between(part) - 1.0)"
         } else {
             "vec3(0.0)"
         };
-        let body = include_str!("pixels.glsl").replace("CORRECTION", correction);
-        self.pass("pixels", &["ILTM_CORRECTIONS"], None, &body);
+        self.passes.push(Pass {
+            about: "pixels",
+            target: None,
+            body: include_str!("pixels.glsl").replace("CORRECTION", correction),
+        });
     }
 }
 
@@ -379,21 +402,17 @@ impl StepFunction {
         }
     }
 
-    fn texels(&self) -> [[f32; 4]; 3] {
-        [
-            [
-                self.start.0 as f32,
-                self.start.1 as f32,
-                self.extent.0 as f32,
-                self.extent.1 as f32,
-            ],
-            [
-                self.first.0 as f32,
-                self.first.1 as f32,
-                self.second.0 as f32,
-                self.second.1 as f32,
-            ],
-            [self.value as f32, 0.0, 0.0, 0.0],
-        ]
+    /// Whole numbers, which pictures of 8 bits keep as they are where there are no others beside
+    /// them: where it is, and where its second halves begin.
+    fn places(&self) -> [[f32; 4]; 2] {
+        let [top, left, high, wide] =
+            [self.start.0, self.start.1, self.extent.0, self.extent.1].map(|n| n as f32);
+        let (row, col) = (self.first.0 as f32, self.first.1 as f32);
+        [[top, left, high, wide], [row, col, 0.0, 0.0]]
+    }
+
+    fn values(&self) -> [f32; 4] {
+        let (row, col) = self.second;
+        [row as f32, col as f32, self.value as f32, 0.0]
     }
 }

@@ -1,13 +1,13 @@
-vec4 hook() {
-    ivec2 texel = kept_at(HOOKED_pos);
-    int row = texel.y * CELLS.x + texel.x;
-    vec4 ends = texelFetch(ILTM_ROWS, ivec2(row % LINE, row / LINE), 0);
+vec4 PASS() {
+    ivec2 texel = kept_at(PLACE);
+    vec4 ends = ILTM_ROWS_at(in_list(texel.y * CELLS.x + texel.x));
     vec3 sum = vec3(0.0);
     for (int at = int(ends.x); at < int(ends.y); at++) {
-        vec4 entry = texelFetch(ILTM_ENTRIES, ivec2(at % LINE, at / LINE), 0);
+        vec4 entry = ILTM_ENTRIES_at(in_list(at));
         int col = int(entry.x);
-        vec3 light = kept(ILTM_INPUTS_raw, ivec2(col % CELLS.x, col / CELLS.x));
+        int row = col / CELLS.x;
+        vec3 light = ILTM_INPUTS_at(ivec2(col - row * CELLS.x, row)).rgb;
         sum += entry.yzw * (2.0 * light - 1.0);
     }
-    return keep(0.5 + 0.5 * sum, HOOKED_pos);
+    return keep(0.5 + 0.5 * sum, PLACE);
 }
