@@ -48,37 +48,6 @@ fn apart(a: &ImageBuffer<Rgb<u16>, Vec<u16>>, b: &ImageBuffer<Rgb<u16>, Vec<u16>
     f64::from(apart.max().unwrap_or(0)) / 257.0
 }
 
-#[test]
-fn a_shader_makes_what_the_runtime_makes_at_every_tier() {
-    for (sample, width, height) in [("m-panels", 336, 208), ("m-panels-colour", 384, 256)] {
-        let user = User::new();
-        let sample = format!("{}/samples/{sample}", env!("CARGO_MANIFEST_DIR"));
-        user.says(&format!("solve {sample} -o t.iltm"));
-        let frame = frame(width, height);
-        frame.save(user.path("in.png")).unwrap();
-        let tiers = user.json("inspect t.iltm --json")["tiers"]
-            .as_array()
-            .unwrap()
-            .len();
-        assert!(tiers > 3);
-        for tier in 0..tiers {
-            user.says(&format!(
-                "compensate t.iltm in.png --tier {tier} -o expected.png"
-            ));
-            let said = user.says(&format!(
-                "export t.iltm --as mpv --tier {tier} -o shader{tier}"
-            ));
-            contains(&said, &["--glsl-shader=", "iltm.glsl"]);
-            let expected = user.picture("expected.png").to_rgb16();
-            let found = by_ffmpeg(&user, &format!("shader{tier}/iltm.glsl"));
-            let apart = apart(&expected, &found);
-            assert!(apart < 1.0, "{sample}, tier {tier}: {apart}");
-            // A frame that nothing was done to would be found out.
-            assert!(self::apart(&frame, &found) > 10.0);
-        }
-    }
-}
-
 /// A pass of a shader that another program than mpv is to run. It reads an image `NAME` by
 /// `NAME_norm(place)`, the film among them, which is `film`; images begin at the bottom left.
 struct HostedPass {
@@ -260,45 +229,51 @@ fn touch_designer(user: &User, folder: &str) -> String {
 }
 
 #[test]
-fn shaders_for_other_programs_make_what_the_runtime_makes_at_every_tier() {
+fn shaders_make_what_the_runtime_makes_at_every_tier() {
     for (sample, width, height) in [("m-panels", 336, 208), ("m-panels-colour", 384, 256)] {
         let user = User::new();
         let sample = format!("{}/samples/{sample}", env!("CARGO_MANIFEST_DIR"));
         user.says(&format!("solve {sample} -o t.iltm"));
         let frame = frame(width, height);
         frame.save(user.path("in.png")).unwrap();
-        let shown_by = |shader: &str| {
-            std::fs::write(user.path("hosted.glsl"), shader).unwrap();
-            by_ffmpeg(&user, "hosted.glsl")
+        let shown_by = |shader: String| {
+            user.write("shader.glsl", shader);
+            by_ffmpeg(&user, "shader.glsl")
         };
         let tiers = user.json("inspect t.iltm --json")["tiers"]
             .as_array()
             .unwrap()
             .len();
+        assert!(tiers > 3);
         for tier in 0..tiers {
             user.says(&format!(
                 "compensate t.iltm in.png --tier {tier} -o expected.png"
             ));
             let expected = user.picture("expected.png").to_rgb16();
-            let said = user.says(&format!(
-                "export t.iltm --as isf --tier {tier} -o isf{tier}"
-            ));
-            contains(&said, &["iltm.fs", "iltm-gains.png", "load iltm.fs"]);
-            let said = user.says(&format!(
-                "export t.iltm --as glsl --tier {tier} -o td{tier}"
-            ));
-            contains(&said, &["README.md", "iltm-gains.png", "-pixels.frag"]);
-            let isf = isf(&user, &format!("isf{tier}"), true);
-            for shader in [isf, touch_designer(&user, &format!("td{tier}"))] {
-                let found = shown_by(&shader);
+            let exported = |player: &str, said: &[&str]| {
+                let folder = format!("{player}{tier}");
+                let line = format!("export t.iltm --as {player} --tier {tier} -o {folder}");
+                contains(&user.says(&line), said);
+                folder
+            };
+            let mpv = exported("mpv", &["--glsl-shader=", "iltm.glsl"]);
+            let isf_folder = exported("isf", &["iltm.fs", "iltm-gains.png", "load iltm.fs"]);
+            let glsl = exported("glsl", &["README.md", "iltm-gains.png", "-pixels.frag"]);
+            let shaders = [
+                String::from_utf8(user.read(&format!("{mpv}/iltm.glsl"))).unwrap(),
+                isf(&user, &isf_folder, true),
+                touch_designer(&user, &glsl),
+            ];
+            for (shader, player) in shaders.into_iter().zip(["mpv", "isf", "glsl"]) {
+                let found = shown_by(shader);
                 let apart = apart(&expected, &found);
-                assert!(apart < 1.0, "{sample}, tier {tier}: {apart}");
+                assert!(apart < 1.0, "{sample}, tier {tier}, {player}: {apart}");
+                // A frame that nothing was done to would be found out.
                 assert!(self::apart(&frame, &found) > 10.0);
             }
         }
         // Switched off, the film is as it was, but for the filter's half floats.
-        let found = shown_by(&isf(&user, "isf1", false));
-        let apart = apart(&frame, &found);
+        let apart = apart(&frame, &shown_by(isf(&user, "isf1", false)));
         assert!(apart < 0.3, "{apart}");
     }
 }

@@ -14,8 +14,8 @@ const INSTRUCTIONS: &str = include_str!("../../../docs/instructions.csv");
 const COSTS: &str = include_str!("../../../docs/costs.csv");
 const STAGES: &str = include_str!("../../../docs/stages.csv");
 
-/// Instructions of a sample clipped at black, as most are. How many there are depends on the picture, so that the model does
-/// not count them.
+/// Instructions of a sample clipped at black, as most are. How many there are depends on the
+/// picture, so that the model does not count them.
 const CLIPPED_SAMPLE: f64 = 2.0;
 
 /// Largest deviation of a frame.

@@ -9,8 +9,8 @@
 //! | operator | rows and pairs of entries of the tier's segments |
 //! | last | nodes of the levels, pixels of each channel |
 //!
-//! Rows and pairs have the numbers of instructions of the kernel's loops, read off
-//! `runtime/src/kernel/arm/gather.rs`. All other numbers were fitted by least squares
+//! Rows, pairs, sums to clear, and what turns of a loop save have the numbers of instructions of
+//! the kernel's loops, read off `runtime/src/kernel/arm`. All other numbers were fitted by least squares
 //! to the 33 kinds of frames of `docs/costs.csv` (`cargo run --release -p iltm-tests
 //! --bin counts -- costs`) and to `docs/instructions.csv`: no frame there is off by more than
 //! 2 %. Those of `docs/stages.csv`, to which nothing was fitted, are off by up to

@@ -188,7 +188,7 @@ global_asm!(
     .endif
         cmp r0, r3
         str r12, [r2, r4, lsl #2]
-        bne 1b
+        blo 1b
         add sp, #4
         pop {{r4-r12, pc}}
     .size \name, . - \name
@@ -368,7 +368,7 @@ global_asm!(
         str r5, [r7, r11]
         str r6, [r7, r11, lsl #1]
         cmp r0, r8
-        bne 1b
+        blo 1b
         add sp, #28
         pop {{r4-r11, pc}}
     .size \name, . - \name

@@ -307,7 +307,8 @@ global_asm!(
 
 // r0 top, r1 bottom, r2 light, r3 sums, r4 details, r5 nodes left in the row (in colour
 // two a turn, an odd one alone), r6-r9 the four values of a node, r10 and r11 ambient
-// light of top and bottom, r12 and lr what comes of them. On the stack: nodes of a row, rows left, stride.
+// light of top and bottom, r12 and lr what comes of them. On the stack: nodes of a row,
+// rows left, stride.
 global_asm!(
     r#"
     .syntax unified

@@ -152,12 +152,6 @@ impl<'t, 'a> Shader<'t, 'a> {
         (2 * grid.cols(), grid.rows())
     }
 
-    /// Value of each channel of a texel; a grey table does the same to all.
-    fn colours(&self, of: impl Fn(usize) -> f32) -> [f32; 3] {
-        let channels = usize::from(self.table.channels());
-        [0, 1, 2].map(|channel| of(channel.min(channels - 1)))
-    }
-
     fn texture(&mut self, name: &'static str, size: (usize, usize), texels: Texels) {
         let texture = ShaderTexture { name, size, texels };
         self.pieces.push(Piece::Texture(texture));
@@ -206,10 +200,10 @@ impl<'t, 'a> Shader<'t, 'a> {
     }
 
     /// Texels of a picture of three channels; a grey table does the same to all.
-    fn rows(&self, size: FrameSize, line: impl Fn(usize, usize) -> Vec<u16>) -> Vec<[u16; 3]> {
+    fn rows<T: Copy>(&self, size: FrameSize, line: impl Fn(usize, usize) -> Vec<T>) -> Vec<[T; 3]> {
         let channels = usize::from(self.table.channels());
         let of_row = |row: usize| {
-            let lines: Vec<Vec<u16>> = (0..channels).map(|channel| line(row, channel)).collect();
+            let lines: Vec<Vec<T>> = (0..channels).map(|channel| line(row, channel)).collect();
             (0..size.width()).map(move |x| [0, 1, 2].map(|c: usize| lines[c.min(channels - 1)][x]))
         };
         (0..size.height()).flat_map(of_row).collect()
@@ -221,27 +215,21 @@ impl<'t, 'a> Shader<'t, 'a> {
         let mut above = "light".to_owned();
         if table.ambient_row(0, 0).is_some() {
             let unit = (-f64::from(table.gain_fraction())).exp2();
-            let mut texels = Vec::new();
-            for row in 0..grid.rows() {
-                let lines: Vec<Vec<f32>> = (0..usize::from(table.channels()))
-                    .map(|channel| {
-                        let ambient = table.ambient_row(row, channel).into_iter().flatten();
-                        let cells = table.gain_row(row, channel).zip(ambient);
-                        let driven = cells.map(|(gain, ambient)| {
-                            let light = ambient.to_num::<f64>();
-                            let gain = f64::from(gain) * unit;
-                            (if gain > 0.0 { gain * light } else { light }) as f32
-                        });
-                        driven.collect()
-                    })
-                    .collect();
-                texels.extend((0..grid.cols()).map(|col| {
-                    let [red, green, blue] = self.colours(|channel| lines[channel][col]);
-                    [red, green, blue, 1.0]
-                }));
-            }
+            let texels = self.rows(FrameSize::of_grid(grid), |row, channel| {
+                let ambient = table.ambient_row(row, channel).into_iter().flatten();
+                let cells = table.gain_row(row, channel).zip(ambient);
+                let driven = cells.map(|(gain, ambient)| {
+                    let light = ambient.to_num::<f64>();
+                    let gain = f64::from(gain) * unit;
+                    (if gain > 0.0 { gain * light } else { light }) as f32
+                });
+                driven.collect()
+            });
+            let texels = texels
+                .into_iter()
+                .map(|[red, green, blue]| [red, green, blue, 1.0]);
             let size = (grid.cols(), grid.rows());
-            self.texture("ILTM_AMBIENT", size, Texels::Float(texels));
+            self.texture("ILTM_AMBIENT", size, Texels::Float(texels.collect()));
             self.between("ILTM_AMBIENT", size);
             "max(light - ILTM_AMBIENT_between(part) / max(gain_of(part), vec3(1e-6)), vec3(0.0))"
                 .clone_into(&mut above);

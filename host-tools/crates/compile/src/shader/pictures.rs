@@ -143,3 +143,21 @@ impl<'x> Encoded<'x> {
         Some((picture, functions))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_larger_than_graphics_processors_take_is_refused() {
+        for (lines, fits) in [(MAX_SIDE, true), (MAX_SIDE + 1, false)] {
+            let texels = (0..lines).map(|line| [line as f32, 0.0, 0.0, 0.0]);
+            let texture = ShaderTexture {
+                name: "LIST",
+                size: (1, lines),
+                texels: Texels::Float(texels.collect()),
+            };
+            assert_eq!(readable(&Piece::Texture(texture), (2, 1)).is_some(), fits);
+        }
+    }
+}
