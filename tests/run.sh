@@ -91,10 +91,9 @@ cargo fmt --manifest-path "$firmware/Cargo.toml" --check
 cargo fmt --manifest-path tests/mutations/Cargo.toml --check
 
 say "clippy"
-cargo clippy --workspace --all-targets --locked -- -D warnings
-if has_mpi; then
-    cargo clippy --workspace --all-targets --locked --features iltm/mpi -- -D warnings
-fi
+mpi=(--features iltm/mpi)
+has_mpi || mpi=()
+cargo clippy --workspace --all-targets --locked "${mpi[@]}" -- -D warnings
 # The firmware's own checks need a Rust with a core library for its target; where
 # there is none, core is built with the firmware, and only the firmware.
 has_target=
@@ -117,16 +116,20 @@ say "tests"
 # Property tests try the same cases on every run, so that one passes or fails by what
 # was changed; another seed, or none, explores.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED-1}
-log=$(mktemp)
-trap 'rm -f "$log"' EXIT
+logs=$(mktemp -d)
+trap 'rm -rf "$logs"' EXIT
 status=0
 # One build for all tests. The page of the quick start builds the tool without MPI, and its test
 # runs that.
-features=(--features iltm/mpi)
-has_mpi || features=()
-cargo test --workspace --locked --no-fail-fast "${features[@]}" 2>&1 | tee "$log" || status=$?
+tests=(cargo test --workspace --locked --no-fail-fast "${mpi[@]}")
+"${tests[@]}" --no-run
+# The printed commands wait for devices and players most of the time: beside the other tests.
+"${tests[@]}" --test printed_commands -- followed:: >"$logs/pages" 2>&1 &
+"${tests[@]}" -- --skip followed:: 2>&1 | tee "$logs/tests" || status=$?
+wait $! || status=$?
+cat "$logs/pages"
 has_mpi || say "no MPI here: what is tested with it is left out"
 
-count() { sed -n "s/^test result:.* \([0-9]\+\) $1;.*/\1/p" "$log" | awk '{ sum += $1 } END { print sum + 0 }'; }
+count() { sed -n "s/^test result:.* \([0-9]\+\) $1;.*/\1/p" "$logs"/* | awk '{ sum += $1 } END { print sum + 0 }'; }
 printf '\n%s passed, %s failed\n' "$(count passed)" "$(count failed)"
 exit "$status"

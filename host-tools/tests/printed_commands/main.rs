@@ -58,18 +58,23 @@ fn follow(page: &str, check: fn(&Path)) {
     follower.finish(check);
 }
 
-/// A test for each page, with what must be there at its end.
+/// A test for each page, with what must be there at its end. `tests/run.sh` chooses them by their
+/// module.
 macro_rules! pages {
     ($($test:ident, $page:literal, $check:expr;)*) => {
         /// Pages that print commands.
         const PAGES: &[&str] = &[$($page),*];
 
-        $(
-            #[test]
-            fn $test() {
-                follow($page, $check);
-            }
-        )*
+        mod followed {
+            use super::{follow, fs, refuses_ranks, there, video};
+
+            $(
+                #[test]
+                fn $test() {
+                    follow($page, $check);
+                }
+            )*
+        }
     };
 }
 
