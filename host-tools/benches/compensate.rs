@@ -9,10 +9,14 @@
 //! Beside it stands the processor time of a frame, all threads and the kernel's
 //! pipes together (Linux only): it tells what a machine could do that had nothing
 //! else to do, while frames a second are those of this machine at this moment.
+//!
+//! What frames move through memory, and how long `memcpy` takes to move as much, says whether
+//! memory limits them.
 
 use iltm::progress::Silent;
 use iltm::video::live::Live;
 use iltm::video::watch::FileWatch;
+use iltm::video::y4m::Header;
 use iltm::video::{CompensateOptions, Compensator, Input};
 use iltm_runtime::Grid;
 use iltm_runtime::image::Table;
@@ -69,11 +73,13 @@ fn main() {
         };
         let (rates, costs) = (sorted(|run| run.0), sorted(|run| run.1));
         println!(
-            "{name:72} {:7.1} frames/s ({:.1} to {:.1}), {:6.2} ms of processor time a frame",
+            "{name:72} {:7.1} frames/s ({:.1} to {:.1}), {:6.2} ms of processor time a frame; {:.0} MB, copied in {:.1} ms",
             rates[RUNS / 2],
             rates[0],
             rates[RUNS - 1],
-            costs[RUNS / 2]
+            costs[RUNS / 2],
+            moved(&case) as f64 / 1e6,
+            copied(moved(&case)),
         );
     }
 }
@@ -102,7 +108,9 @@ fn cases(cores: usize) -> Vec<Case> {
         cases.push(case(full_hd, (48, 64), 3, tier, cores, "420jpeg"));
     }
     cases.push(case(full_hd, (48, 64), 3, 2, 1, "420jpeg"));
-    cases.push(case(full_hd, (16, 24), 3, 2, cores, "444"));
+    for colour in ["444", "422", "420p10", "422p10"] {
+        cases.push(case(full_hd, (16, 24), 3, 2, cores, colour));
+    }
     cases.push(case(full_hd, (16, 24), 1, 2, cores, "420jpeg"));
     cases.push(case(full_hd, (16, 24), 1, 2, cores, "mono"));
     cases.push(case((1280, 720), (16, 24), 3, 2, cores, "420jpeg"));
@@ -133,6 +141,35 @@ fn processor_time() -> f64 {
     }
 }
 
+/// The header of a case's stream.
+fn header(case: &Case) -> Header {
+    let line = format!(
+        "YUV4MPEG2 W{} H{} F60:1 Ip C{}",
+        case.width, case.height, case.colour
+    );
+    Header::parse(line.as_bytes()).expect("a header")
+}
+
+/// Bytes of a frame that are read or written, without the pipes: its planes both ways, the light
+/// of every colour of every pixel both ways, its gain and its ambient light.
+fn moved(case: &Case) -> usize {
+    let header = header(case);
+    2 * header.frame_bytes() + 8 * header.size().pixels() * header.colours()
+}
+
+/// Milliseconds in which one thread reads and writes so many bytes together; the least of several.
+fn copied(bytes: usize) -> f64 {
+    let from = vec![1_u8; bytes / 2];
+    let mut to = vec![0_u8; bytes / 2];
+    let times = (0..RUNS).map(|_| {
+        let start = Instant::now();
+        to.copy_from_slice(std::hint::black_box(&from));
+        std::hint::black_box(&to);
+        1e3 * start.elapsed().as_secs_f64()
+    });
+    times.fold(f64::INFINITY, f64::min)
+}
+
 /// Frames a second and milliseconds of processor time a frame of one run.
 fn run(case: &Case) -> (f64, f64) {
     let grid = Grid::new(case.grid.0, case.grid.1).expect("a small grid");
@@ -144,27 +181,23 @@ fn run(case: &Case) -> (f64, f64) {
         ..CompensateOptions::default()
     };
     let compensator = Compensator::new(&table, settings).expect("threads start");
-    let pixels = usize::from(case.width) * usize::from(case.height);
-    let bytes = match case.colour {
-        "mono" => pixels,
-        "444" => 3 * pixels,
-        _ => pixels * 3 / 2,
-    };
+    let stream = header(case);
+    let bytes = stream.frame_bytes();
     // About a second, whatever the size.
     let frames = (400_000_000 / bytes).clamp(20, 20_000);
     let (input, mut feed) = std::io::pipe().expect("a pipe");
     let (mut drain, output) = std::io::pipe().expect("a pipe");
-    let header = format!(
-        "YUV4MPEG2 W{} H{} F60:1 Ip C{}\n",
-        case.width, case.height, case.colour
-    );
     let mut random = fastrand::Rng::with_seed(2);
-    let samples: Vec<u8> = std::iter::repeat_with(|| random.u8(40..200))
-        .take(bytes)
-        .collect();
+    let deep = stream.sample_bytes() == 2;
+    let sample = |at: usize| match at % 2 {
+        1 if deep => random.u8(0..4),
+        _ => random.u8(40..200),
+    };
+    let samples: Vec<u8> = (0..bytes).map(sample).collect();
     std::thread::scope(|scope| {
         scope.spawn(move || {
-            feed.write_all(header.as_bytes())?;
+            feed.write_all(stream.line())?;
+            feed.write_all(b"\n")?;
             for _ in 0..frames {
                 feed.write_all(b"FRAME\n")?;
                 feed.write_all(&samples)?;

@@ -142,3 +142,57 @@ fn what_has_no_frames_to_change_between_is_refused() {
     contains(&said, &["still picture"]);
     assert!(!user.path("o.png").exists());
 }
+
+/// Mean and largest difference of the samples of two pictures of 16 bits, of the full scale.
+fn differences(user: &User, names: [&str; 2]) -> [f64; 2] {
+    let [a, b] = names.map(|name| user.picture(name).into_rgb16());
+    assert_eq!(a.dimensions(), b.dimensions());
+    let each = a.iter().zip(b.iter());
+    let each: Vec<f64> = each
+        .map(|(a, b)| f64::from(a.abs_diff(*b)) / 65_535.0)
+        .collect();
+    let mean = each.iter().sum::<f64>() / each.len() as f64;
+    [mean, each.iter().copied().fold(0.0, f64::max)]
+}
+
+#[test]
+fn films_of_ten_bits_are_compensated_as_ffmpegs_pictures_of_them_are() {
+    let user = User::with_table();
+    for format in [
+        "yuv444p10",
+        "yuv422p10",
+        "yuv420p10",
+        "yuv444p12",
+        "yuv422p",
+    ] {
+        // Soft colours: chroma is shared by neighbours, and is not cut.
+        user.ffmpeg(&format!(
+            "-f lavfi -i gradients=size=320x180:c0=0x604030:c1=0x90a0b0:x0=0:y0=0:x1=319:y1=179:\
+             duration=1:rate=1:speed=0.00001 -vf scale=out_color_matrix=bt601:out_range=tv,format={format} \
+             -strict -1 film.y4m"
+        ));
+        user.says("compensate t.iltm film.y4m -o shown.y4m");
+        let picture = |film: &str, picture: &str| {
+            user.ffmpeg(&format!(
+                "-i {film} -vf scale=in_color_matrix=bt601:in_range=tv:\
+                 flags=accurate_rnd+full_chroma_int+full_chroma_inp,format=rgb48 -frames:v 1 {picture}"
+            ));
+        };
+        picture("film.y4m", "film.png");
+        picture("shown.y4m", "shown.png");
+        user.says("compensate t.iltm film.png -o wanted.png");
+        let [mean, worst] = differences(&user, ["shown.png", "wanted.png"]);
+        println!("{format}: mean {mean:.6}, worst {worst:.6}");
+        let [changed, _] = differences(&user, ["film.png", "wanted.png"]);
+        assert!(changed > 0.01, "{format}: the table does little: {changed}");
+        let code = match format {
+            _ if format.ends_with("p10") => 1023.0,
+            _ if format.ends_with("p12") => 4095.0,
+            _ => 255.0,
+        };
+        assert!(
+            mean * code < 1.0 && worst * code < 4.0,
+            "{format}: {mean} {worst}"
+        );
+    }
+}

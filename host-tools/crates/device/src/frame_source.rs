@@ -69,7 +69,7 @@ impl FrameFeed {
             Input::Y4m(file) => Reader::new(file)?,
         };
         let header = reader.header();
-        let colours = if header.chroma() == (0, 0) { 1 } else { 3 };
+        let colours = header.colours() as u8;
         Ok(Self {
             size: header.size(),
             channels: channels.unwrap_or(colours),

@@ -205,29 +205,41 @@ impl PlacedFrames {
         if self.keeps() {
             return frame;
         }
-        let black = match shown.range() {
-            CodeRange::Limited => 16,
+        let bytes = shown.sample_bytes();
+        let above = shown.bits() - 8;
+        let black: u16 = match shown.range() {
+            CodeRange::Limited => 16 << above,
             CodeRange::Full => 0,
         };
-        let mut samples = vec![128; shown.frame_bytes()];
-        let (luma, chroma) = samples.split_at_mut(self.shown.pixels());
-        luma.fill(black);
-        let (from_luma, from_chroma) = frame.samples.split_at(self.given.pixels());
-        let plane = |size: FrameSize| (size.width(), size.height());
+        let mut samples = vec![0; shown.frame_bytes()];
+        let (luma, chroma) = samples.split_at_mut(bytes * self.shown.pixels());
+        let fill = |plane: &mut [u8], code: u16| {
+            for sample in plane.chunks_exact_mut(bytes) {
+                sample.copy_from_slice(&code.to_le_bytes()[..bytes]);
+            }
+        };
+        fill(luma, black);
+        fill(chroma, 128 << above);
+        let (from_luma, from_chroma) = frame.samples.split_at(bytes * self.given.pixels());
+        // Sides in bytes.
+        let plane = |(width, height): (usize, usize)| (bytes * width, height);
+        let start = |left: isize, top| (bytes.cast_signed() * left, top);
+        let sides = |size: FrameSize| plane((size.width(), size.height()));
         place(
-            (from_luma, plane(self.given)),
-            (luma, plane(self.shown)),
-            (self.left, self.top),
+            (from_luma, sides(self.given)),
+            (luma, sides(self.shown)),
+            start(self.left, self.top),
         );
-        let (from, to) = (given.chroma(), shown.chroma());
-        let start = match shown.sampling() {
+        let (from, to) = (plane(given.chroma()), plane(shown.chroma()));
+        let (left, top) = match shown.sampling() {
             ChromaSampling::Chroma420 => (self.left.div_euclid(2), self.top.div_euclid(2)),
+            ChromaSampling::Chroma422 => (self.left.div_euclid(2), self.top),
             ChromaSampling::Mono | ChromaSampling::Chroma444 => (self.left, self.top),
         };
         let parts = from_chroma.chunks_exact((from.0 * from.1).max(1));
         let places = chroma.chunks_exact_mut((to.0 * to.1).max(1));
         for (part, place_of) in parts.zip(places) {
-            place((part, from), (place_of, to), start);
+            place((part, from), (place_of, to), start(left, top));
         }
         YuvFrame {
             parameters: frame.parameters,

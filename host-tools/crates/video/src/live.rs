@@ -8,6 +8,7 @@
 use super::planar::{Planar, PlaneLayout};
 use super::stream::{self, FrameQueue};
 use super::y4m::{Header, Reader};
+use super::yuv::PlaneCode;
 use super::{Compensator, FrameTotals, Input, PlacedFrames, VideoError};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{
@@ -116,11 +117,11 @@ impl Live<'_> {
         let given = reader.header().clone();
         let placed = first.place(given.size())?;
         let shown = given.resized(placed.shown());
-        let layout = PlaneLayout::new(&shown);
-        first.job(&placed, layout.colours())?;
+        let colours = shown.colours();
+        first.job(&placed, colours)?;
         let mut run = Run {
             live: self,
-            layout,
+            colours,
             given,
             shown: shown.clone(),
             placed,
@@ -162,7 +163,8 @@ impl Live<'_> {
 /// A stream under way.
 struct Run<'r, 'l> {
     live: Live<'l>,
-    layout: PlaneLayout,
+    /// Colours of a pixel.
+    colours: usize,
     given: Header,
     shown: Header,
     placed: PlacedFrames,
@@ -178,22 +180,24 @@ impl Run<'_, '_> {
         compensator: &Compensator<'_, '_>,
         frames: &mut FrameQueue,
     ) -> Result<Option<Vec<u8>>, VideoError> {
-        match compensator.table.channels() {
-            1 => self.frames_of::<1>(compensator, frames),
-            _ => self.frames_of::<3>(compensator, frames),
+        match (compensator.table.channels(), self.shown.bits()) {
+            (1, 8) => self.frames_of::<u8, 1>(compensator, frames),
+            (1, _) => self.frames_of::<u16, 1>(compensator, frames),
+            (_, 8) => self.frames_of::<u8, 3>(compensator, frames),
+            (..) => self.frames_of::<u16, 3>(compensator, frames),
         }
     }
 
-    /// The same for a table of `C` channels.
-    fn frames_of<const C: usize>(
+    /// The same for frames of such samples and a table of `C` channels.
+    fn frames_of<S: PlaneCode, const C: usize>(
         &mut self,
         compensator: &Compensator<'_, '_>,
         frames: &mut FrameQueue,
     ) -> Result<Option<Vec<u8>>, VideoError> {
-        let layout = self.layout;
+        let layout = PlaneLayout::<S>::new(&self.shown);
         let placed = compensator.place(self.given.size())?;
-        let job = compensator.job(&placed, layout.colours())?;
-        let mut engine = compensator.engine::<Planar, C>(job)?;
+        let job = compensator.job(&placed, self.colours)?;
+        let mut engine = compensator.engine::<Planar<S>, C>(job)?;
         let budget = self.live.budget.map(microseconds);
         let mut governor =
             budget.map(|budget| Governor::for_table(compensator.table, job.samples(), budget));
@@ -205,14 +209,11 @@ impl Run<'_, '_> {
             let tier = governor.as_ref().map_or(job.tier, Governor::tier);
             let start = Instant::now();
             let worked = frames.work(|frame| {
-                let mut planar = Planar {
-                    layout,
-                    frame: self
-                        .placed
-                        .frame(&self.given, &self.shown, std::mem::take(frame)),
-                };
+                let given = std::mem::take(frame);
+                let placed = self.placed.frame(&self.given, &self.shown, given);
+                let mut planar = Planar::new(layout, placed);
                 let clipped = engine.compensate_at(tier, &mut planar);
-                *frame = planar.frame;
+                *frame = planar.frame();
                 clipped
             });
             let took = start.elapsed();
@@ -263,7 +264,7 @@ impl Run<'_, '_> {
         if !placed.moves_like(&self.placed) {
             return Err(VideoError::Elsewhere.into());
         }
-        newer.job(&placed, self.layout.colours())?;
+        newer.job(&placed, self.colours)?;
         Ok((content.to_vec(), table.id()))
     }
 }

@@ -7,21 +7,23 @@
 
 use super::bands::{Band, Bands, Interleaved, STRIP};
 use super::y4m::{ChromaSampling, Header, YuvFrame};
-use super::yuv::{Conversion, Standard, repeat_pairs, sum_squares};
+use super::yuv::{PlaneCode, Standard, repeat_pairs, sum_pairs, sum_squares};
 use iltm_picture::{Picture, Samples};
+use iltm_runtime::FrameSize;
 
 /// How the planes of every frame of a stream are laid out and converted.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PlaneLayout {
+pub(super) struct PlaneLayout<S: PlaneCode> {
     width: usize,
     pixels: usize,
     chroma_width: usize,
     chroma_samples: usize,
     sampling: ChromaSampling,
-    conversion: Conversion,
+    conversion: S::Conversion,
 }
 
-impl PlaneLayout {
+impl<S: PlaneCode> PlaneLayout<S> {
+    /// Of a stream whose samples have as many bits as `S` is for.
     pub(super) fn new(header: &Header) -> Self {
         let (chroma_width, chroma_height) = header.chroma();
         Self {
@@ -30,98 +32,140 @@ impl PlaneLayout {
             chroma_width,
             chroma_samples: chroma_width * chroma_height,
             sampling: header.sampling(),
-            conversion: Conversion::new(Standard::of(header.size()), header.range()),
+            conversion: S::conversion(Standard::of(header.size()), header.range(), header.bits()),
         }
     }
 
-    /// Colours of a pixel.
-    pub(super) const fn colours(&self) -> usize {
-        match self.sampling {
-            ChromaSampling::Mono => 1,
-            ChromaSampling::Chroma420 | ChromaSampling::Chroma444 => 3,
-        }
+    /// Whether rows of pixels share a row of chroma.
+    const fn shares_rows(&self) -> bool {
+        matches!(self.sampling, ChromaSampling::Chroma420)
+    }
+
+    /// Whether the pixels of a row share chroma.
+    const fn shares_columns(&self) -> bool {
+        matches!(
+            self.sampling,
+            ChromaSampling::Chroma420 | ChromaSampling::Chroma422
+        )
     }
 }
 
 /// One frame of a stream.
 #[derive(Debug)]
-pub(super) struct Planar {
-    pub(super) layout: PlaneLayout,
-    pub(super) frame: YuvFrame,
+pub(super) struct Planar<S: PlaneCode> {
+    layout: PlaneLayout<S>,
+    /// What the header of the frame says.
+    parameters: Vec<u8>,
+    /// Luma, then chroma.
+    samples: Vec<S>,
+}
+
+impl<S: PlaneCode> Planar<S> {
+    /// A frame that has been read.
+    pub(super) fn new(layout: PlaneLayout<S>, frame: YuvFrame) -> Self {
+        Self {
+            layout,
+            parameters: frame.parameters,
+            samples: S::of_bytes(frame.samples),
+        }
+    }
+
+    /// The frame to be written.
+    pub(super) fn frame(self) -> YuvFrame {
+        YuvFrame {
+            parameters: self.parameters,
+            samples: S::to_bytes(self.samples),
+        }
+    }
+
+    fn of_picture(header: &Header, size: (FrameSize, usize), samples: &[S]) -> Option<YuvFrame> {
+        let layout = PlaneLayout::new(header);
+        if size != (header.size(), header.colours()) {
+            return None;
+        }
+        let mut planar = Self {
+            layout,
+            parameters: Vec::new(),
+            samples: vec![S::default(); header.frame_bytes() / header.sample_bytes()],
+        };
+        let mut samples = samples.to_vec();
+        convert(
+            &mut layout.picture(header.colours(), &mut samples),
+            &mut planar,
+            header,
+        );
+        Some(planar.frame())
+    }
+
+    fn into_samples(mut self, header: &Header) -> Vec<S> {
+        let layout = self.layout;
+        let mut samples = vec![S::default(); layout.pixels * header.colours()];
+        convert(
+            &mut self,
+            &mut layout.picture(header.colours(), &mut samples),
+            header,
+        );
+        samples
+    }
+}
+
+impl<S: PlaneCode> PlaneLayout<S> {
+    /// The samples of a picture of such frames.
+    fn picture<'p>(&self, channels: usize, samples: &'p mut [S]) -> Interleaved<'p, S> {
+        Interleaved {
+            width: self.width,
+            channels,
+            samples,
+        }
+    }
 }
 
 impl YuvFrame {
-    /// A picture as a frame of a stream: 8 bits, of the stream's size, with as many
-    /// channels as the stream has; `None` for any other.
+    /// A picture as a frame of a stream: of the stream's size, with as many channels as the stream
+    /// has, and 16 bits where the stream has more than 8; `None` for any other.
     #[must_use]
     pub fn from_picture(header: &Header, picture: &Picture) -> Option<Self> {
-        let layout = PlaneLayout::new(header);
-        let Samples::Eight(samples) = picture.samples() else {
-            return None;
-        };
-        if (picture.size(), picture.channels()) != (header.size(), layout.colours()) {
-            return None;
+        let size = (picture.size(), picture.channels());
+        match picture.samples() {
+            Samples::Eight(samples) if header.bits() == 8 => {
+                Planar::of_picture(header, size, samples)
+            }
+            Samples::Sixteen(samples) if header.bits() > 8 => {
+                Planar::of_picture(header, size, samples)
+            }
+            _ => None,
         }
-        let mut planar = Planar {
-            layout,
-            frame: Self {
-                parameters: Vec::new(),
-                samples: vec![0; header.frame_bytes()],
-            },
-        };
-        let rows = header.size().height().next_multiple_of(STRIP);
-        let mut samples = samples.clone();
-        let mut picture = Interleaved {
-            width: layout.width,
-            channels: layout.colours(),
-            samples: &mut samples,
-        };
-        convert(
-            &mut picture,
-            &mut planar,
-            rows,
-            layout.width * layout.colours(),
-        );
-        Some(planar.frame)
     }
 
-    /// A frame of a stream as a picture; `None` if it has another number of samples
-    /// than the stream's frames.
+    /// A frame of a stream as a picture, of 16 bits where the stream has more than 8; `None` if it
+    /// has another number of samples than the stream's frames.
     #[must_use]
     pub fn to_picture(&self, header: &Header) -> Option<Picture> {
-        let layout = PlaneLayout::new(header);
         if self.samples.len() != header.frame_bytes() {
             return None;
         }
-        let mut planar = Planar {
-            layout,
-            frame: self.clone(),
+        let samples = if header.bits() == 8 {
+            let planar = Planar::new(PlaneLayout::new(header), self.clone());
+            Samples::Eight(planar.into_samples(header))
+        } else {
+            let planar = Planar::new(PlaneLayout::new(header), self.clone());
+            Samples::Sixteen(planar.into_samples(header))
         };
-        let rows = header.size().height().next_multiple_of(STRIP);
-        let mut samples = vec![0; layout.pixels * layout.colours()];
-        let mut picture = Interleaved {
-            width: layout.width,
-            channels: layout.colours(),
-            samples: &mut samples,
-        };
-        convert(
-            &mut planar,
-            &mut picture,
-            rows,
-            layout.width * layout.colours(),
-        );
-        Picture::new(header.size(), Samples::Eight(samples))
+        Picture::new(header.size(), samples)
     }
 }
 
-/// Copies the colours of all rows of one frame into another.
-fn convert<A, B>(from: &mut A, to: &mut B, rows: usize, row_len: usize)
+/// Copies the colours of all rows of one frame of a stream into another.
+fn convert<S, A, B>(from: &mut A, to: &mut B, header: &Header)
 where
-    A: Bands<Code = u8>,
-    B: Bands<Code = u8>,
+    S: PlaneCode,
+    A: Bands<Code = S>,
+    B: Bands<Code = S>,
 {
+    let rows = header.size().height().next_multiple_of(STRIP);
+    let row_len = header.size().width() * header.colours();
     let (mut of_from, mut of_to) = (A::Memory::default(), B::Memory::default());
-    let mut colours = vec![0; STRIP * row_len];
+    let mut colours = vec![S::default(); STRIP * row_len];
     for (from, mut to) in from.bands(rows).into_iter().zip(to.bands(rows)) {
         for strip in 0..from.rows().div_ceil(STRIP) {
             let colours = &mut colours[..(from.rows() - STRIP * strip).min(STRIP) * row_len];
@@ -133,53 +177,54 @@ where
 
 /// Adjacent rows of the planes.
 #[derive(Debug)]
-pub(super) struct PlanarBand<'b> {
-    layout: PlaneLayout,
-    luma: &'b mut [u8],
-    u: &'b mut [u8],
-    v: &'b mut [u8],
+pub(super) struct PlanarBand<'b, S: PlaneCode> {
+    layout: PlaneLayout<S>,
+    luma: &'b mut [S],
+    u: &'b mut [S],
+    v: &'b mut [S],
 }
 
 /// Rows on their way between planes and colours.
 #[derive(Debug, Default)]
-pub(super) struct ChromaRows {
+pub(super) struct ChromaRows<S: PlaneCode> {
     /// What each chroma sample adds to each colour.
-    terms: [Vec<i16>; 3],
+    terms: [Vec<S::Term>; 3],
     /// The same for each pixel.
-    spread: [Vec<i16>; 3],
+    spread: [Vec<S::Term>; 3],
     /// Sums of the codes that make each chroma sample.
-    sums: [Vec<u16>; 3],
+    sums: [Vec<S::Sum>; 3],
 }
 
-impl ChromaRows {
-    fn fit(&mut self, layout: &PlaneLayout) {
+impl<S: PlaneCode> ChromaRows<S> {
+    fn fit(&mut self, layout: &PlaneLayout<S>) {
         for terms in &mut self.terms {
-            terms.resize(layout.chroma_width, 0);
+            terms.resize(layout.chroma_width, S::Term::default());
         }
         for spread in &mut self.spread {
-            spread.resize(layout.width, 0);
+            spread.resize(layout.width, S::Term::default());
         }
         for sums in &mut self.sums {
-            sums.resize(layout.chroma_width, 0);
+            sums.resize(layout.chroma_width, S::Sum::default());
         }
     }
 }
 
-impl Bands for Planar {
-    type Code = u8;
+impl<S: PlaneCode> Bands for Planar<S> {
+    type Code = S;
     type Band<'b>
-        = PlanarBand<'b>
+        = PlanarBand<'b, S>
     where
         Self: 'b;
-    type Memory = ChromaRows;
+    type Memory = ChromaRows<S>;
 
-    fn bands(&mut self, rows: usize) -> Vec<PlanarBand<'_>> {
+    fn bands(&mut self, rows: usize) -> Vec<PlanarBand<'_, S>> {
         let layout = self.layout;
-        let (luma, chroma) = self.frame.samples.split_at_mut(layout.pixels);
+        let (luma, chroma) = self.samples.split_at_mut(layout.pixels);
         let (u, v) = chroma.split_at_mut(layout.chroma_samples);
-        let chroma_rows = match layout.sampling {
-            ChromaSampling::Chroma420 => rows / STRIP,
-            ChromaSampling::Mono | ChromaSampling::Chroma444 => rows,
+        let chroma_rows = if layout.shares_rows() {
+            rows / STRIP
+        } else {
+            rows
         };
         let chroma_band = (chroma_rows * layout.chroma_width).max(1);
         let mut u = u.chunks_mut(chroma_band);
@@ -195,12 +240,13 @@ impl Bands for Planar {
     }
 }
 
-impl PlanarBand<'_> {
+impl<S: PlaneCode> PlanarBand<'_, S> {
     /// Where the samples of a strip begin in the luma and in each chroma plane.
     fn starts(&self, strip: usize) -> (usize, usize) {
-        let chroma_rows = match self.layout.sampling {
-            ChromaSampling::Chroma420 => strip,
-            ChromaSampling::Mono | ChromaSampling::Chroma444 => STRIP * strip,
+        let chroma_rows = if self.layout.shares_rows() {
+            strip
+        } else {
+            STRIP * strip
         };
         (
             STRIP * strip * self.layout.width,
@@ -209,23 +255,23 @@ impl PlanarBand<'_> {
     }
 }
 
-impl Band for PlanarBand<'_> {
-    type Code = u8;
-    type Memory = ChromaRows;
+impl<S: PlaneCode> Band for PlanarBand<'_, S> {
+    type Code = S;
+    type Memory = ChromaRows<S>;
 
     fn rows(&self) -> usize {
         self.luma.len() / self.layout.width
     }
 
     #[inline(always)]
-    fn unpack(&self, strip: usize, rows: &mut ChromaRows, colours: &mut [u8]) {
+    fn unpack(&self, strip: usize, rows: &mut ChromaRows<S>, colours: &mut [S]) {
         let layout = self.layout;
-        let (width, sampling, conversion) = (layout.width, layout.sampling, layout.conversion);
+        let (width, conversion) = (layout.width, layout.conversion);
         let (luma, chroma) = self.starts(strip);
         let lumas = self.luma[luma..].chunks_exact(width);
-        if sampling == ChromaSampling::Mono {
+        if layout.sampling == ChromaSampling::Mono {
             for (luma, grey) in lumas.zip(colours.chunks_exact_mut(width)) {
-                conversion.grey_row(luma, grey);
+                S::grey_row(&conversion, luma, grey);
             }
             return;
         }
@@ -233,69 +279,78 @@ impl Band for PlanarBand<'_> {
         let mut us = self.u[chroma..].chunks_exact(layout.chroma_width);
         let mut vs = self.v[chroma..].chunks_exact(layout.chroma_width);
         for (row, (luma, colours)) in lumas.zip(colours.chunks_exact_mut(3 * width)).enumerate() {
-            if sampling == ChromaSampling::Chroma444 || row == 0 {
+            if row == 0 || !layout.shares_rows() {
                 let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
                 let [red, green, blue] = &mut rows.terms;
-                conversion.chroma_terms(u, v, [red, green, blue]);
-                if sampling == ChromaSampling::Chroma420 {
+                S::chroma_terms(&conversion, u, v, [red, green, blue]);
+                if layout.shares_columns() {
                     for (terms, pixels) in rows.terms.iter().zip(&mut rows.spread) {
                         repeat_pairs(terms, pixels);
                     }
                 }
             }
-            let terms = match sampling {
-                ChromaSampling::Chroma420 => &rows.spread,
-                ChromaSampling::Mono | ChromaSampling::Chroma444 => &rows.terms,
+            let terms = if layout.shares_columns() {
+                &rows.spread
+            } else {
+                &rows.terms
             };
             for (terms, colour) in terms.iter().zip(colours.chunks_exact_mut(width)) {
-                conversion.colour_row(luma, terms, colour);
+                S::colour_row(&conversion, luma, terms, colour);
             }
         }
     }
 
     #[inline(always)]
-    fn pack(&mut self, strip: usize, rows: &mut ChromaRows, colours: &[u8]) {
+    fn pack(&mut self, strip: usize, rows: &mut ChromaRows<S>, colours: &[S]) {
         let layout = self.layout;
-        let (width, sampling, conversion) = (layout.width, layout.sampling, layout.conversion);
+        let (width, conversion) = (layout.width, layout.conversion);
         let (luma, chroma) = self.starts(strip);
         let lumas = self.luma[luma..].chunks_exact_mut(width);
-        if sampling == ChromaSampling::Mono {
+        if layout.sampling == ChromaSampling::Mono {
             for (luma, grey) in lumas.zip(colours.chunks_exact(width)) {
-                conversion.grey_luma_row(grey, luma);
+                S::grey_luma_row(&conversion, grey, luma);
             }
             return;
         }
         rows.fit(&layout);
         let mut us = self.u[chroma..].chunks_exact_mut(layout.chroma_width);
         let mut vs = self.v[chroma..].chunks_exact_mut(layout.chroma_width);
+        let mut chroma_row = |sums: &[Vec<S::Sum>; 3], bits| {
+            let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
+            S::chroma_row(&conversion, sums.each_ref().map(Vec::as_slice), bits, u, v);
+        };
         for (luma, colours) in lumas.zip(colours.chunks_exact(3 * width)) {
-            conversion.luma_row(separate(colours, width), luma);
-            if sampling == ChromaSampling::Chroma444 {
-                for (sums, colour) in rows.sums.iter_mut().zip(colours.chunks_exact(width)) {
+            S::luma_row(&conversion, separate(colours, width), luma);
+            if layout.shares_rows() {
+                continue;
+            }
+            let pairs = layout.shares_columns();
+            for (sums, colour) in rows.sums.iter_mut().zip(colours.chunks_exact(width)) {
+                if pairs {
+                    sum_pairs(colour, sums);
+                } else {
                     for (sum, code) in sums.iter_mut().zip(colour) {
-                        *sum = u16::from(*code);
+                        *sum = S::Sum::from(*code);
                     }
                 }
-                let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
-                conversion.chroma_row(rows.sums.each_ref().map(Vec::as_slice), 0, u, v);
             }
+            chroma_row(&rows.sums, u32::from(pairs));
         }
-        if sampling == ChromaSampling::Chroma420 {
+        if layout.shares_rows() {
             let tops = &colours[..3 * width];
             let bottoms = &colours[colours.len() - 3 * width..];
             let pairs = tops.chunks_exact(width).zip(bottoms.chunks_exact(width));
             for ((top, bottom), sums) in pairs.zip(&mut rows.sums) {
                 sum_squares(top, bottom, sums);
             }
-            let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
-            conversion.chroma_row(rows.sums.each_ref().map(Vec::as_slice), 2, u, v);
+            chroma_row(&rows.sums, 2);
         }
     }
 }
 
 /// Three rows that lie one after the other.
 #[inline(always)]
-fn separate(colours: &[u8], width: usize) -> [&[u8]; 3] {
+fn separate<S>(colours: &[S], width: usize) -> [&[S]; 3] {
     let (red, rest) = colours.split_at(width);
     let (green, blue) = rest.split_at(width);
     [red, green, blue]

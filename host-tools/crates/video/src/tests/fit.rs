@@ -169,7 +169,9 @@ fn fits_pad_cut_or_keep_a_frame_and_resample_no_pixel() {
 
 #[test]
 fn a_stream_of_another_aspect_gets_a_header_of_its_new_size_and_black_bars() {
-    for colour in ["mono", "420jpeg", "444"] {
+    for colour in [
+        "mono", "420jpeg", "422", "444", "mono10", "420p10", "422p10", "444p12",
+    ] {
         let mut table = bordered(1);
         table.projector = ProjectorPixels::new(size(40, 25), 0);
         let image = table.image();
@@ -185,7 +187,12 @@ fn a_stream_of_another_aspect_gets_a_header_of_its_new_size_and_black_bars() {
         let mut input = [header.line(), b"\n"].concat();
         for frame in [31, 77] {
             input.extend(b"FRAME\n");
-            input.extend((0..header.frame_bytes()).map(|at| (at * 7 + frame) as u8));
+            let above = header.bits() - 8;
+            let samples = (0..header.frame_bytes() / header.sample_bytes())
+                .map(|at| u16::from((at * 7 + frame) as u8) << above);
+            input.extend(
+                samples.flat_map(|code| code.to_le_bytes().into_iter().take(header.sample_bytes())),
+            );
         }
         let mut output = Vec::new();
         let compensator = Compensator::new(&table, settings).unwrap();

@@ -54,6 +54,11 @@ fn headers_and_frame_parameters_are_kept_byte_for_byte() {
         "YUV4MPEG2 H5 W7",
         "YUV4MPEG2 W5 H3 C444 Xa  Xb",
         "YUV4MPEG2 W5 H3 Cmono",
+        "YUV4MPEG2 W5 H3 C422",
+        "YUV4MPEG2 W5 H3 C420p10 XYSCSS=420P10",
+        "YUV4MPEG2 W5 H3 C422p10",
+        "YUV4MPEG2 W5 H3 C444p12",
+        "YUV4MPEG2 W5 H3 Cmono10",
     ] {
         let input = stream(line, 3, 0..=255);
         let (output, summary) = video(&table, CompensateOptions::default(), &input).unwrap();
@@ -78,6 +83,12 @@ fn mono_video_that_is_not_changed_comes_back_exactly() {
         let (output, _) = video(&table, settings(Encoding::Linear), &input).unwrap();
         assert_eq!(output, input, "{line}");
     }
+    for (bits, codes) in [(10, 0..=1023_u16), (12, 0..=4095)] {
+        let mut input = format!("YUV4MPEG2 W64 H64 Cmono{bits}\nFRAME\n").into_bytes();
+        input.extend(codes.cycle().take(64 * 64).flat_map(u16::to_le_bytes));
+        let (output, _) = video(&table, settings(Encoding::Linear), &input).unwrap();
+        assert_eq!(output, input, "{bits} bits");
+    }
 }
 
 /// Frames of the test scene.
@@ -87,37 +98,65 @@ fn scene_stream(line: &str, frames: usize) -> Vec<u8> {
     let mut stream = format!("{line}\n").into_bytes();
     for number in 0..frames {
         stream.extend(b"FRAME\n");
-        let frame = YuvFrame::from_picture(&header, &scene.frame(number as u64));
+        let mut picture = scene.frame(number as u64);
+        if let (Samples::Eight(samples), true) = (picture.samples(), header.bits() > 8) {
+            let wide = samples.iter().map(|code| u16::from(*code) * 257).collect();
+            picture = Picture::new(header.size(), Samples::Sixteen(wide)).expect("as many");
+        }
+        let frame = YuvFrame::from_picture(&header, &picture);
         stream.extend(frame.expect("a frame of the stream's size").samples);
     }
     stream
 }
 
+/// The samples of the last frame of a stream.
+fn codes(header: &Header, stream: &[u8]) -> Vec<u16> {
+    let bytes = &stream[stream.len() - header.frame_bytes()..];
+    match header.sample_bytes() {
+        1 => bytes.iter().copied().map(u16::from).collect(),
+        _ => bytes
+            .as_chunks()
+            .0
+            .iter()
+            .copied()
+            .map(u16::from_le_bytes)
+            .collect(),
+    }
+}
+
 #[test]
 fn video_that_is_not_changed_comes_back_as_good_as_it_was() {
     let table = MadeUp::new(grid(9, 16), 3);
-    for colour in ["420jpeg", "420mpeg2", "444"] {
+    for colour in [
+        "420jpeg", "420mpeg2", "422", "444", "420p10", "422p10", "444p10", "422p12",
+    ] {
         for range in ["LIMITED", "FULL"] {
             for (width, height) in [(320, 180), (321, 181), (1024, 578)] {
                 let line = format!("YUV4MPEG2 W{width} H{height} C{colour} XCOLORRANGE={range}");
                 let input = scene_stream(&line, 1);
                 let (output, _) = video(&table, settings(Encoding::Linear), &input).unwrap();
-                let differences = input.iter().zip(&output).map(|(a, b)| a.abs_diff(*b));
-                let mean_square = differences
-                    .clone()
-                    .map(|d| f64::from(d).powi(2))
-                    .sum::<f64>()
-                    / input.len() as f64;
-                let psnr = 10.0 * (255.0_f64.powi(2) / mean_square).log10();
+                let header = Header::parse(line.as_bytes()).unwrap();
+                let [before, after] = [&input, &output].map(|stream| codes(&header, stream));
+                let count = before.len() as f64;
+                let differences = before.iter().zip(&after).map(|(a, b)| a.abs_diff(*b));
+                let squares = differences.clone().map(|d| f64::from(d).powi(2));
+                let mean_square = squares.sum::<f64>() / count;
+                let white = f64::from((1_u32 << header.bits()) - 1);
+                let psnr = 10.0 * (white.powi(2) / mean_square).log10();
                 let within = differences.clone().filter(|d| *d <= 1).count() as f64;
-                let share = within / input.len() as f64;
+                let share = within / count;
                 println!(
                     "{line}: {psnr:.1} dB, {share:.5} within a code, worst {:?}",
                     differences.max()
                 );
                 // Chroma that four pixels share can be more than one of them, which is
                 // darker or brighter, can have: those are cut.
-                let enough = if colour == "444" { 1.0 } else { 0.995 };
+                // A code of 10 bits is a quarter of one of 8.
+                let enough = match header.bits() {
+                    _ if colour.starts_with("444") => 1.0,
+                    8 => 0.995,
+                    _ => 0.994,
+                };
                 assert!(
                     share >= enough && psnr >= 48.0,
                     "{line}: {psnr:.1} dB, {share}"
@@ -155,7 +194,8 @@ proptest! {
     fn streams_come_out_alike_for_any_number_of_threads(
         (width, height) in (21_u16..70, 13_u16..70),
         (table_channels, colour) in prop::sample::select(vec![
-            (1, "mono"), (1, "420"), (3, "420jpeg"), (3, "444"),
+            (1, "mono"), (1, "420"), (3, "420jpeg"), (3, "422"), (3, "444"),
+            (1, "mono10"), (3, "420p10"), (3, "422p10"), (3, "444p12"),
         ]),
     ) {
         let table = MadeUp::of_all_kinds(grid(13, 21), table_channels, 5, 3);
@@ -177,10 +217,12 @@ proptest! {
         cut in 0_usize..260,
     ) {
         let table = MadeUp::new(grid(2, 2), 3);
-        let mut input = stream("YUV4MPEG2 W6 H4 C444", 3, 0..=255);
-        input[place] = byte;
-        input.truncate(input.len() - cut);
-        let _ = video(&table, CompensateOptions::default(), &input);
+        for line in ["YUV4MPEG2 W6 H4 C444", "YUV4MPEG2 W6 H4 C422p10"] {
+            let mut input = stream(line, 3, 0..=255);
+            input[place] = byte;
+            input.truncate(input.len() - cut);
+            let _ = video(&table, CompensateOptions::default(), &input);
+        }
     }
 }
 

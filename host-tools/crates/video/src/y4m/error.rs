@@ -49,7 +49,8 @@ pub enum Y4mError {
     /// Samples are laid out in a way that is not read.
     #[error(
         "the colour space {tag:?} at byte {offset} is not supported; \
-         420, 420jpeg, 420mpeg2, 420paldv, 444 and mono are, all with 8 bits"
+         420, 420jpeg, 420mpeg2, 420paldv, 422, 444 and mono are, and 420, 422, 444 and mono \
+         with 10 or 12 bits"
     )]
     Colour {
         /// The tag.

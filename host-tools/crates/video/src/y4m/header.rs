@@ -19,6 +19,8 @@ pub enum ChromaSampling {
     /// One for every square of 2 x 2 pixels; an odd last row or column has its
     /// own.
     Chroma420,
+    /// One for every two pixels of a row; an odd last column has its own.
+    Chroma422,
     /// One for every pixel.
     Chroma444,
 }
@@ -26,9 +28,9 @@ pub enum ChromaSampling {
 /// Which codes are black and white.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CodeRange {
-    /// Luma 16 to 235, chroma 16 to 240.
+    /// Luma 16 to 235, chroma 16 to 240, of 8 bits; times four of 10 bits, and so on.
     Limited,
-    /// 0 to 255.
+    /// All codes.
     Full,
 }
 
@@ -39,11 +41,12 @@ pub struct Header {
     size: FrameSize,
     rate: Option<(u32, u32)>,
     sampling: ChromaSampling,
+    bits: u32,
     range: CodeRange,
 }
 
 impl Header {
-    /// A header for progressive video with square pixels.
+    /// A header for progressive video with square pixels and 8 bits.
     ///
     /// `rate` is the frame rate as a fraction.
     #[must_use]
@@ -56,6 +59,7 @@ impl Header {
         let colour = match sampling {
             ChromaSampling::Mono => "mono",
             ChromaSampling::Chroma420 => "420jpeg",
+            ChromaSampling::Chroma422 => "422",
             ChromaSampling::Chroma444 => "444",
         };
         let name = match range {
@@ -74,6 +78,7 @@ impl Header {
             size,
             rate: Some(rate),
             sampling,
+            bits: 8,
             range,
         }
     }
@@ -99,16 +104,17 @@ impl Header {
         }
         let side = |tag, value: Option<u64>| value.ok_or(Y4mError::NoSize { tag });
         let (width, height) = (side('W', fields.width)?, side('H', fields.height)?);
-        let sampling = fields.sampling.unwrap_or(ChromaSampling::Chroma420);
+        let (sampling, bits) = fields.colour.unwrap_or((ChromaSampling::Chroma420, 8));
         let default_range = match sampling {
             ChromaSampling::Mono => CodeRange::Full,
-            ChromaSampling::Chroma420 | ChromaSampling::Chroma444 => CodeRange::Limited,
+            _ => CodeRange::Limited,
         };
         Ok(Self {
             line: line.to_vec(),
             size: size(width, height)?,
             rate: fields.rate,
             sampling,
+            bits,
             range: fields.range.unwrap_or(default_range),
         })
     }
@@ -161,6 +167,27 @@ impl Header {
         self.sampling
     }
 
+    /// Colours of a pixel.
+    #[must_use]
+    pub const fn colours(&self) -> usize {
+        match self.sampling {
+            ChromaSampling::Mono => 1,
+            _ => 3,
+        }
+    }
+
+    /// Bits of a sample, from 8 on; a sample of more than 8 takes two bytes, the lower one first.
+    #[must_use]
+    pub const fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Bytes of a sample.
+    #[must_use]
+    pub const fn sample_bytes(&self) -> usize {
+        if self.bits > 8 { 2 } else { 1 }
+    }
+
     /// Which codes are black and white.
     #[must_use]
     pub const fn range(&self) -> CodeRange {
@@ -176,6 +203,7 @@ impl Header {
                 self.size.width().div_ceil(2),
                 self.size.height().div_ceil(2),
             ),
+            ChromaSampling::Chroma422 => (self.size.width().div_ceil(2), self.size.height()),
             ChromaSampling::Chroma444 => (self.size.width(), self.size.height()),
         }
     }
@@ -184,7 +212,7 @@ impl Header {
     #[must_use]
     pub const fn frame_bytes(&self) -> usize {
         let (width, height) = self.chroma();
-        self.size.pixels() + 2 * width * height
+        self.sample_bytes() * (self.size.pixels() + 2 * width * height)
     }
 }
 
@@ -235,7 +263,8 @@ struct Fields {
     width: Option<u64>,
     height: Option<u64>,
     rate: Option<(u32, u32)>,
-    sampling: Option<ChromaSampling>,
+    /// Chroma and bits of a sample.
+    colour: Option<(ChromaSampling, u32)>,
     range: Option<CodeRange>,
 }
 
@@ -251,7 +280,7 @@ impl Fields {
                 self.rate = rate(value);
                 Ok(())
             }
-            b'C' => tag.store(&mut self.sampling, sampling(tag, value)?),
+            b'C' => tag.store(&mut self.colour, colour(tag, value)?),
             b'I' => match value {
                 b"p" | b"?" => Ok(()),
                 b"t" | b"b" | b"m" => Err(Y4mError::Interlaced {
@@ -293,11 +322,21 @@ fn rate(value: &[u8]) -> Option<(u32, u32)> {
     Some((number.parse().ok()?, over.parse().ok()?))
 }
 
-fn sampling(tag: Tag<'_>, value: &[u8]) -> Result<ChromaSampling, Y4mError> {
+fn colour(tag: Tag<'_>, value: &[u8]) -> Result<(ChromaSampling, u32), Y4mError> {
+    use ChromaSampling::{Chroma420, Chroma422, Chroma444, Mono};
     match value {
-        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok(ChromaSampling::Chroma420),
-        b"444" => Ok(ChromaSampling::Chroma444),
-        b"mono" => Ok(ChromaSampling::Mono),
+        b"420" | b"420jpeg" | b"420mpeg2" | b"420paldv" => Ok((Chroma420, 8)),
+        b"422" => Ok((Chroma422, 8)),
+        b"444" => Ok((Chroma444, 8)),
+        b"mono" => Ok((Mono, 8)),
+        b"420p10" => Ok((Chroma420, 10)),
+        b"422p10" => Ok((Chroma422, 10)),
+        b"444p10" => Ok((Chroma444, 10)),
+        b"mono10" => Ok((Mono, 10)),
+        b"420p12" => Ok((Chroma420, 12)),
+        b"422p12" => Ok((Chroma422, 12)),
+        b"444p12" => Ok((Chroma444, 12)),
+        b"mono12" => Ok((Mono, 12)),
         _ => Err(Y4mError::Colour {
             tag: tag.text(),
             offset: tag.offset,

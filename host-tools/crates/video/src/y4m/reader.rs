@@ -19,7 +19,7 @@ const BUFFER: usize = 1 << 16;
 pub struct YuvFrame {
     /// What its header says beyond `FRAME`, with the space before it.
     pub parameters: Vec<u8>,
-    /// [`Header::frame_bytes`] samples.
+    /// [`Header::frame_bytes`] bytes.
     pub samples: Vec<u8>,
 }
 

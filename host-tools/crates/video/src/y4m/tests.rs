@@ -118,7 +118,7 @@ fn tags_that_mean_nothing_are_named_with_their_place() {
         error(b"YUV4MPEG2\n"),
         Y4mError::NoSize { tag: 'W' }
     ));
-    for colour in ["420p10", "422", "411", "444alpha", "mono16", ""] {
+    for colour in ["420p14", "422p16", "411", "444alpha", "mono16", ""] {
         let line = format!("YUV4MPEG2 W1 H1 C{colour}\n");
         let error = error(line.as_bytes());
         assert!(

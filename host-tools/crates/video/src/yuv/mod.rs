@@ -18,8 +18,8 @@
 //! Back, sums of products with coefficients of 15 fraction bits are rounded to
 //! nearest, halves upwards; those of chroma add up to exactly nothing for grey.
 //!
-//! A chroma sample of 4:2:0 belongs to its four pixels alike, both ways: codes
-//! are repeated on the way in and averaged on the way out, so that what is not
+//! A chroma sample of 4:2:0 belongs to its four pixels alike, one of 4:2:2 to its two, both
+//! ways: codes are repeated on the way in and averaged on the way out, so that what is not
 //! changed in between comes back. For chroma sited left (`420mpeg2`) that leaves
 //! the *gain* of a chroma sample a quarter of its width to the right, which the
 //! smooth gains do not show; the chroma itself is not moved.
@@ -34,8 +34,120 @@
     reason = "compiled into `engine::rows`, which chooses the processor's instructions"
 )]
 
+mod deep;
+
+use super::curves::Code;
 use super::y4m::CodeRange;
 use iltm_runtime::FrameSize;
+use std::fmt;
+use std::ops::Add;
+
+/// A sample of a plane and of a colour: `u8` of 8 bits; `u16` of more, whose colours have 16 bits.
+pub(super) trait PlaneCode: Code {
+    /// Coefficients.
+    type Conversion: Copy + fmt::Debug + Send + Sync;
+    /// What chroma adds to a colour.
+    type Term: Copy + Default + fmt::Debug + Send + Sync;
+    /// A sum of four codes.
+    type Sum: Copy + Default + fmt::Debug + Send + Sync + From<Self> + Add<Output = Self::Sum>;
+
+    /// Samples of a frame.
+    fn of_bytes(bytes: Vec<u8>) -> Vec<Self>;
+
+    /// The bytes of a frame's samples.
+    fn to_bytes(samples: Vec<Self>) -> Vec<u8>;
+
+    /// Coefficients for so many bits of a plane's sample.
+    fn conversion(standard: Standard, range: CodeRange, bits: u32) -> Self::Conversion;
+
+    /// What chroma adds to red, green and blue; all of one length.
+    fn chroma_terms(
+        conversion: &Self::Conversion,
+        u: &[Self],
+        v: &[Self],
+        terms: [&mut [Self::Term]; 3],
+    );
+
+    /// One colour of a row from its luma and what chroma adds to the colour.
+    fn colour_row(
+        conversion: &Self::Conversion,
+        luma: &[Self],
+        terms: &[Self::Term],
+        colour: &mut [Self],
+    );
+
+    /// Grey codes of a row of luma.
+    fn grey_row(conversion: &Self::Conversion, luma: &[Self], grey: &mut [Self]);
+
+    /// Luma of a row of colours.
+    fn luma_row(conversion: &Self::Conversion, colours: [&[Self]; 3], luma: &mut [Self]);
+
+    /// Luma of a row of grey codes.
+    fn grey_luma_row(conversion: &Self::Conversion, grey: &[Self], luma: &mut [Self]);
+
+    /// Chroma of colours that are each the sum of `2^bits` codes.
+    fn chroma_row(
+        conversion: &Self::Conversion,
+        sums: [&[Self::Sum]; 3],
+        bits: u32,
+        u: &mut [Self],
+        v: &mut [Self],
+    );
+}
+
+impl PlaneCode for u8 {
+    type Conversion = Conversion;
+    type Term = i16;
+    type Sum = u16;
+
+    fn of_bytes(bytes: Vec<u8>) -> Vec<Self> {
+        bytes
+    }
+
+    fn to_bytes(samples: Vec<Self>) -> Vec<u8> {
+        samples
+    }
+
+    fn conversion(standard: Standard, range: CodeRange, _bits: u32) -> Conversion {
+        Conversion::new(standard, range)
+    }
+
+    #[inline(always)]
+    fn chroma_terms(conversion: &Conversion, u: &[u8], v: &[u8], terms: [&mut [i16]; 3]) {
+        conversion.chroma_terms(u, v, terms);
+    }
+
+    #[inline(always)]
+    fn colour_row(conversion: &Conversion, luma: &[u8], terms: &[i16], colour: &mut [u8]) {
+        conversion.colour_row(luma, terms, colour);
+    }
+
+    #[inline(always)]
+    fn grey_row(conversion: &Conversion, luma: &[u8], grey: &mut [u8]) {
+        conversion.grey_row(luma, grey);
+    }
+
+    #[inline(always)]
+    fn luma_row(conversion: &Conversion, colours: [&[u8]; 3], luma: &mut [u8]) {
+        conversion.luma_row(colours, luma);
+    }
+
+    #[inline(always)]
+    fn grey_luma_row(conversion: &Conversion, grey: &[u8], luma: &mut [u8]) {
+        conversion.grey_luma_row(grey, luma);
+    }
+
+    #[inline(always)]
+    fn chroma_row(
+        conversion: &Conversion,
+        sums: [&[u16]; 3],
+        bits: u32,
+        u: &mut [u8],
+        v: &mut [u8],
+    ) {
+        conversion.chroma_row(sums, bits, u, v);
+    }
+}
 
 /// What weighs the colours in luma.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -225,7 +337,7 @@ impl Conversion {
 /// Repeats every term for the two pixels that it belongs to; an odd last pixel
 /// has one of its own.
 #[inline(always)]
-pub(super) fn repeat_pairs(terms: &[i16], pixels: &mut [i16]) {
+pub(super) fn repeat_pairs<T: Copy>(terms: &[T], pixels: &mut [T]) {
     let (pairs, rest) = pixels.as_chunks_mut::<2>();
     for (pair, term) in pairs.iter_mut().zip(terms) {
         *pair = [*term, *term];
@@ -235,19 +347,34 @@ pub(super) fn repeat_pairs(terms: &[i16], pixels: &mut [i16]) {
     }
 }
 
+/// Sums of the codes of two pixels side by side; an odd last pixel counts twice.
+#[inline(always)]
+pub(super) fn sum_pairs<S: PlaneCode>(row: &[S], sums: &mut [S::Sum]) {
+    let (pairs, rest) = row.as_chunks::<2>();
+    for (pair, sum) in pairs.iter().zip(sums.iter_mut()) {
+        let [a, b] = pair.map(S::Sum::from);
+        *sum = a + b;
+    }
+    if let ([a], Some(sum)) = (rest, sums.last_mut()) {
+        let a = S::Sum::from(*a);
+        *sum = a + a;
+    }
+}
+
 /// Sums of the codes in squares of 2 x 2 pixels; an odd last pixel counts twice,
 /// and so does a row given as both `top` and `bottom`.
 #[inline(always)]
-pub(super) fn sum_squares(top: &[u8], bottom: &[u8], sums: &mut [u16]) {
+pub(super) fn sum_squares<S: PlaneCode>(top: &[S], bottom: &[S], sums: &mut [S::Sum]) {
     let ((top_pairs, top_rest), (bottom_pairs, bottom_rest)) =
         (top.as_chunks::<2>(), bottom.as_chunks::<2>());
     for ((top, bottom), sum) in top_pairs.iter().zip(bottom_pairs).zip(sums.iter_mut()) {
-        let [a, b] = top.map(u16::from);
-        let [c, d] = bottom.map(u16::from);
+        let [a, b] = top.map(S::Sum::from);
+        let [c, d] = bottom.map(S::Sum::from);
         *sum = a + b + c + d;
     }
     if let ([a], [c], Some(sum)) = (top_rest, bottom_rest, sums.last_mut()) {
-        *sum = 2 * (u16::from(*a) + u16::from(*c));
+        let column = S::Sum::from(*a) + S::Sum::from(*c);
+        *sum = column + column;
     }
 }
 
