@@ -5,12 +5,12 @@
 //! `docs/instructions.csv` holds it, and a test compares the two.
 
 use crate::firmware::{counted, elf, memory_with, order};
-use crate::grid;
 use crate::simulated::{host_tools, learned, photograph, scene};
 use iltm::compile::{CompileOptions, compile};
 use iltm::device::emulator::Board;
 use iltm::picture::Response;
-use iltm::solve::{ChannelInverse, InverseTransport, natural_images};
+use iltm::scene::description::Scene;
+use iltm::solve::{InverseTransport, natural_images};
 use iltm_runtime::frame_buffers::psram;
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
@@ -78,9 +78,56 @@ fn painted((rows, cols): (u16, u16), (width, height): (u16, u16)) -> Vec<u8> {
             ("height = 150", &format!("height = {height}")),
         ],
     );
+    compiled(&solved(&scene), &[1.0 / 255.0])
+}
+
+/// Two square panels at a right angle, in grey.
+const CORNER: &str = r"
+ambient = 0.004
+
+[projector]
+position = [-4.0, 0.5, 4.0]
+look_at = [0.0, 0.5, 0.0]
+field_of_view = 16.0
+aspect = 1.6
+rows = 32
+cols = 32
+
+[camera]
+position = [-3.6, 0.8, 4.4]
+look_at = [0.0, 0.5, 0.0]
+field_of_view = 18.5
+width = 320
+height = 220
+white = 0.8
+full_well = 20000.0
+read_noise = 5.0
+bits = 12
+
+[[panel]]
+corners = [[-1, 0, 0], [0, 0, 0], [0, 1, 0], [-1, 1, 0]]
+albedo = 0.8
+
+[[panel]]
+corners = [[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0]]
+albedo = 0.8
+";
+
+/// Tables of the corner in a dark room and in one with some light.
+fn corner() -> [Vec<u8>; 2] {
+    let scene = Scene::parse(CORNER.as_bytes(), Path::new("corner.toml")).expect("a scene");
+    let mut inverse = solved(&scene);
+    let targets = [1.0 / 64.0, 1.0 / 255.0, 1.0 / 750.0];
+    let lit = compiled(&inverse, &targets);
+    inverse.channels[0].ambient.fill(0.0);
+    [compiled(&inverse, &targets), lit]
+}
+
+/// What is learned from simulated photographs of a scene.
+fn solved(scene: &Scene) -> InverseTransport {
     let capture = tempfile::tempdir().expect("a folder for photographs");
-    photograph(&scene, 250, 1, capture.path());
-    compiled(&learned(capture.path()).inverse, &[1.0 / 255.0])
+    photograph(scene, 250, 1, capture.path());
+    learned(capture.path()).inverse
 }
 
 fn compiled(inverse: &InverseTransport, targets: &[f64]) -> Vec<u8> {
@@ -104,33 +151,13 @@ fn case(name: &str, image: Vec<u8>, size: Option<(u16, u16)>) -> Case {
 }
 
 fn quick() -> Vec<Case> {
-    let sample = |name: &str| learned(&host_tools().join("samples").join(name));
-    // The grey sample's scene in three colours: as it is, and with less light.
-    let mut panels = sample("m-panels").inverse;
-    let grey = panels.channels.remove(0);
-    panels
-        .channels
-        .extend([1.0, 0.9, 0.7].map(|light| ChannelInverse {
-            gain: grey.gain.iter().map(|gain| gain / light).collect(),
-            scale: grey.scale / light,
-            ..grey.clone()
-        }));
-    let colour = sample("m-panels-colour").compiled.image;
-    let mut wedge = crate::wedge(grid(32, 32), 1);
-    wedge.channels[0].deviation = None;
-    let targets = [1.0 / 64.0, 1.0 / 255.0, 1.0 / 750.0];
-    let lit = compiled(&wedge, &targets);
-    wedge.channels[0].ambient.fill(0.0);
-    let dark = compiled(&wedge, &targets);
+    let sample = host_tools().join("samples/m-panels-colour");
+    let [dark, lit] = corner();
     vec![
-        case("32x32 dark room", dark.clone(), None),
+        case("32x32 dark room", dark, None),
         case("32x32", lit, None),
-        case(
-            "13x21 colour",
-            compiled(&panels, &[1.0 / 64.0, 1.0 / 255.0]),
-            None,
-        ),
-        case("16x24 colour", colour, None),
+        case("13x21 colour", painted((13, 21), (216, 150)), None),
+        case("16x24 colour", learned(&sample).compiled.image, None),
         case("64x64 colour", painted((64, 64), (400, 300)), None),
     ]
 }

@@ -3,11 +3,12 @@
 
 use iltm::build_table::{BuiltTable, TableOptions, build_table};
 use iltm::capture::{CaptureOptions, NO_CELL, Registration, pattern_set};
-
+use iltm::compile::reference_white::uniform_white;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{Forced, Simulation, SimulationOptions, VirtualCamera, folder};
-use iltm::solve::SolveOptions;
+use iltm::scene::{Effect, Forced, Simulation, SimulationOptions, VirtualCamera, folder};
+use iltm::solve::{InverseTransport, Method, SolveOptions, natural_images};
+use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
 
 /// The folder of the tools, with `scenes` and `samples`.
@@ -45,7 +46,16 @@ pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
 
 /// What is learned from a capture with the usual options.
 pub fn learned(capture: &Path) -> BuiltTable {
-    let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
+    learned_by(None, capture)
+}
+
+/// What is learned from a capture by a method, or by the usual one.
+pub fn learned_by(method: Option<Method>, capture: &Path) -> BuiltTable {
+    let photographs = CaptureOptions::default();
+    let solve = SolveOptions {
+        method,
+        ..SolveOptions::default()
+    };
     build_table(
         capture,
         &photographs,
@@ -54,6 +64,70 @@ pub fn learned(capture: &Path) -> BuiltTable {
         &Silent,
     )
     .expect("a good capture")
+}
+
+/// What the projector shows for images that are wanted, by channel: compensated, and with gains alone,
+/// those that make white even.
+pub fn inputs(learned: &BuiltTable, wanted: &[DMatrix<f64>]) -> [Vec<DMatrix<f64>>; 2] {
+    let channels = wanted.iter().enumerate();
+    let both = channels.map(|(channel, wanted)| {
+        let flood = learned.measurements.channels[channel]
+            .observations
+            .column(0);
+        let mut alone = wanted.clone();
+        for mut image in alone.column_iter_mut() {
+            image.component_div_assign(&flood);
+        }
+        (learned.inverse.channel(channel).apply(wanted), alone)
+    });
+    let (compensated, alone) = both.unzip();
+    [compensated, alone]
+}
+
+/// Natural images that a scene can show, by channel, cells x images.
+pub fn showable(inverse: &InverseTransport) -> Vec<DMatrix<f64>> {
+    // Walls that light each other cannot be much darker than their neighbours.
+    let white = uniform_white(inverse).expect("lit");
+    let images = natural_images(inverse.grid).map(|light| white * (0.2 + 0.8 * light));
+    vec![images; inverse.channels.len()]
+}
+
+/// Mean relative error of the light of live cells while the projector shows `inputs` for images that
+/// are `wanted`, both by channel, at the best scale of each image. A camera without noise sees it.
+pub fn error_on_the_wall(
+    scene: &Scene,
+    learned: &BuiltTable,
+    wanted: &[DMatrix<f64>],
+    inputs: &[DMatrix<f64>],
+) -> f64 {
+    let live = &learned.inverse.live;
+    let shown: Vec<_> = inputs
+        .iter()
+        .map(|inputs| {
+            DMatrix::from_fn(inputs.nrows(), inputs.ncols(), |cell, image| {
+                let on = if live[cell] { 1.0 } else { 0.0 };
+                on * inputs[(cell, image)].clamp(0.0, 1.0)
+            })
+        })
+        .collect();
+    let quiet = Forced::default()
+        .with(Effect::Noise, false)
+        .with(Effect::Ambient, false);
+    let simulation = simulation(scene, quiet);
+    let images = shown[0].ncols();
+    let lamp = vec![1.0; images];
+    let exposed = simulation
+        .expose_projected(&shown, &lamp)
+        .expect("bounces end");
+    let of_image = |image| {
+        let planes = simulation.photograph(&exposed, image);
+        let errors = planes.iter().zip(wanted).map(|(plane, wanted)| {
+            let seen = cell_means(&learned.measurements.registration, plane, live.len());
+            error(&seen, wanted.column(image), live)
+        });
+        errors.sum::<f64>() / wanted.len() as f64
+    };
+    (0..images).map(of_image).sum::<f64>() / images as f64
 }
 
 /// Mean light of the pixels of each cell.

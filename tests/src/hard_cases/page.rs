@@ -15,9 +15,9 @@ result. This command writes the page:
 cargo run --release -p iltm-tests --bin hard_cases -- --write docs/hard-cases.md
 ```
 
-`cargo test -p iltm-tests --test scenes hard_cases` checks every case. Each is solved by `joint`,
-the default for so few cells, and by `links`, the default for many ([method](method.md)); both must
-hold.
+`cargo test -p iltm-tests --test scenes hard_cases` checks every case. Each is solved by `joint` and
+by `links`, of which held-out photographs choose where nothing else is asked for ([method](method.md));
+both must hold.
 
 Errors are those of the closed loop, `min_s |s T p - d| / |d|`, as the mean over 16 natural
 images `d` (dead leaves, darkest parts a fifth of white), where `p` is the projector's input

@@ -189,7 +189,12 @@ fn solve_judged(
     let outcome = match method {
         Method::Joint => {
             let joint = task.joint(options.lambda, &mut seconds, &mut clock);
-            task.or_two_stage(joint, &mut seconds, &mut clock)
+            let chosen = if options.may_choose(prepared.live_cells()) {
+                task.or_links(joint, &mut seconds, &mut clock)
+            } else {
+                joint
+            };
+            task.or_two_stage(chosen, &mut seconds, &mut clock)
         }
         Method::Links => {
             let links = task.links(&mut seconds, &mut clock)?;
@@ -348,6 +353,32 @@ impl<'t> Task<'t> {
         outcome
     }
 
+    /// The answer by links where held-out photographs say that it errs less.
+    fn or_links(
+        &self,
+        joint: Outcome<'t>,
+        seconds: &mut Seconds,
+        clock: &mut Clock,
+    ) -> Outcome<'t> {
+        let spent = *seconds;
+        let links = self.links(seconds, clock);
+        seconds.choose += spent.choose;
+        seconds.solve += spent.solve;
+        let error = |outcome: &Outcome<'_>| predict(self.prepared, &outcome.judged).compensated;
+        match links {
+            Ok(links) if self.is_sound(&links) && error(&links) < error(&joint) => links,
+            _ => joint,
+        }
+    }
+
+    /// Whether an answer has converged and can be the inverse of a real scene.
+    fn is_sound(&self, outcome: &Outcome<'_>) -> bool {
+        let live = &self.prepared.live;
+        let candidates = outcome.solution.candidates(live);
+        let near = outcome.solution.convergence.residual() <= HOPELESS;
+        near && candidates.iter().all(|c| c.inverse.flaw(live).is_none())
+    }
+
     /// The two-stage answer where held-out photographs say that the first one errs and that the
     /// other errs less: where cells differ much in light, or each lights several places, `K`
     /// is not smooth, and the transport itself is easier to find.
@@ -369,14 +400,8 @@ impl<'t> Task<'t> {
         let other = self.by_rows(Method::TwoStage, seconds, clock);
         seconds.choose += spent.choose;
         seconds.solve += spent.solve;
-        let live = &self.prepared.live;
-        let sound = |other: &Outcome<'_>| {
-            let candidates = other.solution.candidates(live);
-            let near = other.solution.convergence.residual() <= HOPELESS;
-            near && candidates.iter().all(|c| c.inverse.flaw(live).is_none())
-        };
         match other {
-            Ok(other) if sound(&other) => {
+            Ok(other) if self.is_sound(&other) => {
                 let instead = predict(self.prepared, &other.judged).compensated;
                 if instead < BETTER * error {
                     other

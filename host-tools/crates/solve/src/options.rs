@@ -69,8 +69,9 @@ pub(super) const MOST_INVERTED_CELLS: usize = 2048;
 /// measured best; nothing needs to be set.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SolveOptions {
-    /// How the inverse is found; `None` for [`Method::Joint`], or [`Method::Links`] where there are
-    /// so many cells and photographs that it is as good and takes a fraction of the time.
+    /// How the inverse is found; `None` for [`Method::Joint`] or [`Method::Links`]: the one that
+    /// predicts held-out photographs better, or of many cells and photographs the one that takes a
+    /// fraction of the time.
     pub method: Option<Method>,
     /// Weight of the l1 term of [`Method::Joint`] once light is scaled so that a
     /// mean flood photograph is 1; `None` chooses it by held-out photographs.
@@ -96,11 +97,11 @@ impl Default for SolveOptions {
 }
 
 impl SolveOptions {
-    /// The method for so many live cells and photographs.
+    /// The method for so many live cells and photographs; where both take seconds, held-out
+    /// photographs [may choose](Self::may_choose) another.
     ///
-    /// `docs/measured.md` compares both. On folded panels with few photographs, or with folds within
-    /// the blocks of the quadtree, `joint` errs less, so it is the default while it takes seconds. Of
-    /// more than [`MOST_JOINT_CELLS`] it would take more memory than most computers have.
+    /// `docs/measured.md` compares both. Of more than [`MOST_JOINT_CELLS`] `joint` would take more
+    /// memory than most computers have.
     pub(super) fn method_for(&self, cells: usize, photographs: usize) -> Method {
         let many = cells >= MANY_CELLS && photographs >= MANY_PHOTOGRAPHS;
         match self.method {
@@ -110,6 +111,11 @@ impl SolveOptions {
             None if many || cells > MOST_JOINT_CELLS => Method::Links,
             None => Method::Joint,
         }
+    }
+
+    /// Whether held-out photographs choose between `joint` and `links`: where both take seconds.
+    pub(super) fn may_choose(&self, cells: usize) -> bool {
+        self.method.is_none() && self.lambda.is_none() && cells < MANY_CELLS
     }
 
     pub(super) fn check(&self) -> Result<(), SolveError> {

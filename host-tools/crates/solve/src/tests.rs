@@ -221,7 +221,7 @@ fn channels_get_links_of_their_own_only_where_light_bounces_otherwise_in_them() 
 }
 
 #[test]
-fn links_is_the_default_of_many_cells_and_photographs_alone() {
+fn links_alone_is_for_many_cells_and_photographs() {
     let default = SolveOptions::default();
     let weighted = SolveOptions {
         lambda: Some(0.01),
@@ -238,6 +238,39 @@ fn links_is_the_default_of_many_cells_and_photographs_alone() {
         let chosen = options.method_for(cells, photographs);
         assert_eq!(chosen, wanted, "{cells} {photographs}");
     }
+}
+
+#[test]
+fn held_out_photographs_choose_between_joint_and_links() {
+    let mut chosen = Vec::new();
+    for (bernoulli, noise) in [(60, 1e-3), (150, 1e-3), (300, 2e-3), (150, 1e-2)] {
+        let scene = Corner::new(12, 16, textured);
+        let mut capture = Capture::new(&scene, (12, 16), bernoulli);
+        add_noise(&mut capture.light[0], noise);
+        let by = |options: &SolveOptions| capture.solve(options).unwrap().1;
+        let [joint, links] = PHYSICAL.map(|name| by(&method(name)).prediction.compensated);
+        let report = by(&SolveOptions::default());
+        println!(
+            "{bernoulli} {noise}: joint {joint:.6}, links {links:.6}, {}",
+            report.method
+        );
+        let best = if links < joint {
+            Method::Links
+        } else {
+            Method::Joint
+        };
+        assert_eq!(report.method, best, "{bernoulli} {noise}");
+        assert_eq!(
+            report.prediction.compensated.to_bits(),
+            joint.min(links).to_bits()
+        );
+        chosen.push(best);
+    }
+    // Both are chosen somewhere.
+    assert!(
+        PHYSICAL.iter().all(|name| chosen.contains(name)),
+        "{chosen:?}"
+    );
 }
 
 #[test]
