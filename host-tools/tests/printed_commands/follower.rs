@@ -342,7 +342,14 @@ impl Follower {
         assert_eq!(read(".ci/run").lines().last(), Some(on_change.as_str()));
         let script = ALL_TESTS.trim_start_matches("bash ");
         self.succeed(&format!("bash -n {script}"));
-        assert!(read(script).contains("\ncargo test --workspace "));
+        let script = read(script);
+        for line in [
+            "tests=(cargo test --workspace ",
+            "\"${tests[@]}\" --test printed_commands -- followed:: ",
+            "\"${tests[@]}\" -- --skip followed:: ",
+        ] {
+            assert!(script.contains(&format!("\n{line}")), "{line}");
+        }
     }
 }
 
