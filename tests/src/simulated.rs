@@ -16,6 +16,17 @@ pub fn host_tools() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-tools")
 }
 
+/// The scenes that come with the tools.
+pub fn scene_names() -> Vec<String> {
+    let files = std::fs::read_dir(host_tools().join("scenes")).expect("part of the repository");
+    let paths = files.map(|file| file.expect("readable").path());
+    let scenes = paths.filter(|path| path.extension().is_some_and(|it| it == "toml"));
+    let names = scenes.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()));
+    let mut names: Vec<_> = names.collect();
+    names.sort();
+    names
+}
+
 /// A scene that comes with the tools, with some words replaced.
 pub fn scene(name: &str, replaced: &[(&str, &str)]) -> Scene {
     let path = host_tools().join(format!("scenes/{name}.toml"));

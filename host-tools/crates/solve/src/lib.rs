@@ -360,10 +360,7 @@ impl<'t> Task<'t> {
         seconds: &mut Seconds,
         clock: &mut Clock,
     ) -> Outcome<'t> {
-        let spent = *seconds;
-        let links = self.links(seconds, clock);
-        seconds.choose += spent.choose;
-        seconds.solve += spent.solve;
+        let links = seconds.and_those_of(|seconds| self.links(seconds, clock));
         let error = |outcome: &Outcome<'_>| predict(self.prepared, &outcome.judged).compensated;
         match links {
             Ok(links) if self.is_sound(&links) && error(&links) < error(&joint) => links,
@@ -396,10 +393,7 @@ impl<'t> Task<'t> {
         if good || self.splits.len() > 1 || self.prepared.live_cells() > MOST_INVERTED_CELLS {
             return first;
         }
-        let spent = *seconds;
-        let other = self.by_rows(Method::TwoStage, seconds, clock);
-        seconds.choose += spent.choose;
-        seconds.solve += spent.solve;
+        let other = seconds.and_those_of(|seconds| self.by_rows(Method::TwoStage, seconds, clock));
         match other {
             Ok(other) if self.is_sound(&other) => {
                 let instead = predict(self.prepared, &other.judged).compensated;

@@ -210,3 +210,14 @@ pub struct Seconds {
     /// Bounds of the theorem's constants.
     pub recovery: f64,
 }
+
+impl Seconds {
+    /// What `solve` finds, whose time to choose and to solve is added.
+    pub(super) fn and_those_of<T>(&mut self, solve: impl FnOnce(&mut Self) -> T) -> T {
+        let before = *self;
+        let found = solve(self);
+        self.choose += before.choose;
+        self.solve += before.solve;
+        found
+    }
+}

@@ -117,11 +117,9 @@ impl Live<'_> {
         let given = reader.header().clone();
         let placed = first.place(given.size())?;
         let shown = given.resized(placed.shown());
-        let colours = shown.colours();
-        first.job(&placed, colours)?;
+        first.job(&placed, shown.colours())?;
         let mut run = Run {
             live: self,
-            colours,
             given,
             shown: shown.clone(),
             placed,
@@ -163,8 +161,6 @@ impl Live<'_> {
 /// A stream under way.
 struct Run<'r, 'l> {
     live: Live<'l>,
-    /// Colours of a pixel.
-    colours: usize,
     given: Header,
     shown: Header,
     placed: PlacedFrames,
@@ -196,7 +192,7 @@ impl Run<'_, '_> {
     ) -> Result<Option<Vec<u8>>, VideoError> {
         let layout = PlaneLayout::<S>::new(&self.shown);
         let placed = compensator.place(self.given.size())?;
-        let job = compensator.job(&placed, self.colours)?;
+        let job = compensator.job(&placed, self.shown.colours())?;
         let mut engine = compensator.engine::<Planar<S>, C>(job)?;
         let budget = self.live.budget.map(microseconds);
         let mut governor =
@@ -264,7 +260,7 @@ impl Run<'_, '_> {
         if !placed.moves_like(&self.placed) {
             return Err(VideoError::Elsewhere.into());
         }
-        newer.job(&placed, self.colours)?;
+        newer.job(&placed, self.shown.colours())?;
         Ok((content.to_vec(), table.id()))
     }
 }

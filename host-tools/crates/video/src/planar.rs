@@ -7,7 +7,7 @@
 
 use super::bands::{Band, Bands, Interleaved, STRIP};
 use super::y4m::{ChromaSampling, Header, YuvFrame};
-use super::yuv::{PlaneCode, Standard, repeat_pairs, sum_pairs, sum_squares};
+use super::yuv::{Convert, PlaneCode, Standard, repeat_pairs, sum_pairs, sum_squares};
 use iltm_picture::{Picture, Samples};
 use iltm_runtime::FrameSize;
 
@@ -32,7 +32,11 @@ impl<S: PlaneCode> PlaneLayout<S> {
             chroma_width,
             chroma_samples: chroma_width * chroma_height,
             sampling: header.sampling(),
-            conversion: S::conversion(Standard::of(header.size()), header.range(), header.bits()),
+            conversion: S::Conversion::of(
+                Standard::of(header.size()),
+                header.range(),
+                header.bits(),
+            ),
         }
     }
 
@@ -271,7 +275,7 @@ impl<S: PlaneCode> Band for PlanarBand<'_, S> {
         let lumas = self.luma[luma..].chunks_exact(width);
         if layout.sampling == ChromaSampling::Mono {
             for (luma, grey) in lumas.zip(colours.chunks_exact_mut(width)) {
-                S::grey_row(&conversion, luma, grey);
+                conversion.grey_row(luma, grey);
             }
             return;
         }
@@ -282,7 +286,7 @@ impl<S: PlaneCode> Band for PlanarBand<'_, S> {
             if row == 0 || !layout.shares_rows() {
                 let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
                 let [red, green, blue] = &mut rows.terms;
-                S::chroma_terms(&conversion, u, v, [red, green, blue]);
+                conversion.chroma_terms(u, v, [red, green, blue]);
                 if layout.shares_columns() {
                     for (terms, pixels) in rows.terms.iter().zip(&mut rows.spread) {
                         repeat_pairs(terms, pixels);
@@ -295,7 +299,7 @@ impl<S: PlaneCode> Band for PlanarBand<'_, S> {
                 &rows.terms
             };
             for (terms, colour) in terms.iter().zip(colours.chunks_exact_mut(width)) {
-                S::colour_row(&conversion, luma, terms, colour);
+                conversion.colour_row(luma, terms, colour);
             }
         }
     }
@@ -308,7 +312,7 @@ impl<S: PlaneCode> Band for PlanarBand<'_, S> {
         let lumas = self.luma[luma..].chunks_exact_mut(width);
         if layout.sampling == ChromaSampling::Mono {
             for (luma, grey) in lumas.zip(colours.chunks_exact(width)) {
-                S::grey_luma_row(&conversion, grey, luma);
+                conversion.grey_luma_row(grey, luma);
             }
             return;
         }
@@ -317,10 +321,10 @@ impl<S: PlaneCode> Band for PlanarBand<'_, S> {
         let mut vs = self.v[chroma..].chunks_exact_mut(layout.chroma_width);
         let mut chroma_row = |sums: &[Vec<S::Sum>; 3], bits| {
             let (u, v) = (us.next().unwrap_or_default(), vs.next().unwrap_or_default());
-            S::chroma_row(&conversion, sums.each_ref().map(Vec::as_slice), bits, u, v);
+            conversion.chroma_row(sums.each_ref().map(Vec::as_slice), bits, u, v);
         };
         for (luma, colours) in lumas.zip(colours.chunks_exact(3 * width)) {
-            S::luma_row(&conversion, separate(colours, width), luma);
+            conversion.luma_row(separate(colours, width), luma);
             if layout.shares_rows() {
                 continue;
             }

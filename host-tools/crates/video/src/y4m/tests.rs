@@ -20,7 +20,7 @@ fn error(stream: &[u8]) -> Y4mError {
 
 #[test]
 fn tags_say_how_frames_are_laid_out() {
-    use ChromaSampling::{Chroma420, Chroma444, Mono};
+    use ChromaSampling::{Chroma420, Chroma422, Chroma444, Mono};
     use CodeRange::{Full, Limited};
     for (line, sampling, range, bytes) in [
         ("W5 H3", Chroma420, Limited, 15 + 2 * 3 * 2),
@@ -35,6 +35,11 @@ fn tags_say_how_frames_are_laid_out() {
         ("W5 H3 I? C444 A1:1 F30000:1001", Chroma444, Limited, 45),
         ("W5 H3  Cmono Xsomething", Mono, Full, 15),
         ("W1 H1", Chroma420, Limited, 3),
+        ("W5 H3 C422", Chroma422, Limited, 15 + 2 * 3 * 3),
+        ("W5 H3 C420p10", Chroma420, Limited, 2 * 27),
+        ("W5 H3 C422p10", Chroma422, Limited, 2 * 33),
+        ("W5 H3 C444p12", Chroma444, Limited, 2 * 45),
+        ("W5 H3 Cmono12", Mono, Full, 2 * 15),
     ] {
         let line = &format!("YUV4MPEG2 {line}");
         let header = Header::parse(line.as_bytes()).expect(line);
@@ -53,6 +58,7 @@ fn a_header_of_ours_reads_as_what_it_was_made_for() {
     for sampling in [
         ChromaSampling::Mono,
         ChromaSampling::Chroma420,
+        ChromaSampling::Chroma422,
         ChromaSampling::Chroma444,
     ] {
         for range in [CodeRange::Limited, CodeRange::Full] {

@@ -12,7 +12,7 @@
 )]
 
 use super::super::y4m::CodeRange;
-use super::{PlaneCode, Standard};
+use super::{Convert, PlaneCode, Standard, fixed};
 
 /// Fraction bits of coefficients to RGB.
 const BITS: u32 = 13;
@@ -38,46 +38,6 @@ pub(crate) struct DeepConversion {
 }
 
 impl DeepConversion {
-    fn new(standard: Standard, range: CodeRange, bits: u32) -> Self {
-        let (red, blue) = standard.red_and_blue();
-        let green = 1.0 - red - blue;
-        let unit = f64::from(bits - 8).exp2();
-        let most = f64::from(bits).exp2() - 1.0;
-        let (black, luma, chroma) = match range {
-            CodeRange::Limited => (16.0 * unit, 219.0 * unit, 224.0 * unit),
-            CodeRange::Full => (0.0, most, most),
-        };
-        let white = f64::from(WHITE);
-        let fixed = |value: f64, bits: u32| (value * f64::from(bits).exp2()).round() as i32;
-        let (of_v, of_u) = (2.0 * (1.0 - red), 2.0 * (1.0 - blue));
-        let term = |coefficient: f64| fixed(coefficient * white / chroma, BITS);
-        let back_bits = 30 - bits;
-        let whole = fixed(luma / white, back_bits);
-        let of_luma = |part: f64| fixed(part * luma / white, back_bits);
-        let (from_red, from_blue) = (of_luma(red), of_luma(blue));
-        let half = fixed(0.5 * chroma / white, back_bits);
-        let share = |part: f64, of: f64| fixed(-part * chroma / white / of, back_bits);
-        let (red_in_u, blue_in_v) = (share(red, of_u), share(blue, of_v));
-        Self {
-            luma_scale: fixed(white / luma, BITS),
-            chroma: [
-                term(of_v),
-                term(-of_u * blue / green),
-                term(-of_v * red / green),
-                term(of_u),
-            ],
-            back: [
-                [from_red, whole - from_red - from_blue, from_blue],
-                [red_in_u, -half - red_in_u, half],
-                [half, -half - blue_in_v, blue_in_v],
-            ],
-            back_bits,
-            black: black as i32,
-            middle: (128.0 * unit) as i32,
-            most: most as i32,
-        }
-    }
-
     /// Luma in units of a colour's code, [`BITS`] fraction bits, the half of rounding included.
     #[inline(always)]
     fn luma_term(&self, code: u16) -> i32 {
@@ -105,16 +65,29 @@ impl PlaneCode for u16 {
     fn to_bytes(samples: Vec<Self>) -> Vec<u8> {
         samples.into_iter().flat_map(Self::to_le_bytes).collect()
     }
+}
 
-    fn conversion(standard: Standard, range: CodeRange, bits: u32) -> DeepConversion {
-        DeepConversion::new(standard, range, bits)
+impl Convert<u16> for DeepConversion {
+    fn of(standard: Standard, range: CodeRange, bits: u32) -> Self {
+        let widths @ [black, luma, _] = range.widths(bits);
+        let white = f64::from(WHITE);
+        let back_bits = 30 - bits;
+        Self {
+            luma_scale: fixed(white / luma, BITS),
+            chroma: standard.to_colours(white, widths, BITS),
+            back: standard.to_planes(white, widths, back_bits),
+            back_bits,
+            black: black as i32,
+            middle: 1 << (bits - 1),
+            most: (1 << bits) - 1,
+        }
     }
 
     #[inline(always)]
-    fn chroma_terms(conversion: &DeepConversion, u: &[u16], v: &[u16], terms: [&mut [i32]; 3]) {
-        let [v_red, u_green, v_green, u_blue] = conversion.chroma;
+    fn chroma_terms(&self, u: &[u16], v: &[u16], terms: [&mut [i32]; 3]) {
+        let [v_red, u_green, v_green, u_blue] = self.chroma;
         let [red, green, blue] = terms;
-        let centred = |code: u16| i32::from(code).min(conversion.most) - conversion.middle;
+        let centred = |code: u16| i32::from(code).min(self.most) - self.middle;
         let slots = red.iter_mut().zip(green).zip(blue);
         for ((u, v), ((red, green), blue)) in u.iter().zip(v).zip(slots) {
             let (u, v) = (centred(*u), centred(*v));
@@ -125,57 +98,51 @@ impl PlaneCode for u16 {
     }
 
     #[inline(always)]
-    fn colour_row(conversion: &DeepConversion, luma: &[u16], terms: &[i32], colour: &mut [u16]) {
+    fn colour_row(&self, luma: &[u16], terms: &[i32], colour: &mut [u16]) {
         for ((luma, term), colour) in luma.iter().zip(terms).zip(colour) {
-            let sum = conversion.luma_term(*luma) + *term;
+            let sum = self.luma_term(*luma) + *term;
             *colour = (sum >> BITS).clamp(0, WHITE) as u16;
         }
     }
 
     #[inline(always)]
-    fn grey_row(conversion: &DeepConversion, luma: &[u16], grey: &mut [u16]) {
+    fn grey_row(&self, luma: &[u16], grey: &mut [u16]) {
         for (luma, grey) in luma.iter().zip(grey) {
-            *grey = (conversion.luma_term(*luma) >> BITS).clamp(0, WHITE) as u16;
+            *grey = (self.luma_term(*luma) >> BITS).clamp(0, WHITE) as u16;
         }
     }
 
     #[inline(always)]
-    fn luma_row(conversion: &DeepConversion, [red, green, blue]: [&[u16]; 3], luma: &mut [u16]) {
-        let [[of_red, of_green, of_blue], ..] = conversion.back;
+    fn luma_row(&self, [red, green, blue]: [&[u16]; 3], luma: &mut [u16]) {
+        let [[of_red, of_green, of_blue], ..] = self.back;
         let colours = red.iter().zip(green).zip(blue);
         for (((red, green), blue), luma) in colours.zip(luma) {
             let sum = of_red * i32::from(*red)
                 + of_green * i32::from(*green)
                 + of_blue * i32::from(*blue);
-            *luma = conversion.code(sum, conversion.black);
+            *luma = self.code(sum, self.black);
         }
     }
 
     #[inline(always)]
-    fn grey_luma_row(conversion: &DeepConversion, grey: &[u16], luma: &mut [u16]) {
-        let [of_luma, ..] = conversion.back;
+    fn grey_luma_row(&self, grey: &[u16], luma: &mut [u16]) {
+        let [of_luma, ..] = self.back;
         let scale: i32 = of_luma.into_iter().sum();
         for (grey, luma) in grey.iter().zip(luma) {
-            *luma = conversion.code(scale * i32::from(*grey), conversion.black);
+            *luma = self.code(scale * i32::from(*grey), self.black);
         }
     }
 
     #[inline(always)]
-    fn chroma_row(
-        conversion: &DeepConversion,
-        [red, green, blue]: [&[u32]; 3],
-        bits: u32,
-        u: &mut [u16],
-        v: &mut [u16],
-    ) {
-        let [_, of_u, of_v] = conversion.back;
+    fn chroma_row(&self, [red, green, blue]: [&[u32]; 3], bits: u32, u: &mut [u16], v: &mut [u16]) {
+        let [_, of_u, of_v] = self.back;
         let half = (1 << bits) >> 1;
         let colours = red.iter().zip(green).zip(blue);
         for (((red, green), blue), (u, v)) in colours.zip(u.iter_mut().zip(v)) {
             let colour = [red, green, blue].map(|sum| ((sum + half) >> bits) as i32);
             let sum = |of: [i32; 3]| of[0] * colour[0] + of[1] * colour[1] + of[2] * colour[2];
-            *u = conversion.code(sum(of_u), conversion.middle);
-            *v = conversion.code(sum(of_v), conversion.middle);
+            *u = self.code(sum(of_u), self.middle);
+            *v = self.code(sum(of_v), self.middle);
         }
     }
 }
@@ -193,26 +160,20 @@ mod tests {
                     [CodeRange::Limited, CodeRange::Full].map(|range| (bits, standard, range))
                 })
         }) {
-            let conversion = DeepConversion::new(standard, range, bits);
+            let conversion = DeepConversion::of(standard, range, bits);
             let yuv = |[red, green, blue]: [u16; 3]| {
                 let (mut y, mut u, mut v) = ([0], [0], [0]);
-                u16::luma_row(&conversion, [&[red], &[green], &[blue]], &mut y);
+                conversion.luma_row([&[red], &[green], &[blue]], &mut y);
                 let sums = [red, green, blue].map(|code| [u32::from(code)]);
-                u16::chroma_row(
-                    &conversion,
-                    sums.each_ref().map(|s| &s[..]),
-                    0,
-                    &mut u,
-                    &mut v,
-                );
+                conversion.chroma_row(sums.each_ref().map(|s| &s[..]), 0, &mut u, &mut v);
                 [y[0], u[0], v[0]]
             };
             let rgb = |[y, u, v]: [u16; 3]| {
                 let (mut red, mut green, mut blue) = ([0], [0], [0]);
-                u16::chroma_terms(&conversion, &[u], &[v], [&mut red, &mut green, &mut blue]);
+                conversion.chroma_terms(&[u], &[v], [&mut red, &mut green, &mut blue]);
                 [red, green, blue].map(|term| {
                     let mut code = [0];
-                    u16::colour_row(&conversion, &[y], &term, &mut code);
+                    conversion.colour_row(&[y], &term, &mut code);
                     code[0]
                 })
             };

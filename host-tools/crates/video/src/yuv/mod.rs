@@ -45,7 +45,7 @@ use std::ops::Add;
 /// A sample of a plane and of a colour: `u8` of 8 bits; `u16` of more, whose colours have 16 bits.
 pub(super) trait PlaneCode: Code {
     /// Coefficients.
-    type Conversion: Copy + fmt::Debug + Send + Sync;
+    type Conversion: Convert<Self>;
     /// What chroma adds to a colour.
     type Term: Copy + Default + fmt::Debug + Send + Sync;
     /// A sum of four codes.
@@ -56,43 +56,6 @@ pub(super) trait PlaneCode: Code {
 
     /// The bytes of a frame's samples.
     fn to_bytes(samples: Vec<Self>) -> Vec<u8>;
-
-    /// Coefficients for so many bits of a plane's sample.
-    fn conversion(standard: Standard, range: CodeRange, bits: u32) -> Self::Conversion;
-
-    /// What chroma adds to red, green and blue; all of one length.
-    fn chroma_terms(
-        conversion: &Self::Conversion,
-        u: &[Self],
-        v: &[Self],
-        terms: [&mut [Self::Term]; 3],
-    );
-
-    /// One colour of a row from its luma and what chroma adds to the colour.
-    fn colour_row(
-        conversion: &Self::Conversion,
-        luma: &[Self],
-        terms: &[Self::Term],
-        colour: &mut [Self],
-    );
-
-    /// Grey codes of a row of luma.
-    fn grey_row(conversion: &Self::Conversion, luma: &[Self], grey: &mut [Self]);
-
-    /// Luma of a row of colours.
-    fn luma_row(conversion: &Self::Conversion, colours: [&[Self]; 3], luma: &mut [Self]);
-
-    /// Luma of a row of grey codes.
-    fn grey_luma_row(conversion: &Self::Conversion, grey: &[Self], luma: &mut [Self]);
-
-    /// Chroma of colours that are each the sum of `2^bits` codes.
-    fn chroma_row(
-        conversion: &Self::Conversion,
-        sums: [&[Self::Sum]; 3],
-        bits: u32,
-        u: &mut [Self],
-        v: &mut [Self],
-    );
 }
 
 impl PlaneCode for u8 {
@@ -107,46 +70,30 @@ impl PlaneCode for u8 {
     fn to_bytes(samples: Vec<Self>) -> Vec<u8> {
         samples
     }
+}
 
-    fn conversion(standard: Standard, range: CodeRange, _bits: u32) -> Conversion {
-        Conversion::new(standard, range)
-    }
+/// Rows of planes to rows of colours and back.
+pub(super) trait Convert<S: PlaneCode>: Copy + fmt::Debug + Send + Sync {
+    /// The coefficients for so many bits of a plane's sample.
+    fn of(standard: Standard, range: CodeRange, bits: u32) -> Self;
 
-    #[inline(always)]
-    fn chroma_terms(conversion: &Conversion, u: &[u8], v: &[u8], terms: [&mut [i16]; 3]) {
-        conversion.chroma_terms(u, v, terms);
-    }
+    /// What chroma adds to red, green and blue; all of one length.
+    fn chroma_terms(&self, u: &[S], v: &[S], terms: [&mut [S::Term]; 3]);
 
-    #[inline(always)]
-    fn colour_row(conversion: &Conversion, luma: &[u8], terms: &[i16], colour: &mut [u8]) {
-        conversion.colour_row(luma, terms, colour);
-    }
+    /// One colour of a row from its luma and what chroma adds to the colour.
+    fn colour_row(&self, luma: &[S], terms: &[S::Term], colour: &mut [S]);
 
-    #[inline(always)]
-    fn grey_row(conversion: &Conversion, luma: &[u8], grey: &mut [u8]) {
-        conversion.grey_row(luma, grey);
-    }
+    /// Grey codes of a row of luma.
+    fn grey_row(&self, luma: &[S], grey: &mut [S]);
 
-    #[inline(always)]
-    fn luma_row(conversion: &Conversion, colours: [&[u8]; 3], luma: &mut [u8]) {
-        conversion.luma_row(colours, luma);
-    }
+    /// Luma of a row of colours.
+    fn luma_row(&self, colours: [&[S]; 3], luma: &mut [S]);
 
-    #[inline(always)]
-    fn grey_luma_row(conversion: &Conversion, grey: &[u8], luma: &mut [u8]) {
-        conversion.grey_luma_row(grey, luma);
-    }
+    /// Luma of a row of grey codes.
+    fn grey_luma_row(&self, grey: &[S], luma: &mut [S]);
 
-    #[inline(always)]
-    fn chroma_row(
-        conversion: &Conversion,
-        sums: [&[u16]; 3],
-        bits: u32,
-        u: &mut [u8],
-        v: &mut [u8],
-    ) {
-        conversion.chroma_row(sums, bits, u, v);
-    }
+    /// Chroma of colours that are each the sum of `2^bits` codes.
+    fn chroma_row(&self, sums: [&[S::Sum]; 3], bits: u32, u: &mut [S], v: &mut [S]);
 }
 
 /// What weighs the colours in luma.
@@ -176,6 +123,48 @@ impl Standard {
             Self::Bt709 => (0.2126, 0.0722),
         }
     }
+
+    /// What v adds to red, u and v to green, and u to blue, whose codes end at `white`: coefficients of
+    /// so many fraction bits.
+    fn to_colours(self, white: f64, [_, _, chroma]: [f64; 3], bits: u32) -> [i32; 4] {
+        let (red, blue) = self.red_and_blue();
+        let green = 1.0 - red - blue;
+        let (of_v, of_u) = (2.0 * (1.0 - red), 2.0 * (1.0 - blue));
+        let exact = [of_v, -of_u * blue / green, -of_v * red / green, of_u];
+        exact.map(|coefficient| fixed(coefficient * white / chroma, bits))
+    }
+
+    /// Of red, green, blue, whose codes end at `white`, in luma, u and v: coefficients of so many
+    /// fraction bits. Those of chroma add up to nothing.
+    fn to_planes(self, white: f64, [_, luma, chroma]: [f64; 3], bits: u32) -> [[i32; 3]; 3] {
+        let (red, blue) = self.red_and_blue();
+        let whole = fixed(luma / white, bits);
+        let [from_red, from_blue] = [red, blue].map(|part| fixed(part * luma / white, bits));
+        let half = fixed(0.5 * chroma / white, bits);
+        let share = |part: f64, of: f64| fixed(-part * chroma / white / (2.0 * (1.0 - of)), bits);
+        let (red_in_u, blue_in_v) = (share(red, blue), share(blue, red));
+        [
+            [from_red, whole - from_red - from_blue, from_blue],
+            [red_in_u, -half - red_in_u, half],
+            [half, -half - blue_in_v, blue_in_v],
+        ]
+    }
+}
+
+impl CodeRange {
+    /// Black, and the widths of luma and of chroma, in codes of so many bits.
+    fn widths(self, bits: u32) -> [f64; 3] {
+        let unit = f64::from(bits - 8).exp2();
+        let most = f64::from(bits).exp2() - 1.0;
+        match self {
+            Self::Limited => [16.0 * unit, 219.0 * unit, 224.0 * unit],
+            Self::Full => [0.0, most, most],
+        }
+    }
+}
+
+fn fixed(value: f64, bits: u32) -> i32 {
+    (value * f64::from(bits).exp2()).round() as i32
 }
 
 /// Fraction bits of a row of terms.
@@ -203,40 +192,24 @@ impl Conversion {
     /// The coefficients for frames of this standard and range.
     #[must_use]
     pub fn new(standard: Standard, range: CodeRange) -> Self {
-        let (red, blue) = standard.red_and_blue();
-        let green = 1.0 - red - blue;
-        let (black, luma, chroma) = match range {
-            CodeRange::Limited => (16.0, 219.0, 224.0),
-            CodeRange::Full => (0.0, 255.0, 255.0),
-        };
+        let widths @ [black, luma, _] = range.widths(8);
         let scale = 255.0 / luma;
-        let term = |coefficient: f64| {
-            let bits = TERM_BITS + CHROMA_BITS;
-            (coefficient * 255.0 / chroma * f64::from(bits).exp2()).round() as i16
-        };
-        let (of_v, of_u) = (2.0 * (1.0 - red), 2.0 * (1.0 - blue));
-        let fixed = |value: f64| (value * f64::from(BACK_BITS).exp2()).round() as i32;
-        let whole = fixed(luma / 255.0);
-        let (from_red, from_blue) = (fixed(red * luma / 255.0), fixed(blue * luma / 255.0));
-        let half = fixed(0.5 * chroma / 255.0);
-        let share = |part: f64, of: f64| fixed(-part * chroma / 255.0 / of);
-        let (red_in_u, blue_in_v) = (share(red, of_u), share(blue, of_v));
+        let chroma = standard.to_colours(255.0, widths, TERM_BITS + CHROMA_BITS);
         Self {
             luma_scale: (64.0 * 255.0 * scale).round() as u16,
             luma_bias: (32.0 - 64.0 * scale * black).round() as i16,
-            chroma: [
-                term(of_v),
-                term(-of_u * blue / green),
-                term(-of_v * red / green),
-                term(of_u),
-            ],
-            back: [
-                [from_red, whole - from_red - from_blue, from_blue],
-                [red_in_u, -half - red_in_u, half],
-                [half, -half - blue_in_v, blue_in_v],
-            ],
+            chroma: chroma.map(|coefficient| coefficient as i16),
+            back: standard.to_planes(255.0, widths, BACK_BITS),
             black: black as i32,
         }
+    }
+
+    /// Luma of a pixel.
+    #[must_use]
+    pub fn luma(&self, [red, green, blue]: [u8; 3]) -> u8 {
+        let mut luma = [0];
+        self.luma_row([&[red], &[green], &[blue]], &mut luma);
+        luma[0]
     }
 
     #[inline(always)]
@@ -244,11 +217,16 @@ impl Conversion {
         let scaled = u32::from(u16::from(code) * 257) * u32::from(self.luma_scale);
         ((scaled >> 16) as i16).wrapping_add(self.luma_bias)
     }
+}
 
-    /// What chroma adds to red, green and blue, in 64ths of a code; all of one
-    /// length.
+impl Convert<u8> for Conversion {
+    fn of(standard: Standard, range: CodeRange, _bits: u32) -> Self {
+        Self::new(standard, range)
+    }
+
+    // In 64ths of a code.
     #[inline(always)]
-    pub(super) fn chroma_terms(&self, u: &[u8], v: &[u8], terms: [&mut [i16]; 3]) {
+    fn chroma_terms(&self, u: &[u8], v: &[u8], terms: [&mut [i16]; 3]) {
         const HALF: i32 = 1 << (CHROMA_BITS - 1);
         let [v_red, u_green, v_green, u_blue] = self.chroma.map(i32::from);
         let [red, green, blue] = terms;
@@ -262,34 +240,23 @@ impl Conversion {
         }
     }
 
-    /// One colour of a row from its luma and what chroma adds to the colour.
     #[inline(always)]
-    pub(super) fn colour_row(&self, luma: &[u8], terms: &[i16], colour: &mut [u8]) {
+    fn colour_row(&self, luma: &[u8], terms: &[i16], colour: &mut [u8]) {
         for ((luma, term), colour) in luma.iter().zip(terms).zip(colour) {
             let sum = self.luma_term(*luma).saturating_add(*term);
             *colour = (sum >> TERM_BITS).clamp(0, 255) as u8;
         }
     }
 
-    /// Grey codes of a row of luma.
     #[inline(always)]
-    pub(super) fn grey_row(&self, luma: &[u8], grey: &mut [u8]) {
+    fn grey_row(&self, luma: &[u8], grey: &mut [u8]) {
         for (luma, grey) in luma.iter().zip(grey) {
             *grey = (self.luma_term(*luma) >> TERM_BITS).clamp(0, 255) as u8;
         }
     }
 
-    /// Luma of a pixel.
-    #[must_use]
-    pub fn luma(&self, [red, green, blue]: [u8; 3]) -> u8 {
-        let mut luma = [0];
-        self.luma_row([&[red], &[green], &[blue]], &mut luma);
-        luma[0]
-    }
-
-    /// Luma of a row of colours.
     #[inline(always)]
-    pub(super) fn luma_row(&self, [red, green, blue]: [&[u8]; 3], luma: &mut [u8]) {
+    fn luma_row(&self, [red, green, blue]: [&[u8]; 3], luma: &mut [u8]) {
         let [[of_red, of_green, of_blue], ..] = self.back;
         let offset = (self.black << BACK_BITS) + (1 << (BACK_BITS - 1));
         let colours = red.iter().zip(green).zip(blue);
@@ -301,9 +268,8 @@ impl Conversion {
         }
     }
 
-    /// Luma of a row of grey codes.
     #[inline(always)]
-    pub(super) fn grey_luma_row(&self, grey: &[u8], luma: &mut [u8]) {
+    fn grey_luma_row(&self, grey: &[u8], luma: &mut [u8]) {
         let [of_luma, ..] = self.back;
         let scale: i32 = of_luma.into_iter().sum();
         let offset = (self.black << BACK_BITS) + (1 << (BACK_BITS - 1));
@@ -312,15 +278,8 @@ impl Conversion {
         }
     }
 
-    /// Chroma of colours that are each the sum of `2^bits` codes.
     #[inline(always)]
-    pub(super) fn chroma_row(
-        &self,
-        [red, green, blue]: [&[u16]; 3],
-        bits: u32,
-        u: &mut [u8],
-        v: &mut [u8],
-    ) {
+    fn chroma_row(&self, [red, green, blue]: [&[u16]; 3], bits: u32, u: &mut [u8], v: &mut [u8]) {
         let [_, of_u, of_v] = self.back;
         let shift = BACK_BITS + bits;
         let offset = (128 << shift) + (1 << (shift - 1));
