@@ -91,18 +91,18 @@ cargo fmt --manifest-path "$firmware/Cargo.toml" --check
 cargo fmt --manifest-path tests/mutations/Cargo.toml --check
 
 say "clippy"
-mpi=(--features iltm/mpi)
-has_mpi || mpi=()
-cargo clippy --workspace --all-targets --locked "${mpi[@]}" -- -D warnings
+features=(--features iltm/gpu)
+if has_mpi; then features+=(--features iltm/mpi); fi
+cargo clippy --workspace --all-targets --locked "${features[@]}" -- -D warnings
 # The firmware's own checks need a Rust with a core library for its target; where
 # there is none, core is built with the firmware, and only the firmware.
 has_target=
 [ -d "$(rustc --print sysroot)/lib/rustlib/thumbv7em-none-eabihf/lib" ] && has_target=yes
 if [ $has_target ]; then
     # Both boards with all stages, and one with gain alone.
-    for features in mps2-an500,stages mps2-an386,stages mps2-an500; do
+    for stages in mps2-an500,stages mps2-an386,stages mps2-an500; do
         (cd "$firmware" && cargo clippy --release --lib --bins --locked \
-            --no-default-features --features "$features" -- -D warnings)
+            --no-default-features --features "$stages" -- -D warnings)
     done
 fi
 
@@ -119,9 +119,9 @@ export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED-1}
 logs=$(mktemp -d)
 trap 'rm -rf "$logs"' EXIT
 status=0
-# One build for all tests. The page of the quick start builds the tool without MPI, and its test
-# runs that.
-tests=(cargo test --workspace --locked --no-fail-fast "${mpi[@]}")
+# One build for all tests. The page of the quick start builds the tool without MPI and without its
+# part for graphics processors, and its test runs that.
+tests=(cargo test --workspace --locked --no-fail-fast "${features[@]}")
 "${tests[@]}" --no-run
 # The printed commands wait for devices and players most of the time: beside the other tests.
 "${tests[@]}" --test printed_commands -- followed:: >"$logs/pages" 2>&1 &

@@ -58,8 +58,12 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     let brightness = Provenance::read(table.provenance()).brightness;
     let (mut data, totals) = totals(&summary, start.elapsed().as_secs_f64());
     data["brightness"] = json!(brightness);
+    data["gpu"] = json!(compensator.gpu());
     let mut text = brightness.map_or_else(String::new, |brightness| brightness.words() + "\n");
     text += &totals;
+    if let Some(gpu) = compensator.gpu() {
+        let _ = writeln!(text, "frames   made by {gpu}");
+    }
     if let Some(live) = live {
         add_live(&live, arguments, &mut data, &mut text);
     }
@@ -80,6 +84,7 @@ fn settings(arguments: &Compensate) -> CompensateOptions {
             Encoding::Display
         },
         fit: arguments.fit,
+        gpu: arguments.gpu,
         ..CompensateOptions::default()
     }
 }

@@ -109,6 +109,8 @@ pub(super) enum Kind {
     OtherTable = 37,
     #[strum(message = "the player is missing, or a show went wrong")]
     Player = 38,
+    #[strum(message = "there is no graphics processor to work with")]
+    Gpu = 39,
 }
 
 impl From<&Rejected> for Kind {
@@ -414,6 +416,7 @@ impl From<VideoError> for Failure {
             | VideoError::Still
             | VideoError::NothingToFit => Kind::Usage,
             VideoError::Table(_) => Kind::Table,
+            VideoError::Gpu { .. } | VideoError::WithoutGpu => Kind::Gpu,
             VideoError::File { .. }
             | VideoError::Y4m(Y4mError::Write { .. })
             | VideoError::Png(PngError::Write { .. }) => Kind::Write,

@@ -196,3 +196,28 @@ fn films_of_ten_bits_are_compensated_as_ffmpegs_pictures_of_them_are() {
         );
     }
 }
+
+#[cfg(feature = "gpu")]
+#[test]
+fn a_graphics_processor_makes_the_same_film_and_where_there_is_none_nothing_is_written() {
+    let user = User::with_table();
+    user.ffmpeg("-f lavfi -i testsrc2=size=320x180:rate=5:duration=1 -pix_fmt yuv420p film.y4m");
+    let plain = user.json("compensate t.iltm film.y4m -o plain.y4m");
+    assert!(plain["gpu"].is_null());
+    let with_gpu = user.json("compensate t.iltm film.y4m -o gpu.y4m --gpu");
+    let name = with_gpu["gpu"].as_str().expect("a name");
+    assert!(!name.is_empty());
+    assert!(user.read("gpu.y4m") == user.read("plain.y4m"));
+    assert_eq!(with_gpu["clipped"], plain["clipped"]);
+    let said = user.says("compensate t.iltm film.y4m -o again.y4m --gpu");
+    contains(&said, &[name]);
+
+    let mut command = user.iltm("compensate t.iltm film.y4m -o none.y4m --gpu");
+    command.env("VK_DRIVER_FILES", user.path("no-driver.json"));
+    command.env("VK_ICD_FILENAMES", user.path("no-driver.json"));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let ended = Ended::of(command.spawn().expect("built"));
+    assert_eq!(ended.code, 39, "{}", ended.said);
+    contains(&ended.said, &["Leave --gpu away"]);
+    assert!(!user.path("none.y4m").exists());
+}

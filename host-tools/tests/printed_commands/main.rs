@@ -66,7 +66,7 @@ macro_rules! pages {
         const PAGES: &[&str] = &[$($page),*];
 
         mod followed {
-            use super::{follow, fs, refuses_ranks, there, video};
+            use super::{follow, fs, refuses_gpu, refuses_ranks, there, video};
 
             $(
                 #[test]
@@ -88,6 +88,7 @@ pages! {
         let script = fs::read_to_string(clone.join("iltm.bash")).expect("completions");
         assert!(script.contains("complete -F _iltm"), "{script}");
         refuses_ranks(&clone.join("target/release/iltm"));
+        refuses_gpu(&clone.join("target/release/iltm"), clone);
     };
     the_technicians_guide, "docs/guide.md", |clone| {
         there(clone, &[
@@ -136,6 +137,24 @@ fn refuses_ranks(iltm: &Path) {
     let object: serde_json::Value = serde_json::from_slice(&refused.stdout).expect("an object");
     assert_eq!(object["error"]["kind"], "usage");
     assert_ne!(run("1", &["ports"]).status.code(), Some(2));
+}
+
+/// Built as the quick start says, without its part for graphics processors.
+fn refuses_gpu(iltm: &Path, clone: &Path) {
+    let mut command = Command::new(iltm);
+    command
+        .current_dir(clone)
+        .args(["compensate", "foyer.iltm", "--gpu"]);
+    command.args([
+        "host-tools/samples/m-panels/patterns/000.png",
+        "-o",
+        "none.png",
+    ]);
+    let refused = command.output().expect("built");
+    assert_eq!(refused.status.code(), Some(39));
+    let words = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(words.contains("--features gpu"), "{words}");
+    assert!(!clone.join("none.png").exists());
 }
 
 #[test]

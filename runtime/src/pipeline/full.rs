@@ -148,6 +148,12 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.area
     }
 
+    /// Where its pixels lie between the centres of the cells: rows, then columns.
+    #[must_use]
+    pub const fn cell_axes(&self) -> [Axis; 2] {
+        self.cells
+    }
+
     /// Whether frames of `tier` go through the operator. Those of others need neither
     /// averages nor corrections.
     #[must_use]

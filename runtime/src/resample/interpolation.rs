@@ -37,6 +37,15 @@ pub struct Place {
     pub fraction: u32,
 }
 
+/// The pixels of one centre.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Piece {
+    /// The first of them.
+    pub first: usize,
+    /// How far that is after the centre: pixels, 32 fraction bits.
+    pub past: u32,
+}
+
 impl Axis {
     /// `cells` values over `length` pixels; `None` unless
     /// `1 <= cells <= length <= 65,535`.
@@ -81,6 +90,36 @@ impl Axis {
             after: before + 1,
             fraction: ((rest << 31) / (2 * length)) as u32,
         }
+    }
+
+    /// What one pixel is of the distance of two centres, 32 fraction bits.
+    #[must_use]
+    pub const fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Where the pixels of every centre begin: those at or after it and before the next.
+    ///
+    /// For whoever works on pixels one by one: pixel `x` of a piece is
+    /// `value + ((s * past) >> 32) + (x - first) * s`, where `s` is the difference to the
+    /// next value times [`step`](Self::step), rounded to the nearest `2^32`th. Pixels
+    /// before all pieces have the first value, and those of the last piece the last.
+    pub fn pieces(&self) -> impl Iterator<Item = Piece> + use<> {
+        let Self {
+            cells,
+            length,
+            half_cell,
+            ..
+        } = *self;
+        let (twice, length) = (2 * u64::from(cells), u64::from(length));
+        (0..u64::from(cells)).map(move |cell| {
+            let centre = (2 * cell + 1) * length - u64::from(cells);
+            let first = centre.div_ceil(twice);
+            Piece {
+                first: first as usize,
+                past: ((first * twice - centre) * half_cell) as u32,
+            }
+        })
     }
 
     /// Spreads `cells` values over the pixels of a row.
@@ -171,4 +210,39 @@ pub fn blend_rows(before: &[i32], after: &[i32], fraction: u32, line: &mut [i32]
 pub fn blend(before: i32, after: i32, fraction: u32) -> i32 {
     let difference = i64::from(after) - i64::from(before);
     before.wrapping_add((difference.wrapping_mul(i64::from(fraction)) >> 31) as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::{vec, vec::Vec};
+
+    proptest! {
+        #[test]
+        fn pixels_one_by_one_are_those_of_a_row(
+            (cells, more) in (1_usize..70, 0_usize..700),
+            values in prop::collection::vec(-1_i32 << 30..1 << 30, 70),
+        ) {
+            let (length, values) = (cells + more, &values[..cells]);
+            let axis = Axis::new(cells, length).expect("no fewer pixels than cells");
+            let mut row = vec![0; length];
+            axis.expand(values, &mut row);
+            let pieces: Vec<_> = axis.pieces().collect();
+            prop_assert_eq!(pieces.len(), cells);
+            for (x, pixel) in row.into_iter().enumerate() {
+                let piece = pieces.partition_point(|piece| piece.first <= x);
+                let one = if piece == 0 || piece == cells {
+                    values[piece.max(1) - 1]
+                } else {
+                    let (value, next) = (values[piece - 1], values[piece]);
+                    let difference = i128::from(next - value) * i128::from(axis.step());
+                    let step = (difference + (1 << 31)) >> 32;
+                    let Piece { first, past } = pieces[piece - 1];
+                    value + ((step * i128::from(past)) >> 32) as i32 + (x - first) as i32 * step as i32
+                };
+                prop_assert_eq!(one, pixel, "pixel {}", x);
+            }
+        }
+    }
 }

@@ -11,7 +11,7 @@
 //! its size changes.
 
 use super::bands::{Bands, Interleaved};
-use super::engine::{Engine, EngineJob};
+use super::engine::{Engine, EngineJob, Gpu};
 use super::live::Live;
 use super::{Fit, Input, PlacedFrames, VideoError};
 use iltm_picture::{Picture, Samples, WholeFile, png, progress::Progress};
@@ -34,6 +34,9 @@ pub struct CompensateOptions {
     /// What becomes of frames whose aspect is not the projector's; they are refused if
     /// this is unsaid.
     pub fit: Option<Fit>,
+    /// Whether frames larger than the grid are worked on by a graphics processor. The result
+    /// is the same.
+    pub gpu: bool,
 }
 
 impl Default for CompensateOptions {
@@ -43,6 +46,7 @@ impl Default for CompensateOptions {
             encoding: Encoding::Display,
             threads: 0,
             fit: None,
+            gpu: false,
         }
     }
 }
@@ -73,21 +77,37 @@ pub struct Compensator<'t, 'a> {
     settings: CompensateOptions,
     tier: u8,
     threads: Arc<ThreadPool>,
+    gpu: Option<Arc<Gpu>>,
 }
 
 impl<'t, 'a> Compensator<'t, 'a> {
     /// A compensator for `table`.
     ///
     /// # Errors
-    /// [`VideoError::NoSuchTier`], or [`VideoError::Threads`] if the threads cannot
-    /// be started.
+    /// [`VideoError::NoSuchTier`], [`VideoError::Threads`] if the threads cannot be
+    /// started, [`VideoError::Gpu`] or [`VideoError::WithoutGpu`] if there is no graphics
+    /// processor.
     pub fn new(table: &'t Table<'a>, settings: CompensateOptions) -> Result<Self, VideoError> {
         let threads = ThreadPoolBuilder::new().num_threads(settings.threads);
         let threads = threads.build().map_err(|error| VideoError::Threads {
             threads: settings.threads,
             reason: error.to_string(),
         })?;
-        Self::on(table, settings, Arc::new(threads))
+        let gpu = settings.gpu.then(Gpu::find).transpose()?;
+        Self::on(table, settings, Arc::new(threads), gpu.map(Arc::new))
+    }
+
+    /// The same on this graphics processor.
+    #[cfg(all(test, feature = "gpu"))]
+    pub(super) fn with_gpu(&self, gpu: &Arc<Gpu>) -> Result<Self, VideoError> {
+        let gpu = Some(Arc::clone(gpu));
+        Self::on(self.table, self.settings, Arc::clone(&self.threads), gpu)
+    }
+
+    /// The graphics processor that works, by its name.
+    #[must_use]
+    pub fn gpu(&self) -> Option<&str> {
+        self.gpu.as_ref().map(|gpu| gpu.name())
     }
 
     /// One for another table, with the same settings, on the same threads.
@@ -95,13 +115,15 @@ impl<'t, 'a> Compensator<'t, 'a> {
         &self,
         table: &'u Table<'b>,
     ) -> Result<Compensator<'u, 'b>, VideoError> {
-        Compensator::on(table, self.settings, Arc::clone(&self.threads))
+        let gpu = self.gpu.clone();
+        Compensator::on(table, self.settings, Arc::clone(&self.threads), gpu)
     }
 
     fn on(
         table: &'t Table<'a>,
         settings: CompensateOptions,
         threads: Arc<ThreadPool>,
+        gpu: Option<Arc<Gpu>>,
     ) -> Result<Self, VideoError> {
         let top = table.top_tier();
         let tier = settings.tier.unwrap_or(top);
@@ -113,6 +135,7 @@ impl<'t, 'a> Compensator<'t, 'a> {
             settings,
             tier,
             threads,
+            gpu,
         })
     }
 
@@ -309,6 +332,6 @@ impl<'t, 'a> Compensator<'t, 'a> {
         &self,
         job: EngineJob,
     ) -> Result<Engine<'_, 'a, P, C>, VideoError> {
-        Engine::new(self.table, &self.threads, job).map_err(VideoError::Runtime)
+        Engine::new(self.table, &self.threads, self.gpu.as_ref(), job)
     }
 }

@@ -16,12 +16,15 @@ use iltm_runtime::{
     pipeline::{Encoding, Sample},
     units::{Drive, Light},
 };
+use pulp::bytemuck::Pod;
 
 /// Elements of a table.
 const VALUES: usize = 1 << 16;
 
 /// A [`Sample`] that indexes a table.
-pub(super) trait Code: Sample + Into<usize> + PartialEq + Send + Sync + 'static {
+pub(super) trait Code:
+    Sample + Pod + Into<usize> + PartialEq + Send + Sync + 'static
+{
     /// Every code there is, in ascending order.
     fn all() -> impl Iterator<Item = Self>;
 }
@@ -92,5 +95,21 @@ impl<S: Code> Curves<S> {
         for (drive, code) in drives.iter().zip(codes) {
             *code = by_drive[usize::from(drive.to_bits())];
         }
+    }
+
+    /// Bits of the light of every code.
+    #[cfg(feature = "gpu")]
+    pub(super) fn light_words(&self) -> Vec<u32> {
+        let lights = self.light.iter().zip(S::all());
+        lights.map(|(light, _)| light.to_bits().into()).collect()
+    }
+
+    /// Codes of every drive, one curve after the other, and how many curves there are.
+    #[cfg(feature = "gpu")]
+    pub(super) fn code_words(&self) -> (Vec<u32>, usize) {
+        let drives = usize::from(Drive::ONE.to_bits()) + 1;
+        let codes = self.codes.iter().flat_map(|codes| &codes[..drives]);
+        let words = codes.map(|code| (*code).into() as u32).collect();
+        (words, self.codes.len())
     }
 }

@@ -90,6 +90,15 @@ pub enum VideoError {
         /// What the operating system says.
         reason: String,
     },
+    /// There is no graphics processor, or it failed.
+    #[error("the graphics processor: {reason}")]
+    Gpu {
+        /// What its driver says.
+        reason: String,
+    },
+    /// A graphics processor was asked for, and this build has no part for it.
+    #[error("this iltm was built without the feature `gpu`")]
+    WithoutGpu,
     /// The bytes of a table's file are no table.
     #[error("the table cannot be used: {0}")]
     Table(ImageError),
@@ -151,6 +160,14 @@ impl VideoError {
                 "Ask for a tier that `iltm inspect` lists, or for none, to use the top one."
             }
             Self::Threads { .. } => "Ask for fewer threads.",
+            Self::Gpu { .. } => {
+                "Leave --gpu away: the processor makes the same frames. Or look at the computer's \
+                 graphics driver (`vulkaninfo --summary`)."
+            }
+            Self::WithoutGpu => {
+                "Leave --gpu away: the processor makes the same frames. Or build it anew: \
+                 `cargo build --release --features gpu`."
+            }
             Self::Table(_) => "Copy the table again, or make it anew with `iltm solve`.",
             Self::Still => "Leave --watch and --budget away.",
             Self::Runtime(_) => {

@@ -13,7 +13,7 @@
 //! | YUV to RGB and back | [`yuv`] |
 //! | reading, working and writing at the same time | `stream` |
 //! | bands of rows of planar frames and of pictures | `bands`, `planar` |
-//! | frames of one size through one table, on all cores | `engine` |
+//! | frames of one size through one table, on all cores or on a graphics processor | `engine` |
 //! | codes to light and drives to codes by lookup | `curves` |
 //! | a moving scene made by arithmetic, to show and test with | [`test_scene`] |
 //! | errors | [`VideoError`] |

@@ -5,12 +5,15 @@
 //! once to become drives and codes. In between the operator works on the grid,
 //! which takes little time beside that. The light is kept from the one to the
 //! other, and the gains of the pixels from frame to frame. A frame of one pixel a
-//! cell goes through [`cells`].
+//! cell goes through [`cells`]. With `--gpu` the larger ones go through a compute shader
+//! instead ([`gpu`]).
 //!
 //! Averages are sums of integers, so that it does not matter which thread adds
 //! which row, or how many there are.
 
 mod cells;
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
+mod gpu;
 mod memory;
 mod rows;
 
@@ -19,15 +22,19 @@ use super::bands::Bands;
 pub use memory::OperatorMemory;
 
 use cells::Cells;
+pub(super) use gpu::Gpu;
+#[cfg(feature = "gpu")]
+use gpu::GpuFrames;
 use iltm_runtime::{
     FrameSize,
     image::Table,
-    pipeline::{Encoding, FrameError},
+    pipeline::{Encoding, FrameError, FullPipeline},
     placement::PixelArea,
     units::ClippedSamples,
 };
 use rayon::ThreadPool;
 use rows::FullFrames;
+use std::sync::Arc;
 
 /// Compensates frames of type `P` with a table of `C` channels.
 pub(super) struct Engine<'t, 'a, P: Bands, const C: usize> {
@@ -70,23 +77,36 @@ enum EnginePath<'t, 'a, P: Bands, const C: usize> {
     Cells(Cells<'t, 'a, P::Code, C>),
     /// More.
     Full(Box<FullFrames<'t, 'a, P, C>>),
+    /// More, on a graphics processor.
+    #[cfg(feature = "gpu")]
+    Gpu(Box<GpuFrames<'t, 'a, P, C>>),
 }
 
 impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
     /// Sizes everything for the frames to come and expands the gains.
     ///
     /// # Errors
-    /// [`FrameError`] if the frame is smaller than the grid, or the table has not
-    /// `C` channels.
+    /// [`VideoError::Runtime`] if the frame is smaller than the grid, or the table has not
+    /// `C` channels; [`VideoError::Gpu`] if the graphics processor has no room for it.
     pub(super) fn new(
         table: &'t Table<'a>,
         threads: &'t ThreadPool,
+        gpu: Option<&Arc<Gpu>>,
         job: EngineJob,
-    ) -> Result<Self, FrameError> {
+    ) -> Result<Self, VideoError> {
         let path = if job.size == FrameSize::of_grid(table.grid()) {
-            EnginePath::Cells(Cells::new(table, &job)?)
+            EnginePath::Cells(Cells::new(table, &job).map_err(VideoError::Runtime)?)
         } else {
-            EnginePath::Full(Box::new(FullFrames::new(table, threads, &job)?))
+            match gpu {
+                #[cfg(feature = "gpu")]
+                Some(gpu) => EnginePath::Gpu(Box::new(GpuFrames::new(table, gpu, threads, &job)?)),
+                #[cfg(not(feature = "gpu"))]
+                Some(gpu) => match **gpu {},
+                None => {
+                    let full = FullFrames::new(table, threads, &job);
+                    EnginePath::Full(Box::new(full.map_err(VideoError::Runtime)?))
+                }
+            }
         };
         Ok(Self {
             job,
@@ -110,7 +130,25 @@ impl<'t, 'a, P: Bands, const C: usize> Engine<'t, 'a, P, C> {
         let clipped = match &mut self.path {
             EnginePath::Cells(cells) => cells.compensate(&self.job, &mut self.operator, frame),
             EnginePath::Full(full) => full.compensate(&self.job, &mut self.operator, frame),
+            #[cfg(feature = "gpu")]
+            EnginePath::Gpu(gpu) => return gpu.compensate(&self.job, &mut self.operator, frame),
         };
         clipped.map_err(VideoError::Runtime)
     }
+}
+
+/// Turns the sums of a frame into the corrections of its cells, both colour by colour.
+fn correct<const C: usize>(
+    pipeline: &FullPipeline<'_, '_, C>,
+    tier: u8,
+    sums: &[u64],
+    corrections: &mut [i32],
+    operator: &mut OperatorMemory,
+) -> Result<(), FrameError> {
+    let group = C * pipeline.table().grid().cells();
+    let groups = sums.chunks_exact(group);
+    for (sums, corrections) in groups.zip(corrections.chunks_exact_mut(group)) {
+        pipeline.correct(tier, sums, corrections, &mut operator.workspace())?;
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@
 use super::super::bands::{Band, Bands, STRIP};
 use super::super::curves::{Code, Curves};
 use super::memory::{BandMemory, Memories, RowMemory};
-use super::{EngineJob, OperatorMemory};
+use super::{EngineJob, OperatorMemory, correct};
 use iltm_runtime::{
     image::Table,
     pipeline::{
@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 /// Rows that a thread takes at a time: few enough that the threads end together,
 /// many enough that taking them costs nothing.
-const BAND_ROWS: usize = 16;
+pub(super) const BAND_ROWS: usize = 16;
 
 /// Compensates frames larger than the grid.
 pub(super) struct FullFrames<'t, 'a, P: Bands, const C: usize> {
@@ -93,13 +93,8 @@ impl<'t, 'a, P: Bands, const C: usize> FullFrames<'t, 'a, P, C> {
     ) -> Result<ClippedSamples, FrameError> {
         self.read(frame);
         self.memories.take_sums(&mut self.sums);
-        let group = C * self.stages.cells();
-        let groups = self.sums.chunks_exact(group);
-        for (sums, corrections) in groups.zip(self.corrections.chunks_exact_mut(group)) {
-            let mut workspace = operator.workspace();
-            let pipeline = &self.stages.pipeline;
-            pipeline.correct(job.tier, sums, corrections, &mut workspace)?;
-        }
+        let (pipeline, corrections) = (&self.stages.pipeline, &mut self.corrections);
+        correct(pipeline, job.tier, &self.sums, corrections, operator)?;
         Ok(self.write(frame))
     }
 
@@ -310,7 +305,7 @@ impl<B: Band, const C: usize> NullaryFnOnce for WriteBand<'_, '_, '_, B, C> {
 
 /// Gains and ambient light of every pixel: row by row, in a row channel by channel. In a dark room
 /// there is no ambient light.
-fn expand<const C: usize>(pipeline: &FullPipeline<'_, '_, C>) -> (Vec<u16>, Vec<u16>) {
+pub(super) fn expand<const C: usize>(pipeline: &FullPipeline<'_, '_, C>) -> (Vec<u16>, Vec<u16>) {
     let mut gains = vec![0; C * pipeline.frame().pixels()];
     each_row(pipeline, &mut gains, |y, channel, row, gains| {
         pipeline.gain_row(y, channel, row, gains);

@@ -13,7 +13,7 @@ use std::time::Duration;
 const LINE: &str = "YUV4MPEG2 W63 H41 C420jpeg";
 
 /// Frames of random bytes.
-fn stream(line: &str, frames: usize) -> Vec<u8> {
+pub(super) fn stream(line: &str, frames: usize) -> Vec<u8> {
     let bytes = Header::parse(line.as_bytes()).unwrap().frame_bytes();
     let mut random = fastrand::Rng::with_seed(5);
     let mut stream = format!("{line}\n").into_bytes();

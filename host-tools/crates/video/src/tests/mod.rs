@@ -2,6 +2,8 @@
 
 mod exactness;
 mod fit;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod kinds;
 mod live;
 mod reference;
