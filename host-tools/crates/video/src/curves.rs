@@ -1,10 +1,9 @@
 //! Lookup tables from codes to light and from drives to codes.
 //!
-//! Both kinds of table have an element for every value of a `u16`, though not all
-//! can occur: looking up then needs no check. A table of codes by knot of the
-//! response would be eight times smaller, but finding the knots costs what the
-//! smaller table saves (measured equal), and codes without a response would need
-//! a way of their own.
+//! Both kinds of table have an element for every value that an index can have, though not
+//! all can occur: looking up then needs no check. A response of 8-bit frames has the same
+//! code for four drives at a time, so that its table is by the upper bits of the drive and
+//! leaves more of the caches to the frame.
 
 #![allow(
     clippy::inline_always,
@@ -14,6 +13,7 @@
 use iltm_runtime::{
     image::Table,
     pipeline::{Encoding, Sample},
+    response::INDEX_SHIFT,
     units::{Drive, Light},
 };
 use pulp::bytemuck::Pod;
@@ -41,14 +41,42 @@ impl Code for u16 {
     }
 }
 
+/// Elements of a table by the upper bits of a drive.
+const COARSE_VALUES: usize = VALUES >> INDEX_SHIFT;
+
 /// What every sample goes through.
 #[derive(Clone, Debug)]
 pub(super) struct Curves<S> {
     /// Light by code.
     light: Vec<Light>,
-    /// Codes by the bits of the drive: of each channel, or one for all where they
-    /// are the same, which leaves more of the caches to the frame.
-    codes: Vec<Vec<S>>,
+    /// Of each channel, or one for all where they are the same, which leaves more of the
+    /// caches to the frame.
+    codes: Vec<CodeCurve<S>>,
+}
+
+/// From drives to codes.
+#[derive(Clone, PartialEq, Debug)]
+enum CodeCurve<S> {
+    /// Codes by the bits of the drive.
+    Fine(Vec<S>),
+    /// Codes by the bits of the drive without the lowest [`INDEX_SHIFT`].
+    Coarse(Vec<S>),
+}
+
+impl<S: Code> CodeCurve<S> {
+    /// Of these codes, by the bits of the drive.
+    fn of(codes: Vec<S>) -> Self {
+        let groups = codes.chunks_exact(1 << INDEX_SHIFT);
+        let coarse: Option<Vec<S>> = groups
+            .map(|group| {
+                group
+                    .iter()
+                    .all(|code| *code == group[0])
+                    .then_some(group[0])
+            })
+            .collect();
+        coarse.map_or(Self::Fine(codes), Self::Coarse)
+    }
 }
 
 impl<S: Code> Curves<S> {
@@ -61,10 +89,10 @@ impl<S: Code> Curves<S> {
             .map(|channel| {
                 let curves = S::curves(table, encoding, channel);
                 let mut codes = vec![S::default(); VALUES];
-                for (code, bits) in codes.iter_mut().zip(0..=Drive::ONE.to_bits()) {
-                    *code = S::code(bits.into(), curves);
+                for (code, bits) in codes.iter_mut().zip(0..) {
+                    *code = S::code(bits, curves);
                 }
-                codes
+                CodeCurve::of(codes)
             })
             .collect();
         if codes.iter().all(|curve| *curve == codes[0]) {
@@ -88,12 +116,24 @@ impl<S: Code> Curves<S> {
     /// [`Sample::code`] of every drive of a channel.
     #[inline(always)]
     pub(super) fn encode(&self, channel: usize, drives: &[Drive], codes: &mut [S]) {
-        let curve = &self.codes[channel.min(self.codes.len() - 1)];
-        let Some(by_drive) = curve.first_chunk::<VALUES>() else {
-            return;
-        };
-        for (drive, code) in drives.iter().zip(codes) {
-            *code = by_drive[usize::from(drive.to_bits())];
+        // The lengths are known to the compiler from here on.
+        match &self.codes[channel.min(self.codes.len() - 1)] {
+            CodeCurve::Fine(by_drive) => {
+                let Some(by_drive) = by_drive.first_chunk::<VALUES>() else {
+                    return;
+                };
+                for (drive, code) in drives.iter().zip(codes) {
+                    *code = by_drive[usize::from(drive.to_bits())];
+                }
+            }
+            CodeCurve::Coarse(by_drive) => {
+                let Some(by_drive) = by_drive.first_chunk::<COARSE_VALUES>() else {
+                    return;
+                };
+                for (drive, code) in drives.iter().zip(codes) {
+                    *code = by_drive[usize::from(drive.to_bits() >> INDEX_SHIFT)];
+                }
+            }
         }
     }
 
@@ -111,5 +151,55 @@ impl<S: Code> Curves<S> {
         let codes = self.codes.iter().flat_map(|codes| &codes[..drives]);
         let words = codes.map(|code| (*code).into() as u32).collect();
         (words, self.codes.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use iltm_runtime::Grid;
+    use iltm_tests::made_up::MadeUp;
+
+    /// Compares both tables with what they stand for; of each channel, whether its codes
+    /// are by the upper bits of the drive.
+    fn coarse<S: Code>(table: &Table<'_>, encoding: Encoding) -> Vec<bool> {
+        let curves = Curves::<S>::new(table, encoding);
+        let all: Vec<S> = S::all().collect();
+        // Whole vectors, and some elements less and more.
+        for codes in [&all[..], &all[1..], &all[..7], &all[100..133]] {
+            let mut light = vec![Light::ZERO; codes.len()];
+            curves.decode(codes, &mut light);
+            for (code, light) in codes.iter().zip(light) {
+                assert_eq!(light, code.light(S::curves(table, encoding, 0)), "{code:?}");
+            }
+        }
+        let drives: Vec<Drive> = (0..=Drive::ONE.to_bits()).map(Drive::from_bits).collect();
+        let mut codes = vec![S::default(); drives.len()];
+        for channel in 0..usize::from(table.channels()) {
+            curves.encode(channel, &drives, &mut codes);
+            let of_channel = S::curves(table, encoding, channel);
+            for (drive, code) in drives.iter().zip(&codes) {
+                assert_eq!(
+                    *code,
+                    S::code(drive.to_bits().into(), of_channel),
+                    "{drive}"
+                );
+            }
+        }
+        let codes = curves.codes.iter();
+        codes
+            .map(|curve| matches!(curve, CodeCurve::Coarse(_)))
+            .collect()
+    }
+
+    #[test]
+    fn tables_are_what_they_stand_for_and_codes_by_upper_bits_only_where_that_is_the_same() {
+        let grid = Grid::new(4, 4).unwrap();
+        let image = MadeUp::of_all_kinds(grid, 3, 2, 1).image();
+        let table = Table::check(&image).unwrap();
+        assert!(coarse::<u8>(&table, Encoding::Display).iter().all(|is| *is));
+        assert_eq!(coarse::<u8>(&table, Encoding::Linear), [false]);
+        assert!(!coarse::<u16>(&table, Encoding::Display).contains(&true));
+        assert_eq!(coarse::<u16>(&table, Encoding::Linear), [false]);
     }
 }
