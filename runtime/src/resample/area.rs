@@ -194,7 +194,17 @@ impl Amount for Light {
         (after, part): (Option<&Self>, u32),
     ) -> u32 {
         let at = |light: Option<&Self>| light.map_or(0, |light| u32::from(light.to_bits()));
-        let inner: u32 = inner.iter().map(|light| u32::from(light.to_bits())).sum();
+        // As many sums side by side as a vector has elements: the compiler's own choice is
+        // four vectors at a time, which leaves much of a cell's row for the end.
+        let (chunks, rest) = inner.as_chunks::<8>();
+        let mut lanes = [0; 8];
+        for chunk in chunks {
+            for (lane, light) in lanes.iter_mut().zip(chunk) {
+                *lane += u32::from(light.to_bits());
+            }
+        }
+        let rest = rest.iter().map(|light| u32::from(light.to_bits()));
+        let inner: u32 = rest.chain(lanes).sum();
         (inner * whole) - at(first) * before + at(after) * part
     }
 }
