@@ -15,6 +15,7 @@
 
 use iltm::progress::Silent;
 use iltm::video::live::Live;
+use iltm::video::pipe;
 use iltm::video::watch::FileWatch;
 use iltm::video::y4m::Header;
 use iltm::video::{CompensateOptions, Compensator, Input};
@@ -187,6 +188,9 @@ fn run(case: &Case) -> (f64, f64) {
     let frames = (400_000_000 / bytes).clamp(20, 20_000);
     let (input, mut feed) = std::io::pipe().expect("a pipe");
     let (mut drain, output) = std::io::pipe().expect("a pipe");
+    // As the program does.
+    pipe::widen(&input);
+    pipe::widen(&output);
     let mut random = fastrand::Rng::with_seed(2);
     let deep = stream.sample_bytes() == 2;
     let sample = |at: usize| match at % 2 {

@@ -8,6 +8,7 @@ use super::tables::{check, read_table, watch_table};
 use super::words::advice_for_white;
 use crate::compile::Provenance;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
+use crate::video::pipe;
 use crate::video::watch::FileWatch;
 use crate::video::y4m::Y4mError;
 use crate::video::{CompensateOptions, Compensator, FrameTotals, Input, VideoError};
@@ -92,7 +93,9 @@ fn settings(arguments: &Compensate) -> CompensateOptions {
 /// The input, from its beginning.
 fn opened(path: &Path) -> Result<Input<Box<dyn Read + Send>>, Failure> {
     let input: Box<dyn Read + Send> = if is_pipe(path) {
-        Box::new(io::stdin())
+        let stdin = io::stdin();
+        pipe::widen(&stdin);
+        Box::new(stdin)
     } else {
         Box::new(foreign_file::open(path).map_err(|error| cannot_read(path, &error))?)
     };
@@ -147,7 +150,9 @@ fn standard_output() -> io::Result<File> {
     let handle = std::os::windows::io::AsHandle::as_handle(&stdout);
     #[cfg(not(windows))]
     let handle = std::os::fd::AsFd::as_fd(&stdout);
-    Ok(File::from(handle.try_clone_to_owned()?))
+    let stdout = File::from(handle.try_clone_to_owned()?);
+    pipe::widen(&stdout);
+    Ok(stdout)
 }
 
 /// `-` stands for standard input or output.

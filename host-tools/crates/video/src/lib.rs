@@ -45,6 +45,7 @@ mod error;
 mod fit;
 mod input;
 pub mod live;
+pub mod pipe;
 mod planar;
 mod stream;
 pub mod test_scene;
