@@ -56,6 +56,14 @@ impl Code for u16 {
     }
 }
 
+/// The light of every code, one after the other.
+#[inline(always)]
+fn look_up<S: Code>(by_code: &[Light; VALUES], codes: &[S], light: &mut [Light]) {
+    for (code, light) in codes.iter().zip(light) {
+        *light = by_code[(*code).into() % VALUES];
+    }
+}
+
 /// Elements of a table by the upper bits of a drive.
 const COARSE_VALUES: usize = VALUES >> INDEX_SHIFT;
 
@@ -123,11 +131,8 @@ impl<S: Code> Curves<S> {
         let Some(by_code) = self.light.first_chunk::<VALUES>() else {
             return;
         };
-        if S::decode(by_code, codes, light) {
-            return;
-        }
-        for (code, light) in codes.iter().zip(light) {
-            *light = by_code[(*code).into() % VALUES];
+        if !S::decode(by_code, codes, light) {
+            look_up(by_code, codes, light);
         }
     }
 
@@ -165,10 +170,14 @@ impl<S: Code> Curves<S> {
     /// Codes of every drive, one curve after the other, and how many curves there are.
     #[cfg(feature = "gpu")]
     pub(super) fn code_words(&self) -> (Vec<u32>, usize) {
-        let drives = usize::from(Drive::ONE.to_bits()) + 1;
-        let codes = self.codes.iter().flat_map(|codes| &codes[..drives]);
-        let words = codes.map(|code| (*code).into() as u32).collect();
-        (words, self.codes.len())
+        let drives: Vec<_> = (0..=Drive::ONE.to_bits()).map(Drive::from_bits).collect();
+        let curves = 0..self.codes.len();
+        let words = curves.clone().flat_map(|curve| {
+            let mut codes = vec![S::default(); drives.len()];
+            self.encode(curve, &drives, &mut codes);
+            codes.into_iter().map(|code| code.into() as u32)
+        });
+        (words.collect(), curves.len())
     }
 }
 
@@ -187,6 +196,9 @@ mod tests {
         for codes in [&all[..], &all[1..], &all[..7], &all[100..133]] {
             let mut light = vec![Light::ZERO; codes.len()];
             curves.decode(codes, &mut light);
+            let mut one_by_one = vec![Light::ZERO; codes.len()];
+            look_up(curves.light.first_chunk().unwrap(), codes, &mut one_by_one);
+            assert_eq!(light, one_by_one);
             for (code, light) in codes.iter().zip(light) {
                 assert_eq!(light, code.light(S::curves(table, encoding, 0)), "{code:?}");
             }
