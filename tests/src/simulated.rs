@@ -128,7 +128,7 @@ pub fn error_on_the_wall(
     let images = shown[0].ncols();
     let lamp = vec![1.0; images];
     let exposed = simulation
-        .expose_projected(&shown, &lamp)
+        .expose_projected(&shown, &[lamp])
         .expect("bounces end");
     let of_image = |image| {
         let planes = simulation.photograph(&exposed, image);
@@ -139,6 +139,50 @@ pub fn error_on_the_wall(
         errors.sum::<f64>() / wanted.len() as f64
     };
     (0..images).map(of_image).sum::<f64>() / images as f64
+}
+
+/// What the projectors of a scene show for images that are wanted, by channel, where each was
+/// photographed, solved and compensated without the others: their frames side by side. `wanted` is in
+/// the units of photographs of all.
+pub fn inputs_of_each_alone(
+    scene: &Scene,
+    bernoulli: usize,
+    wanted: &[DMatrix<f64>],
+) -> Vec<DMatrix<f64>> {
+    let exposure = |scene: &Scene| {
+        let simulation = simulation(scene, Forced::default());
+        let white = DMatrix::from_element(simulation.grid().cells(), 1, 1.0);
+        let white = simulation.expose(&white).expect("bounces end");
+        simulation
+            .sensor(&simulation.photograph(&white, 0))
+            .exposure()
+    };
+    let of_all = exposure(scene);
+    let (cols, columns) = (scene.grid().cols(), scene.columns());
+    let mut shown: Vec<_> = wanted.iter().map(|all| 0.0 * all).collect();
+    for (index, columns) in columns.into_iter().enumerate() {
+        let alone = Scene {
+            projectors: vec![scene.projectors[index].clone()],
+            ..scene.clone()
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        photograph(&alone, bernoulli, 1, &folder.path().join("capture"));
+        let learned = learned(&folder.path().join("capture"));
+        let units = exposure(&alone) / of_all;
+        // Of a cell of its own, the cell of all.
+        let place =
+            |cell: usize| cell / columns.len() * cols + columns.start + cell % columns.len();
+        for (channel, shown) in shown.iter_mut().enumerate() {
+            let own = DMatrix::from_fn(alone.grid().cells(), shown.ncols(), |cell, image| {
+                units * wanted[channel][(place(cell), image)]
+            });
+            let inputs = learned.inverse.channel(channel).apply(&own);
+            for (cell, of_cell) in inputs.row_iter().enumerate() {
+                shown.set_row(place(cell), &of_cell);
+            }
+        }
+    }
+    shown
 }
 
 /// Mean light of the pixels of each cell.

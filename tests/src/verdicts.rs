@@ -298,7 +298,7 @@ impl VerdictRig {
         };
         let lamp = vec![1.0; inputs.len()];
         let exposed = simulation
-            .expose_projected(&projected, &lamp)
+            .expose_projected(&projected, &[lamp])
             .expect("light");
         let live: Vec<bool> = self.learned().measurements.live.repeat(channels);
         let srgb = |_, code: u8| iltm::picture::Response::Srgb.light(f64::from(code) / 255.0);
@@ -320,7 +320,7 @@ fn fill(scene: &Scene, folder: &Path, (forced, seed, faults): (Forced, u64, &[In
     let simulation = simulation(scene, forced);
     let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
     let camera = camera.with_faults(faults);
-    let session = fill_capture::UnfilledCapture::read(folder, simulation.grid());
+    let session = fill_capture::UnfilledCapture::read(folder, scene);
     let session = session.expect("a folder to fill");
     session.take_missing(&camera, &Silent).expect("taken");
 }

@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     check_used(arguments)?;
     let session = match &arguments.photograph {
         Some(folder) => {
-            let read = UnfilledCapture::read(folder, scene.projector.grid);
+            let read = UnfilledCapture::read(folder, &scene);
             Some((folder.as_path(), read.map_err(not_taken)?))
         }
         None => None,
@@ -183,7 +183,7 @@ fn photograph(
             table: &read_table(path)?,
             path,
             grid: camera.grid(),
-            response: scene.projector.response,
+            response: scene.projectors[0].response,
         };
         let codes = slides.codes(&session.indices())?;
         session = session.showing(camera.grid(), codes);

@@ -101,6 +101,7 @@ fn every_scene_that_comes_with_the_tools_is_explained() {
         "painted-corner",
         "dome",
         "stage",
+        "two-walls",
     ] {
         User::new().says(&format!("simulate SCENES/{scene}.toml --explain"));
     }
@@ -110,6 +111,16 @@ fn every_scene_that_comes_with_the_tools_is_explained() {
 fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
     let panels = &CORNER[CORNER.find("[[panel").expect("two")..];
     let left = "albedo = 0.8\n[[";
+    let one =
+        &CORNER[CORNER.find("[projector").expect("one")..CORNER.find("[camera").expect("one")];
+    // The same again, with a line that says something else.
+    let two = |line: &str| {
+        let key = line.split(' ').next().expect("a key");
+        let table = one.replace("[projector]", "[[projector]]");
+        let lines = table.lines().filter(|line| !line.starts_with(key));
+        let second: Vec<&str> = lines.chain([line, ""]).collect();
+        table.clone() + &second.join("\n")
+    };
     for (from, to, words) in [
         ("rows = 4", "rovs = 4", &["rovs", "line 6"][..]),
         (left, "albedo = 1.8\n[[", &["`left`", "1.8"]),
@@ -136,6 +147,14 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
             &["looks nowhere"],
         ),
         ("full_well", "read_noise", &["full_well"]),
+        (one, "projector = []\n", &["there is no [projector]"]),
+        (
+            one,
+            &two("rows = 5"),
+            &["[[projector]] rows is 5", "side by side"],
+        ),
+        (one, &two("response = 1.8"), &["[[projector]] response"]),
+        (one, &two("clos = 6"), &["clos"]),
         (panels, "", &["no [[panel]]"]),
     ] {
         let user = user(&[(from, to)]);

@@ -22,7 +22,7 @@ fn main() {
     for name in scene_names() {
         // The solvers are compared: what an 8-bit camera and an unknown response cost is another matter.
         let mut scene = scene(&name, &[]);
-        if scene.projector.grid.cells() > MOST_CELLS {
+        if scene.grid().cells() > MOST_CELLS {
             continue;
         }
         scene.camera.bits = Some(12);
@@ -38,7 +38,7 @@ fn main() {
                     inputs(&learned, &wanted)
                         .map(|inputs| error_on_the_wall(&scene, &learned, &wanted, &inputs))
                 });
-            let grid = scene.projector.grid;
+            let grid = scene.grid();
             println!(
                 "| `{name}` | {} x {} | {bernoulli} | {:.4} | {:.4} | {:.4} | {:.4} |",
                 grid.rows(),

@@ -122,7 +122,7 @@ impl BenchmarkScene {
         progress: &dyn Progress,
     ) -> Result<Self, BenchmarkSceneError> {
         let scene = Scene::read(file)?;
-        check_size(scene.projector.grid)?;
+        check_size(scene.grid())?;
         let simulation = Simulation::new(&scene, &SimulationOptions::default(), progress)?;
         let room = TemporaryFolder::new()?;
         let folder = room.path().join("capture");

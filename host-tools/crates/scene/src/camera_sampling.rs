@@ -257,7 +257,7 @@ impl<'e> PixelSampler<'e> {
 
     /// Adds `part` of what a point of a surface options like.
     fn look(&self, point: &SurfacePoint<'_>, part: f64, pixel: &mut PixelSamples) {
-        let view = &self.facets.scene().projector.view;
+        let view = &self.facets.projector().view;
         let described = self.facets.described(point.facet);
         let albedo = point.panel.albedo.at(described.texture_place(&point.world));
         let at = |patches: &Patches| patches.at(view, point.facet, point.back, &point.world);

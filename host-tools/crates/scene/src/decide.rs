@@ -24,7 +24,7 @@ pub(super) fn threshold(scene: &Scene) -> f64 {
     let noise = Sensor::noise_at_white(&scene.camera);
     let (width, height) = scene.camera.size;
     // About half of the pixels see a cell of their own.
-    let pixels = f64::from(width) * f64::from(height) / (2.0 * scene.projector.grid.cells() as f64);
+    let pixels = f64::from(width) * f64::from(height) / (2.0 * scene.grid().cells() as f64);
     (OF_NOISE * noise / pixels.max(1.0).sqrt()).max(THRESHOLD)
 }
 
@@ -36,8 +36,8 @@ pub(super) fn named(facets: &Facets<'_>, threshold: f64, decisions: &mut Decisio
     let scene = facets.scene();
     colour(scene, threshold, decisions);
     gloss(scene, threshold, decisions);
-    projector(&scene.projector, threshold, decisions);
-    let ambient = scene.ambient.into_iter().fold(0.0, f64::max) / estimate::level(facets);
+    projector(facets.projector(), threshold, decisions);
+    let ambient = facets.ambient().into_iter().fold(0.0, f64::max) / estimate::level(facets);
     let what = "of white comes from all around";
     let found = share(ambient, threshold, what);
     decisions.weigh(Effect::Ambient, found, "no light comes from all around");
@@ -125,9 +125,11 @@ fn colour(scene: &Scene, threshold: f64, decisions: &mut Decisions) {
         };
         widen(of_panel, &|| format!("`{}`", panel.name));
     }
-    if scene.projector.mixing != Projector::UNMIXED {
-        let whose = || "what the camera sees of the projector's light".to_owned();
-        widen(scene.projector.foreign_light(), &whose);
+    for projector in &scene.projectors {
+        if projector.mixing != Projector::UNMIXED {
+            let whose = || "what the camera sees of the projector's light".to_owned();
+            widen(projector.foreign_light(), &whose);
+        }
     }
     let (spread, whose) = widest;
     let reason = if spread > 0.0 {
@@ -191,9 +193,8 @@ pub(super) fn between_surfaces(
     threshold: f64,
     decisions: &mut Decisions,
 ) -> (bool, PatchExtent) {
-    let scene = facets.scene();
     let ambient = if decisions.on(Effect::Ambient) {
-        scene.ambient.into_iter().fold(0.0, f64::max)
+        facets.ambient().into_iter().fold(0.0, f64::max)
     } else {
         0.0
     };

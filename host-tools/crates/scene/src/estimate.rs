@@ -51,7 +51,7 @@ impl Estimate {
     pub(super) fn new(facets: &Facets<'_>, ambient: f64) -> Self {
         let count = facets.count();
         let pairs = count * count.saturating_sub(1) / 2;
-        let projector = &facets.scene().projector.view;
+        let projector = &facets.projector().view;
         let level = level(facets);
         let side = |facet: usize, polygon, lit: f64| Side {
             polygon,
@@ -205,7 +205,7 @@ fn irradiance(polygon: &Polygon, view: &Pinhole) -> f64 {
 /// Light that the projector's white makes on the surfaces in its frame, without
 /// bounces: the mean over their area.
 pub(super) fn level(facets: &Facets<'_>) -> f64 {
-    let projector = &facets.scene().projector.view;
+    let projector = &facets.projector().view;
     let (mut light, mut areas) = (0.0, 0.0);
     for facet in 0..facets.count() {
         let Some(part) = split_by_frame(facets.polygon(facet), projector).0 else {

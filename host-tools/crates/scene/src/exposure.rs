@@ -2,11 +2,13 @@
 //! see of it.
 
 use super::effects::Effect;
-use super::pixel_sampling::PixelSampling;
+use super::pixel_sampling::FrameSampling;
 use super::radiosity::{FormFactorMatrix, StopRule, radiosity};
 use super::simulation::{Simulation, SimulationError};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::iter;
+use std::ops::Range;
 
 /// Part of the threshold that bounces may leave out.
 const OF_THRESHOLD: f64 = 0.1;
@@ -28,6 +30,8 @@ pub struct Exposed {
     pub(super) leaving: Vec<DMatrix<f64>>,
     /// Light from elsewhere.
     ambient: Vec<f64>,
+    /// In the light of each further projector.
+    beside: Vec<Self>,
     /// Bounces that were followed, or steps of the solve.
     pub bounces: usize,
 }
@@ -35,6 +39,29 @@ pub struct Exposed {
 /// The entry of a channel; there is one alone where all are the same.
 fn of_channel(entries: &[DMatrix<f64>], channel: usize) -> &DMatrix<f64> {
     &entries[channel.min(entries.len() - 1)]
+}
+
+/// The factors of a projector's lamp.
+fn of_projector(lamps: &[Vec<f64>], projector: usize) -> &[f64] {
+    &lamps[projector.min(lamps.len() - 1)]
+}
+
+/// What of frames of this width, frames x pixels turned on its side, is in some columns.
+fn part(frames: &DMatrix<f64>, width: usize, columns: &Range<usize>) -> DMatrix<f64> {
+    let pixels = frames.nrows() / width * columns.len();
+    DMatrix::from_fn(pixels, frames.ncols(), |pixel, frame| {
+        let (row, col) = (pixel / columns.len(), pixel % columns.len());
+        frames[(row * width + columns.start + col, frame)]
+    })
+}
+
+/// Adds the light of a photograph, channel by channel.
+fn add(planes: &mut [Vec<f32>], more: &[Vec<f32>]) {
+    for (plane, more) in planes.iter_mut().zip(more) {
+        for (light, more) in plane.iter_mut().zip(more) {
+            *light += more;
+        }
+    }
 }
 
 impl Simulation<'_> {
@@ -45,18 +72,44 @@ impl Simulation<'_> {
     /// [`SimulationError::Radiosity`] if there is no end to the bounces.
     pub fn expose(&self, patterns: &DMatrix<f64>) -> Result<Exposed, SimulationError> {
         let lamp = vec![1.0; patterns.ncols()];
-        self.expose_projected(std::slice::from_ref(patterns), &lamp)
+        self.expose_projected(std::slice::from_ref(patterns), &[lamp])
     }
 
     /// Light in the scene while each of the projector's channels shows an entry of
-    /// `projected`, cells x patterns, 0 to 1, or all the same one entry. `lamp`
-    /// multiplies all the projector's light, black as well, one factor a pattern.
+    /// `projected`, cells x patterns, 0 to 1, or all the same one entry. An entry of `lamps`
+    /// multiplies all of a projector's light, black as well, one factor a pattern; the last
+    /// one is for all further projectors.
     ///
     /// A grey camera sees the mean of the channels.
     ///
     /// # Errors
     /// [`SimulationError::Radiosity`] if there is no end to the bounces.
     pub fn expose_projected(
+        &self,
+        projected: &[DMatrix<f64>],
+        lamps: &[Vec<f64>],
+    ) -> Result<Exposed, SimulationError> {
+        if self.beside.is_empty() {
+            return self.expose_one(projected, of_projector(lamps, 0));
+        }
+        let (width, columns) = (self.grid().cols(), self.scene.columns());
+        let of = |index: usize| -> Vec<_> {
+            let channels = projected.iter();
+            channels
+                .map(|all| part(all, width, &columns[index]))
+                .collect()
+        };
+        let mut exposed = self.expose_one(&of(0), of_projector(lamps, 0))?;
+        for (index, one) in (1..).zip(&self.beside) {
+            let beside = one.expose_one(&of(index), of_projector(lamps, index))?;
+            exposed.bounces = exposed.bounces.max(beside.bounces);
+            exposed.beside.push(beside);
+        }
+        Ok(exposed)
+    }
+
+    /// In the light of one projector.
+    pub(super) fn expose_one(
         &self,
         projected: &[DMatrix<f64>],
         lamp: &[f64],
@@ -68,10 +121,12 @@ impl Simulation<'_> {
             indirect: Vec::new(),
             leaving: Vec::new(),
             ambient: Vec::new(),
+            beside: Vec::new(),
             bounces: 0,
         };
         for channel in 0..self.channels {
-            let ambient = if self.decisions.on(Effect::Ambient) {
+            // It is added once.
+            let ambient = if self.decisions.on(Effect::Ambient) && self.index == 0 {
                 self.scene.ambient[channel]
             } else {
                 0.0
@@ -97,13 +152,9 @@ impl Simulation<'_> {
     }
 
     /// What each of the camera's channels gets of the projector's, its black included.
-    pub(crate) fn seen_by_channels(
-        &self,
-        projected: &[DMatrix<f64>],
-        lamp: &[f64],
-    ) -> Vec<DMatrix<f64>> {
+    fn seen_by_channels(&self, projected: &[DMatrix<f64>], lamp: &[f64]) -> Vec<DMatrix<f64>> {
         let black = if self.decisions.on(Effect::Black) {
-            self.scene.projector.black
+            self.projector().black
         } else {
             0.0
         };
@@ -129,7 +180,7 @@ impl Simulation<'_> {
             };
         }
         if self.decisions.on(Effect::Mixing) {
-            return self.scene.projector.mixing.map(mixed).into();
+            return self.projector().mixing.map(mixed).into();
         }
         lit
     }
@@ -186,26 +237,48 @@ impl Simulation<'_> {
     /// by row, before exposure and noise.
     #[must_use]
     pub fn photograph(&self, exposed: &Exposed, pattern: usize) -> Vec<Vec<f32>> {
-        self.seen(exposed, pattern, &|channel, pixel| {
+        let mut planes = self.seen(exposed, pattern, &|channel, pixel| {
             let shown = of_channel(&exposed.shown, channel).column(pattern);
             self.sight.direct[channel].times(pixel, |cell| shown[cell])
-        })
+        });
+        for (one, exposed) in self.beside.iter().zip(&exposed.beside) {
+            add(&mut planes, &one.photograph(exposed, pattern));
+        }
+        planes
     }
 
-    /// The same of a frame that is finer than the cells, whose means the pattern was. `shown` is
-    /// what each of the camera's channels gets of every pixel of the frame, one entry where it is
-    /// the same for all.
+    /// The same of a frame that is finer than the cells, whose means the pattern was. `projected`
+    /// is what each of the projector's channels shows of it, one column, or all the same one
+    /// entry; `lamps` has a factor for each projector.
     pub(crate) fn photograph_of_pixels(
         &self,
         exposed: &Exposed,
         pattern: usize,
-        pixels: &PixelSampling,
-        shown: &[DMatrix<f64>],
+        sampling: &FrameSampling,
+        projected: &[DMatrix<f64>],
+        lamps: &[f64],
     ) -> Vec<Vec<f32>> {
-        self.seen(exposed, pattern, &|channel, pixel| {
-            let shown = of_channel(shown, channel);
-            pixels.direct[channel].times(pixel, |at| shown[at])
-        })
+        let all = iter::once((self, exposed)).chain(self.beside.iter().zip(&exposed.beside));
+        let of_projectors = sampling.projectors.iter().zip(lamps);
+        let each = all
+            .zip(of_projectors)
+            .map(|((one, exposed), ((columns, pixels), lamp))| {
+                let own = |frame| part(frame, sampling.size.width(), columns);
+                let own: Vec<_> = projected.iter().map(own).collect();
+                let mut shown = one.seen_by_channels(&own, &[*lamp]);
+                for light in &mut shown {
+                    pixels.blur(light);
+                }
+                one.seen(exposed, pattern, &|channel, pixel| {
+                    let shown = of_channel(&shown, channel);
+                    pixels.direct[channel].times(pixel, |at| shown[at])
+                })
+            });
+        let sum = each.reduce(|mut planes, more| {
+            add(&mut planes, &more);
+            planes
+        });
+        sum.unwrap_or_default()
     }
 
     /// What the camera's pixels see, with light straight from the projector by channel and pixel.

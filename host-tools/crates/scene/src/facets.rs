@@ -1,7 +1,7 @@
 //! Facets: the scene's flat parts as light sees them, turned to the projector, and which of
 //! them may throw a shadow onto which.
 
-use super::description::{Facet, Scene};
+use super::description::{Facet, Projector, Scene};
 use super::geometry::{Obstacles, Polygon};
 use super::pinhole::Pinhole;
 use nalgebra::Vector2;
@@ -15,6 +15,7 @@ const TOUCHING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(crate) struct Facets<'s> {
     scene: &'s Scene,
+    index: usize,
     described: Vec<(usize, &'s Facet)>,
     obstacles: Obstacles,
     /// Facets that may stand between the projector and each facet.
@@ -22,9 +23,9 @@ pub(crate) struct Facets<'s> {
 }
 
 impl<'s> Facets<'s> {
-    /// Turns every facet's normal to the projector's side.
-    pub(crate) fn new(scene: &'s Scene) -> Self {
-        let projector = &scene.projector.view;
+    /// Turns every facet's normal to the side of the projector with this index.
+    pub(crate) fn new(scene: &'s Scene, index: usize) -> Self {
+        let projector = &scene.projectors[index].view;
         let turned = |facet: &Facet| {
             if facet.polygon.plane().distance(&projector.position()) < 0.0 {
                 facet.polygon.flipped()
@@ -36,6 +37,7 @@ impl<'s> Facets<'s> {
         let polygons: Vec<_> = described.iter().map(|(_, facet)| turned(facet)).collect();
         Self {
             scene,
+            index,
             described,
             shaded_by: shaded_by(&polygons, projector),
             obstacles: Obstacles::new(polygons),
@@ -45,6 +47,20 @@ impl<'s> Facets<'s> {
     /// The scene they are of.
     pub(crate) fn scene(&self) -> &'s Scene {
         self.scene
+    }
+
+    /// The projector that they are turned to.
+    pub(crate) fn projector(&self) -> &'s Projector {
+        &self.scene.projectors[self.index]
+    }
+
+    /// Light from all around, by channel; it is added to the first projector's.
+    pub(crate) fn ambient(&self) -> [f64; 3] {
+        if self.index == 0 {
+            self.scene.ambient
+        } else {
+            [0.0; 3]
+        }
     }
 
     /// All of them as obstacles; each faces the projector.

@@ -1,6 +1,7 @@
 //! Capture folder that waits for photographs: takes those that it calls for, as the camera of
 //! somebody who practises. `iltm patterns` or a verification made it.
 
+use super::description::Scene;
 use super::simulation::SimulationError;
 use super::virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};
 use iltm_capture::{CaptureError, Settings, find_photo, listed};
@@ -85,7 +86,7 @@ impl UnfilledCapture {
     ///
     /// # Errors
     /// [`FillCaptureError`] with the manifest's line or the pattern.
-    pub fn read(folder: &Path, grid: Grid) -> Result<Self, FillCaptureError> {
+    pub fn read(folder: &Path, scene: &Scene) -> Result<Self, FillCaptureError> {
         // What a frame is shown for does not change its light.
         let mut shots: Vec<_> = listed(folder)?.into_iter().map(|(_, shot)| shot).collect();
         shots.sort_by_key(|shot| shot.index);
@@ -94,7 +95,7 @@ impl UnfilledCapture {
         let projector = Settings::read(folder)?.projector.pixels();
         let frames = shots.iter().map(|shot| {
             let path = folder.join(&shot.pattern);
-            let (size, codes) = frame(&path, grid, projector)?;
+            let (size, codes) = frame(&path, scene, projector)?;
             Ok(ProjectedFrame {
                 size,
                 codes,
@@ -207,9 +208,10 @@ fn write(photograph: &Photograph, path: &Path) -> Result<(), FillCaptureError> {
 /// Size and input codes of a picture of one pixel a cell, or of what a border leaves of a slide.
 fn frame(
     path: &Path,
-    grid: Grid,
+    scene: &Scene,
     projector: Option<ProjectorPixels>,
 ) -> Result<(FrameSize, Vec<[u8; 3]>), FillCaptureError> {
+    let grid = scene.grid();
     let refuse = |reason: String| FillCaptureError::Pattern {
         path: path.to_owned(),
         reason,
@@ -235,6 +237,13 @@ fn frame(
             )));
         }
     };
+    if scene.columns_of(picture.size().width()).is_none() {
+        return Err(refuse(format!(
+            "its {} columns do not divide among the projectors' {} columns of cells",
+            picture.size().width(),
+            grid.cols()
+        )));
+    }
     let codes: Vec<u8> = match picture.samples() {
         Samples::Eight(codes) => codes.clone(),
         Samples::Sixteen(codes) => {

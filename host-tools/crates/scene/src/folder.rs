@@ -87,10 +87,10 @@ fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
             ..CameraSettings::default()
         },
         projector: ProjectorSettings {
-            response: scene.projector.response.into(),
+            response: scene.projectors[0].response.into(),
             // Known exactly here, as whoever focused the projector might know it.
             blur: Some(if simulation.blurred() {
-                scene.projector.blur
+                scene.projectors[0].blur
             } else {
                 0.0
             }),

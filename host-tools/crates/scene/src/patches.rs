@@ -56,7 +56,7 @@ pub(crate) struct Patches {
 impl Patches {
     /// Cuts all facets.
     pub(crate) fn new(facets: &Facets<'_>, cut: PatchExtent) -> Self {
-        let projector = &facets.scene().projector;
+        let projector = facets.projector();
         let mut patches = Self {
             rows: projector.grid.rows(),
             cols: projector.grid.cols(),
@@ -137,7 +137,7 @@ impl Patches {
 
     /// Cuts the part of a facet that is in the frame along rows and columns.
     fn cut_cells(&mut self, facets: &Facets<'_>, facet: usize, part: &Polygon) {
-        let view = &facets.scene().projector.view;
+        let view = &facets.projector().view;
         let columns = range(part, self.cols, |c| view.place(c).map(|p| p.across));
         for col in columns {
             let [left, right] =

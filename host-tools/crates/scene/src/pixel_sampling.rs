@@ -11,12 +11,43 @@ use super::simulation::Simulation;
 use super::sparse::SparseRows;
 use iltm_runtime::FrameSize;
 use nalgebra::DMatrix;
+use std::iter;
+use std::ops::Range;
 
-/// What each camera pixel sees of each pixel of a frame.
+/// What each camera pixel sees of each pixel of a frame, which all projectors share.
 #[derive(Clone, Debug)]
-pub(crate) struct PixelSampling {
+pub(crate) struct FrameSampling {
     /// Of the frame, borders left out.
     pub(crate) size: FrameSize,
+    /// The columns of each projector and what is seen of them.
+    pub(crate) projectors: Vec<(Range<usize>, PixelSampling)>,
+}
+
+impl FrameSampling {
+    /// Follows the camera's rays to the pixels of a frame.
+    ///
+    /// # Panics
+    /// If projectors share a pixel of it.
+    pub(crate) fn new(simulation: &Simulation<'_>, size: FrameSize) -> Self {
+        let columns = simulation.scene.columns_of(size.width());
+        let columns = columns.expect("a frame that divides among the projectors");
+        let all = iter::once(simulation).chain(&simulation.beside);
+        let projectors = columns.into_iter().zip(all).map(|(columns, one)| {
+            let own = FrameSize::new(columns.len() as u16, size.height() as u16);
+            let own = own.expect("a pixel a cell or more");
+            (columns, PixelSampling::new(one, own))
+        });
+        Self {
+            size,
+            projectors: projectors.collect(),
+        }
+    }
+}
+
+/// What each camera pixel sees of each pixel of a projector's frame.
+#[derive(Clone, Debug)]
+pub(crate) struct PixelSampling {
+    size: FrameSize,
     /// Camera pixels x frame pixels, one entry a channel.
     pub(crate) direct: Vec<SparseRows>,
     /// Standard deviation of the blur in frame pixels, across and down; 0 for none.
@@ -24,10 +55,9 @@ pub(crate) struct PixelSampling {
 }
 
 impl PixelSampling {
-    /// Follows the camera's rays to the pixels of a frame.
-    pub(crate) fn new(simulation: &Simulation<'_>, size: FrameSize) -> Self {
+    fn new(simulation: &Simulation<'_>, size: FrameSize) -> Self {
         let on = |effect| simulation.decisions.on(effect);
-        let facets = Facets::new(simulation.scene);
+        let facets = Facets::new(simulation.scene, simulation.index);
         let beam = Beam {
             vignetting: on(Effect::Vignetting),
             blur: false,
@@ -40,7 +70,7 @@ impl PixelSampling {
             mirrors: on(Effect::Mirrors),
             distortion: on(Effect::Distortion),
         };
-        let projector = &simulation.scene.projector;
+        let projector = simulation.projector();
         let cells = FrameSize::of_grid(projector.grid);
         let sigma = if on(Effect::Blur) {
             projector.blur

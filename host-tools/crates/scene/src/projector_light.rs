@@ -45,7 +45,7 @@ impl<'f> ProjectorLight<'f> {
         Self {
             facets,
             beam,
-            frame: FrameSize::of_grid(facets.scene().projector.grid),
+            frame: FrameSize::of_grid(facets.projector().grid),
         }
     }
 
@@ -64,7 +64,7 @@ impl<'f> ProjectorLight<'f> {
     }
 
     fn projector(&self) -> &'f Projector {
-        &self.facets.scene().projector
+        self.facets.projector()
     }
 
     /// Irradiance by white of a point with this normal, blur and shadows aside.

@@ -3,7 +3,7 @@
 
 use super::camera_sampling::{CameraSampling, SamplingOptions};
 use super::decide;
-use super::description::Scene;
+use super::description::{Projector, Scene};
 use super::effects::{Decision, Decisions, Effect, Forced};
 use super::facets::Facets;
 use super::interreflection;
@@ -17,6 +17,8 @@ use super::specular::{Specular, Surfaces, TooGlossy};
 use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::Grid;
 use nalgebra::DMatrix;
+use std::iter;
+use std::slice;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -68,6 +70,8 @@ impl SimulationError {
 #[derive(Clone, Debug)]
 pub struct Simulation<'s> {
     pub(super) scene: &'s Scene,
+    /// Of the projector that lights it.
+    pub(super) index: usize,
     pub(super) channels: usize,
     pub(super) decisions: Decisions,
     pub(super) threshold: f64,
@@ -77,6 +81,8 @@ pub struct Simulation<'s> {
     pub(super) exchange: Option<FormFactorMatrix>,
     pub(super) specular: Option<Specular>,
     pub(super) sight: CameraSampling,
+    /// In the light of each further projector; light adds up.
+    pub(super) beside: Vec<Self>,
     /// Seconds that following the camera's rays took.
     rays: f64,
 }
@@ -94,9 +100,23 @@ impl<'s> Simulation<'s> {
     /// Decides about every effect and computes what patterns do not change.
     ///
     /// # Errors
-    /// [`SimulationError`] if nothing is lit, or surfaces keep too much light.
+    /// [`SimulationError`] if a projector lights nothing, or surfaces keep too much light.
     pub fn new(
         scene: &'s Scene,
+        options: &SimulationOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, SimulationError> {
+        let of = |index| Self::of_projector(scene, index, options, progress);
+        let mut first = of(0)?;
+        let others = 1..scene.projectors.len();
+        first.beside = others.map(of).collect::<Result<_, _>>()?;
+        Ok(first)
+    }
+
+    /// In the light of one projector.
+    fn of_projector(
+        scene: &'s Scene,
+        index: usize,
         options: &SimulationOptions,
         progress: &dyn Progress,
     ) -> Result<Self, SimulationError> {
@@ -104,7 +124,7 @@ impl<'s> Simulation<'s> {
             .threshold
             .unwrap_or_else(|| decide::threshold(scene));
         let mut decisions = Decisions::new(options.forced.clone());
-        let facets = Facets::new(scene);
+        let facets = Facets::new(scene, index);
         decide::named(&facets, threshold, &mut decisions);
         let channels = if decisions.on(Effect::Colour) { 3 } else { 1 };
         let beam = Beam {
@@ -135,6 +155,7 @@ impl<'s> Simulation<'s> {
         };
         let mut simulation = Self {
             scene,
+            index,
             channels,
             threshold,
             decisions,
@@ -143,6 +164,7 @@ impl<'s> Simulation<'s> {
             exchange,
             specular: None,
             sight: CameraSampling::default(),
+            beside: Vec::new(),
             rays: 0.0,
         };
         let surfaces = Surfaces {
@@ -181,8 +203,8 @@ impl<'s> Simulation<'s> {
         let obstacles = hidden.then_some(facets.obstacles());
         let (width, height) = self.scene.camera.size;
         let near = NearField::new(&self.patches, obstacles, (width * height) as usize);
-        let white = DMatrix::from_element(self.scene.projector.grid.cells(), 1, 1.0);
-        let flood = self.expose(&white)?;
+        let white = DMatrix::from_element(self.projector().grid.cells(), 1, 1.0);
+        let flood = self.expose_one(slice::from_ref(&white), &[1.0])?;
         let level = self.level();
         let largest = flood
             .leaving
@@ -215,13 +237,23 @@ impl<'s> Simulation<'s> {
     /// Seconds that following the camera's rays took, which no effect is charged for.
     #[must_use]
     pub fn rays_seconds(&self) -> f64 {
-        self.rays
+        self.rays + self.beside.iter().map(Self::rays_seconds).sum::<f64>()
     }
 
-    /// What was decided about every effect.
+    /// What was decided about every effect: that it is on if it is for any projector.
     #[must_use]
     pub fn decisions(&self) -> Vec<Decision> {
-        self.decisions.all()
+        let mut decisions = self.decisions.all();
+        for other in self.beside.iter().flat_map(|one| one.decisions.all()) {
+            for decision in decisions.iter_mut().filter(|d| d.effect == other.effect) {
+                let seconds = decision.seconds + other.seconds;
+                if other.on && !decision.on {
+                    *decision = other.clone();
+                }
+                decision.seconds = seconds;
+            }
+        }
+        decisions
     }
 
     /// Share of white below which an effect was left out.
@@ -233,41 +265,56 @@ impl<'s> Simulation<'s> {
     /// What the simulation consists of.
     #[must_use]
     pub fn work(&self) -> Work {
-        Work {
+        let mut work = Work {
             lit: self.on_patches.entries(),
             exchanged: self.exchange.as_ref().map_or(0, |e| e.report().evaluated),
+        };
+        for of_other in self.beside.iter().map(Self::work) {
+            work.lit += of_other.lit;
+            work.exchanged += of_other.exchanged;
         }
+        work
     }
 
-    /// Light of the projector's lamp at a moment of a session, 0 to 1 from its first
+    /// Light of each projector's lamp at a moment of a session, 0 to 1 from its first
     /// photograph to its last, relative to the first.
     #[must_use]
-    pub fn lamp(&self, moment: f64) -> f64 {
+    pub fn lamps(&self, moment: f64) -> Vec<f64> {
+        let all = iter::once(self).chain(&self.beside);
+        all.map(|one| one.lamp(moment)).collect()
+    }
+
+    fn lamp(&self, moment: f64) -> f64 {
         /// Time constants in a session: a lamp settles in some ten minutes.
         const SETTLING: f64 = 3.0;
         if !self.decisions.on(Effect::Drift) {
             return 1.0;
         }
         let settled = |moment: f64| 1.0 - (-SETTLING * moment).exp();
-        1.0 - self.scene.projector.drift * settled(moment) / settled(1.0)
+        1.0 - self.projector().drift * settled(moment) / settled(1.0)
     }
 
-    /// Whether the projector's blur is simulated.
+    /// Whether the first projector's blur is simulated.
     #[must_use]
     pub fn blurred(&self) -> bool {
         self.decisions.on(Effect::Blur)
     }
 
-    /// The projector's cells.
+    /// The projector that lights it.
+    pub(super) fn projector(&self) -> &'s Projector {
+        &self.scene.projectors[self.index]
+    }
+
+    /// Cells of the projector, or of all side by side.
     #[must_use]
     pub fn grid(&self) -> Grid {
-        self.scene.projector.grid
+        self.scene.grid()
     }
 
     /// Pieces that surfaces were cut into.
     #[must_use]
     pub fn patches(&self) -> usize {
-        self.patches.len()
+        self.patches.len() + self.beside.iter().map(Self::patches).sum::<usize>()
     }
 
     /// 1 for grey, 3 for colour.

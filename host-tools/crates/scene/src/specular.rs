@@ -139,7 +139,7 @@ impl Surfaces<'_> {
 
     /// What each patch gets from the projector over mirrors.
     fn projector_over_mirrors(&self) -> Entries {
-        let projector = &self.facets.scene().projector;
+        let projector = self.facets.projector();
         let (view, grid) = (&projector.view, projector.grid);
         let rays = (grid.cols() * CELL_RAYS, grid.rows() * CELL_RAYS);
         // Each ray stands for a part of the frame, and for the flux through it.
@@ -181,7 +181,7 @@ impl Surfaces<'_> {
         mut way: Vector3<f64>,
         mut mirror: usize,
     ) -> Option<(usize, f64)> {
-        let view = &self.facets.scene().projector.view;
+        let view = &self.facets.projector().view;
         let mut kept = 1.0;
         for _ in 0..MOST_MIRRORS {
             kept *= self.mirror(mirror);
@@ -222,7 +222,7 @@ impl Surfaces<'_> {
         let factors = exchange.irradiance(&shining);
         let area = |patch: usize| patches[patch].polygon.area();
         let centres: Vec<_> = patches.iter().map(|p| p.polygon.centroid()).collect();
-        let projector = self.facets.scene().projector.view.position();
+        let projector = self.facets.projector().view.position();
         let to = |to: usize| {
             let (mut by_patches, mut by_cells) = (vec![0.0; patches.len()], Vec::new());
             for (k, (at, gloss)) in glossy.iter().enumerate() {

@@ -3,7 +3,7 @@
 
 use super::description::Scene;
 use super::injected_fault::{CaptureFault, InjectedFault, InjectedFaults};
-use super::pixel_sampling::PixelSampling;
+use super::pixel_sampling::FrameSampling;
 use super::sensor::Sensor;
 use super::simulation::{Simulation, SimulationError};
 use iltm_capture::Pattern;
@@ -178,11 +178,11 @@ impl<'s> VirtualCamera<'s> {
         };
         let mut bounces = self.bounces;
         let cells = FrameSize::of_grid(self.grid());
-        let mut finer: Vec<PixelSampling> = Vec::new();
+        let mut finer: Vec<FrameSampling> = Vec::new();
         let shown = places.iter().filter_map(|place| faults.shown_at(*place));
         for size in shown.map(|shown| frames[shown].size) {
             if size != cells && finer.iter().all(|known| known.size != size) {
-                finer.push(PixelSampling::new(self.simulation, size));
+                finer.push(FrameSampling::new(self.simulation, size));
             }
         }
         for places in places.chunks(TOGETHER) {
@@ -193,8 +193,8 @@ impl<'s> VirtualCamera<'s> {
             for place in places.iter().filter(|p| faults.shown_at(**p).is_none()) {
                 keep(*place, None)?;
             }
-            let (projected, lamp) = self.projected(&faults, &shown);
-            let exposed = self.simulation.expose_projected(&projected, &lamp)?;
+            let (projected, lamps) = self.projected(&faults, &shown);
+            let exposed = self.simulation.expose_projected(&projected, &lamps)?;
             bounces = bounces.max(exposed.bounces);
             let kept = shown
                 .par_iter()
@@ -203,9 +203,10 @@ impl<'s> VirtualCamera<'s> {
                     let pixels = finer.iter().find(|pixels| pixels.size == frame.size);
                     let mut light = match pixels {
                         Some(pixels) => {
-                            let shown = self.shown(frame, &faults, lamp[column], pixels);
+                            let projected = self.projected_pixels(frame, &faults);
+                            let lamps: Vec<_> = lamps.iter().map(|lamp| lamp[column]).collect();
                             let of = self.simulation;
-                            of.photograph_of_pixels(&exposed, column, pixels, &shown)
+                            of.photograph_of_pixels(&exposed, column, pixels, &projected, &lamps)
                         }
                         None => self.simulation.photograph(&exposed, column),
                     };
@@ -218,13 +219,13 @@ impl<'s> VirtualCamera<'s> {
         Ok(bounces)
     }
 
-    /// Light of each of the projector's channels under some frames, cells x frames, and
-    /// its lamp's under each; one entry where all channels show the same.
+    /// Light of each of the projector's channels under some frames, cells x frames, one entry
+    /// where all channels show the same; and of each projector's lamp under each.
     fn projected(
         &self,
         faults: &InjectedFaults<'_>,
         shown: &[(usize, &ProjectedFrame)],
-    ) -> (Vec<DMatrix<f64>>, Vec<f64>) {
+    ) -> (Vec<DMatrix<f64>>, Vec<Vec<f64>>) {
         let light = self.light_of_codes();
         let grid = self.grid();
         let mut channels = vec![DMatrix::zeros(grid.cells(), shown.len()); 3];
@@ -250,35 +251,38 @@ impl<'s> VirtualCamera<'s> {
             }
         }
         let last = faults.count.saturating_sub(1).max(1) as f64;
-        let lamp = shown.iter().enumerate().map(|(column, (place, _))| {
+        let mut lamps = vec![Vec::new(); self.scene.projectors.len()];
+        for (column, (place, _)) in shown.iter().enumerate() {
             let mean = channels
                 .iter()
                 .map(|c| c.column(column).mean())
                 .sum::<f64>()
                 / 3.0;
-            self.simulation.lamp(*place as f64 / last) * faults.dimmed(mean)
-        });
-        let lamp = lamp.collect();
+            let dimmed = faults.dimmed(mean);
+            let of_moment = self.simulation.lamps(*place as f64 / last);
+            for (lamp, of_moment) in lamps.iter_mut().zip(of_moment) {
+                lamp.push(of_moment * dimmed);
+            }
+        }
         if channels[0] == channels[1] && channels[0] == channels[2] {
             channels.truncate(1);
         }
-        (channels, lamp)
+        (channels, lamps)
     }
 
     /// Light, 0 to 1, that the projector makes of each input code.
     fn light_of_codes(&self) -> Vec<f64> {
-        let response = self.scene.projector.response;
+        let response = self.scene.projectors[0].response;
         let light = |code| response.light(f64::from(code) / 255.0);
         (0..=255_u8).map(light).collect()
     }
 
-    /// What each of the camera's channels gets of every pixel of a fine frame.
-    fn shown(
+    /// Light of each of the projector's channels in every pixel of a fine frame, one entry
+    /// where all show the same.
+    fn projected_pixels(
         &self,
         frame: &ProjectedFrame,
         faults: &InjectedFaults<'_>,
-        lamp: f64,
-        pixels: &PixelSampling,
     ) -> Vec<DMatrix<f64>> {
         let light = self.light_of_codes();
         let projected = |codes: &[u8; 3]| faults.projected(codes.map(|c| light[usize::from(c)]));
@@ -287,12 +291,7 @@ impl<'s> VirtualCamera<'s> {
             let light = frame.codes.iter().map(|codes| projected(codes)[channel]);
             DMatrix::from_iterator(frame.codes.len(), 1, light)
         };
-        let all: Vec<_> = (0..if grey { 1 } else { 3 }).map(of_channel).collect();
-        let mut shown = self.simulation.seen_by_channels(&all, &[lamp]);
-        for light in &mut shown {
-            pixels.blur(light);
-        }
-        shown
+        (0..if grey { 1 } else { 3 }).map(of_channel).collect()
     }
 
     fn photograph(&self, light: &[Vec<f32>], exposure: f64, place: usize) -> Photograph {

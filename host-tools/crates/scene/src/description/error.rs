@@ -58,6 +58,9 @@ pub enum SceneProblem {
         /// What is wrong.
         source: PolygonError,
     },
+    /// There is nothing to project with.
+    #[error("there is no [projector]")]
+    NoProjector,
     /// There is nothing to project onto.
     #[error("there is no [[panel]]")]
     NoPanels,
@@ -85,6 +88,7 @@ impl SceneError {
             SceneProblem::Outline { .. } => {
                 "List the corners in order around a flat, convex outline."
             }
+            SceneProblem::NoProjector => "Describe one: [projector], or [[projector]] for each.",
             SceneProblem::NoPanels => {
                 "Describe at least one surface: [[panel]] with `corners` or `mesh`."
             }

@@ -2,7 +2,10 @@
 
 use super::{Gloss, Projector};
 use iltm_picture::Response;
-use serde::Deserialize;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
 use std::path::PathBuf;
 
 /// Everything a scene file says.
@@ -10,7 +13,8 @@ use std::path::PathBuf;
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
     pub(super) name: Option<String>,
-    pub(super) projector: ProjectorTable,
+    #[serde(rename = "projector")]
+    pub(super) projectors: ProjectorTables,
     pub(super) camera: CameraTable,
     /// Light from elsewhere.
     #[serde(default)]
@@ -19,7 +23,37 @@ pub(super) struct SceneFile {
     pub(super) panels: Vec<PanelTable>,
 }
 
-/// `[projector]`
+/// `[projector]`, or `[[projector]]` for each of several.
+#[derive(Clone, Debug)]
+pub(super) struct ProjectorTables(pub(super) Vec<ProjectorTable>);
+
+impl<'de> Deserialize<'de> for ProjectorTables {
+    // Not `untagged`, which would lose what is wrong with a key and where it stands.
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrMore;
+
+        impl<'de> Visitor<'de> for OneOrMore {
+            type Value = ProjectorTables;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table, or one for each projector")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ProjectorTables, A::Error> {
+                let one = ProjectorTable::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(ProjectorTables(vec![one]))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<ProjectorTables, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(ProjectorTables)
+            }
+        }
+
+        deserializer.deserialize_any(OneOrMore)
+    }
+}
+
+/// A table of [`ProjectorTables`].
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ProjectorTable {

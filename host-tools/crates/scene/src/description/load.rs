@@ -67,10 +67,29 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
     if file.panels.is_empty() {
         return Err(SceneProblem::NoPanels);
     }
+    let projectors = file.projectors.0.iter().map(projector);
+    let projectors: Vec<_> = projectors.collect::<Result<_, _>>()?;
+    let Some(first) = projectors.first() else {
+        return Err(SceneProblem::NoProjector);
+    };
+    for other in &projectors {
+        if other.grid.rows() != first.grid.rows() {
+            let must = "the same for all projectors: their frames stand side by side";
+            return Err(refused("[[projector]] rows", other.grid.rows(), must));
+        }
+        if other.response != first.response {
+            let must = "the same for all projectors: a table has one";
+            let found = format!("{:?}", other.response);
+            return Err(refused("[[projector]] response", found, must));
+        }
+    }
+    let cols: usize = projectors.iter().map(|one| one.grid.cols()).sum();
+    let [rows, cols] = [first.grid.rows(), cols].map(|count| count.try_into().unwrap_or(u16::MAX));
+    Grid::new(rows, cols)?;
     let panels = file.panels.into_iter().enumerate();
     Ok(Scene {
         name: file.name,
-        projector: projector(&file.projector)?,
+        projectors,
         camera: camera(&file.camera)?,
         ambient: ambient(file.ambient)?,
         panels: panels

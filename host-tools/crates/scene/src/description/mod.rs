@@ -27,14 +27,16 @@ use iltm_picture::Response;
 use iltm_runtime::Grid;
 use nalgebra::{Vector2, Vector3};
 use serde::Deserialize;
+use std::ops::Range;
 
 /// A scene and who looks at it.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// For people; `None` if the file names none.
     pub name: Option<String>,
-    /// What lights it.
-    pub projector: Projector,
+    /// What lights it, at least one. Their frames stand side by side, from left to right, and
+    /// make one frame.
+    pub projectors: Vec<Projector>,
     /// What photographs it.
     pub camera: Camera,
     /// Light from all around, by channel: what a surface with nothing in view gets,
@@ -241,6 +243,45 @@ impl Albedo {
 }
 
 impl Scene {
+    /// Cells of the frame of all projectors side by side.
+    #[must_use]
+    pub fn grid(&self) -> Grid {
+        let first = self.projectors[0].grid;
+        let cols: usize = self.projectors.iter().map(|one| one.grid.cols()).sum();
+        // What reads scenes has made sure that there is such a grid.
+        Grid::new(first.rows() as u16, cols as u16).unwrap_or(first)
+    }
+
+    /// The columns of [`grid`](Self::grid) that each projector has.
+    #[must_use]
+    pub fn columns(&self) -> Vec<Range<usize>> {
+        let mut end = 0;
+        let projectors = self.projectors.iter();
+        projectors
+            .map(|projector| {
+                let start = end;
+                end += projector.grid.cols();
+                start..end
+            })
+            .collect()
+    }
+
+    /// The columns of a frame of this width that each projector has; `None` if a pixel would
+    /// be shared.
+    #[must_use]
+    pub fn columns_of(&self, width: usize) -> Option<Vec<Range<usize>>> {
+        let cols = self.grid().cols();
+        let pixel = |col: usize| {
+            (col * width)
+                .is_multiple_of(cols)
+                .then_some(col * width / cols)
+        };
+        let columns = self.columns().into_iter();
+        columns
+            .map(|of| Some(pixel(of.start)?..pixel(of.end)?))
+            .collect()
+    }
+
     /// All facets with the index of their panel, in the order of the panels.
     pub fn facets(&self) -> impl Iterator<Item = (usize, &Facet)> {
         let panels = self.panels.iter().enumerate();
