@@ -51,6 +51,9 @@ override CURVES: u32;
 // Below black, above white.
 @group(0) @binding(10) var<storage, read_write> clipped: array<atomic<u32>, 2>;
 
+// Of every row and colour, column of cells by column: its light, times how much of it is in the cell.
+@group(0) @binding(11) var<storage, read_write> row_sums: array<u32>;
+
 const GROUP: u32 = 64;
 
 struct Invocation {
@@ -109,6 +112,29 @@ fn light(code: u32, paint: u32) -> u32 {
     return light - min(light, paint >> 16);
 }
 
+// Light of each column of cells along a row. Rows and their sum are two passes: on their own,
+// they are many and short, and software stops a loop after 65,535 rounds.
+@compute @workgroup_size(GROUP)
+fn average_rows(invocation: Invocation) {
+    let index = index_of(invocation);
+    if index >= AREA_HEIGHT * COLOURS * COLS {
+        return;
+    }
+    let y = index / COLS / COLOURS;
+    let colour = index / COLS % COLOURS;
+    // A pixel is COLS units wide, a cell AREA_WIDTH.
+    let left = index % COLS * AREA_WIDTH;
+    let right = left + AREA_WIDTH;
+    let line = (AREA_TOP + y) * COLOURS + colour;
+    var sum = 0u;
+    for (var x = left / COLS; x * COLS < right; x++) {
+        let code = code_at(line * WIDTH + AREA_LEFT + x);
+        let overlap = min((x + 1) * COLS, right) - max(x * COLS, left);
+        sum += overlap * light(code, paint_at(x, y, colour));
+    }
+    row_sums[index] = sum;
+}
+
 @compute @workgroup_size(GROUP)
 fn average(invocation: Invocation) {
     let index = index_of(invocation);
@@ -116,23 +142,15 @@ fn average(invocation: Invocation) {
         return;
     }
     let colour = index / (ROWS * COLS);
-    let cell = index % (ROWS * COLS);
-    // A pixel is ROWS units high and COLS wide, a cell AREA_HEIGHT and AREA_WIDTH.
-    let top = cell / COLS * AREA_HEIGHT;
-    let left = cell % COLS * AREA_WIDTH;
+    let row = index / COLS % ROWS;
+    let col = index % COLS;
+    // A pixel is ROWS units high, a cell AREA_HEIGHT.
+    let top = row * AREA_HEIGHT;
     let bottom = top + AREA_HEIGHT;
-    let right = left + AREA_WIDTH;
     var sum = vec2(0u, 0u);
     for (var y = top / ROWS; y * ROWS < bottom; y++) {
-        let line = (AREA_TOP + y) * COLOURS + colour;
-        var of_row = 0u;
-        for (var x = left / COLS; x * COLS < right; x++) {
-            let code = code_at(line * WIDTH + AREA_LEFT + x);
-            let overlap = min((x + 1) * COLS, right) - max(x * COLS, left);
-            of_row += overlap * light(code, paint_at(x, y, colour));
-        }
         let overlap = min((y + 1) * ROWS, bottom) - max(y * ROWS, top);
-        let more = product(of_row, overlap);
+        let more = product(row_sums[(y * COLOURS + colour) * COLS + col], overlap);
         let low = sum.x + more.x;
         sum = vec2(low, sum.y + more.y + select(0u, 1u, low < more.x));
     }

@@ -256,6 +256,7 @@ pub(super) struct GpuFrames<'t, 'a, P: Bands, const C: usize> {
     sums: Vec<u64>,
     /// Of the cells, colour by colour.
     corrections: Vec<i32>,
+    average_rows: Pass,
     average: Pass,
     interpolate: Pass,
     finish: Pass,
@@ -302,6 +303,8 @@ impl<'t, 'a, P: Bands, const C: usize> GpuFrames<'t, 'a, P, C> {
         let of_columns = words_of(of_columns.collect())?;
         let gpu_lines = gpu.working(lines * size_of::<[i32; 2]>())?;
         let gpu_codes = Shared::new(gpu, words * size_of::<u32>())?;
+        let row_sums = area.height() * job.colours * cols;
+        let gpu_row_sums = gpu.working(row_sums * size_of::<u32>())?;
         let gpu_sums = Shared::new(gpu, cells * job.colours * size_of::<u64>())?;
         let gpu_corrections = gpu.working(cells * job.colours * size_of::<i32>())?;
         let gpu_clipped = Shared::new(gpu, size_of::<[u32; 2]>())?;
@@ -312,15 +315,20 @@ impl<'t, 'a, P: Bands, const C: usize> GpuFrames<'t, 'a, P, C> {
             Pass::new(gpu, (&shader, &constants), entry, invocations, buffers)
         };
         Ok(Self {
-            average: pass(
-                "average",
-                cells * job.colours,
+            average_rows: pass(
+                "average_rows",
+                row_sums,
                 &[
                     (0, &gpu_codes.working),
                     (1, &light_by_code),
                     (2, &paint),
-                    (3, &gpu_sums.working),
+                    (11, &gpu_row_sums),
                 ],
+            ),
+            average: pass(
+                "average",
+                cells * job.colours,
+                &[(3, &gpu_sums.working), (11, &gpu_row_sums)],
             ),
             interpolate: pass(
                 "interpolate",
@@ -375,6 +383,7 @@ impl<'t, 'a, P: Bands, const C: usize> GpuFrames<'t, 'a, P, C> {
             let mut commands = gpu
                 .device
                 .create_command_encoder(&CommandEncoderDescriptor::default());
+            self.average_rows.add(&mut commands);
             self.average.add(&mut commands);
             self.gpu_sums.copy(&mut commands);
             gpu.run(commands)?;

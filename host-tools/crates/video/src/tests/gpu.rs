@@ -57,6 +57,15 @@ proptest! {
 }
 
 #[test]
+fn a_frame_of_4k_is_the_processors() {
+    // Sums of its cells need more than 32 bits, and its words more groups than one side takes.
+    let table = MadeUp::of_all_kinds(grid(3, 5), 3, 3, 7);
+    let picture = random_picture(size(3840, 2160), 3, false, 3);
+    let [on_processor, on_gpu] = by_both(&table, settings(Encoding::Display), &picture);
+    assert!(on_gpu == on_processor);
+}
+
+#[test]
 fn borders_and_bars_are_the_processors() {
     for (channels, wide) in [(1, false), (3, false), (3, true)] {
         let mut table = MadeUp::of_all_kinds(grid(3, 5), channels, 3, 7);
