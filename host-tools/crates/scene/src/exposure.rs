@@ -46,7 +46,7 @@ fn of_projector(lamps: &[Vec<f64>], projector: usize) -> &[f64] {
     &lamps[projector.min(lamps.len() - 1)]
 }
 
-/// What of frames of this width, frames x pixels turned on its side, is in some columns.
+/// Some columns of frames of this width; frames are columns of a matrix, pixels x frames.
 fn part(frames: &DMatrix<f64>, width: usize, columns: &Range<usize>) -> DMatrix<f64> {
     let pixels = frames.nrows() / width * columns.len();
     DMatrix::from_fn(pixels, frames.ncols(), |pixel, frame| {
