@@ -5,7 +5,7 @@ use fastrand::Rng;
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm::compile::image::{ImageWriter, StoredRow, projector_section, segment_bytes};
 use iltm::compile::response;
-use iltm::picture::Response;
+use iltm::picture::{ProjectorResponse, Response};
 use iltm_runtime::Grid;
 use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::SectionKind;
@@ -29,6 +29,8 @@ pub struct MadeUp {
     pub ambient: Option<Vec<u16>>,
     /// Whether codes follow a projector's response (sRGB).
     pub response: bool,
+    /// Whether each channel then has another response.
+    pub of_channels: bool,
     /// Gains finer than the cells: rows, columns, and gains as above.
     pub fine_gains: Option<(u16, u16, Vec<u16>)>,
     /// The projector that it was made with, where that is known.
@@ -52,6 +54,7 @@ impl MadeUp {
             gains: vec![1 << 13; grid.cells() * channels],
             ambient: None,
             response: false,
+            of_channels: false,
             fine_gains: None,
             projector: None,
             tiers: Vec::new(),
@@ -158,7 +161,14 @@ impl MadeUp {
             image.section(SectionKind::Ambient, 0, halfwords(ambient.iter().copied()));
         }
         if self.response {
-            let knots = response::knots(&Response::Srgb.into(), 1).expect("not linear");
+            let knots = if self.of_channels {
+                let of_channel = |gamma| Response::Gamma(gamma).into();
+                let all = ProjectorResponse::of_channels([1.8, 2.2, 2.6].map(of_channel).into());
+                response::knots(&all.expect("three"), self.channels)
+            } else {
+                response::knots(&Response::Srgb.into(), 1)
+            };
+            let knots = knots.expect("not linear");
             image.section(SectionKind::Codes, 0, response::codes(&knots));
             image.section(SectionKind::Response, 0, halfwords(knots));
         }

@@ -37,11 +37,13 @@ proptest! {
         linear: bool,
         wide: bool,
         dark: bool,
+        of_channels: bool,
         seed: u64,
     ) {
         // A side may have as many pixels as cells, both may not: that is another way.
         let size = size(cols + more_width, rows + more_height + 1);
         let mut table = MadeUp::of_all_kinds(grid(rows, cols), table_channels, 5, seed);
+        table.of_channels = of_channels;
         if dark {
             table.ambient = None;
             table.fine_gains = None;
