@@ -630,8 +630,8 @@ pub(super) struct Compensate {
     /// higher ones when there is time, as on the device
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub(super) budget: Option<Duration>,
-    /// Frames are worked on by the graphics processor, with the same result; for a program that
-    /// was built with the feature `gpu`
+    /// Frames larger than one pixel a cell are worked on by the graphics processor, with the same
+    /// result; for a program that was built with the feature `gpu`
     #[arg(long)]
     pub(super) gpu: bool,
 }

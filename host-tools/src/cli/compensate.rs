@@ -59,10 +59,11 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     let brightness = Provenance::read(table.provenance()).brightness;
     let (mut data, totals) = totals(&summary, start.elapsed().as_secs_f64());
     data["brightness"] = json!(brightness);
-    data["gpu"] = json!(compensator.gpu());
+    let gpu = compensator.gpu(summary.size);
+    data["gpu"] = json!(gpu);
     let mut text = brightness.map_or_else(String::new, |brightness| brightness.words() + "\n");
     text += &totals;
-    if let Some(gpu) = compensator.gpu() {
+    if let Some(gpu) = gpu {
         let _ = writeln!(text, "frames   made by {gpu}");
     }
     if let Some(live) = live {

@@ -211,6 +211,11 @@ fn a_graphics_processor_makes_the_same_film_and_where_there_is_none_nothing_is_w
     assert_eq!(with_gpu["clipped"], plain["clipped"]);
     let said = user.says("compensate t.iltm film.y4m -o again.y4m --gpu");
     contains(&said, &[name]);
+    // One pixel a cell is the processor's work, and is not called another's.
+    let picture = Path::new(SAMPLE).join("patterns/000.png");
+    fs::copy(picture, user.path("cells.png")).expect("a copy");
+    let cells = user.json("compensate t.iltm cells.png -o small.png --gpu");
+    assert!(cells["gpu"].is_null());
 
     let mut command = user.iltm("compensate t.iltm film.y4m -o none.y4m --gpu");
     command.env("VK_DRIVER_FILES", user.path("no-driver.json"));

@@ -197,7 +197,7 @@ fn effects_that_are_asked_for_are_simulated_and_said_to_be() {
 /// picture, through a blur of .4 cells and with vignetting.
 #[test]
 fn a_slide_of_even_cells_is_photographed_as_the_cells_are() {
-    for name in ["dome", "installation"] {
+    for name in ["dome", "installation", "two-walls"] {
         let scene = scene(name, &[]);
         let still = [Effect::Noise, Effect::Quantisation, Effect::Drift];
         let forced = still.into_iter().fold(Forced::default(), |forced, effect| {

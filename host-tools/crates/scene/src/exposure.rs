@@ -125,9 +125,8 @@ impl Simulation<'_> {
             bounces: 0,
         };
         for channel in 0..self.channels {
-            // It is added once.
-            let ambient = if self.decisions.on(Effect::Ambient) && self.index == 0 {
-                self.scene.ambient[channel]
+            let ambient = if self.decisions.on(Effect::Ambient) {
+                self.scene.ambient_beside(self.index)[channel]
             } else {
                 0.0
             };

@@ -54,13 +54,9 @@ impl<'s> Facets<'s> {
         &self.scene.projectors[self.index]
     }
 
-    /// Light from all around, by channel; it is added to the first projector's.
+    /// Light from all around that is added to this projector's.
     pub(crate) fn ambient(&self) -> [f64; 3] {
-        if self.index == 0 {
-            self.scene.ambient
-        } else {
-            [0.0; 3]
-        }
+        self.scene.ambient_beside(self.index)
     }
 
     /// All of them as obstacles; each faces the projector.

@@ -104,10 +104,12 @@ impl<'t, 'a> Compensator<'t, 'a> {
         Self::on(self.table, self.settings, Arc::clone(&self.threads), gpu)
     }
 
-    /// The graphics processor that works, by its name.
+    /// The graphics processor that works on frames of this size, by its name; frames of one pixel
+    /// a cell are the processor's.
     #[must_use]
-    pub fn gpu(&self) -> Option<&str> {
-        self.gpu.as_ref().map(|gpu| gpu.name())
+    pub fn gpu(&self, frame: FrameSize) -> Option<&str> {
+        let gpu = self.gpu.as_ref()?;
+        (frame != FrameSize::of_grid(self.table.grid())).then(|| gpu.name())
     }
 
     /// One for another table, with the same settings, on the same threads.

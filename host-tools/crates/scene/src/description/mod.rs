@@ -282,6 +282,16 @@ impl Scene {
             .collect()
     }
 
+    /// Light from all around, by channel, that is added to that of the projector with this index:
+    /// to the first one's, so that it is added once.
+    #[must_use]
+    pub(crate) fn ambient_beside(&self, projector: usize) -> [f64; 3] {
+        match projector {
+            0 => self.ambient,
+            _ => [0.0; 3],
+        }
+    }
+
     /// All facets with the index of their panel, in the order of the panels.
     pub fn facets(&self) -> impl Iterator<Item = (usize, &Facet)> {
         let panels = self.panels.iter().enumerate();

@@ -1,7 +1,7 @@
 // Frames in integers: averages over the cells, corrections between their centres, gains and
 // codes. Every result is the runtime's, bit for bit.
 //
-// Codes lie row by row, in a row colour by colour, `PER_WORD` in a word. The light of an average
+// Codes lie row by row, in a row colour by colour, two or four in a word. The light of an average
 // and the correction of a pixel are what iltm_runtime::resample says. Whatever is the same for
 // all frames is an override.
 
