@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
-use std::process::Child;
+use std::process::{Child, Command};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -49,7 +49,12 @@ struct Playing<'u> {
 
 impl<'u> Playing<'u> {
     fn start(desktop: &Desktop, user: &'u User, line: &str) -> Self {
-        let child = desktop.spawn(user, &format!("play t.iltm {line} -- {MPV}"));
+        Self::with(desktop, user, line, "")
+    }
+
+    /// With an option for mpv.
+    fn with(desktop: &Desktop, user: &'u User, line: &str, option: &str) -> Self {
+        let child = desktop.spawn(user, &format!("play t.iltm {line} -- {MPV} {option}"));
         let socket = user.path("socket");
         let stream = within(60, || UnixStream::connect(&socket).ok());
         let mut show = Self {
@@ -290,6 +295,38 @@ fn a_playlist_is_all_of_its_films_and_one_film_begins_again() {
     within(60, || (show.get("loop-file") == "inf").then_some(()));
     let ended = show.end();
     contains(&ended.said, &["films       1 begun"]);
+}
+
+/// The desktop has no rate of its own.
+#[test]
+fn late_frames_are_counted_where_the_rate_of_the_display_is_known() {
+    let desktop = Desktop::start(&format!("{SIZE}x24"));
+    let user = user();
+    film(&user, "good.mkv", 25, "yuv420p");
+    let show = Playing::start(&desktop, &user, "good.mkv");
+    contains(
+        &show.end().said,
+        &["late ones cannot be told: the display's rate is not known"],
+    );
+    let mut show = Playing::with(&desktop, &user, "good.mkv", "--override-display-fps=50");
+    let late = |show: &mut Playing<'_>| show.get("vo-delayed-frame-count").as_i64();
+    within(60, || late(&mut show));
+    let player = show.get("pid").to_string();
+    let signal = |signal: &str| {
+        let sent = Command::new("kill").args([signal, &player]).status();
+        assert!(sent.expect("kill is there").success());
+    };
+    signal("-STOP");
+    thread::sleep(Duration::from_millis(700));
+    signal("-CONT");
+    thread::sleep(Duration::from_secs(2));
+    let counted = late(&mut show);
+    let said = show.end().said;
+    let line = said.lines().find(|line| line.starts_with("frames"));
+    let words: Vec<&str> = line.expect("counts").split_whitespace().collect();
+    assert_eq!((words[2], words[4]), ("dropped,", "late"), "{said}");
+    let told: i64 = words[3].parse().expect("a count");
+    assert!(told > 0 && Some(told) >= counted, "{said}: {counted:?}");
 }
 
 #[test]

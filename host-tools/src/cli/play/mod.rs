@@ -1,8 +1,8 @@
 //! `iltm play`: mpv on a projector, with the table as its shader.
 //!
 //! Decoding, sound and clocks are mpv's, and the compensation is the user shader of
-//! `iltm export`. The script `play.lua` runs within mpv: it has the keys, counts late frames,
-//! and says what happens as JSON lines on standard output.
+//! `iltm export`. The script `play.lua` runs within mpv: it has the keys, counts frames that were
+//! dropped or late, and says what happens as JSON lines on standard output.
 
 use super::args::Play;
 use super::failure::{Failure, Kind, cannot_write};
@@ -154,6 +154,9 @@ impl ShowFiles<'_> {
             .args(["--quiet", "--msg-level=all=error"])
             .args(["--idle=yes", "--image-display-duration=10"])
             .args(["--prefetch-playlist=yes", "--gapless-audio=yes"])
+            // In step with the display, where its rate is known: frames last evenly, late ones
+            // are counted, and sound follows.
+            .arg("--video-sync=display-resample")
             .args(["--audio-fallback-to-null=yes"])
             // Subtitles would be drawn over the compensated picture, and turned films stretched.
             .args(["--sid=no", "--video-rotate=no"])
@@ -394,12 +397,17 @@ impl FilmShow<'_> {
             "films": counts["films"],
             "failed": counts["failed"],
             "dropped": counts["dropped"],
+            "late": counts["late"],
             "problems": self.said,
         });
+        let late = match &counts["late"] {
+            Value::Null => "late ones cannot be told: the display's rate is not known".to_owned(),
+            late => format!("{late} late"),
+        };
         let text = format!(
             "played      {:.0} s\n\
              films       {} begun, {} that could not be played\n\
-             frames      {} dropped\n",
+             frames      {} dropped, {late}\n",
             time.as_secs_f64(),
             counts["films"],
             counts["failed"],

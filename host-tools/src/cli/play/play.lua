@@ -9,8 +9,10 @@ local state = {
     generation = 0, tier = settings.tier, tiers = settings.tiers,
     compensated = true, white = false, card = false, line = false,
 }
-local counts = { dropped = 0, films = 0, failed = 0, shown = false }
+local counts = { dropped = 0, late = 0, films = 0, failed = 0, shown = false }
 local loaded, pictured, ending = false, false, false
+-- mpv counts late frames only while it plays in step with the display.
+local in_step = false
 
 local function say(event)
     io.stdout:write(utils.format_json(event), "\n")
@@ -52,8 +54,9 @@ local function show_line()
     local name = mp.get_property("filename") or "nothing to play"
     local held = mp.get_property_native("pause") and "  paused" or ""
     line.data = string.format(
-        "{\\an1\\fs22\\bord1}%s  %s%s  %d dropped",
-        (name:gsub("[{}\\]", " ")), words(), held, counts.dropped
+        "{\\an1\\fs22\\bord1}%s  %s%s  %d dropped%s",
+        (name:gsub("[{}\\]", " ")), words(), held, counts.dropped,
+        in_step and string.format(", %d late", counts.late) or ""
     )
     line:update()
 end
@@ -128,17 +131,19 @@ key("q", "quit", function() finish(0) end)
 key("ESC", "escape", function() finish(0) end)
 
 -- A player's counts begin again with each film.
-local function count(property)
+local function count(property, what)
     local before = 0
     mp.observe_property(property, "number", function(_, now)
         now = now or 0
-        counts.dropped = counts.dropped + math.max(0, now < before and now or now - before)
+        counts[what] = counts[what] + math.max(0, now < before and now or now - before)
         before = now
         show_line()
     end)
 end
-count("frame-drop-count")
-count("decoder-frame-drop-count")
+count("frame-drop-count", "dropped")
+count("decoder-frame-drop-count", "dropped")
+count("vo-delayed-frame-count", "late")
+
 mp.observe_property("pause", "bool", show_line)
 
 -- The display fits, or nothing is shown; in mid show it may change, as when a cable is pulled.
@@ -268,6 +273,8 @@ local function there(name)
     return file and file:close()
 end
 mp.add_periodic_timer(0.25, function()
+    -- No event says so.
+    in_step = in_step or mp.get_property_native("display-sync-active")
     if there("stop") or not there("settings.lua") then
         finish(0)
     end
@@ -287,6 +294,7 @@ mp.add_periodic_timer(0.25, function()
 end)
 
 mp.register_event("shutdown", function()
+    counts.late = in_step and counts.late or nil
     say({ ended = counts })
 end)
 
