@@ -320,7 +320,7 @@ fn fill(scene: &Scene, folder: &Path, (forced, seed, faults): (Forced, u64, &[In
     let simulation = simulation(scene, forced);
     let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
     let camera = camera.with_faults(faults);
-    let session = fill_capture::UnfilledCapture::read(folder, scene);
+    let session = fill_capture::UnfilledCapture::read(folder, scene, None);
     let session = session.expect("a folder to fill");
     session.take_missing(&camera, &Silent).expect("taken");
 }

@@ -144,6 +144,10 @@ pub(super) struct Simulate {
     /// `iltm patterns` or `iltm verify` made
     #[arg(long, value_name = "FOLDER")]
     pub(super) photograph: Option<PathBuf>,
+    /// The folder's slides are those of this one of the scene's projectors, named or counted
+    /// from 1; all others show black
+    #[arg(long, value_name = "NAME", requires = "photograph")]
+    pub(super) projector: Option<String>,
     /// Take only the photograph with this index, and write it to --output
     #[arg(
         long,

@@ -28,7 +28,8 @@ pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> 
     check_used(arguments)?;
     let session = match &arguments.photograph {
         Some(folder) => {
-            let read = UnfilledCapture::read(folder, &scene);
+            let lit = lit(arguments, &scene)?;
+            let read = UnfilledCapture::read(folder, &scene, lit);
             Some((folder.as_path(), read.map_err(not_taken)?))
         }
         None => None,
@@ -128,6 +129,25 @@ fn check_used(arguments: &Simulate) -> Result<(), Failure> {
     ))
 }
 
+/// The index of the projector that the slides are for; `None` for all side by side.
+fn lit(arguments: &Simulate, scene: &Scene) -> Result<Option<usize>, Failure> {
+    let Some(name) = &arguments.projector else {
+        return Ok(None);
+    };
+    let lit = scene.projector_called(name).ok_or_else(|| {
+        let names = scene.projector_names().join("`, `");
+        Failure::new(
+            Kind::Usage,
+            format!(
+                "{}: there is no projector `{name}`; there is `{names}`",
+                arguments.scene.display()
+            ),
+            "Name one of these after --projector, or count them from 1.",
+        )
+    })?;
+    Ok(Some(lit))
+}
+
 /// The effects that the command line turns on and off.
 fn forced(arguments: &Simulate) -> Forced {
     let on = arguments.with.iter().map(|effect| (*effect, true));
@@ -182,11 +202,11 @@ fn photograph(
             chain,
             table: &read_table(path)?,
             path,
-            grid: camera.grid(),
+            grid: session.grid(),
             response: scene.projectors[0].response,
         };
         let codes = slides.codes(&session.indices())?;
-        session = session.showing(camera.grid(), codes);
+        session = session.showing(scene, codes);
     }
     let taken = match (arguments.shot, &arguments.output) {
         (Some(index), Some(file)) => session.take_one(camera, index, file).map(|()| 1),

@@ -102,6 +102,9 @@ fn every_scene_that_comes_with_the_tools_is_explained() {
         "dome",
         "stage",
         "two-walls",
+        "folded-screen",
+        "cube-room",
+        "dome-of-four",
     ] {
         User::new().says(&format!("simulate SCENES/{scene}.toml --explain"));
     }
@@ -121,6 +124,8 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
         let second: Vec<&str> = lines.chain([line, ""]).collect();
         table.clone() + &second.join("\n")
     };
+    let named = "name = \"wall\"";
+    let named_alike = two(named).replacen("]]\n", &format!("]]\n{named}\n"), 1);
     for (from, to, words) in [
         ("rows = 4", "rovs = 4", &["rovs", "line 6"][..]),
         (left, "albedo = 1.8\n[[", &["`left`", "1.8"]),
@@ -155,6 +160,16 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
         ),
         (one, &two("response = 1.8"), &["[[projector]] response"]),
         (one, &two("clos = 6"), &["clos"]),
+        (
+            one,
+            &two("name = \"1\""),
+            &["[projector] name is \"1\"", "called by its number"],
+        ),
+        (
+            one,
+            &named_alike,
+            &["[projector] name is \"wall\"", "another for each"],
+        ),
         (panels, "", &["no [[panel]]"]),
     ] {
         let user = user(&[(from, to)]);
@@ -250,6 +265,64 @@ fn patterns_of_another_grid_are_refused() {
     user.write("scene.toml", CORNER.replace("cols = 6", "cols = 5"));
     let said = user.fails(4, PHOTOGRAPH);
     contains(&said, &["4 x 6 cells", "has 4 x 5"]);
+}
+
+#[test]
+fn slides_of_one_of_several_projectors_are_photographed_while_the_others_show_black() {
+    let user = user(&[
+        ("[projector]\n", "[[projector]]\nname = \"near\"\n"),
+        (
+            "[camera]",
+            "[[projector]]
+position = [0.1, 0, 4]
+look_at = [0, 0, 0]
+field_of_view = 24
+rows = 4
+cols = 6
+[camera]",
+        ),
+    ]);
+    user.says("patterns -o near --rows 4 --cols 6 --photos 10 --projector 60x40");
+    user.says("patterns -o both --rows 4 --cols 12 --photos 10 --projector 120x40");
+    let simulate = "simulate scene.toml --photograph";
+    let said = user.fails(2, &format!("{simulate} near --projector far"));
+    contains(
+        &said,
+        &["no projector `far`", "there is `near`, `2`", "next: "],
+    );
+    let said = user.fails(2, "simulate scene.toml --explain --projector near");
+    contains(&said, &["--photograph"]);
+    let said = user.fails(4, &format!("{simulate} near"));
+    contains(&said, &["side by side, have 4 x 12", "--projector"]);
+    // By name and by number, all and one alone.
+    user.says(&format!("{simulate} near --projector near"));
+    user.says(&format!("{simulate} near --projector 1 --shot 0 -o 1.png"));
+    user.says(&format!("{simulate} near --projector 2 --shot 0 -o 2.png"));
+    user.says(&format!("{simulate} both --shot 0 -o both.png"));
+    // But for the bounces, which end where the patterns of one pass have lost their light.
+    let own = difference(&user, "1.png", "near/photos/000.png");
+    let other = difference(&user, "1.png", "2.png");
+    assert!(own < 1e-4 * other, "{own} {other}");
+    let light = |name: &str| -> f64 {
+        let picture = user.picture(name).into_luma16();
+        picture.iter().map(|value| f64::from(*value)).sum()
+    };
+    // Both throw about as much onto the same walls, and their light adds up.
+    let [one, two, both] = ["1.png", "2.png", "both.png"].map(light);
+    assert!(
+        ((one + two) / both - 1.0).abs() < 0.01,
+        "{one} {two} {both}"
+    );
+    assert!((one / both - 0.5).abs() < 0.05, "{one} {both}");
+    assert!(user.json(&format!("{simulate} near --projector near"))["photographs"] == 0);
+}
+
+#[test]
+fn a_projector_that_is_the_only_one_may_be_named() {
+    let user = without_photographs();
+    user.says(&format!("{PHOTOGRAPH} --projector 1 --shot 3 -o one.png"));
+    user.says(&format!("{PHOTOGRAPH} --shot 3 -o same.png"));
+    assert_eq!(user.read("one.png"), user.read("same.png"));
 }
 
 #[test]

@@ -132,7 +132,7 @@ impl StudiedSession {
         let camera = VirtualCamera::new(&self.scene, simulation, self.seed).expect("light");
         let faults: Vec<InjectedFault> = fault.into_iter().collect();
         let camera = camera.with_faults(&faults);
-        let unfilled = UnfilledCapture::read(folder, &self.scene).expect("slides");
+        let unfilled = UnfilledCapture::read(folder, &self.scene, None).expect("slides");
         unfilled.take_missing(&camera, &Silent).expect("taken");
         if let Some(quality) = self.jpeg {
             for (_, shot) in listed(folder).expect("a capture") {

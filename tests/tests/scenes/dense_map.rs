@@ -175,7 +175,7 @@ fn measured(scene: &Scene, projector: (u16, u16), border: u16, jpeg: bool) -> Me
     };
     let slides = order(&layout, &options);
     session::write(&slides, &layout, &settings, &folder, &Silent).unwrap();
-    let unfilled = UnfilledCapture::read(&folder, scene).unwrap();
+    let unfilled = UnfilledCapture::read(&folder, scene, None).unwrap();
     let taken = VirtualCamera::new(scene, &simulation, 1).unwrap();
     unfilled.take_missing(&taken, &Silent).unwrap();
     if jpeg {

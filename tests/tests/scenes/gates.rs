@@ -100,7 +100,7 @@ fn few_patterns_accuse_no_photograph_and_a_curved_camera_no_projector() {
     };
     session::write(&slides, &layout, &camera, &folder, &Silent).unwrap();
     let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
-    let unfilled = UnfilledCapture::read(&folder, &scene).unwrap();
+    let unfilled = UnfilledCapture::read(&folder, &scene, None).unwrap();
     unfilled.take_missing(&camera, &Silent).unwrap();
     for bernoulli in [10, 15, 20] {
         let gates = gates(&folder, Some(bernoulli));

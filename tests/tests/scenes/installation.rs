@@ -51,7 +51,7 @@ fn photographed(
     session::write(&slides, &layout, &camera(scene), folder, &Silent).unwrap();
     let camera = VirtualCamera::new(scene, simulation, 5).unwrap();
     let camera = camera.with_faults(faults);
-    let session = fill_capture::UnfilledCapture::read(folder, scene).unwrap();
+    let session = fill_capture::UnfilledCapture::read(folder, scene, None).unwrap();
     session.take_missing(&camera, &Silent).unwrap();
 }
 
@@ -136,7 +136,7 @@ fn error(scene: &Scene, laboratory: &Scene, place: &Path) -> (BuiltTable, [f64; 
     let quiet = Forced::default().with(Effect::Noise, false);
     let simulation = simulation(laboratory, quiet);
     let camera = VirtualCamera::new(laboratory, &simulation, 11).unwrap();
-    let session = fill_capture::UnfilledCapture::read(&folder, laboratory).unwrap();
+    let session = fill_capture::UnfilledCapture::read(&folder, laboratory, None).unwrap();
     session.take_missing(&camera, &Silent).unwrap();
     let session = verify::Readings::read(&folder, &table, &Silent).unwrap();
     let verdict = verify::judge(&folder, &table, &session, None).unwrap();

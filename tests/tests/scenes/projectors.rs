@@ -1,12 +1,19 @@
 //! Several projectors in one scene, their frames side by side.
 
-use iltm::scene::Forced;
+use iltm::capture::listed;
+use iltm::picture::{Picture, Samples, png};
+use iltm::progress::Silent;
 use iltm::scene::description::Scene;
+use iltm::scene::fill_capture::{FillCaptureError, UnfilledCapture};
+use iltm::scene::{Effect, Forced, VirtualCamera};
+use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, photograph, scene, showable,
     simulation,
 };
 use nalgebra::DMatrix;
+use std::fs::{self, File};
+use std::path::Path;
 
 /// Two walls, two projectors, a small camera.
 fn two_walls() -> Scene {
@@ -52,6 +59,169 @@ fn light_of_two_projectors_is_the_sum_of_the_light_of_each_and_ambient_light_is_
     // Each reaches the other's wall, by a bounce.
     let lit = |half: &Vec<f32>| half.iter().filter(|light| **light > 0.005).count();
     assert!(halves.iter().all(|half| lit(half) > 160 * 100 * 2 / 3));
+}
+
+/// Columns of cells of the second of two projectors, which are fewer than the first one's.
+const OF_SECOND: usize = 12;
+/// Codes of black and of another slide, of all cells or pixels.
+type Codes<'c> = &'c dyn Fn(usize, usize) -> u8;
+
+/// Two walls whose projectors have other numbers of cells, glow in black and meet a camera without
+/// noise.
+fn unlike() -> Scene {
+    let mut scene = two_walls();
+    scene.projectors[1].grid = Grid::new(12, OF_SECOND as u16).unwrap();
+    for projector in &mut scene.projectors {
+        projector.black = 0.02;
+    }
+    scene
+}
+
+/// Makes a folder that calls for two photographs: of black and of `codes`, by column and row.
+fn folder(place: &Path, (width, height): (usize, usize), pixels: bool, codes: Codes<'_>) {
+    let size = FrameSize::new(width as u16, height as u16).unwrap();
+    fs::create_dir_all(place.join("patterns")).unwrap();
+    let mut lines = "index,role,pattern,photo\n".to_owned();
+    for (index, role) in ["black", "bernoulli"].into_iter().enumerate() {
+        let slide = Picture::of_codes(size, 1, |at, _| match index {
+            0 => 0,
+            _ => codes(at % width, at / width),
+        });
+        fs::write(
+            place.join(format!("patterns/{index}.png")),
+            png::encode(&slide),
+        )
+        .unwrap();
+        lines += &format!("{index},{role},patterns/{index}.png,photos/{index}.png\n");
+    }
+    fs::write(place.join("capture.csv"), lines).unwrap();
+    let settings = if pixels {
+        format!("[projector]\nsize = [{width}, {height}]\n")
+    } else {
+        String::new()
+    };
+    fs::write(place.join("capture.toml"), settings).unwrap();
+}
+
+/// The two photographs of a folder, 0 to 1, without noise.
+fn taken(scene: &Scene, folder: &Path, projector: Option<usize>) -> [Vec<f64>; 2] {
+    let still = [Effect::Noise, Effect::Quantisation];
+    let quiet = still.into_iter().fold(Forced::default(), |forced, effect| {
+        forced.with(effect, false)
+    });
+    let simulation = simulation(scene, quiet);
+    let camera = VirtualCamera::new(scene, &simulation, 1).unwrap();
+    let session = UnfilledCapture::read(folder, scene, projector).unwrap();
+    assert_eq!(session.take_missing(&camera, &Silent).unwrap(), 2);
+    let mut shots = listed(folder).unwrap().into_iter();
+    [0, 1].map(|_| {
+        let (_, shot) = shots.next().unwrap();
+        let picture = png::read(File::open(folder.join(shot.photo)).unwrap()).unwrap();
+        let Samples::Sixteen(values) = picture.samples() else {
+            panic!("16 bits");
+        };
+        let light = values.iter().map(|value| f64::from(*value) / 65_535.0);
+        light.collect()
+    })
+}
+
+#[test]
+fn photographs_of_each_projector_while_the_other_shows_black_add_up_to_those_of_both() {
+    let scene = unlike();
+    // One pixel a cell, and slides of the projectors' own pixels.
+    for side in [1, 5] {
+        let (first, all) = (16 * side, (16 + OF_SECOND) * side);
+        let mut random = fastrand::Rng::with_seed(5);
+        let frame: Vec<u8> = (0..all * 12 * side).map(|_| random.u8(..)).collect();
+        let code = |col: usize, row: usize| frame[row * all + col];
+        let place = tempfile::tempdir().unwrap();
+        let take = |name: &str, width: usize, projector, codes: Codes<'_>| {
+            let place = place.path().join(name);
+            folder(&place, (width, 12 * side), side > 1, codes);
+            taken(&scene, &place, projector)
+        };
+        let [black, both] = take("both", all, None, &code);
+        let [dark, left] = take("left", first, Some(0), &code);
+        let [_, right] = take("right", all - first, Some(1), &|col, row| {
+            code(first + col, row)
+        });
+        // The others are on and show black.
+        assert!(black.iter().zip(&dark).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert!(black.iter().sum::<f64>() > 0.005 * black.len() as f64);
+        let sums = left.iter().zip(&right).zip(&black);
+        let off = sums
+            .zip(&both)
+            .map(|(((left, right), black), both)| (left + right - black - both).abs());
+        let off = off.fold(0.0, f64::max);
+        println!("{side} pixels a cell: off by {off:.5} at most");
+        // Bounces are followed until little is left, and photographs have 16 bits.
+        assert!(off < 3e-4, "{side}: {off}");
+        let share = |one: &[f64]| one.iter().sum::<f64>() / both.iter().sum::<f64>();
+        assert!(share(&left) < 0.8 && share(&right) < 0.8);
+    }
+}
+
+#[test]
+fn slides_that_do_not_fit_the_projector_they_are_for_are_refused() {
+    let scene = unlike();
+    let place = tempfile::tempdir().unwrap();
+    let refused = |name: &str, size: (usize, usize), pixels, projector| {
+        let place = place.path().join(name);
+        folder(&place, size, pixels, &|_, _| 0);
+        let error = UnfilledCapture::read(&place, &scene, projector).unwrap_err();
+        assert!(matches!(error, FillCaptureError::Pattern { .. }), "{error}");
+        error.to_string()
+    };
+    // Slides of all for one of them, and of one of them for all.
+    let said = refused("a", (28, 12), false, Some(0));
+    assert!(said.contains("projector `1` has 12 x 16"), "{said}");
+    let said = refused("b", (16, 12), false, None);
+    assert!(said.contains("side by side, have 12 x 28"), "{said}");
+    // 62 pixels over 16 columns would be 108.5 over all 28.
+    let said = refused("c", (62, 48), true, Some(0));
+    assert!(
+        said.contains("62 columns, over 16 columns of cells"),
+        "{said}"
+    );
+}
+
+#[test]
+fn projectors_are_called_by_name_or_number() {
+    let named = [(
+        "[[projector]]\nposition = [2.2,",
+        "[[projector]]\nname = \"left\"\nposition = [2.2,",
+    )];
+    let scene = scene("two-walls", &named);
+    assert_eq!(scene.projector_names(), ["left", "2"]);
+    let called = ["left", "1", "2", "0", "3", "right", ""].map(|name| scene.projector_called(name));
+    assert_eq!(called, [Some(0), Some(0), Some(1), None, None, None, None]);
+}
+
+#[test]
+fn pictures_of_the_folded_screen_overlap_by_a_fifth_of_their_width() {
+    let scene = scene("folded-screen", &[]);
+    assert_eq!(scene.projector_names(), ["left", "right"]);
+    let [left, right] = [0, 1].map(|index| &scene.projectors[index].view);
+    // Where the left picture ends on the right half, and where the right one begins on the left.
+    let half = scene.panels[1].facets[0].polygon.corners();
+    let along = (half[1] - half[0]).normalize();
+    let middle = 0.5 * (half[0] + half[3]);
+    let across = |metres: f64| left.place(&(middle + metres * along)).unwrap().across;
+    let mut reach = (0.0, 1.0);
+    for _ in 0..50 {
+        let metres = 0.5 * (reach.0 + reach.1);
+        if across(metres) < 1.0 {
+            reach.0 = metres;
+        } else {
+            reach.1 = metres;
+        }
+    }
+    let mut begins = middle + reach.0 * along;
+    begins.x = -begins.x;
+    assert!(right.place(&begins).unwrap().across.abs() < 1e-3);
+    let overlap = 1.0 - left.place(&begins).unwrap().across;
+    println!("{overlap:.3} of a width, {:.1} cells", 24.0 * overlap);
+    assert!((overlap - 0.2).abs() < 0.01, "{overlap}");
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     .unwrap();
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
-    let session = fill_capture::UnfilledCapture::read(folder, scene).unwrap();
+    let session = fill_capture::UnfilledCapture::read(folder, scene, None).unwrap();
     session.take_missing(&camera, &Silent).unwrap();
 }
 

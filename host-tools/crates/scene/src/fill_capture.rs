@@ -9,6 +9,7 @@ use iltm_picture::{Samples, foreign_file, png, progress::Progress, whole_file};
 use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, resample::area::AreaAverage};
 use std::fs;
 use std::io::{self, BufReader};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
@@ -62,7 +63,8 @@ impl FillCaptureError {
             Self::Capture(error) => error.next_step(),
             Self::Simulation(error) => error.next_step(),
             Self::Pattern { .. } => {
-                "Make the patterns with the rows and cols of the scene's projector: `iltm patterns`."
+                "Make the patterns with the rows and cols of the scene's projector: `iltm patterns`; \
+                 --projector NAME is for those of one of several."
             }
             Self::NoIndex { .. } => "Choose an index from the first column of capture.csv.",
             Self::Missed { .. } => "Leave the fault away.",
@@ -78,24 +80,109 @@ pub struct UnfilledCapture {
     indices: Vec<u32>,
     photos: Vec<PathBuf>,
     frames: Vec<ProjectedFrame>,
+    place: SlidePlace,
+}
+
+/// Where slides stand in the frame of all projectors.
+#[derive(Clone, Debug)]
+struct SlidePlace {
+    /// Cells of the frame of all projectors.
+    all: Grid,
+    /// Its columns of cells that slides have.
+    columns: Range<usize>,
+    /// Cells of a slide.
+    grid: Grid,
+    /// Of whom the slides are, for words: the scene's projectors, or one of them.
+    whose: String,
+}
+
+impl SlidePlace {
+    /// Of slides for the projector with this index, or for all of the scene's.
+    ///
+    /// # Panics
+    /// If there is no such projector.
+    fn new(scene: &Scene, projector: Option<usize>) -> Self {
+        let all = scene.grid();
+        match projector {
+            Some(index) => Self {
+                all,
+                columns: scene.columns()[index].clone(),
+                grid: scene.projectors[index].grid,
+                whose: format!("the projector `{}` has", scene.projector_names()[index]),
+            },
+            None => Self {
+                all,
+                columns: 0..all.cols(),
+                grid: all,
+                whose: if scene.projectors.len() == 1 {
+                    "the scene's projector has".to_owned()
+                } else {
+                    "the scene's projectors, side by side, have".to_owned()
+                },
+            },
+        }
+    }
+
+    /// Size of the frame of all projectors whose part is a slide of this size, and the columns of
+    /// its pixels that the slide has; `None` if there would be no whole number of them.
+    fn within(&self, scene: &Scene, slide: FrameSize) -> Option<(FrameSize, Range<usize>)> {
+        let cells = self.columns.len();
+        let wide = slide.width() * self.all.cols();
+        let width = wide.is_multiple_of(cells).then_some(wide / cells)?;
+        // No projector shares a pixel with another, however many columns of cells they have.
+        scene.columns_of(width)?;
+        let start = self.columns.start * slide.width() / cells;
+        let size = FrameSize::new(width.try_into().ok()?, slide.height() as u16)?;
+        Some((size, start..start + slide.width()))
+    }
+
+    /// The frame of all projectors while the others show black, and its size.
+    fn widened(
+        &self,
+        scene: &Scene,
+        slide: FrameSize,
+        codes: Vec<[u8; 3]>,
+    ) -> Option<(FrameSize, Vec<[u8; 3]>)> {
+        let (size, columns) = self.within(scene, slide)?;
+        if size == slide {
+            return Some((size, codes));
+        }
+        let mut frame = vec![[0; 3]; size.pixels()];
+        let rows = frame.chunks_exact_mut(size.width());
+        for (row, own) in rows.zip(codes.chunks_exact(slide.width())) {
+            row[columns.clone()].copy_from_slice(own);
+        }
+        Some((size, frame))
+    }
 }
 
 impl UnfilledCapture {
     /// Reads the manifests of a folder and their patterns, each of one pixel a cell of `grid` or
     /// a slide of the projector's own pixels.
     ///
+    /// The slides are those of the scene's projector with the index `projector`, while all others
+    /// show black; or, where it is `None`, of the frames of all projectors side by side.
+    ///
     /// # Errors
     /// [`FillCaptureError`] with the manifest's line or the pattern.
-    pub fn read(folder: &Path, scene: &Scene) -> Result<Self, FillCaptureError> {
+    ///
+    /// # Panics
+    /// If the scene has no projector with that index.
+    pub fn read(
+        folder: &Path,
+        scene: &Scene,
+        projector: Option<usize>,
+    ) -> Result<Self, FillCaptureError> {
         // What a frame is shown for does not change its light.
         let mut shots: Vec<_> = listed(folder)?.into_iter().map(|(_, shot)| shot).collect();
         shots.sort_by_key(|shot| shot.index);
         // Exposures are relative to the longest, which white is exposed for.
         let longest = shots.iter().filter_map(|s| s.exposure).fold(0.0, f64::max);
-        let projector = Settings::read(folder)?.projector.pixels();
+        let place = SlidePlace::new(scene, projector);
+        let pixels = Settings::read(folder)?.projector.pixels();
         let frames = shots.iter().map(|shot| {
             let path = folder.join(&shot.pattern);
-            let (size, codes) = frame(&path, scene, projector)?;
+            let (size, codes) = frame(&path, scene, &place, pixels)?;
             Ok(ProjectedFrame {
                 size,
                 codes,
@@ -107,6 +194,7 @@ impl UnfilledCapture {
             folder: folder.to_owned(),
             indices: shots.iter().map(|shot| shot.index).collect(),
             photos: shots.into_iter().map(|shot| shot.photo).collect(),
+            place,
         })
     }
 
@@ -131,13 +219,23 @@ impl UnfilledCapture {
         self.indices.clone()
     }
 
-    /// The same with other input codes of every cell for each photograph, in the order of the
-    /// indices; what has none stays.
+    /// Cells of a slide: those of one projector, or of all side by side.
     #[must_use]
-    pub fn showing(mut self, grid: Grid, codes: Vec<Vec<[u8; 3]>>) -> Self {
+    pub fn grid(&self) -> Grid {
+        self.place.grid
+    }
+
+    /// The same with other input codes of every cell of a slide, [`grid`](Self::grid), for each
+    /// photograph, in the order of the indices; what has none stays.
+    #[must_use]
+    pub fn showing(mut self, scene: &Scene, codes: Vec<Vec<[u8; 3]>>) -> Self {
+        let cells = FrameSize::of_grid(self.place.grid);
         for (frame, codes) in self.frames.iter_mut().zip(codes) {
-            frame.size = FrameSize::of_grid(grid);
-            frame.codes = codes;
+            // A pixel a cell always makes a whole number of them.
+            if let Some((size, codes)) = self.place.widened(scene, cells, codes) {
+                frame.size = size;
+                frame.codes = codes;
+            }
         }
         self
     }
@@ -205,13 +303,15 @@ fn write(photograph: &Photograph, path: &Path) -> Result<(), FillCaptureError> {
     })
 }
 
-/// Size and input codes of a picture of one pixel a cell, or of what a border leaves of a slide.
+/// Size and input codes of the frame of all projectors that has a picture of one pixel a cell in its
+/// place, or what a border leaves of a slide.
 fn frame(
     path: &Path,
     scene: &Scene,
+    place: &SlidePlace,
     projector: Option<ProjectorPixels>,
 ) -> Result<(FrameSize, Vec<[u8; 3]>), FillCaptureError> {
-    let grid = scene.grid();
+    let grid = place.grid;
     let refuse = |reason: String| FillCaptureError::Pattern {
         path: path.to_owned(),
         reason,
@@ -231,19 +331,13 @@ fn frame(
             .ok_or_else(|| refuse(format!("its border leaves fewer pixels than {grid} cells")))?,
         None => {
             return Err(refuse(format!(
-                "{} x {} cells (rows x columns), but the scene's projector has {grid}",
+                "{} x {} cells (rows x columns), but {} {grid}",
                 found.height(),
-                found.width()
+                found.width(),
+                place.whose
             )));
         }
     };
-    if scene.columns_of(picture.size().width()).is_none() {
-        return Err(refuse(format!(
-            "its {} columns do not divide among the projectors' {} columns of cells",
-            picture.size().width(),
-            grid.cols()
-        )));
-    }
     let codes: Vec<u8> = match picture.samples() {
         Samples::Eight(codes) => codes.clone(),
         Samples::Sixteen(codes) => {
@@ -253,5 +347,19 @@ fn frame(
     };
     let pixels = codes.chunks_exact(picture.channels());
     let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % pixel.len()]);
-    Ok((picture.size(), pixels.map(colour).collect()))
+    let widened = place.widened(scene, picture.size(), pixels.map(colour).collect());
+    widened.ok_or_else(|| {
+        let (width, all) = (picture.size().width(), place.all.cols());
+        refuse(if place.columns.len() == all {
+            format!(
+                "its {width} columns do not divide among the projectors' {all} columns of cells"
+            )
+        } else {
+            format!(
+                "its {width} columns, over {} columns of cells, leave no whole number of pixels \
+                 for each projector in a frame of all {all} columns of cells",
+                place.columns.len()
+            )
+        })
+    })
 }

@@ -26,7 +26,7 @@ pub enum SceneProblem {
     /// column.
     #[error("{0}")]
     Syntax(String),
-    /// A number is out of its range.
+    /// A number is out of its range, or a name is not one of its own.
     #[error("{key} is {value}; it must be {must}")]
     Value {
         /// Where it stands.
@@ -76,7 +76,7 @@ impl SceneError {
             }
             SceneProblem::Syntax(_) => "Correct that line; docs/scenes.md lists every key.",
             SceneProblem::Value { .. } => {
-                "Change the number; docs/scenes.md gives units and ranges."
+                "Change the value; docs/scenes.md gives units and ranges."
             }
             SceneProblem::View(_) => {
                 "Put look_at away from position, and up in another direction than between the two."

@@ -57,6 +57,7 @@ impl<'de> Deserialize<'de> for ProjectorTables {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ProjectorTable {
+    pub(super) name: Option<String>,
     pub(super) position: [f64; 3],
     pub(super) look_at: [f64; 3],
     #[serde(default = "up")]

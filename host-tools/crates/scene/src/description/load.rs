@@ -83,6 +83,7 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
             return Err(refused("[[projector]] response", found, must));
         }
     }
+    check_names(&projectors)?;
     let cols: usize = projectors.iter().map(|one| one.grid.cols()).sum();
     let [rows, cols] = [first.grid.rows(), cols].map(|count| count.try_into().unwrap_or(u16::MAX));
     Grid::new(rows, cols)?;
@@ -98,6 +99,22 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
     })
 }
 
+/// Refuses names by which a projector could not be told from the others.
+fn check_names(projectors: &[Projector]) -> Result<(), SceneProblem> {
+    let names: Vec<_> = projectors.iter().filter_map(|p| p.name.as_ref()).collect();
+    for (at, name) in names.iter().enumerate() {
+        let must = if names[..at].contains(name) {
+            "another for each projector"
+        } else if name.trim().is_empty() || name.parse::<usize>().is_ok() {
+            "a word: a projector without a name is called by its number"
+        } else {
+            continue;
+        };
+        return Err(refused("[projector] name", format!("{name:?}"), must));
+    }
+    Ok(())
+}
+
 fn projector(table: &ProjectorTable) -> Result<Projector, SceneProblem> {
     let grid = Grid::new(table.rows, table.cols)?;
     let square = f64::from(table.cols) / f64::from(table.rows);
@@ -106,6 +123,7 @@ fn projector(table: &ProjectorTable) -> Result<Projector, SceneProblem> {
     let aspect = within("aspect", table.aspect.unwrap_or(square), [1e-3, 1e3], "")?;
     let places = [table.position, table.look_at, table.up];
     Ok(Projector {
+        name: table.name.clone(),
         view: pinhole("projector", places, table.field_of_view, aspect)?,
         grid,
         response: table.response,

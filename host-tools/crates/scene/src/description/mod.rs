@@ -49,6 +49,8 @@ pub struct Scene {
 /// The projector.
 #[derive(Clone, Debug)]
 pub struct Projector {
+    /// What it is called by, none of the others' and no number; `None` for its number alone.
+    pub name: Option<String>,
     /// Where it stands and what it looks at.
     pub view: Pinhole,
     /// Its cells, spread evenly over the frame.
@@ -264,6 +266,29 @@ impl Scene {
                 start..end
             })
             .collect()
+    }
+
+    /// The index of the projector of this name, or of this number, counted from 1; `None` if
+    /// there is none.
+    #[must_use]
+    pub fn projector_called(&self, name: &str) -> Option<usize> {
+        let mut projectors = self.projectors.iter();
+        let named = projectors.position(|one| one.name.as_deref() == Some(name));
+        let numbered = || {
+            let index = name.parse::<usize>().ok()?.checked_sub(1)?;
+            (index < self.projectors.len()).then_some(index)
+        };
+        named.or_else(numbered)
+    }
+
+    /// What each projector is called: its name, or its number, counted from 1.
+    #[must_use]
+    pub fn projector_names(&self) -> Vec<String> {
+        let named = |(number, one): (usize, &Projector)| {
+            let name = one.name.clone();
+            name.unwrap_or_else(|| number.to_string())
+        };
+        (1..).zip(&self.projectors).map(named).collect()
     }
 
     /// The columns of a frame of this width that each projector has; `None` if a pixel would
