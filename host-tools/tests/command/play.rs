@@ -8,8 +8,9 @@ use image::{DynamicImage, RgbImage};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
+use std::net::UdpSocket;
 use std::os::unix::net::UnixStream;
-use std::process::{Child, Command};
+use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -55,6 +56,11 @@ impl<'u> Playing<'u> {
     /// With an option for mpv.
     fn with(desktop: &Desktop, user: &'u User, line: &str, option: &str) -> Self {
         let child = desktop.spawn(user, &format!("play t.iltm {line} -- {MPV} {option}"));
+        Self::of(user, child)
+    }
+
+    /// Once a film is on the screen.
+    fn of(user: &'u User, child: Child) -> Self {
         let socket = user.path("socket");
         let stream = within(60, || UnixStream::connect(&socket).ok());
         let mut show = Self {
@@ -295,6 +301,55 @@ fn a_playlist_is_all_of_its_films_and_one_film_begins_again() {
     within(60, || (show.get("loop-file") == "inf").then_some(()));
     let ended = show.end();
     contains(&ended.said, &["films       1 begun"]);
+}
+
+/// A programme that sends its picture, as OBS does.
+#[test]
+fn a_stream_is_waited_for_and_what_was_received_is_not_played_again() {
+    let desktop = Desktop::start(&format!("{SIZE}x24"));
+    let user = user();
+    let port = UdpSocket::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
+    let address = format!("udp://127.0.0.1:{port}");
+    let send = || {
+        let source = format!("-re -f lavfi -i testsrc2=size={SIZE}:rate=25");
+        let coded = "-c:v mpeg2video -b:v 4M -g 5 -f mpegts";
+        Command::new("ffmpeg")
+            .args(["-v", "quiet"])
+            .args(source.split(' '))
+            .args(coded.split(' '))
+            .arg(format!("{address}?pkt_size=1316"))
+            .stdin(Stdio::null())
+            .spawn()
+            .expect("ffmpeg is there")
+    };
+    let child = desktop.spawn(&user, &format!("play t.iltm {address} -- {MPV}"));
+    thread::sleep(Duration::from_secs(1));
+    let mut sender = send();
+    let mut show = Playing::of(&user, child);
+    assert_eq!(show.get("loop-file"), false);
+    assert_eq!(show.get("prefetch-playlist"), false);
+    sender.kill().expect("it runs");
+    sender.wait().expect("it ends");
+    let before = within(30, || {
+        let time = show.get("time-pos").as_f64();
+        thread::sleep(Duration::from_secs(1));
+        time.filter(|time| Some(*time) == show.get("time-pos").as_f64())
+    });
+    let mut sender = send();
+    within(30, || {
+        show.get("time-pos")
+            .as_f64()
+            .filter(|now| now.total_cmp(&before).is_ne())
+    });
+    sender.kill().expect("it runs");
+    sender.wait().expect("it ends");
+    let ended = show.end();
+    assert_eq!(ended.code, 0, "{}", ended.said);
+    contains(&ended.said, &["0 that could not be played"]);
 }
 
 /// The desktop has no rate of its own.

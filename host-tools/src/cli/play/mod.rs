@@ -153,7 +153,9 @@ impl ShowFiles<'_> {
             .args(["--input-default-bindings=no", "--osd-bar=no"])
             .args(["--quiet", "--msg-level=all=error"])
             .args(["--idle=yes", "--image-display-duration=10"])
-            .args(["--prefetch-playlist=yes", "--gapless-audio=yes"])
+            .arg("--gapless-audio=yes")
+            // A stream that pauses is waited for.
+            .arg("--network-timeout=0")
             // In step with the display, where its rate is known: frames last evenly, late ones
             // are counted, and sound follows.
             .arg("--video-sync=display-resample")

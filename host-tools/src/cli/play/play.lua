@@ -204,9 +204,13 @@ mp.register_event("file-loaded", function()
         end
         sound = sound or track.type == "audio" and track.selected
     end
-    -- One film begins again without a gap.
-    local alone = mp.get_property_native("playlist-count") == 1 and not settings.once
-    mp.set_property("loop-file", alone and "inf" or "no")
+    -- One film begins again without a gap. A stream would begin again with what was received before,
+    -- and it cannot be opened twice.
+    local several = mp.get_property_native("playlist-count") > 1
+    local repeated = not several and not settings.once and mp.get_property_native("seekable")
+        and not mp.get_property_native("demuxer-via-network")
+    mp.set_property("loop-file", repeated and "inf" or "no")
+    mp.set_property_native("prefetch-playlist", several)
     local film = mp.get_property("path")
     pictured = picture
     if not picture then
