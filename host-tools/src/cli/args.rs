@@ -336,8 +336,10 @@ pub(super) struct Capture {
 pub(super) struct Solve {
     #[command(flatten)]
     pub(super) detail: Detail,
-    /// Folder with `capture.csv`, patterns and photographs
-    pub(super) capture: PathBuf,
+    /// Folder with `capture.csv`, patterns and photographs; of several projectors one each,
+    /// photographed while the others were dark, from left to right in the wide frame
+    #[arg(required = true, value_name = "CAPTURE")]
+    pub(super) captures: Vec<PathBuf>,
     /// Table to write
     #[arg(short, long, value_name = "TABLE.iltm")]
     pub(super) output: PathBuf,

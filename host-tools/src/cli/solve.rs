@@ -7,7 +7,7 @@ use super::progress::progress;
 use super::summary::{self, remarks, summary};
 use super::table_words;
 use super::tables::{check, check_date, seal};
-use crate::build_table::{BuiltTable, TableOptions, build_table_from};
+use crate::build_table::{BuiltTable, LearnedFrom, TableOptions, build_table_from};
 use crate::capture::{self, CaptureOptions, Measurements};
 use crate::compile::reference_white::WhiteRequest;
 use crate::compile::sign::read_key;
@@ -40,11 +40,13 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     // So is a place that cannot be written to.
     check_place(&arguments.output)?;
-    let photographs = CaptureOptions {
-        bernoulli: arguments.photos,
-        ignore: arguments.ignore.clone(),
-        ..CaptureOptions::default()
-    };
+    if arguments.report.is_some() && arguments.captures.len() > 1 {
+        return Err(Failure::new(
+            Kind::Usage,
+            "--report draws the capture of one projector, not of several".to_owned(),
+            "Leave --report away.",
+        ));
+    }
     let options = SolveOptions {
         method: arguments.method,
         lambda: arguments.lambda,
@@ -53,11 +55,9 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
     };
     let bars = progress(output);
     let content = content(&arguments.content, bars.as_ref())?;
-    let mut measurements = capture::read(&arguments.capture, &photographs, bars.as_ref())?;
-    if let Some(name) = &arguments.name {
-        measurements.settings.scene.name = Some(name.clone());
-    }
-    let content = placed(content, &measurements, arguments.fit)?;
+    let captures = &arguments.captures;
+    let learned = learned_from(arguments, bars.as_ref())?;
+    let content = placed(content, learned.measurements(), arguments.fit)?;
     let frames: Vec<LightPicture> = content.iter().flat_map(Content::light).collect();
     let white = match arguments.white {
         Some(light) => Some(WhiteRequest::Light(light)),
@@ -68,8 +68,8 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
         }),
     };
     let built = build_table_from(
-        measurements,
-        &arguments.capture,
+        learned,
+        &captures[0],
         &options,
         &TableOptions {
             white,
@@ -125,6 +125,23 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
     }
     output.result(&data, &text);
     Ok(())
+}
+
+/// The capture of one projector, or those of several.
+fn learned_from(arguments: &Solve, bars: &dyn Progress) -> Result<LearnedFrom, Failure> {
+    let photographs = CaptureOptions {
+        bernoulli: arguments.photos,
+        ignore: arguments.ignore.clone(),
+        ..CaptureOptions::default()
+    };
+    let mut learned: LearnedFrom = match &arguments.captures[..] {
+        [one] => capture::read(one, &photographs, bars)?.into(),
+        several => capture::read_several(several, &photographs, bars)?.into(),
+    };
+    if let Some(name) = &arguments.name {
+        learned.measurements_mut().settings.scene.name = Some(name.clone());
+    }
+    Ok(learned)
 }
 
 /// Whether a file can be put in a place, before the work for it is done.
@@ -197,7 +214,13 @@ fn report(
     folder: &Path,
     bars: &dyn Progress,
 ) -> Result<PathBuf, Failure> {
-    let report = solve_page::report(built, &arguments.capture, &arguments.output, content, bars);
+    let report = solve_page::report(
+        built,
+        &arguments.captures[0],
+        &arguments.output,
+        content,
+        bars,
+    );
     let report = report.map_err(|error| {
         Failure::new(
             Kind::Frames,

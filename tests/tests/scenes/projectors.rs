@@ -1,19 +1,20 @@
 //! Several projectors in one scene, their frames side by side.
 
-use iltm::capture::listed;
+use iltm::capture::{CaptureOptions, listed, read_several};
 use iltm::picture::{Picture, Samples, png};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::{FillCaptureError, UnfilledCapture};
 use iltm::scene::{Effect, Forced, VirtualCamera};
 use iltm_runtime::{FrameSize, Grid};
+use iltm_tests::overlapping::{Screen, learned_alone, learned_together, photograph_each};
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, photograph, scene, showable,
     simulation,
 };
 use nalgebra::DMatrix;
 use std::fs::{self, File};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Two walls, two projectors, a small camera.
 fn two_walls() -> Scene {
@@ -92,7 +93,8 @@ fn folder(place: &Path, (width, height): (usize, usize), pixels: bool, codes: Co
             png::encode(&slide),
         )
         .unwrap();
-        lines += &format!("{index},{role},patterns/{index}.png,photos/{index}.png\n");
+        let line = format!("{index},{role},patterns/{index}.png,photos/{index}.png\n");
+        lines.push_str(&line);
     }
     fs::write(place.join("capture.csv"), lines).unwrap();
     let settings = if pixels {
@@ -239,4 +241,58 @@ fn one_solve_cancels_the_light_that_goes_from_one_projectors_wall_to_the_others(
     println!("together {together:.4}, each alone {alone:.4}, gains alone {gains:.4}");
     assert!(together < 0.010);
     assert!(alone > 2.0 * together);
+}
+
+/// Where the pictures overlap, the wall is twice as bright by the tables of each.
+#[test]
+fn projectors_that_overlap_share_the_light_and_cancel_what_crosses() {
+    let scene = scene("folded-screen", &[]);
+    let place = tempfile::tempdir().unwrap();
+    let captures = photograph_each(&scene, 40, place.path());
+    let together = learned_together(&captures);
+    let screen = Screen::new(&scene);
+    let seen = screen.seen(&together);
+    assert!(seen.whole < 0.008, "{seen:?}");
+    assert!(seen.overlap < 0.02, "{seen:?}");
+    assert!(seen.step < 0.03, "{seen:?}");
+    let alone = learned_alone(&captures, together.white.light);
+    let alone = screen.seen_of_each(&alone);
+    assert!(alone.overlap > 0.5 && alone.step > 0.2, "{alone:?}");
+}
+
+#[test]
+fn captures_that_cannot_be_of_one_frame_are_refused_by_name() {
+    let scene = two_walls();
+    let place = tempfile::tempdir().unwrap();
+    let captures = photograph_each(&scene, 10, place.path());
+    let options = CaptureOptions::default();
+    let refused = |captures: &[PathBuf]| {
+        let error = read_several(captures, &options, &Silent).unwrap_err();
+        (error.to_string(), error.next_step())
+    };
+    let (words, next) = refused(&[captures[0].clone(), captures[0].clone()]);
+    assert!(words.contains("given twice"), "{words}");
+    assert!(next.contains("once"), "{next}");
+    let mut lower = scene.clone();
+    lower.projectors[1].grid = Grid::new(11, 16).unwrap();
+    let other = place.path().join("other");
+    fs::create_dir(&other).unwrap();
+    let others = photograph_each(&single(&lower, 1), 10, &other);
+    let (words, next) = refused(&[captures[0].clone(), others[0].clone()]);
+    assert!(words.contains("11 rows of cells beside 12"), "{words}");
+    assert!(next.contains("--rows"), "{next}");
+    let mut nearer = single(&scene, 1);
+    nearer.camera.size = (150, 100);
+    let others = photograph_each(&nearer, 10, &place.path().join("other/nearer"));
+    let (words, next) = refused(&[captures[0].clone(), others[0].clone()]);
+    assert!(words.contains("other photographs than in"), "{words}");
+    assert!(next.contains("one camera"), "{next}");
+}
+
+/// One projector of a scene alone.
+fn single(scene: &Scene, projector: usize) -> Scene {
+    Scene {
+        projectors: vec![scene.projectors[projector].clone()],
+        ..scene.clone()
+    }
 }

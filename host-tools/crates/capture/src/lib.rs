@@ -34,6 +34,7 @@ mod photographs;
 mod refusal_tests;
 mod registration;
 mod remeasure;
+mod several;
 #[cfg(test)]
 mod test_capture;
 #[cfg(test)]
@@ -80,6 +81,7 @@ pub use registration::map_file::{MapFormat, exr};
 pub use registration::projector_map::{MapError, MapSource, ProjectorMap};
 pub use registration::{MIN_REGRESSION, PixelCount, RegistrationMethod};
 pub use remeasure::{CellPlanes, CellReadings, PixelReadings, Remeasured, remeasure};
+pub use several::{OneOfSeveral, SeveralCaptures, read_several};
 
 use cells::images;
 use evidence::CaptureEvidence;

@@ -3,7 +3,7 @@
 use crate::provenance::{PredictedError, Provenance};
 use crate::reference_white::{ReferenceWhite, WhiteRequest};
 use crate::{CompileError, CompileOptions, Compiled, FineGains, ViewerError};
-use iltm_capture::{CaptureError, CaptureOptions, FineFlood, Measurements};
+use iltm_capture::{CaptureError, CaptureOptions, FineFlood, Measurements, SeveralCaptures};
 use iltm_picture::progress::Progress;
 use iltm_runtime::FrameSize;
 use iltm_solve::{Compensation, InverseTransport, SolveError, SolveOptions, SolveReport, Solved};
@@ -92,25 +92,78 @@ pub fn build_table(
     progress: &dyn Progress,
 ) -> Result<BuiltTable, BuildError> {
     let measurements = iltm_capture::read(capture, photographs, progress)?;
-    build_table_from(measurements, capture, options, table, progress)
+    build_table_from(measurements.into(), capture, options, table, progress)
 }
 
-/// The same from photographs that have been read before; `capture` is where.
+/// What a table is made from.
+#[derive(Debug)]
+pub enum LearnedFrom {
+    /// The capture of one projector.
+    One(Box<Measurements>),
+    /// Captures of several projectors, whose frames stand side by side. Where they overlap, each
+    /// shows its share of the light.
+    Several(Box<SeveralCaptures>),
+}
+
+impl From<Measurements> for LearnedFrom {
+    fn from(one: Measurements) -> Self {
+        Self::One(Box::new(one))
+    }
+}
+
+impl From<SeveralCaptures> for LearnedFrom {
+    fn from(several: SeveralCaptures) -> Self {
+        Self::Several(Box::new(several))
+    }
+}
+
+impl LearnedFrom {
+    /// Those of the whole frame.
+    #[must_use]
+    pub const fn measurements(&self) -> &Measurements {
+        match self {
+            Self::One(one) => one,
+            Self::Several(several) => &several.all,
+        }
+    }
+
+    /// The same, to change their settings.
+    pub const fn measurements_mut(&mut self) -> &mut Measurements {
+        match self {
+            Self::One(one) => one,
+            Self::Several(several) => &mut several.all,
+        }
+    }
+
+    const fn several(&self) -> Option<&SeveralCaptures> {
+        match self {
+            Self::One(_) => None,
+            Self::Several(several) => Some(several),
+        }
+    }
+}
+
+/// The same from photographs that have been read before; `capture` is where, for a name.
 ///
 /// # Errors
 /// Those of [`build_table`], but for [`BuildError::Capture`].
 pub fn build_table_from(
-    measurements: Measurements,
+    mut learned: LearnedFrom,
     capture: &Path,
     options: &SolveOptions,
     table: &TableOptions<'_>,
     progress: &dyn Progress,
 ) -> Result<BuiltTable, BuildError> {
+    let solved = match &mut learned {
+        LearnedFrom::One(measurements) => iltm_solve::solve(measurements, options, progress)?,
+        LearnedFrom::Several(several) => iltm_solve::solve_several(several, options, progress)?,
+    };
+    let (measurements, several) = (learned.measurements(), learned.several());
     let Solved {
         inverse,
         mut report,
         trials,
-    } = iltm_solve::solve(&measurements, options, progress)?;
+    } = solved;
     if report.compensation == Compensation::Nothing {
         return Err(BuildError::Worse {
             uncompensated: report.prediction.uncompensated,
@@ -119,9 +172,16 @@ pub fn build_table_from(
         });
     }
     progress.begin("predicting what a viewer sees", 0);
-    let flood = FineFlood::new(&measurements, table.gain_resolution);
-    let gain_only = iltm_solve::gain_only(&(&measurements).into(), &report)?;
-    let viewer = ViewerError::predict(&measurements, &trials, &gain_only, &flood);
+    let flood = match several {
+        Some(several) => FineFlood::of_several(several, table.gain_resolution),
+        None => FineFlood::new(measurements, table.gain_resolution),
+    };
+    let gain_only = iltm_solve::gain_only(&measurements.into(), &report)?;
+    // Pixels in which projectors overlap see two places of the frame.
+    let viewer = match several {
+        Some(_) => None,
+        None => ViewerError::predict(measurements, &trials, &gain_only, &flood),
+    };
     let as_even = |viewer: ViewerError| viewer.uncompensated.relative <= viewer.gain_only.relative;
     // Who asks for a white asks for another picture.
     let free = table.white.is_none() && report.compensation == Compensation::GainOnly;
@@ -144,12 +204,18 @@ pub fn build_table_from(
     }
     let fine = match report.compensation {
         Compensation::Nothing => None,
-        _ => crate::gain::fine_gains(&inverse, &flood),
+        _ => match several {
+            Some(several) => crate::gain::fine_gains_of_several(&inverse, &flood, several),
+            None => crate::gain::fine_gains(&inverse, &flood),
+        },
     };
+    if let Some(several) = several {
+        inverse.share(&several.shares_of_cells());
+    }
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white)?;
     let provenance = Provenance {
         ambient_kept,
-        ..Provenance::new(capture, &measurements, &report, predicted, &white)
+        ..Provenance::new(capture, measurements, &report, predicted, &white)
     };
     let options = CompileOptions {
         label: provenance.label(),
@@ -163,7 +229,10 @@ pub fn build_table_from(
     let compiled = crate::compile(&inverse, fine.as_ref(), &options)?;
     progress.end();
     Ok(BuiltTable {
-        measurements,
+        measurements: match learned {
+            LearnedFrom::One(measurements) => *measurements,
+            LearnedFrom::Several(several) => several.all,
+        },
         inverse,
         fine,
         report,

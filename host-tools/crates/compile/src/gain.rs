@@ -1,8 +1,8 @@
 //! Gains in reference units: per cell, and finer than the cells.
 
-use iltm_capture::FineFlood;
+use iltm_capture::{FineFlood, Measurements, SeveralCaptures};
 use iltm_runtime::{FrameSize, resample::interpolation::Axis};
-use iltm_solve::{InverseTransport, LeftOut, WhyLeftOut};
+use iltm_solve::{ChannelInverse, InverseTransport, LeftOut, WhyLeftOut};
 use nalgebra::DVector;
 
 /// Gains on a grid finer than the cells.
@@ -31,6 +31,54 @@ pub(crate) fn even(mut inverse: InverseTransport, left_out: &[LeftOut]) -> Inver
     inverse
 }
 
+/// Values of live cells, interpolated between their centres at the samples of a finer grid.
+struct BetweenCells<'i> {
+    live: &'i [bool],
+    /// Of cells and of samples.
+    cols: [usize; 2],
+    across: Axis,
+    down: Axis,
+}
+
+impl<'i> BetweenCells<'i> {
+    fn new(inverse: &'i InverseTransport, flood: &FineFlood) -> Option<Self> {
+        let grid = inverse.grid;
+        Some(Self {
+            live: &inverse.live,
+            cols: [grid.cols(), flood.cols],
+            across: Axis::new(grid.cols(), flood.cols)?,
+            down: Axis::new(grid.rows(), flood.rows)?,
+        })
+    }
+
+    /// At one sample; 0 among cells that took no part.
+    fn of(&self, cells: &[f64], sample: usize) -> f64 {
+        let [cols, fine] = self.cols;
+        let (y, x) = (
+            self.down.place(sample / fine),
+            self.across.place(sample % fine),
+        );
+        let share = |fraction: u32| f64::from(fraction) / f64::from(1_u32 << 31);
+        let (down, right) = (share(y.fraction), share(x.fraction));
+        // Cells that took no part have no value to interpolate with.
+        let corners = [
+            (y.before, x.before, (1.0 - down) * (1.0 - right)),
+            (y.before, x.after, (1.0 - down) * right),
+            (y.after, x.before, down * (1.0 - right)),
+            (y.after, x.after, down * right),
+        ];
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (row, col, share) in corners {
+            let cell = row * cols + col;
+            if self.live[cell] {
+                sum += share * cells[cell];
+                weight += share;
+            }
+        }
+        if weight > 0.0 { sum / weight } else { 0.0 }
+    }
+}
+
 /// Darkest flood light, relative to its cell's, that still gets its own gain;
 /// darker samples are treated as being that bright, since noise rules there.
 const LEAST_FLOOD: f64 = 0.2;
@@ -51,8 +99,7 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
         return None;
     }
     let size = FrameSize::new(flood.cols as u16, flood.rows as u16)?;
-    let rows = Axis::new(grid.rows(), flood.rows)?;
-    let cols = Axis::new(grid.cols(), flood.cols)?;
+    let between = BetweenCells::new(inverse, flood)?;
     let channels = flood.channels.iter().zip(&flood.observed);
     let channels = channels.zip(&inverse.channels);
     let channels = channels
@@ -74,30 +121,6 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
                 let bounced = &operator * &DVector::from_column_slice(observed);
                 bounced.iter().map(|bounced| 1.0 + bounced).collect()
             };
-            let interpolate = |index: usize| {
-                let (y, x) = (
-                    rows.place(index / flood.cols),
-                    cols.place(index % flood.cols),
-                );
-                let share = |fraction: u32| f64::from(fraction) / f64::from(1_u32 << 31);
-                let (down, right) = (share(y.fraction), share(x.fraction));
-                // Cells that took no part have no gain to interpolate with.
-                let corners = [
-                    (y.before, x.before, (1.0 - down) * (1.0 - right)),
-                    (y.before, x.after, (1.0 - down) * right),
-                    (y.after, x.before, down * (1.0 - right)),
-                    (y.after, x.after, down * right),
-                ];
-                let (mut sum, mut weight) = (0.0, 0.0);
-                for (row, col, share) in corners {
-                    let cell = row * grid.cols() + col;
-                    if inverse.live[cell] {
-                        sum += share * numerator[cell];
-                        weight += share;
-                    }
-                }
-                if weight > 0.0 { sum / weight } else { 0.0 }
-            };
             (0..flood_light.len())
                 .map(|index| {
                     let cell = cell_of(index);
@@ -105,10 +128,81 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
                         return 0.0;
                     }
                     let light = f64::from(flood_light[index]).max(LEAST_FLOOD * cell_light[cell]);
-                    interpolate(index) / light
+                    between.of(&numerator, index) / light
                 })
                 .collect()
         });
     let channels = channels.collect();
     Some(FineGains { size, channels })
+}
+
+/// The fine gain map of several projectors, each from its own flood photograph `b` while the others
+/// were dark, for a share `s` of the light: `g(x) = s(x) (1 - (U K 1 / g)(x)) / e(x) + (U s K 1)(x)`,
+/// with the light straight from the projector `e(x) = b(x) - (U K A b / g)(x)`.
+///
+/// Even white of all together is right then. [`fine_gains`] makes white of a projector alone right,
+/// and here it is far from the light that is wanted: half of what bounces is missing. Light that
+/// bounces, not drive, is interpolated: it goes on across a crease, where drive has a step.
+pub(crate) fn fine_gains_of_several(
+    inverse: &InverseTransport,
+    flood: &FineFlood,
+    several: &SeveralCaptures,
+) -> Option<FineGains> {
+    let grid = inverse.grid;
+    let by_operator = inverse.channels.len() == flood.channels.len()
+        && flood.mapped
+        && (0..inverse.channels.len()).all(|channel| !inverse.channel(channel).operator.is_none());
+    if !by_operator {
+        let mut fine = fine_gains(inverse, flood)?;
+        for gains in &mut fine.channels {
+            let gains = gains.iter_mut().zip(several.shares(flood.factor));
+            gains.for_each(|(gain, share)| *gain *= share);
+        }
+        return Some(fine);
+    }
+    let size = FrameSize::new(flood.cols as u16, flood.rows as u16)?;
+    let between = BetweenCells::new(inverse, flood)?;
+    let (shares, shares_of_cells) = (several.shares(flood.factor), several.shares_of_cells());
+    let even = inverse.live.iter().map(|live| f64::from(u8::from(*live)));
+    let even = DVector::from_iterator(grid.cells(), even);
+    let of_channel = |(index, channel): (usize, &ChannelInverse)| {
+        let operator = inverse.channel(index).operator;
+        let as_light = |drive: &[f64]| -> Vec<f64> {
+            let cells = drive.iter().zip(&channel.gain);
+            cells
+                .map(|(drive, gain)| if *gain > 0.0 { drive / gain } else { 0.0 })
+                .collect()
+        };
+        let drive = (&operator * &even).as_slice().to_vec();
+        let bounced = as_light(&drive);
+        let shared = drive.iter().zip(&shares_of_cells);
+        let shared: Vec<f64> = shared.map(|(drive, share)| share * drive).collect();
+        // What bounces to each cell while its own projector shows white.
+        let mut of_white = vec![0.0; grid.cells()];
+        for one in &several.projectors {
+            let white = one.views.start + Measurements::WHITE;
+            let observed = several.all.channels[index].observations.column(white);
+            let got = as_light((&operator * &observed.into_owned()).as_slice());
+            for cell in (0..grid.cells()).filter(|cell| one.columns.contains(&(cell % grid.cols())))
+            {
+                of_white[cell] = got[cell];
+            }
+        }
+        let gain = |(sample, light): (usize, &f32)| {
+            let light = f64::from(*light);
+            if light <= 0.0 {
+                return 0.0;
+            }
+            let straight = light - between.of(&of_white, sample);
+            let straight = straight.max(LEAST_FLOOD * light);
+            let own = shares[sample] * (1.0 - between.of(&bounced, sample)) / straight;
+            own + between.of(&shared, sample)
+        };
+        flood.channels[index].iter().enumerate().map(gain).collect()
+    };
+    let channels = inverse.channels.iter().enumerate().map(of_channel);
+    Some(FineGains {
+        size,
+        channels: channels.collect(),
+    })
 }

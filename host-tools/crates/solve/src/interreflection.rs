@@ -56,6 +56,18 @@ impl Interreflection {
         }
     }
 
+    /// Multiplies what each cell gets by a factor of the cell.
+    pub(super) fn scale_rows(&mut self, factors: &[f64]) {
+        match self {
+            Self::Dense(elements) => {
+                for (mut row, factor) in elements.row_iter_mut().zip(factors) {
+                    row *= *factor;
+                }
+            }
+            Self::Links(links) => links.scale_rows(factors),
+        }
+    }
+
     /// `K^T`.
     pub(super) fn transpose(&self) -> Self {
         match self {

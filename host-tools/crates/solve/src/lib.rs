@@ -23,6 +23,7 @@
 //! clipped_projection    what clipping makes of natural images
 //! flux                  what of a gain is the projector's, where reciprocity tells
 //! deblur                undoes the projector's blur as well
+//! overlap               several projectors whose light meets on one place
 //! restricted_isometry   whether the paper's theorem promises anything here
 //! gain_only             what it is judged against, and what remains if it loses
 //! ```
@@ -58,6 +59,7 @@ mod natural_images;
 mod observability;
 mod observed;
 mod options;
+mod overlap;
 mod prepare;
 mod report;
 pub mod restricted_isometry;
@@ -91,6 +93,7 @@ pub use natural_images::{
 pub use observability::{LeftOut, WhyLeftOut};
 pub use observed::{CellNoise, Observed, ObservedChannel};
 pub use options::{GainOnly, Method, SolveOptions, UnknownMethod};
+pub use overlap::solve_several;
 pub use report::{
     Clipped, Compensation, LambdaTrial, PhotographCounts, Prediction, Seconds, SolveReport,
 };

@@ -61,6 +61,21 @@ impl InverseTransport {
     }
 }
 
+impl InverseTransport {
+    /// Gives each cell only a share of the light that it was to show, as where projectors overlap;
+    /// one factor a cell.
+    pub fn share(&mut self, shares: &[f64]) {
+        self.shared.scale_rows(shares);
+        for channel in &mut self.channels {
+            let gains = channel.gain.iter_mut().zip(shares);
+            gains.for_each(|(gain, share)| *gain *= share);
+            if let Some(deviation) = &mut channel.deviation {
+                deviation.scale_rows(shares);
+            }
+        }
+    }
+}
+
 /// What a solve found.
 #[derive(Clone, Debug)]
 pub struct Solved {

@@ -89,6 +89,28 @@ impl CellPixels {
         }
     }
 
+    /// Those of cells from several choices, each by the choice and the cell's number there.
+    pub(crate) fn joined(cells: &[(&Self, usize)]) -> Self {
+        let why = |(all, cell): &(&Self, usize)| {
+            let mut out = all.left_out.iter();
+            out.find(|out| out.cell == *cell).map(|out| out.why)
+        };
+        Self {
+            of_cell: (cells.iter())
+                .map(|(all, cell)| all.of_cell[*cell].clone())
+                .collect(),
+            live: cells.iter().map(|(all, cell)| all.live[*cell]).collect(),
+            left_out: (cells.iter().enumerate())
+                .filter_map(|(cell, own)| {
+                    Some(LeftOut {
+                        cell,
+                        why: why(own)?,
+                    })
+                })
+                .collect(),
+        }
+    }
+
     /// Pixels of each cell, `N` slices; empty for a cell that is not live.
     pub(crate) fn of_cells(&self) -> impl Iterator<Item = &[u32]> {
         self.of_cell.iter().map(Vec::as_slice)

@@ -15,6 +15,7 @@ use super::pixel_views::PixelViews;
 use super::wiener_filter;
 use crate::registration::cell_map::Registration;
 use crate::registration::projector_map::ProjectorMap;
+use crate::several::SeveralCaptures;
 use iltm_picture::statistics::median;
 use iltm_runtime::{FrameSize, Grid};
 use rayon::prelude::*;
@@ -110,19 +111,68 @@ impl FineFlood {
                 }
             }
         }
-        let observed = measurements.channels.iter().map(|channel| {
-            let flood = channel.observations.column(Measurements::WHITE);
-            flood.iter().copied().collect()
-        });
         Self {
             rows,
             cols,
             factor,
             channels,
             mapped: mapped.is_some(),
-            observed: observed.collect(),
+            observed: observed(measurements, Measurements::WHITE),
         }
     }
+
+    /// Those of several projectors side by side, each by its own photographs of white, as finely
+    /// as the coarsest of them allows.
+    #[must_use]
+    pub fn of_several(several: &SeveralCaptures, most: Option<FrameSize>) -> Self {
+        let grid = several.all.grid;
+        let own = several.projectors.iter().map(|one| &one.own);
+        let factors: Vec<[usize; 2]> = own.map(|own| natural_factor(own, None)).collect();
+        let most = most.map_or([usize::MAX; 2], |most| {
+            [most.width() / grid.cols(), most.height() / grid.rows()]
+        });
+        let least = |axis: usize| {
+            let told = factors.iter().map(|factor| factor[axis]).min();
+            told.unwrap_or(1).min(most[axis]).max(1)
+        };
+        let factor = [0, 1].map(least);
+        let (rows, cols) = (grid.rows() * factor[1], grid.cols() * factor[0]);
+        let mut all = Self {
+            rows,
+            cols,
+            factor,
+            channels: vec![vec![0.0; rows * cols]; several.all.channels.len()],
+            mapped: true,
+            observed: vec![vec![0.0; grid.cells()]; several.all.channels.len()],
+        };
+        for one in &several.projectors {
+            let flood = Self::with_factor(&one.own, factor);
+            all.mapped &= flood.mapped;
+            let start = one.columns.start * factor[0];
+            for (plane, own) in all.channels.iter_mut().zip(&flood.channels) {
+                let rows = plane.chunks_exact_mut(cols);
+                for (row, own) in rows.zip(own.chunks_exact(flood.cols)) {
+                    row[start..start + own.len()].copy_from_slice(own);
+                }
+            }
+            let white = observed(&several.all, one.views.start + Measurements::WHITE);
+            for (all, white) in all.observed.iter_mut().zip(white) {
+                for (cell, light) in white.into_iter().enumerate() {
+                    if one.columns.contains(&(cell % grid.cols())) {
+                        all[cell] = light;
+                    }
+                }
+            }
+        }
+        all
+    }
+}
+
+/// Light of each cell in one view, one plane a channel.
+fn observed(measurements: &Measurements, view: usize) -> Vec<Vec<f64>> {
+    let channels = measurements.channels.iter();
+    let of = channels.map(|channel| channel.observations.column(view).iter().copied().collect());
+    of.collect()
 }
 
 /// White's light without the noise that is known to be in it.

@@ -63,7 +63,7 @@ pub(super) fn of_capture(
     let reference = read_reference(folder, measurements.grid, channels)?;
     let options = SolveOptions::default();
     let learned = build_table_from(
-        measurements,
+        measurements.into(),
         folder,
         &options,
         &TableOptions::default(),
@@ -183,7 +183,7 @@ impl Base<'_> {
         options: &SolveOptions,
     ) -> Result<BuiltTable, BuildError> {
         build_table_from(
-            measurements,
+            measurements.into(),
             self.folder,
             options,
             &TableOptions::default(),

@@ -99,6 +99,19 @@ impl Links {
         }
     }
 
+    /// Multiplies what each cell gets.
+    ///
+    /// # Panics
+    /// If the operator is transposed.
+    pub(crate) fn scale_rows(&mut self, factors: &[f64]) {
+        assert!(!self.transposed, "rows are cells");
+        for (row, factor) in Arc::make_mut(&mut self.rows).iter_mut().zip(factors) {
+            for link in row {
+                link.value = (f64::from(link.value) * factor) as f32;
+            }
+        }
+    }
+
     pub(crate) fn dense(&self) -> DMatrix<f64> {
         let cells = self.cells();
         let mut dense = DMatrix::zeros(cells, cells);

@@ -1,0 +1,183 @@
+//! Overlap of projectors: light that several of them throw on one place.
+//!
+//! A cell's row of the inverse says what light its own projector must throw on the place that the
+//! cell lights: `g c - K c`. Where another projector shows on that place as well, the row gives
+//! the light of both: of the own one, and `b` of each cell `j` of the other that lights it,
+//! relative to white of the own. So the right side of the row is `p + sum_j b_j p_j`, and the
+//! solve is that of one projector. First `b` is found from the cell's light alone, as how strongly
+//! it follows each of these cells; then, as bounces are known better, from what the rows give.
+
+use super::{InverseTransport, SolveError, SolveOptions, Solved, solve};
+use iltm_capture::{OneOfSeveral, SeveralCaptures};
+use iltm_picture::progress::Progress;
+use iltm_runtime::Grid;
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Times that the overlap is found from rows, each followed by a solve.
+const ROUNDS: usize = 2;
+
+/// Part of the mean diagonal that keeps a fit from following noise.
+const RIDGE: f64 = 1e-6;
+
+/// Solves the captures of several projectors for the inverse of the wide frame. Where they overlap,
+/// each row gives the light of all together; shares divide it.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_several(
+    several: &mut SeveralCaptures,
+    options: &SolveOptions,
+    progress: &dyn Progress,
+) -> Result<Solved, SolveError> {
+    let none = several.overlaps.iter().all(Vec::is_empty);
+    if none {
+        return solve(&several.all, options, progress);
+    }
+    for channel in 0..several.all.channels.len() {
+        by_light(several, channel);
+    }
+    let mut solved = solve(&several.all, options, progress)?;
+    for _ in 0..ROUNDS {
+        for channel in 0..several.all.channels.len() {
+            by_rows(several, &solved.inverse, channel);
+        }
+        solved = solve(&several.all, options, progress)?;
+    }
+    Ok(solved)
+}
+
+/// A cell that others light too.
+struct Overlapping {
+    cell: usize,
+    /// By projector that is not its own, the cells.
+    others: Vec<(usize, Vec<usize>)>,
+}
+
+fn overlapping(several: &SeveralCaptures) -> Vec<Overlapping> {
+    let projectors = 0..several.projectors.len();
+    let of_cell = |(cell, all): (usize, &Vec<usize>)| {
+        let of = |projector: usize| {
+            let cells = all.iter().copied();
+            let cells = cells.filter(|other| several.projector_of(*other) == projector);
+            (projector, cells.collect::<Vec<_>>())
+        };
+        let others = projectors.clone().map(of);
+        let others: Vec<_> = others.filter(|(_, cells)| !cells.is_empty()).collect();
+        let live = several.all.live[cell] && !others.is_empty();
+        live.then_some(Overlapping { cell, others })
+    };
+    let cells = several.overlaps.iter().enumerate();
+    cells.filter_map(of_cell).collect()
+}
+
+/// Sets the right sides of one channel by the light of the cells.
+fn by_light(several: &mut SeveralCaptures, channel: usize) {
+    let measured = &several.all.channels[channel];
+    let (patterns, light) = (&measured.patterns, &measured.observations);
+    let follows = |cell: usize, of: &OneOfSeveral, cells: &[usize]| {
+        let views = of.views.clone();
+        let mut columns: Vec<DVector<f64>> = cells
+            .iter()
+            .map(|other| {
+                patterns
+                    .row(*other)
+                    .columns_range(views.clone())
+                    .transpose()
+            })
+            .collect();
+        // What bounces follows how much of the picture is lit.
+        let cells = patterns.nrows() as f64;
+        let lit = views
+            .clone()
+            .map(|view| patterns.column(view).sum() / cells);
+        columns.push(DVector::from_iterator(views.len(), lit));
+        fit(&columns, &light.row(cell).columns_range(views).transpose())
+    };
+    let mut found = Vec::new();
+    for Overlapping { cell, others } in overlapping(several) {
+        let own = &several.projectors[several.projector_of(cell)];
+        let near = around(several.all.grid, own, cell);
+        // Its own cell is the first.
+        let direct = follows(cell, own, &near)[0];
+        for (projector, cells) in others {
+            let of = follows(cell, &several.projectors[projector], &cells);
+            let parts = of.iter().zip(&cells);
+            let parts: Vec<_> = parts
+                .map(|(part, other)| (*other, (part / direct).max(0.0)))
+                .collect();
+            found.push((cell, projector, parts));
+        }
+    }
+    set(several, channel, &found);
+}
+
+/// Sets the right sides of one channel by what the rows of an inverse give.
+fn by_rows(several: &mut SeveralCaptures, inverse: &InverseTransport, channel: usize) {
+    let measured = &several.all.channels[channel];
+    let given = inverse.channel(channel).apply(&measured.observations);
+    let mut found = Vec::new();
+    for Overlapping { cell, others } in overlapping(several) {
+        for (projector, cells) in others {
+            let views = several.projectors[projector].views.clone();
+            let columns: Vec<DVector<f64>> = cells
+                .iter()
+                .map(|other| {
+                    let row = measured.patterns.row(*other);
+                    row.columns_range(views.clone()).transpose()
+                })
+                .collect();
+            let of = fit(&columns, &given.row(cell).columns_range(views).transpose());
+            let parts = of.iter().zip(&cells);
+            let parts: Vec<_> = parts.map(|(part, other)| (*other, part.max(0.0))).collect();
+            found.push((cell, projector, parts));
+        }
+    }
+    set(several, channel, &found);
+}
+
+/// What a cell gets from each of some cells of another projector, which comes second.
+type Found = (usize, usize, Vec<(usize, f64)>);
+
+/// Sets the right sides of the cells, in the photographs of other projectors. Own patterns of
+/// others stay: they are read from the views in which their own projector shows.
+fn set(several: &mut SeveralCaptures, channel: usize, found: &[Found]) {
+    let own = several.all.channels[channel].patterns.clone();
+    let patterns = &mut several.all.channels[channel].patterns;
+    for (cell, projector, parts) in found {
+        for view in several.projectors[*projector].views.clone() {
+            let light = parts.iter().map(|(other, part)| part * own[(*other, view)]);
+            patterns[(*cell, view)] = light.sum();
+        }
+    }
+}
+
+/// A cell of a projector and those around it, by the wide frame.
+fn around(grid: Grid, own: &OneOfSeveral, cell: usize) -> Vec<usize> {
+    let (row, col) = (cell / grid.cols(), cell % grid.cols());
+    let mut cells = vec![cell];
+    for row in row.saturating_sub(1)..(row + 2).min(grid.rows()) {
+        for col in col.saturating_sub(1)..col + 2 {
+            let other = row * grid.cols() + col;
+            if own.columns.contains(&col) && other != cell {
+                cells.push(other);
+            }
+        }
+    }
+    cells
+}
+
+/// Factors of the columns that come nearest to a target, by least squares; zeros where they do not
+/// tell.
+fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> Vec<f64> {
+    let columns = DMatrix::from_columns(columns);
+    let mut normal = columns.tr_mul(&columns);
+    let ridge = RIDGE * normal.trace() / normal.nrows() as f64;
+    for at in 0..normal.nrows() {
+        normal[(at, at)] += ridge;
+    }
+    let right = columns.tr_mul(target);
+    Cholesky::new(normal).map_or_else(
+        || vec![0.0; right.len()],
+        |factors| factors.solve(&right).iter().copied().collect(),
+    )
+}

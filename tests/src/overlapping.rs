@@ -1,0 +1,372 @@
+//! Projectors that overlap: each photographed while the others are dark, all solved together, and
+//! what a camera sees of compensated pictures that lie on the screen itself.
+//!
+//! Where a place of the screen lies in frames and photographs comes from the scene's geometry, not
+//! from the photographs that a table was learned from.
+
+use crate::simulated::simulation;
+use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
+use iltm::capture::{CameraSettings, CaptureOptions, read_several};
+use iltm::compile::reference_white::WhiteRequest;
+use iltm::picture::{Picture, Response, Samples};
+use iltm::progress::Silent;
+use iltm::scene::description::Scene;
+use iltm::scene::fill_capture::UnfilledCapture;
+use iltm::scene::{Forced, Photograph, Pinhole, ProjectedFrame, SimulationError, VirtualCamera};
+use iltm::session::{self, Layout, OrderOptions};
+use iltm::solve::{SolveOptions, natural_images};
+use iltm::video::{CompensateOptions, Compensator};
+use iltm_runtime::image::Table;
+use iltm_runtime::{FrameSize, Grid};
+use nalgebra::{DMatrix, Vector3};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Side of a cell in pixels of a projector.
+const CELL: usize = 20;
+
+/// Details of the pictures on the screen, across and down: finer than the cells.
+const DETAILS: (u16, u16) = (40, 64);
+
+/// Light of the darkest part of a picture, of white.
+const DARKEST: f64 = 0.2;
+
+/// Pixels on both sides of a border over which its step is looked at, and the side of the square
+/// that is averaged on each side.
+const BESIDE: usize = 4;
+
+/// Takes the photographs of a session for each projector while the others are dark; their folders.
+pub fn photograph_each(scene: &Scene, bernoulli: usize, place: &Path) -> Vec<PathBuf> {
+    let simulation = simulation(scene, Forced::default());
+    let camera = VirtualCamera::new(scene, &simulation, 1).expect("light");
+    let of_projector = |(index, projector): (usize, &iltm::scene::description::Projector)| {
+        let grid = projector.grid;
+        let layout = Layout::new(grid, pixels(grid), 0).expect("whole cells");
+        let options = OrderOptions {
+            bernoulli,
+            ..OrderOptions::default()
+        };
+        let slides = session::order(&layout, &options);
+        std::fs::create_dir_all(place).expect("a folder");
+        let folder = place.join(index.to_string());
+        let settings = CameraSettings::default();
+        session::write(&slides, &layout, &settings, &folder, &Silent).expect("written");
+        let unfilled = UnfilledCapture::read(&folder, scene, Some(index)).expect("slides");
+        unfilled.take_missing(&camera, &Silent).expect("taken");
+        folder
+    };
+    scene
+        .projectors
+        .iter()
+        .enumerate()
+        .map(of_projector)
+        .collect()
+}
+
+fn pixels(grid: Grid) -> FrameSize {
+    let side = |cells: usize| u16::try_from(CELL * cells).expect("a frame");
+    FrameSize::new(side(grid.cols()), side(grid.rows())).expect("a frame")
+}
+
+/// The table of all projectors.
+pub fn learned_together(captures: &[PathBuf]) -> BuiltTable {
+    let options = CaptureOptions::default();
+    let several = read_several(captures, &options, &Silent).expect("good captures");
+    build_table_from(
+        several.into(),
+        &captures[0],
+        &SolveOptions::default(),
+        &TableOptions::default(),
+        &Silent,
+    )
+    .expect("a table")
+}
+
+/// A table for each projector, learned from its own photographs alone, for this light of white.
+pub fn learned_alone(captures: &[PathBuf], white: f64) -> Vec<BuiltTable> {
+    let table = TableOptions {
+        white: Some(WhiteRequest::Light(white)),
+        ..TableOptions::default()
+    };
+    let (photographs, solve) = (CaptureOptions::default(), SolveOptions::default());
+    let learned = |capture| build_table(capture, &photographs, &solve, &table, &Silent);
+    let tables = captures
+        .iter()
+        .map(|capture| learned(capture).expect("a table"));
+    tables.collect()
+}
+
+/// What a camera sees of compensated pictures, by pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenOnScreen {
+    /// Relative error over all that the projectors light, mean over the pictures.
+    pub whole: f64,
+    /// The same over what more than one of them lights.
+    pub overlap: f64,
+    /// The largest step of an even white across a border of the overlap, of its light.
+    pub step: f64,
+}
+
+/// The screen as a camera and the projectors see it.
+pub struct Screen<'s> {
+    scene: &'s Scene,
+    /// Smallest and largest coordinates of the panels' corners from the front.
+    span: [(f64, f64); 2],
+}
+
+impl<'s> Screen<'s> {
+    /// That of a scene.
+    pub fn new(scene: &'s Scene) -> Self {
+        let corners = scene.panels.iter().flat_map(|panel| &panel.facets);
+        let corners: Vec<_> = corners.flat_map(|facet| facet.polygon.corners()).collect();
+        let span = [0, 1].map(|axis: usize| {
+            let side = corners.iter().map(|corner| corner[axis]);
+            let (least, most) = (side.clone().reduce(f64::min), side.reduce(f64::max));
+            (least.expect("corners"), most.expect("corners"))
+        });
+        Self { scene, span }
+    }
+
+    /// The place of the screen that a ray meets first.
+    fn met(&self, from: Vector3<f64>, ray: Vector3<f64>) -> Option<Vector3<f64>> {
+        let facets = self.scene.panels.iter().flat_map(|panel| &panel.facets);
+        let met = facets.filter_map(|facet| {
+            let plane = facet.polygon.plane();
+            let way = -plane.distance(&from) / plane.normal().dot(&ray);
+            let place = from + way * ray;
+            (way > 0.0 && facet.polygon.contains(&place)).then_some((way, place))
+        });
+        let first = met.min_by(|(a, _), (b, _)| a.total_cmp(b));
+        first.map(|(_, place)| place)
+    }
+
+    /// Light of one picture on the screen, 0 to 1, each column of `pictures` being one.
+    fn wanted(&self, pictures: &DMatrix<f64>, number: usize, place: Vector3<f64>) -> f64 {
+        let (rows, cols) = (usize::from(DETAILS.0), usize::from(DETAILS.1));
+        let along = |axis: usize, count: usize| {
+            let (least, most) = self.span[axis];
+            let at = (place[axis] - least) / (most - least) * (count - 1) as f64;
+            let before = (at.max(0.0) as usize).min(count - 2);
+            (before, (at - before as f64).clamp(0.0, 1.0))
+        };
+        let ((col, right), (row, down)) = (along(0, cols), along(1, rows));
+        let at = |row: usize, col: usize| pictures[(row * cols + col, number)];
+        let across = |row: usize| (1.0 - right) * at(row, col) + right * at(row, col + 1);
+        let light = (1.0 - down) * across(row) + down * across(row + 1);
+        DARKEST + (1.0 - DARKEST) * light
+    }
+
+    /// The frame of all projectors that wants a picture, as codes of sRGB.
+    fn frame(&self, light: &dyn Fn(Vector3<f64>) -> f64) -> Picture {
+        let grid = self.scene.grid();
+        let size = pixels(grid);
+        let mut codes = vec![0_u16; size.pixels()];
+        for (columns, projector) in self.scene.columns().iter().zip(&self.scene.projectors) {
+            let own = pixels(projector.grid);
+            for pixel in 0..own.pixels() {
+                let (x, y) = (pixel % own.width(), pixel / own.width());
+                let across = (x as f64 + 0.5) / own.width() as f64;
+                let down = (y as f64 + 0.5) / own.height() as f64;
+                let view = &projector.view;
+                let met = self.met(view.position(), view.ray(across, down));
+                let value = met.map_or(0.0, |place| Response::Srgb.value(light(place)));
+                let at = y * size.width() + columns.start * CELL + x;
+                codes[at] = (65535.0 * value).round() as u16;
+            }
+        }
+        Picture::new(size, Samples::Sixteen(codes)).expect("one code a pixel")
+    }
+
+    /// Where each pixel of the camera looks, and how many projectors light it there, half a cell
+    /// within their borders; `None` beside the light of all.
+    fn looks(&self) -> Vec<Option<(Vector3<f64>, usize)>> {
+        let camera = &self.scene.camera;
+        let (width, height) = (camera.size.0 as usize, camera.size.1 as usize);
+        let look = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            let (across, down) = (
+                (x as f64 + 0.5) / width as f64,
+                (y as f64 + 0.5) / height as f64,
+            );
+            let ray = camera.view.ray(across, down);
+            let place = self.met(camera.view.position(), ray)?;
+            let lit = self.scene.projectors.iter();
+            let lit = lit.filter(|projector| is_lit(&projector.view, projector.grid, &place));
+            let lit = lit.count();
+            (lit > 0).then_some((place, lit))
+        };
+        let all: Vec<_> = (0..width * height).map(look).collect();
+        // A pixel at the border of the light, or of the screen, sees something else as well.
+        let whole = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            let inside = (1..width - 1).contains(&x) && (1..height - 1).contains(&y);
+            let mut around = (0..9).map(|at| (y + at / 3 - 1) * width + x + at % 3 - 1);
+            let lit = inside && around.all(|other| all[other].is_some());
+            all[pixel].filter(|_| lit)
+        };
+        (0..width * height).map(whole).collect()
+    }
+
+    /// What a camera without noise sees of pictures that the table of all projectors compensates.
+    pub fn seen(&self, built: &BuiltTable) -> SeenOnScreen {
+        self.seen_of(&|frame| compensated(built, frame))
+    }
+
+    /// The same where each projector has a table of its own, learned from its own photographs and
+    /// for the same light of white.
+    pub fn seen_of_each(&self, tables: &[BuiltTable]) -> SeenOnScreen {
+        self.seen_of(&|frame| {
+            let (width, height) = (frame.size().width(), frame.size().height());
+            let Samples::Sixteen(wanted) = frame.samples() else {
+                unreachable!("frames of 16 bits");
+            };
+            let mut shown = vec![0; wanted.len()];
+            for (columns, built) in self.scene.columns().iter().zip(tables) {
+                let columns = columns.start * CELL..columns.end * CELL;
+                let rows = wanted.chunks_exact(width);
+                let own: Vec<u16> = rows
+                    .flat_map(|row| &row[columns.clone()])
+                    .copied()
+                    .collect();
+                let side = |pixels: usize| u16::try_from(pixels).expect("a frame");
+                let size = FrameSize::new(side(columns.len()), side(height)).expect("a frame");
+                let own = Picture::new(size, Samples::Sixteen(own)).expect("one code a pixel");
+                let own = compensated(built, own);
+                let Samples::Sixteen(codes) = own.samples() else {
+                    unreachable!("frames of 16 bits");
+                };
+                let rows = shown.chunks_exact_mut(width);
+                for (row, own) in rows.zip(codes.chunks_exact(columns.len())) {
+                    row[columns.clone()].copy_from_slice(own);
+                }
+            }
+            Picture::new(frame.size(), Samples::Sixteen(shown)).expect("one code a pixel")
+        })
+    }
+
+    /// The same of frames that are compensated somehow.
+    fn seen_of(&self, compensate: &dyn Fn(Picture) -> Picture) -> SeenOnScreen {
+        let (rows, cols) = DETAILS;
+        let pictures = natural_images(Grid::new(rows, cols).expect("a grid"));
+        let white = |_: Vector3<f64>| 1.0;
+        let mut lights: Vec<Box<dyn Fn(Vector3<f64>) -> f64 + '_>> = vec![Box::new(white)];
+        for number in 0..pictures.ncols() {
+            let pictures = &pictures;
+            lights.push(Box::new(move |place| self.wanted(pictures, number, place)));
+        }
+        let frames: Vec<ProjectedFrame> = lights
+            .iter()
+            .map(|light| projected(&compensate(self.frame(light))))
+            .collect();
+        let photographs = self.photographs(&frames);
+        let looks = self.looks();
+        let (mut whole, mut overlap) = (0.0, 0.0);
+        for (light, seen) in lights.iter().zip(&photographs).skip(1) {
+            let pairs = looks.iter().zip(seen).filter_map(|(look, seen)| {
+                let (place, lit) = (*look)?;
+                Some((*seen, light(place), lit))
+            });
+            let pairs: Vec<(f64, f64, usize)> = pairs.collect();
+            let sum = |of: &dyn Fn(&(f64, f64, usize)) -> f64| pairs.iter().map(of).sum::<f64>();
+            let scale = sum(&|(s, w, _)| s * w) / sum(&|(s, _, _)| s * s);
+            let error = |least: usize| {
+                let lit = |lit: usize| f64::from(u8::from(lit >= least));
+                let off = sum(&|(s, w, n)| lit(*n) * (scale * s - w).powi(2));
+                (off / sum(&|(_, w, n)| lit(*n) * w * w)).sqrt()
+            };
+            whole += error(1) / pictures.ncols() as f64;
+            overlap += error(2) / pictures.ncols() as f64;
+        }
+        SeenOnScreen {
+            whole,
+            overlap,
+            step: self.step(&looks, &photographs[0]),
+        }
+    }
+
+    /// The largest step of an even picture across a border of the overlap.
+    fn step(&self, looks: &[Option<(Vector3<f64>, usize)>], seen: &[f64]) -> f64 {
+        let width = self.scene.camera.size.0 as usize;
+        let mean = |x: usize, y: usize, lit: usize| {
+            let (mut sum, mut count) = (0.0, 0);
+            for pixel in (0..BESIDE * BESIDE).map(|at| (y + at / BESIDE) * width + x + at % BESIDE)
+            {
+                let (_, own) = looks.get(pixel).copied().flatten()?;
+                if own != lit {
+                    return None;
+                }
+                sum += seen[pixel];
+                count += 1;
+            }
+            Some(sum / f64::from(count))
+        };
+        let height = seen.len() / width;
+        let mut largest = 0.0_f64;
+        for y in 0..height - BESIDE {
+            for x in 0..width - 4 * BESIDE {
+                for (left, right) in [(1, 2), (2, 1)] {
+                    // The pixels between belong to either.
+                    let beside = mean(x, y, left).zip(mean(x + 2 * BESIDE, y, right));
+                    if let Some((a, b)) = beside {
+                        largest = largest.max((a - b).abs() / a.max(b));
+                    }
+                }
+            }
+        }
+        largest
+    }
+
+    /// Photographs of frames without noise, mean of the channels.
+    fn photographs(&self, frames: &[ProjectedFrame]) -> Vec<Vec<f64>> {
+        let mut quiet = self.scene.clone();
+        quiet.camera.full_well = None;
+        quiet.camera.read_noise = 0.0;
+        quiet.camera.bits = Some(16);
+        let simulation = simulation(&quiet, Forced::default());
+        let camera = VirtualCamera::new(&quiet, &simulation, 1).expect("light");
+        let taken = Mutex::new(vec![Vec::new(); frames.len()]);
+        let places: Vec<usize> = (0..frames.len()).collect();
+        let keep = |place: usize, photograph: Option<Photograph>| {
+            let photograph = photograph.expect("no fault");
+            let pixels = 0..photograph.values[0].len();
+            let planes = &photograph.values;
+            let light = |pixel: usize| planes.iter().map(|plane| f64::from(plane[pixel])).sum();
+            taken.lock().expect("no panic")[place] = pixels.map(light).collect();
+            Ok::<(), SimulationError>(())
+        };
+        camera.take(frames, &places, keep).expect("light");
+        taken.into_inner().expect("no panic")
+    }
+}
+
+fn compensated(built: &BuiltTable, frame: Picture) -> Picture {
+    let table = Table::check(&built.compiled.image).expect("a table");
+    let compensator = Compensator::new(&table, CompensateOptions::default()).expect("threads");
+    compensator.frame(frame).expect("a frame of the table").0
+}
+
+/// Whether a projector lights a place, half a cell within its border.
+fn is_lit(view: &Pinhole, grid: Grid, place: &Vector3<f64>) -> bool {
+    let within = |at: f64, cells: usize| {
+        let border = 0.5 / cells as f64;
+        (border..1.0 - border).contains(&at)
+    };
+    view.place(place)
+        .is_some_and(|at| within(at.across, grid.cols()) && within(at.down, grid.rows()))
+}
+
+/// A picture as projectors show it, with 8 bits.
+fn projected(picture: &Picture) -> ProjectedFrame {
+    let code = |code: u16| ((u32::from(code) + 128) / 257) as u8;
+    let codes: Vec<u8> = match picture.samples() {
+        Samples::Eight(codes) => codes.clone(),
+        Samples::Sixteen(codes) => codes.iter().map(|value| code(*value)).collect(),
+    };
+    let channels = picture.channels();
+    let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % channels]);
+    ProjectedFrame {
+        size: picture.size(),
+        codes: codes.chunks_exact(channels).map(colour).collect(),
+        exposure: 1.0,
+    }
+}
