@@ -10,7 +10,7 @@ use iltm::capture::{CameraSettings, CaptureOptions, read_several};
 use iltm::compile::reference_white::WhiteRequest;
 use iltm::picture::{Picture, Response, Samples};
 use iltm::progress::Silent;
-use iltm::scene::description::Scene;
+use iltm::scene::description::{Projector, Scene};
 use iltm::scene::fill_capture::UnfilledCapture;
 use iltm::scene::{Forced, Photograph, Pinhole, ProjectedFrame, SimulationError, VirtualCamera};
 use iltm::session::{self, Layout, OrderOptions};
@@ -39,20 +39,16 @@ const BESIDE: usize = 4;
 pub fn photograph_each(scene: &Scene, bernoulli: usize, place: &Path) -> Vec<PathBuf> {
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 1).expect("light");
-    let of_projector = |(index, projector): (usize, &iltm::scene::description::Projector)| {
-        let grid = projector.grid;
-        let layout = Layout::new(grid, pixels(grid), 0).expect("whole cells");
-        let options = OrderOptions {
-            bernoulli,
-            ..OrderOptions::default()
-        };
-        let slides = session::order(&layout, &options);
-        std::fs::create_dir_all(place).expect("a folder");
+    std::fs::create_dir_all(place).expect("a folder");
+    let of_projector = |(index, projector): (usize, &Projector)| {
         let folder = place.join(index.to_string());
-        let settings = CameraSettings::default();
-        session::write(&slides, &layout, &settings, &folder, &Silent).expect("written");
-        let unfilled = UnfilledCapture::read(&folder, scene, Some(index)).expect("slides");
-        unfilled.take_missing(&camera, &Silent).expect("taken");
+        photograph_session(
+            &camera,
+            scene,
+            (Some(index), projector.grid),
+            bernoulli,
+            &folder,
+        );
         folder
     };
     scene
@@ -61,6 +57,33 @@ pub fn photograph_each(scene: &Scene, bernoulli: usize, place: &Path) -> Vec<Pat
         .enumerate()
         .map(of_projector)
         .collect()
+}
+
+/// Takes the photographs of one session of wide frames.
+pub fn photograph_together(scene: &Scene, bernoulli: usize, folder: &Path) {
+    let simulation = simulation(scene, Forced::default());
+    let camera = VirtualCamera::new(scene, &simulation, 1).expect("light");
+    std::fs::create_dir_all(folder.parent().unwrap_or(folder)).expect("a folder");
+    photograph_session(&camera, scene, (None, scene.grid()), bernoulli, folder);
+}
+
+fn photograph_session(
+    camera: &VirtualCamera<'_>,
+    scene: &Scene,
+    (projector, grid): (Option<usize>, Grid),
+    bernoulli: usize,
+    folder: &Path,
+) {
+    let layout = Layout::new(grid, pixels(grid), 0).expect("whole cells");
+    let options = OrderOptions {
+        bernoulli,
+        ..OrderOptions::default()
+    };
+    let slides = session::order(&layout, &options);
+    let settings = CameraSettings::default();
+    session::write(&slides, &layout, &settings, folder, &Silent).expect("written");
+    let unfilled = UnfilledCapture::read(folder, scene, projector).expect("slides");
+    unfilled.take_missing(camera, &Silent).expect("taken");
 }
 
 fn pixels(grid: Grid) -> FrameSize {
@@ -102,29 +125,20 @@ pub struct SeenOnScreen {
     /// Relative error over all that the projectors light, mean over the pictures.
     pub whole: f64,
     /// The same over what more than one of them lights.
-    pub overlap: f64,
+    pub overlap: Option<f64>,
     /// The largest step of an even white across a border of the overlap, of its light.
-    pub step: f64,
+    pub step: Option<f64>,
 }
 
 /// The screen as a camera and the projectors see it.
 pub struct Screen<'s> {
     scene: &'s Scene,
-    /// Smallest and largest coordinates of the panels' corners from the front.
-    span: [(f64, f64); 2],
 }
 
 impl<'s> Screen<'s> {
     /// That of a scene.
-    pub fn new(scene: &'s Scene) -> Self {
-        let corners = scene.panels.iter().flat_map(|panel| &panel.facets);
-        let corners: Vec<_> = corners.flat_map(|facet| facet.polygon.corners()).collect();
-        let span = [0, 1].map(|axis: usize| {
-            let side = corners.iter().map(|corner| corner[axis]);
-            let (least, most) = (side.clone().reduce(f64::min), side.reduce(f64::max));
-            (least.expect("corners"), most.expect("corners"))
-        });
-        Self { scene, span }
+    pub const fn new(scene: &'s Scene) -> Self {
+        Self { scene }
     }
 
     /// The place of the screen that a ray meets first.
@@ -140,41 +154,39 @@ impl<'s> Screen<'s> {
         first.map(|(_, place)| place)
     }
 
-    /// Light of one picture on the screen, 0 to 1, each column of `pictures` being one.
+    /// Light of one picture on the screen, 0 to 1, each column of `pictures` being one. It fills the
+    /// camera's frame.
     fn wanted(&self, pictures: &DMatrix<f64>, number: usize, place: Vector3<f64>) -> f64 {
         let (rows, cols) = (usize::from(DETAILS.0), usize::from(DETAILS.1));
-        let along = |axis: usize, count: usize| {
-            let (least, most) = self.span[axis];
-            let at = (place[axis] - least) / (most - least) * (count - 1) as f64;
-            let before = (at.max(0.0) as usize).min(count - 2);
-            (before, (at - before as f64).clamp(0.0, 1.0))
+        let along = |at: f64, count: usize| {
+            let at = at.clamp(0.0, 1.0) * (count - 1) as f64;
+            let before = (at as usize).min(count - 2);
+            (before, at - before as f64)
         };
-        let ((col, right), (row, down)) = (along(0, cols), along(1, rows));
+        let seen = self.scene.camera.view.place(&place);
+        let seen = seen.map_or([0.0; 2], |at| [at.across, at.down]);
+        let ((col, right), (row, down)) = (along(seen[0], cols), along(seen[1], rows));
         let at = |row: usize, col: usize| pictures[(row * cols + col, number)];
         let across = |row: usize| (1.0 - right) * at(row, col) + right * at(row, col + 1);
         let light = (1.0 - down) * across(row) + down * across(row + 1);
         DARKEST + (1.0 - DARKEST) * light
     }
 
-    /// The frame of all projectors that wants a picture, as codes of sRGB.
-    fn frame(&self, light: &dyn Fn(Vector3<f64>) -> f64) -> Picture {
-        let grid = self.scene.grid();
-        let size = pixels(grid);
-        let mut codes = vec![0_u16; size.pixels()];
+    /// The place of the screen that each pixel of the frame of all projectors lights.
+    fn lit_places(&self) -> Vec<Option<Vector3<f64>>> {
+        let size = pixels(self.scene.grid());
+        let mut places = vec![None; size.pixels()];
         for (columns, projector) in self.scene.columns().iter().zip(&self.scene.projectors) {
-            let own = pixels(projector.grid);
+            let (own, view) = (pixels(projector.grid), &projector.view);
             for pixel in 0..own.pixels() {
                 let (x, y) = (pixel % own.width(), pixel / own.width());
                 let across = (x as f64 + 0.5) / own.width() as f64;
                 let down = (y as f64 + 0.5) / own.height() as f64;
-                let view = &projector.view;
-                let met = self.met(view.position(), view.ray(across, down));
-                let value = met.map_or(0.0, |place| Response::Srgb.value(light(place)));
                 let at = y * size.width() + columns.start * CELL + x;
-                codes[at] = (65535.0 * value).round() as u16;
+                places[at] = self.met(view.position(), view.ray(across, down));
             }
         }
-        Picture::new(size, Samples::Sixteen(codes)).expect("one code a pixel")
+        places
     }
 
     /// Where each pixel of the camera looks, and how many projectors light it there, half a cell
@@ -254,9 +266,10 @@ impl<'s> Screen<'s> {
             let pictures = &pictures;
             lights.push(Box::new(move |place| self.wanted(pictures, number, place)));
         }
+        let (size, places) = (pixels(self.scene.grid()), self.lit_places());
         let frames: Vec<ProjectedFrame> = lights
             .iter()
-            .map(|light| projected(&compensate(self.frame(light))))
+            .map(|light| projected(&compensate(frame(size, &places, light))))
             .collect();
         let photographs = self.photographs(&frames);
         let looks = self.looks();
@@ -277,15 +290,16 @@ impl<'s> Screen<'s> {
             whole += error(1) / pictures.ncols() as f64;
             overlap += error(2) / pictures.ncols() as f64;
         }
+        let overlaps = looks.iter().flatten().any(|(_, lit)| *lit > 1);
         SeenOnScreen {
             whole,
-            overlap,
+            overlap: overlaps.then_some(overlap),
             step: self.step(&looks, &photographs[0]),
         }
     }
 
     /// The largest step of an even picture across a border of the overlap.
-    fn step(&self, looks: &[Option<(Vector3<f64>, usize)>], seen: &[f64]) -> f64 {
+    fn step(&self, looks: &[Option<(Vector3<f64>, usize)>], seen: &[f64]) -> Option<f64> {
         let width = self.scene.camera.size.0 as usize;
         let mean = |x: usize, y: usize, lit: usize| {
             let (mut sum, mut count) = (0.0, 0);
@@ -301,14 +315,15 @@ impl<'s> Screen<'s> {
             Some(sum / f64::from(count))
         };
         let height = seen.len() / width;
-        let mut largest = 0.0_f64;
+        let mut largest: Option<f64> = None;
         for y in 0..height - BESIDE {
             for x in 0..width - 4 * BESIDE {
                 for (left, right) in [(1, 2), (2, 1)] {
                     // The pixels between belong to either.
                     let beside = mean(x, y, left).zip(mean(x + 2 * BESIDE, y, right));
                     if let Some((a, b)) = beside {
-                        largest = largest.max((a - b).abs() / a.max(b));
+                        let step = (a - b).abs() / a.max(b);
+                        largest = Some(largest.map_or(step, |largest| largest.max(step)));
                     }
                 }
             }
@@ -337,6 +352,20 @@ impl<'s> Screen<'s> {
         camera.take(frames, &places, keep).expect("light");
         taken.into_inner().expect("no panic")
     }
+}
+
+/// A frame that wants a picture whose light is that of places on the screen, as codes of sRGB.
+fn frame(
+    size: FrameSize,
+    places: &[Option<Vector3<f64>>],
+    light: &dyn Fn(Vector3<f64>) -> f64,
+) -> Picture {
+    let code = |place: &Option<Vector3<f64>>| {
+        let value = place.map_or(0.0, |place| Response::Srgb.value(light(place)));
+        (65535.0 * value).round() as u16
+    };
+    let codes = places.iter().map(code).collect();
+    Picture::new(size, Samples::Sixteen(codes)).expect("one code a pixel")
 }
 
 fn compensated(built: &BuiltTable, frame: Picture) -> Picture {

@@ -3,8 +3,8 @@
 use super::words::lines;
 use crate::build_table::BuiltTable;
 use crate::capture::{
-    CameraFit, Devices, Diagnostics, FileFormat, Gate, LeftOut, MapError, Measurements, Verdict,
-    Why,
+    CameraFit, Devices, Diagnostics, FileFormat, Gate, LeftOut, MapError, Measurements, Role,
+    Verdict, Why,
 };
 use crate::solve::{Compensation, Flux, InverseTransport, Method, WhyLeftOut};
 use serde_json::{Value, json};
@@ -201,8 +201,11 @@ pub(super) fn text(built: &BuiltTable) -> String {
     let report = &built.report;
     let mut text = String::new();
     let photographs = report.photographs;
-    let repeats = &built.measurements.repeats;
-    let white = repeats.get(Measurements::WHITE).copied().unwrap_or(1);
+    let views = (built.measurements.roles.iter()).zip(&built.measurements.repeats);
+    let white: u32 = views
+        .filter(|(role, _)| **role == Role::White)
+        .map(|(_, repeats)| repeats)
+        .sum();
     let _ = writeln!(
         text,
         "photographs {} white, {} Gray code, {}",
@@ -361,8 +364,8 @@ const AMBIENT_WORTH_A_WORD: f64 = 0.1;
 /// Light under black relative to that under white, over all live cells and channels.
 fn ambient_share(measurements: &Measurements) -> f64 {
     let (mut dark, mut lit) = (0.0, 0.0);
-    for channel in &measurements.channels {
-        let flood = channel.observations.column(Measurements::WHITE);
+    for (index, channel) in measurements.channels.iter().enumerate() {
+        let flood = measurements.white(index);
         let cells = flood.iter().zip(&channel.ambient).zip(&measurements.live);
         for ((flood, ambient), _) in cells.filter(|(_, live)| **live) {
             dark += ambient.max(0.0);

@@ -148,10 +148,14 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
     // Of a device or a pipe, the table is wherever its reader has put it.
     if path.is_file() && !path.starts_with("/dev") {
         let file = crate::solve_page::quoted(path);
-        let _ = writeln!(
-            text,
-            "next        prove it on the wall: iltm verify {file} -o VERIFY"
-        );
+        let next = if provenance.overlapping {
+            format!(
+                "iltm compensate {file} FRAMES -o INPUT; projectors overlap, so iltm verify cannot tell"
+            )
+        } else {
+            format!("prove it on the wall: iltm verify {file} -o VERIFY")
+        };
+        let _ = writeln!(text, "next        {next}");
     }
     text
 }

@@ -43,9 +43,18 @@ fn prepare(
     bars: &dyn Progress,
     output: &Output,
 ) -> Result<(), Failure> {
-    let settings = Provenance::read(table.provenance())
-        .capture
-        .unwrap_or_default();
+    let provenance = Provenance::read(table.provenance());
+    if provenance.overlapping {
+        return Err(Failure::new(
+            Kind::Usage,
+            format!(
+                "{}: projectors overlap, and stripes of two on one place cannot be told apart",
+                arguments.table.display()
+            ),
+            "Look at compensated pictures on the wall.",
+        ));
+    }
+    let settings = provenance.capture.unwrap_or_default();
     let own = settings.projector.size;
     let projector = arguments
         .projector

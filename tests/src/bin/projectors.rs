@@ -1,20 +1,20 @@
 //! Several projectors: errors on the wall of the scene `two-walls`, solved together, each projector
-//! alone, and with gains alone; and on the scene `folded-screen`, where projectors overlap.
+//! alone, and with gains alone; and by pixels on all scenes of several projectors.
 //!
 //! `cargo run --release -p iltm-tests --bin projectors` prints the tables of
 //! `docs/several-projectors.md`.
 
 use iltm_tests::overlapping::{
-    Screen, SeenOnScreen, learned_alone, learned_together, photograph_each,
+    Screen, SeenOnScreen, learned_alone, learned_together, photograph_each, photograph_together,
 };
 use iltm_tests::simulated::{
-    error_on_the_wall, inputs, inputs_of_each_alone, learned, photograph, scene, showable,
+    error_on_the_wall, inputs, inputs_of_each_alone, learned, overlaps, photograph, scene, showable,
 };
 
 fn main() {
     side_by_side();
     println!();
-    overlapping();
+    by_pixels();
 }
 
 fn side_by_side() {
@@ -39,28 +39,36 @@ fn side_by_side() {
     }
 }
 
-fn overlapping() {
-    println!("| overlap | whole screen | overlap alone | largest step |");
-    println!("|---|---|---|---|");
-    let scene = scene("folded-screen", &[]);
+/// By pixels of a camera without noise.
+fn by_pixels() {
+    println!("| scene | tables | whole screen | overlap | largest step |");
+    println!("|---|---|---|---|---|");
     let place = tempfile::tempdir().expect("a folder");
-    let captures = photograph_each(&scene, 60, place.path());
-    let screen = Screen::new(&scene);
-    let together = learned_together(&captures);
-    let alone = learned_alone(&captures, together.white.light);
-    let rows = [
-        ("each alone", screen.seen_of_each(&alone)),
-        ("together", screen.seen(&together)),
-    ];
-    for (name, seen) in rows {
-        let SeenOnScreen {
-            whole,
-            overlap,
-            step,
-        } = seen;
-        println!(
-            "| {name} | {whole:.4} | {overlap:.4} | {:.1} % |",
-            100.0 * step
-        );
+    for name in ["two-walls", "cube-room", "folded-screen", "dome-of-four"] {
+        let scene = scene(name, &[]);
+        let captures = photograph_each(&scene, 60, &place.path().join(name));
+        let together = if overlaps(name) {
+            learned_together(&captures)
+        } else {
+            // Slides light all of them at once.
+            let capture = place.path().join("wide").join(name);
+            photograph_together(&scene, 60, &capture);
+            learned(&capture)
+        };
+        let alone = learned_alone(&captures, together.white.light);
+        let screen = Screen::new(&scene);
+        row(name, "each alone", screen.seen_of_each(&alone));
+        row(name, "together", screen.seen(&together));
     }
+}
+
+fn row(scene: &str, tables: &str, seen: SeenOnScreen) {
+    let SeenOnScreen {
+        whole,
+        overlap,
+        step,
+    } = seen;
+    let overlap = overlap.map_or_else(String::new, |error| format!("{error:.4}"));
+    let step = step.map_or_else(String::new, |step| format!("{:.1} %", 100.0 * step));
+    println!("| {scene} | {tables} | {whole:.4} | {overlap} | {step} |");
 }

@@ -426,7 +426,13 @@ impl WideFrame {
 }
 
 impl SeveralCaptures {
-    /// The projector of each cell of the wide frame.
+    /// Whether two projectors light one place.
+    #[must_use]
+    pub fn is_overlapping(&self) -> bool {
+        self.overlaps.iter().any(|others| !others.is_empty())
+    }
+
+    /// The projector of a cell of the wide frame.
     #[must_use]
     pub fn projector_of(&self, cell: usize) -> usize {
         let col = cell % self.all.grid.cols();
@@ -615,4 +621,46 @@ fn filled(mut values: Vec<Option<f64>>, cols: usize) -> Vec<f64> {
         .into_iter()
         .map(|value| value.unwrap_or(1.0))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_go_along_the_eight_directions_and_are_infinite_without_a_region() {
+        let mut region = vec![false; 7 * 5];
+        assert!(distances(&region, 7).iter().all(|way| way.is_infinite()));
+        region[2 * 7 + 3] = true;
+        let found = distances(&region, 7);
+        let diagonal = std::f32::consts::SQRT_2;
+        for (pixel, way) in found.iter().enumerate() {
+            let (x, y) = ((pixel % 7).abs_diff(3), (pixel / 7).abs_diff(2));
+            let (least, most) = (x.min(y) as f32, x.max(y) as f32);
+            let expected = diagonal * least + most - least;
+            assert!((way - expected).abs() < 1e-5, "{pixel}: {way} {expected}");
+        }
+    }
+
+    #[test]
+    fn holes_are_closed_and_what_lies_far_from_a_region_stays_outside() {
+        let (width, height) = (24, 20);
+        let within = |pixel: usize| (4..20).contains(&(pixel % width)) && pixel / width >= 6;
+        let whole: Vec<bool> = (0..width * height).map(within).collect();
+        let mut holed = whole.clone();
+        for (x, y) in [(10, 10), (11, 10), (12, 14), (6, 12)] {
+            holed[y * width + x] = false;
+        }
+        assert_eq!(closed(&holed, width, 3.0), whole);
+        assert_eq!(closed(&whole, width, 3.0), whole);
+    }
+
+    #[test]
+    fn unknown_values_are_filled_from_their_neighbours_outwards() {
+        let unknown = vec![None, None, Some(0.5), None, None, None];
+        assert_eq!(filled(unknown, 3), [0.5; 6]);
+        assert_eq!(filled(vec![None; 4], 2), [1.0; 4]);
+        let row = vec![Some(0.0), None, Some(1.0)];
+        assert_eq!(filled(row, 3), [0.0, 0.5, 1.0]);
+    }
 }

@@ -21,10 +21,12 @@ impl Brightness {
     #[must_use]
     pub fn of(measurements: &Measurements, white: f64) -> Option<Self> {
         let channels = &measurements.channels;
+        let whites: Vec<Vec<f64>> = (0..channels.len())
+            .map(|channel| measurements.white(channel))
+            .collect();
         let uncompensated = |cell: usize| -> f64 {
-            let light = channels.iter().map(|channel| {
-                channel.observations[(cell, Measurements::WHITE)] + channel.ambient[cell].max(0.0)
-            });
+            let light = channels.iter().zip(&whites);
+            let light = light.map(|(channel, white)| white[cell] + channel.ambient[cell].max(0.0));
             light.sum()
         };
         let cells = (0..measurements.live.len()).filter(|cell| measurements.live[*cell]);

@@ -215,6 +215,7 @@ pub fn build_table_from(
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white)?;
     let provenance = Provenance {
         ambient_kept,
+        overlapping: several.is_some_and(SeveralCaptures::is_overlapping),
         ..Provenance::new(capture, measurements, &report, predicted, &white)
     };
     let options = CompileOptions {

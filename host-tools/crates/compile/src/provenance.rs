@@ -39,6 +39,10 @@ pub struct Provenance {
     /// Whether light that is there without the projector was left as it is.
     #[serde(skip_serializing_if = "is_false")]
     pub ambient_kept: bool,
+    /// Whether it is for several projectors whose pictures overlap: two places of its frame are one
+    /// place on the wall then.
+    #[serde(skip_serializing_if = "is_false")]
+    pub overlapping: bool,
     /// Names of the gates that failed and were ignored.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ignored_gates: Vec<String>,
@@ -199,6 +203,7 @@ impl Provenance {
             }),
             live_cells: report.live_cells,
             ambient_kept: false,
+            overlapping: false,
             lambda: report.lambda,
             condition: report.condition,
             ignored_gates: failed.map(|gate| gate.name.to_string()).collect(),

@@ -29,8 +29,7 @@ pub fn solve_several(
     options: &SolveOptions,
     progress: &dyn Progress,
 ) -> Result<Solved, SolveError> {
-    let none = several.overlaps.iter().all(Vec::is_empty);
-    if none {
+    if !several.is_overlapping() {
         return solve(&several.all, options, progress);
     }
     for channel in 0..several.all.channels.len() {
@@ -180,4 +179,29 @@ fn fit(columns: &[DVector<f64>], target: &DVector<f64>) -> Vec<f64> {
         || vec![0.0; right.len()],
         |factors| factors.solve(&right).iter().copied().collect(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fit_finds_the_factors_and_none_of_what_is_not_there() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let column = |random: &mut fastrand::Rng| {
+            DVector::from_fn(60, |_, _| f64::from(u8::from(random.bool())))
+        };
+        let columns = [
+            column(&mut random),
+            column(&mut random),
+            column(&mut random),
+        ];
+        let target = 0.7 * &columns[0] + 0.2 * &columns[2];
+        let found = fit(&columns, &target);
+        for (found, expected) in found.iter().zip([0.7, 0.0, 0.2]) {
+            assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+        }
+        let dark = [DVector::zeros(5)];
+        assert_eq!(fit(&dark, &DVector::from_element(5, 1.0)), [0.0]);
+    }
 }

@@ -62,6 +62,23 @@ impl Measurements {
     /// Column of the white pattern in every [`ChannelMeasurements::patterns`] and
     /// [`ChannelMeasurements::observations`].
     pub const WHITE: usize = 0;
+
+    /// Light of each cell under white in one channel, length `N`; of several projectors, under white
+    /// of all together.
+    #[must_use]
+    pub fn white(&self, channel: usize) -> Vec<f64> {
+        let observations = &self.channels[channel].observations;
+        let views = self.roles.iter().enumerate();
+        let whites = views.filter(|(_, role)| **role == Role::White);
+        let mut sum = vec![0.0; observations.nrows()];
+        for (view, _) in whites {
+            let light = observations.column(view);
+            sum.iter_mut()
+                .zip(&light)
+                .for_each(|(sum, light)| *sum += light);
+        }
+        sum
+    }
 }
 
 /// One colour channel of [`Measurements`].
