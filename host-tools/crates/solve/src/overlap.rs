@@ -102,7 +102,7 @@ fn by_light(several: &mut SeveralCaptures, channel: usize) {
             let of = follows(cell, &several.projectors[projector], &cells);
             let parts = of.iter().zip(&cells);
             let parts: Vec<_> = parts
-                .map(|(part, other)| (*other, (part / direct).max(0.0)))
+                .map(|(part, other)| (*other, relative(*part, direct)))
                 .collect();
             found.push((cell, projector, parts));
         }
@@ -132,6 +132,15 @@ fn by_rows(several: &mut SeveralCaptures, inverse: &InverseTransport, channel: u
         }
     }
     set(several, channel, &found);
+}
+
+/// Light of another projector relative to that of a cell's own; 0 where its own is not seen.
+fn relative(light: f64, own: f64) -> f64 {
+    if own > 0.0 {
+        (light / own).max(0.0)
+    } else {
+        0.0
+    }
 }
 
 /// What a cell gets from each of some cells of another projector, which comes second.
@@ -201,6 +210,7 @@ mod tests {
         for (found, expected) in found.iter().zip([0.7, 0.0, 0.2]) {
             assert!((found - expected).abs() < 1e-4, "{found} {expected}");
         }
+        assert!(relative(0.4, 0.0).max(relative(-0.1, 1.0)) <= 0.0);
         let dark = [DVector::zeros(5)];
         assert_eq!(fit(&dark, &DVector::from_element(5, 1.0)), [0.0]);
     }
