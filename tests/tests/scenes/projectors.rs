@@ -263,12 +263,12 @@ fn projectors_that_overlap_share_the_light_and_cancel_what_crosses() {
     );
     let screen = Screen::new(&scene);
     let seen = screen.seen(&together);
-    assert!(seen.whole < 0.008, "{seen:?}");
+    assert!(seen.whole < 0.006, "{seen:?}");
     let within = |figure: Option<f64>, least: f64, most: f64| {
         figure.is_some_and(|figure| (least..most).contains(&figure))
     };
-    assert!(within(seen.overlap, 0.0, 0.02), "{seen:?}");
-    assert!(within(seen.step, 0.0, 0.03), "{seen:?}");
+    assert!(within(seen.overlap, 0.0, 0.016), "{seen:?}");
+    assert!(within(seen.step, 0.0, 0.02), "{seen:?}");
     let alone = learned_alone(&captures, together.white.light);
     let alone = screen.seen_of_each(&alone);
     assert!(within(alone.overlap, 0.5, 1.0), "{alone:?}");

@@ -14,7 +14,7 @@ use iltm_runtime::Grid;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Times that the overlap is found from rows, each followed by a solve.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 4;
 
 /// Part of the mean diagonal that keeps a fit from following noise.
 const RIDGE: f64 = 1e-6;
@@ -96,8 +96,8 @@ fn by_light(several: &mut SeveralCaptures, channel: usize) {
     for Overlapping { cell, others } in overlapping(several) {
         let own = &several.projectors[several.projector_of(cell)];
         let near = around(several.all.grid, own, cell);
-        // Its own cell is the first.
-        let direct = follows(cell, own, &near)[0];
+        // Cells beside it light some of its pixels as well.
+        let direct: f64 = follows(cell, own, &near)[..near.len()].iter().sum();
         for (projector, cells) in others {
             let of = follows(cell, &several.projectors[projector], &cells);
             let parts = of.iter().zip(&cells);
@@ -125,7 +125,10 @@ fn by_rows(several: &mut SeveralCaptures, inverse: &InverseTransport, channel: u
                     row.columns_range(views.clone()).transpose()
                 })
                 .collect();
-            let of = fit(&columns, &given.row(cell).columns_range(views).transpose());
+            let given = given.row(cell).columns_range(views.clone()).transpose();
+            let before = measured.patterns.row(cell).columns_range(views).transpose();
+            // The rows follow half of a change, so that twice the difference is nearly all of it.
+            let of = fit(&columns, &(2.0 * given - before));
             let parts = of.iter().zip(&cells);
             let parts: Vec<_> = parts.map(|(part, other)| (*other, part.max(0.0))).collect();
             found.push((cell, projector, parts));
