@@ -332,6 +332,8 @@ fn a_stream_is_waited_for_and_what_was_received_is_not_played_again() {
     let mut show = Playing::of(&user, child);
     assert_eq!(show.get("loop-file"), false);
     assert_eq!(show.get("prefetch-playlist"), false);
+    // However long it pauses.
+    assert_eq!(show.get("network-timeout"), 0.0);
     sender.kill().expect("it runs");
     sender.wait().expect("it ends");
     let before = within(30, || {

@@ -34,13 +34,16 @@ const LEAST_OVERLAP: f64 = 0.02;
 pub struct SeveralCaptures {
     /// Of the wide frame. The columns of patterns and observations are those of the first
     /// projector's photographs, then the second's and so on; a pattern is dark where others show.
-    /// Where projectors overlap, a camera pixel belongs to the one whose border is farther.
+    /// Where projectors overlap, a camera pixel belongs to the one with the largest share. The light
+    /// of single pixels is that of the first capture.
     pub all: Measurements,
     /// The projectors, from left to right in the wide frame.
     pub projectors: Vec<OneOfSeveral>,
     /// Cells of other projectors that light the same place directly, by cell of the wide frame,
     /// length `N`; empty where nothing overlaps.
     pub overlaps: Vec<Vec<usize>>,
+    /// Share of each projector at each camera pixel.
+    pixel_shares: Vec<Vec<f32>>,
 }
 
 /// One of several projectors.
@@ -123,6 +126,7 @@ struct WideFrame {
     grid: Grid,
     own: Vec<Measurements>,
     columns: Vec<Range<usize>>,
+    pixel_shares: Vec<Vec<f32>>,
 }
 
 impl WideFrame {
@@ -186,7 +190,12 @@ impl WideFrame {
                 reason: format!("{} x {cols} cells in all", first.grid.rows()),
                 next_step: "Make patterns with fewer cells.",
             })?;
-        Ok(Self { grid, own, columns })
+        Ok(Self {
+            pixel_shares: pixel_shares(&own),
+            grid,
+            own,
+            columns,
+        })
     }
 
     /// The cell in the wide frame of a projector's own.
@@ -237,8 +246,7 @@ impl WideFrame {
 
     /// The projector with the largest share of each camera pixel.
     fn owners(&self) -> Vec<Option<usize>> {
-        let own: Vec<&Measurements> = self.own.iter().collect();
-        let shares = pixel_shares(&own);
+        let shares = &self.pixel_shares;
         let owner = |pixel: usize| {
             let shares = shares.iter().map(|shares| shares[pixel]).enumerate();
             let most = shares.max_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -421,6 +429,7 @@ impl WideFrame {
                 })
                 .collect(),
             overlaps,
+            pixel_shares: self.pixel_shares,
         }
     }
 }
@@ -452,10 +461,8 @@ impl SeveralCaptures {
         let [wide, tall] = factor;
         let grid = self.all.grid;
         let width = grid.cols() * wide;
-        let own: Vec<&Measurements> = self.projectors.iter().map(|one| &one.own).collect();
-        let of_pixels = pixel_shares(&own);
         let mut shares = vec![1.0; width * grid.rows() * tall];
-        for (one, of_pixels) in self.projectors.iter().zip(&of_pixels) {
+        for (one, of_pixels) in self.projectors.iter().zip(&self.pixel_shares) {
             let cols = one.columns.len() * wide;
             let mut sums = vec![(0.0, 0.0); cols * grid.rows() * tall];
             for (pixel, share) in of_pixels.iter().enumerate() {
@@ -513,7 +520,7 @@ fn place(own: &Measurements, pixel: usize) -> Option<[f32; 2]> {
 }
 
 /// Share of each projector at each camera pixel, by projector and pixel; 0 where it does not reach.
-fn pixel_shares(own: &[&Measurements]) -> Vec<Vec<f32>> {
+fn pixel_shares(own: &[Measurements]) -> Vec<Vec<f32>> {
     let (width, height) = own[0].registration.camera;
     let pixels = width * height;
     let lit: Vec<Vec<bool>> = own

@@ -12,6 +12,7 @@ use iltm_capture::{OneOfSeveral, SeveralCaptures};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
 use nalgebra::{Cholesky, DMatrix, DVector};
+use std::ops::Range;
 
 /// Times that the overlap is found from rows, each followed by a solve.
 const ROUNDS: usize = 4;
@@ -73,24 +74,13 @@ fn overlapping(several: &SeveralCaptures) -> Vec<Overlapping> {
 fn by_light(several: &mut SeveralCaptures, channel: usize) {
     let measured = &several.all.channels[channel];
     let (patterns, light) = (&measured.patterns, &measured.observations);
+    // What bounces follows how much of the picture is lit.
+    let lit = patterns.row_sum_tr() / patterns.nrows() as f64;
     let follows = |cell: usize, of: &OneOfSeveral, cells: &[usize]| {
         let views = of.views.clone();
-        let mut columns: Vec<DVector<f64>> = cells
-            .iter()
-            .map(|other| {
-                patterns
-                    .row(*other)
-                    .columns_range(views.clone())
-                    .transpose()
-            })
-            .collect();
-        // What bounces follows how much of the picture is lit.
-        let cells = patterns.nrows() as f64;
-        let lit = views
-            .clone()
-            .map(|view| patterns.column(view).sum() / cells);
-        columns.push(DVector::from_iterator(views.len(), lit));
-        fit(&columns, &light.row(cell).columns_range(views).transpose())
+        let mut columns = rows(patterns, cells, &views);
+        columns.push(lit.rows_range(views.clone()).into_owned());
+        fit(&columns, &row(light, cell, &views))
     };
     let mut found = Vec::new();
     for Overlapping { cell, others } in overlapping(several) {
@@ -118,23 +108,25 @@ fn by_rows(several: &mut SeveralCaptures, inverse: &InverseTransport, channel: u
     for Overlapping { cell, others } in overlapping(several) {
         for (projector, cells) in others {
             let views = several.projectors[projector].views.clone();
-            let columns: Vec<DVector<f64>> = cells
-                .iter()
-                .map(|other| {
-                    let row = measured.patterns.row(*other);
-                    row.columns_range(views.clone()).transpose()
-                })
-                .collect();
-            let given = given.row(cell).columns_range(views.clone()).transpose();
-            let before = measured.patterns.row(cell).columns_range(views).transpose();
+            let columns = rows(&measured.patterns, &cells, &views);
+            let before = row(&measured.patterns, cell, &views);
             // The rows follow half of a change, so that twice the difference is nearly all of it.
-            let of = fit(&columns, &(2.0 * given - before));
+            let of = fit(&columns, &(2.0 * row(&given, cell, &views) - before));
             let parts = of.iter().zip(&cells);
             let parts: Vec<_> = parts.map(|(part, other)| (*other, part.max(0.0))).collect();
             found.push((cell, projector, parts));
         }
     }
     set(several, channel, &found);
+}
+
+/// A cell's row of a matrix in some views.
+fn row(of: &DMatrix<f64>, cell: usize, views: &Range<usize>) -> DVector<f64> {
+    of.row(cell).columns_range(views.clone()).transpose()
+}
+
+fn rows(of: &DMatrix<f64>, cells: &[usize], views: &Range<usize>) -> Vec<DVector<f64>> {
+    cells.iter().map(|cell| row(of, *cell, views)).collect()
 }
 
 /// Light of another projector relative to that of a cell's own; 0 where its own is not seen.
@@ -152,11 +144,12 @@ type Found = (usize, usize, Vec<(usize, f64)>);
 /// Sets the right sides of the cells, in the photographs of other projectors. Own patterns of
 /// others stay: they are read from the views in which their own projector shows.
 fn set(several: &mut SeveralCaptures, channel: usize, found: &[Found]) {
-    let own = several.all.channels[channel].patterns.clone();
     let patterns = &mut several.all.channels[channel].patterns;
     for (cell, projector, parts) in found {
         for view in several.projectors[*projector].views.clone() {
-            let light = parts.iter().map(|(other, part)| part * own[(*other, view)]);
+            let light = parts
+                .iter()
+                .map(|(other, part)| part * patterns[(*other, view)]);
             patterns[(*cell, view)] = light.sum();
         }
     }

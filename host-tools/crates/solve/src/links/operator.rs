@@ -281,6 +281,18 @@ mod tests {
         Links::new(tree, rows)
     }
 
+    #[test]
+    fn rows_are_scaled_as_those_of_the_dense_operator() {
+        let links = links(3, 5, 8);
+        let factors: Vec<f64> = (0..15).map(|cell| f64::from(cell % 4) / 2.0).collect();
+        let mut expected = Interreflection::Dense(links.dense());
+        let mut scaled = Interreflection::Links(links);
+        expected.scale_rows(&factors);
+        scaled.scale_rows(&factors);
+        assert_eq!(scaled.dense(), expected.dense());
+        assert_ne!(scaled.dense().row(1), scaled.dense().row(0));
+    }
+
     /// Numbers without a pattern.
     fn numbers(rows: usize, cols: usize) -> DMatrix<f64> {
         DMatrix::from_fn(rows, cols, |i, j| {
