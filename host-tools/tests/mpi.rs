@@ -30,10 +30,15 @@ fn iltm(ranks: usize) -> Command {
 }
 
 fn solve(ranks: usize, capture: &Path, table: &Path) -> Command {
+    solve_several(ranks, &[capture], table)
+}
+
+fn solve_several(ranks: usize, captures: &[&Path], table: &Path) -> Command {
     let mut command = iltm(ranks);
     command
         .env("SOURCE_DATE_EPOCH", "1000000000")
-        .args([OsStr::new("solve"), capture.as_os_str()])
+        .arg("solve")
+        .args(captures)
         .args(["--method", "links", "-o"])
         .arg(table);
     command
@@ -90,6 +95,44 @@ fn an_error_is_said_once_and_has_its_exit_code() {
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(words(&output).matches("--no-such-option").count(), 1);
+}
+
+#[test]
+fn any_number_of_ranks_makes_the_same_table_of_projectors_that_overlap() {
+    let folder = tempdir().unwrap();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/folded-screen.toml");
+    let captures = ["left", "right"].map(|projector| {
+        let capture = folder.path().join(projector);
+        let order = "--rows 15 --cols 24 --photos 12 --projector 240x150";
+        let patterns = iltm(0)
+            .args([
+                OsStr::new("patterns"),
+                OsStr::new("-o"),
+                capture.as_os_str(),
+            ])
+            .args(order.split(' '))
+            .output()
+            .unwrap();
+        assert!(patterns.status.success(), "{}", words(&patterns));
+        let photographs = iltm(0)
+            .args([OsStr::new("simulate"), scene.as_os_str()])
+            .args(["--projector", projector, "--photograph"])
+            .arg(&capture)
+            .output()
+            .unwrap();
+        assert!(photographs.status.success(), "{}", words(&photographs));
+        capture
+    });
+    let captures = captures.each_ref().map(PathBuf::as_path);
+    let tables = [0, 1, 2, 4].map(|ranks| {
+        let table = folder.path().join(format!("{ranks}.iltm"));
+        let output = solve_several(ranks, &captures, &table).output().unwrap();
+        let words = words(&output);
+        assert!(output.status.success(), "{words}");
+        assert_eq!(words.matches("predicted to be").count(), 1, "{words}");
+        fs::read(table).unwrap()
+    });
+    assert!(tables.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
 /// The process of a rank, once it is there.

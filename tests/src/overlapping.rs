@@ -8,7 +8,7 @@ use crate::simulated::simulation;
 use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
 use iltm::capture::{CameraSettings, CaptureOptions, read_several};
 use iltm::compile::reference_white::WhiteRequest;
-use iltm::picture::{Picture, Response, Samples};
+use iltm::picture::{ContactSheet, Picture, Response, Samples, Tile};
 use iltm::progress::Silent;
 use iltm::scene::description::{Projector, Scene};
 use iltm::scene::fill_capture::UnfilledCapture;
@@ -30,6 +30,10 @@ const DETAILS: (u16, u16) = (40, 64);
 
 /// Light of the darkest part of a picture, of white.
 const DARKEST: f64 = 0.2;
+
+/// Light that is drawn as white in [`Screen::before_and_after`], of white: without a table some
+/// places are brighter than wanted.
+const BRIGHTEST: f64 = 1.8;
 
 /// Pixels on both sides of a border over which its step is looked at, and the side of the square
 /// that is averaged on each side.
@@ -254,6 +258,49 @@ impl<'s> Screen<'s> {
             }
             Picture::new(frame.size(), Samples::Sixteen(shown)).expect("one code a pixel")
         })
+    }
+
+    /// What a camera without noise sees of an even white and of a picture: wanted, without a table,
+    /// and with the table of all projectors.
+    ///
+    /// A viewer sets the brightness: each photograph is scaled to the light that is wanted of it.
+    pub fn before_and_after(&self, heading: &str, built: &BuiltTable) -> Picture {
+        let (rows, cols) = DETAILS;
+        let pictures = natural_images(Grid::new(rows, cols).expect("a grid"));
+        let camera = &self.scene.camera.size;
+        let side = |pixels: u32| u16::try_from(pixels).expect("a photograph");
+        let camera = FrameSize::new(side(camera.0), side(camera.1)).expect("a photograph");
+        let (size, places, looks) = (pixels(self.scene.grid()), self.lit_places(), self.looks());
+        let white = |_: Vector3<f64>| 1.0;
+        let picture = |place: Vector3<f64>| self.wanted(&pictures, 0, place);
+        let lit = |values: &dyn Fn(usize, Vector3<f64>) -> f64| -> Vec<f64> {
+            let value = |(pixel, look): (usize, &Option<(Vector3<f64>, usize)>)| {
+                look.map_or(0.0, |(place, _)| values(pixel, place))
+            };
+            looks.iter().enumerate().map(value).collect()
+        };
+        let row = |name: &str, light: &dyn Fn(Vector3<f64>) -> f64| {
+            let frame = frame(size, &places, light);
+            let frames = [projected(&frame), projected(&compensated(built, frame))];
+            let seen = self.photographs(&frames);
+            let wanted = lit(&|_, place| light(place));
+            let sum: f64 = wanted.iter().sum();
+            let tile = |words: &str, values: Vec<f64>| {
+                let scale = values.iter().sum::<f64>() / sum;
+                Tile::light((name, words), camera, values, scale * BRIGHTEST)
+            };
+            vec![
+                tile("wanted", wanted.clone()),
+                tile("without a table", lit(&|pixel, _| seen[0][pixel])),
+                tile("with the table of all", lit(&|pixel, _| seen[1][pixel])),
+            ]
+        };
+        let sheet = ContactSheet {
+            heading: heading.to_owned(),
+            rows: vec![row("White", &white), row("A picture", &picture)],
+            ..ContactSheet::default()
+        };
+        sheet.compose().expect("tiles")
     }
 
     /// The same of frames that are compensated somehow.

@@ -2,16 +2,27 @@
 //! alone, and with gains alone; and by pixels on all scenes of several projectors.
 //!
 //! `cargo run --release -p iltm-tests --bin projectors` prints the tables of
-//! `docs/several-projectors.md`.
+//! `docs/several-projectors.md`; with `-- FOLDER` it draws the pictures there, and nothing else.
 
+use iltm::picture::png;
 use iltm_tests::overlapping::{
     Screen, SeenOnScreen, learned_alone, learned_together, photograph_each, photograph_together,
 };
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, overlaps, photograph, scene, showable,
 };
+use std::path::Path;
+
+/// Scenes whose photographs are drawn, and the heading.
+const DRAWN: [(&str, &str); 2] = [
+    ("dome-of-four", "A dome with four projectors"),
+    ("folded-screen", "A folded screen with two projectors"),
+];
 
 fn main() {
+    if let Some(folder) = std::env::args_os().nth(1) {
+        return draw(Path::new(&folder));
+    }
     side_by_side();
     println!();
     by_pixels();
@@ -59,6 +70,20 @@ fn by_pixels() {
         let screen = Screen::new(&scene);
         row(name, "each alone", screen.seen_of_each(&alone));
         row(name, "together", screen.seen(&together));
+    }
+}
+
+/// Photographs before and after, a file for each scene.
+fn draw(folder: &Path) {
+    for (name, heading) in DRAWN {
+        let place = tempfile::tempdir().expect("a folder");
+        let scene = scene(name, &[]);
+        let captures = photograph_each(&scene, 60, &place.path().join(name));
+        let built = learned_together(&captures);
+        let picture = Screen::new(&scene).before_and_after(heading, &built);
+        let mut bytes = Vec::new();
+        png::write(&mut bytes, &picture).expect("a picture");
+        std::fs::write(folder.join(format!("{name}.png")), bytes).expect("written");
     }
 }
 
