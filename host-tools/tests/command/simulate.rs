@@ -240,6 +240,7 @@ fn a_folder_of_patterns_gets_the_photographs_that_it_lacks() {
     assert_eq!(user.json(PHOTOGRAPH)["photographs"], 1);
     let alone = difference(&user, "c/photos/011.png", "taken/011.png");
     assert!(alone < 1e-4 * other, "{alone} {other}");
+    assert_eq!(user.json(PHOTOGRAPH)["photographs"], 0);
 }
 
 #[test]
