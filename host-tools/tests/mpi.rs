@@ -1,6 +1,5 @@
 //! `mpirun iltm solve`: the same table from any number of ranks, and what a rank does that fails.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -105,19 +104,15 @@ fn any_number_of_ranks_makes_the_same_table_of_projectors_that_overlap() {
         let capture = folder.path().join(projector);
         let order = "--rows 15 --cols 24 --photos 12 --projector 240x150";
         let patterns = iltm(0)
-            .args([
-                OsStr::new("patterns"),
-                OsStr::new("-o"),
-                capture.as_os_str(),
-            ])
+            .args(["patterns", "-o"])
+            .arg(&capture)
             .args(order.split(' '))
             .output()
             .unwrap();
         assert!(patterns.status.success(), "{}", words(&patterns));
         let photographs = iltm(0)
-            .args([OsStr::new("simulate"), scene.as_os_str()])
-            .args(["--projector", projector, "--photograph"])
-            .arg(&capture)
+            .args(["simulate", "--projector", projector, "--photograph"])
+            .args([&capture, &scene])
             .output()
             .unwrap();
         assert!(photographs.status.success(), "{}", words(&photographs));
@@ -165,7 +160,7 @@ fn rank(mpirun: &Child, rank: usize) -> u32 {
     }
 }
 
-/// Waits until a rank has begun `MPI_Init` for good: its process has loaded Open MPI's messaging layer.
+/// Waits until a rank has joined the others: its process has loaded Open MPI's messaging layer.
 ///
 /// A process that dies before it has joined is a failed program to `mpirun`, which then gives no
 /// rank's number.

@@ -279,10 +279,14 @@ impl<'s> Screen<'s> {
             };
             looks.iter().enumerate().map(value).collect()
         };
-        let row = |name: &str, light: &dyn Fn(Vector3<f64>) -> f64| {
+        let lights: [&dyn Fn(Vector3<f64>) -> f64; 2] = [&white, &picture];
+        let frames = lights.iter().flat_map(|light| {
             let frame = frame(size, &places, light);
-            let frames = [projected(&frame), projected(&compensated(built, frame))];
-            let seen = self.photographs(&frames);
+            [projected(&frame), projected(&compensated(built, frame))]
+        });
+        let photographs = self.photographs(&frames.collect::<Vec<_>>());
+        let row = |name: &str, number: usize| {
+            let (light, seen) = (lights[number], &photographs[2 * number..]);
             let wanted = lit(&|_, place| light(place));
             let sum: f64 = wanted.iter().sum();
             let tile = |words: &str, values: Vec<f64>| {
@@ -297,7 +301,7 @@ impl<'s> Screen<'s> {
         };
         let sheet = ContactSheet {
             heading: heading.to_owned(),
-            rows: vec![row("White", &white), row("A picture", &picture)],
+            rows: vec![row("White", 0), row("A picture", 1)],
             ..ContactSheet::default()
         };
         sheet.compose().expect("tiles")
