@@ -1,12 +1,12 @@
 //! Several projectors in one scene, their frames side by side.
 
-use iltm::capture::{CaptureOptions, listed, read_several};
+use iltm::capture::{CaptureOptions, GateName, Verdict, listed, read_several};
 use iltm::compile::Provenance;
 use iltm::picture::{Picture, Samples, png};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::{FillCaptureError, UnfilledCapture};
-use iltm::scene::{Effect, Forced, VirtualCamera};
+use iltm::scene::{Effect, Forced, Pinhole, VirtualCamera};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::overlapping::{Screen, learned_alone, learned_together, photograph_each};
@@ -14,7 +14,7 @@ use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, photograph, scene, showable,
     simulation,
 };
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
@@ -302,6 +302,76 @@ fn captures_that_cannot_be_of_one_frame_are_refused_by_name() {
     let (words, next) = refused(&[captures[0].clone(), others[0].clone()]);
     assert!(words.contains("other photographs than in"), "{words}");
     assert!(next.contains("one camera"), "{next}");
+}
+
+/// Every fault is looked for in one capture of the right wall, beside a good one of the left.
+#[test]
+fn captures_between_which_something_changed_are_refused_or_said_by_name() {
+    let mut scene = two_walls();
+    for projector in &mut scene.projectors {
+        projector.black = 0.003;
+    }
+    let place = tempfile::tempdir().unwrap();
+    let captures = photograph_each(&scene, 10, &place.path().join("good"));
+    let right = |name: &str, scene: &Scene| {
+        let folder = place.path().join(name);
+        photograph_each(scene, 10, &folder)[1].clone()
+    };
+    let read = |right: &PathBuf, ignore: &[GateName]| {
+        let options = CaptureOptions {
+            ignore: ignore.to_vec(),
+            ..CaptureOptions::default()
+        };
+        read_several(&[captures[0].clone(), right.clone()], &options, &Silent)
+    };
+    // Those between captures come last.
+    let said = |right: &PathBuf| {
+        let several = read(right, &[]).unwrap();
+        let gates = several.all.diagnostics.gates;
+        let between = gates[gates.len() - 2..].iter();
+        let what = between.map(|gate| (gate.name, gate.verdict, gate.what.clone()));
+        what.collect::<Vec<_>>()
+    };
+    let good = said(&captures[1]);
+    println!("{good:?}");
+    assert!(good.iter().all(|(_, verdict, _)| *verdict == Verdict::Pass));
+
+    let mut bumped = scene.clone();
+    // The scene's camera, turned by a degree.
+    let (position, target) = (Vector3::new(2.6, 1.5, 2.6), Vector3::new(0.06, 1.15, 0.0));
+    let aspect = 160.0 / 100.0;
+    bumped.camera.view = Pinhole::new(position, target, Vector3::y(), 72.0, aspect).unwrap();
+    let bumped = right("bumped", &bumped);
+    let error = read(&bumped, &[]).unwrap_err().to_string();
+    println!("{error}");
+    assert!(error.contains("gate movement") && error.contains("the camera moved by at least"));
+    assert!(error.contains(&bumped.display().to_string()));
+    assert!(read(&bumped, &[GateName::Movement]).is_ok());
+
+    let mut lamp = scene.clone();
+    lamp.ambient = [0.002; 3];
+    let lamp = said(&right("lamp", &lamp));
+    println!("{lamp:?}");
+    assert!(lamp[1].0 == GateName::Drift && lamp[1].1 == Verdict::Warn);
+    assert!(lamp[1].2.contains("exposure"), "{lamp:?}");
+
+    let mut dark = scene.clone();
+    for projector in &mut dark.projectors {
+        projector.black = 0.0;
+    }
+    let dark = said(&right("dark", &dark));
+    println!("{dark:?}");
+    assert!(dark[0].0 == GateName::Movement && dark[0].1 == Verdict::Warn);
+    assert!(dark[0].2.contains("is not known"), "{dark:?}");
+
+    // The cables were not changed, or both displays show the left one's slides.
+    let mut mirrored = scene.clone();
+    mirrored.projectors.swap(0, 1);
+    let mirrored = right("mirrored", &mirrored);
+    let error = read(&mirrored, &[]).unwrap_err();
+    println!("{error}");
+    assert!(error.to_string().contains("show one picture"), "{error}");
+    assert!(error.next_step().contains("cables"));
 }
 
 /// One projector of a scene alone.

@@ -85,15 +85,16 @@ impl CaptureEvidence {
     ///
     /// # Errors
     /// A photograph's own error, or a phase's.
-    pub(crate) fn collect(
-        folder: &Path,
+    pub(crate) fn collect<'f>(
+        folder: &'f Path,
         sequence: &Sequence,
         settings: &Settings,
         progress: &dyn Progress,
-    ) -> Result<Self, CaptureError> {
+    ) -> Result<(Self, LinearPhotographs<'f>), CaptureError> {
         let reading = settings.camera.reading();
         let mut linear = LinearPhotographs::read(folder, sequence, &reading, progress)?;
-        Self::find(folder, sequence, (settings, None), &mut linear, progress)
+        let found = Self::find(folder, sequence, (settings, None), &mut linear, progress)?;
+        Ok((found, linear))
     }
 
     /// Goes through all phases. With `mixing`, of camera channels by projector channels, and

@@ -87,6 +87,7 @@ use cells::images;
 use evidence::CaptureEvidence;
 use format::sequence::{Selection, Sequence};
 use iltm_picture::progress::Progress;
+use photographs::linearise::LinearPhotographs;
 use std::path::Path;
 
 /// What the gates say of a capture, and what was measured in it.
@@ -110,13 +111,25 @@ pub fn read(
     options: &CaptureOptions,
     progress: &dyn Progress,
 ) -> Result<Measurements, CaptureError> {
-    let examined = examine(folder, options, progress)?;
+    Ok(read_keeping(folder, options, progress)?.0)
+}
+
+/// What was shown, and its photographs.
+type Kept<'f> = (Sequence, LinearPhotographs<'f>);
+
+/// The same, with what was shown and its photographs, for those who go on with them.
+pub(crate) fn read_keeping<'f>(
+    folder: &'f Path,
+    options: &CaptureOptions,
+    progress: &dyn Progress,
+) -> Result<(Measurements, Kept<'f>), CaptureError> {
+    let (examined, kept) = examine_keeping(folder, options, progress)?;
     let fails = |gate: &&Gate| gate.fails() && !options.ignore.contains(&gate.name);
     let failed: Vec<Gate> = examined.gates.iter().filter(fails).cloned().collect();
-    match examined.measurements {
-        Some(mut measurements) if failed.is_empty() => {
+    match (examined.measurements, kept) {
+        (Some(mut measurements), Some(kept)) if failed.is_empty() => {
             measurements.diagnostics.gates = examined.gates;
-            Ok(measurements)
+            Ok((measurements, kept))
         }
         // Without cells there is nothing to go on with, whatever is ignored.
         _ => Err(CaptureError::Refused {
@@ -141,6 +154,14 @@ pub fn examine(
     options: &CaptureOptions,
     progress: &dyn Progress,
 ) -> Result<Examined, CaptureError> {
+    Ok(examine_keeping(folder, options, progress)?.0)
+}
+
+fn examine_keeping<'f>(
+    folder: &'f Path,
+    options: &CaptureOptions,
+    progress: &dyn Progress,
+) -> Result<(Examined, Option<Kept<'f>>), CaptureError> {
     let manifest = Manifest::read(folder)?;
     let settings = Settings::read(folder)?;
     let mut selection = Selection::new(folder, &manifest.shots, options)?;
@@ -152,16 +173,17 @@ pub fn examine(
     };
     // What is there says more, if it is enough to go on with.
     let sequence = match Sequence::read(folder, selection) {
-        Err(_) if examined.gates[0].fails() => return Ok(examined),
+        Err(_) if examined.gates[0].fails() => return Ok((examined, None)),
         sequence => sequence?,
     };
-    let mut cause = None;
+    let (mut cause, mut kept) = (None, None);
     match CaptureEvidence::collect(folder, &sequence, &settings, progress) {
         Err(error @ CaptureError::Unlike { .. }) => {
             examined.gates.push(gates::files::refuse_format(&error));
         }
         found => {
-            let mut found = found?;
+            let (mut found, linear) = found?;
+            kept = Some(linear);
             cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
             examined.gates.extend(gates::judge(&sequence, &found));
             examined.white = Some(found.white.clone());
@@ -182,5 +204,5 @@ pub fn examine(
             .filter(|shot| shot.role == Role::Bernoulli);
         measurements.diagnostics.bernoulli_taken = bernoulli.count();
     }
-    Ok(examined)
+    Ok((examined, kept.map(|linear| (sequence, linear))))
 }

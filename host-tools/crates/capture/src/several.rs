@@ -8,12 +8,13 @@
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Measurements};
-use crate::devices::MeasuredDevices;
 use crate::format::error::CaptureError;
-use crate::format::manifest::Manifest;
-use crate::format::sequence::{CaptureOptions, Selection, Sequence};
+use crate::format::sequence::{CaptureOptions, Sequence};
+use crate::gate::{Gate, GateName};
+use crate::gates::between;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::sampled::Sampled;
+use crate::registration::black_shift;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::registration::projector_map::ProjectorMap;
 use iltm_picture::progress::Progress;
@@ -21,7 +22,7 @@ use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid};
 use nalgebra::DMatrix;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Samples along a cell's sides by which its share is worked out.
 const SHARE_SAMPLES: usize = 4;
@@ -80,18 +81,27 @@ pub fn read_several(
             });
         }
     }
-    let read = |folder: &PathBuf| crate::read(folder, options, progress);
-    let own: Vec<Measurements> = folders.iter().map(read).collect::<Result<_, _>>()?;
-    let wide = WideFrame::new(folders, own)?;
-    let sequences = folders.iter().map(|folder| sequence(folder, options));
-    let sequences: Vec<Sequence> = sequences.collect::<Result<_, _>>()?;
-    let mut photographs = Vec::new();
-    for ((folder, sequence), own) in folders.iter().zip(&sequences).zip(&wide.own) {
-        let reading = own.settings.camera.reading();
-        let mut linear = LinearPhotographs::read(folder, sequence, &reading, progress)?;
-        // Photographs change by it as they did when the capture was read.
-        MeasuredDevices::measure(folder, sequence, &own.settings, &mut linear, progress)?;
+    let (mut own, mut sequences, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
+    for folder in folders {
+        let (measurements, (sequence, mut linear)) =
+            crate::read_keeping(folder, options, progress)?;
+        // The others need the room.
+        linear.photographs.leave_memory();
+        own.push(measurements);
+        sequences.push(sequence);
         photographs.push(linear);
+    }
+    let wide = WideFrame::new(folders, own)?;
+    let gates = wide.gates(folders, &photographs);
+    let failed = gates
+        .iter()
+        .filter(|(_, gate)| gate.fails() && !options.ignore.contains(&gate.name));
+    let failed: Vec<_> = failed.cloned().collect();
+    if let Some((at, _)) = failed.first() {
+        return Err(CaptureError::Refused {
+            path: folders[*at].clone(),
+            gates: failed.into_iter().map(|(_, gate)| gate).collect(),
+        });
     }
     let pixels = wide.pixels(&photographs);
     let registration = wide.registration();
@@ -110,15 +120,10 @@ pub fn read_several(
         )?;
         measured.push(cells.channels);
     }
-    Ok(wide.joined(&measured, &pixels, registration))
-}
-
-/// The patterns of a capture that has been read before.
-fn sequence(folder: &Path, options: &CaptureOptions) -> Result<Sequence, CaptureError> {
-    let manifest = Manifest::read(folder)?;
-    let mut selection = Selection::new(folder, &manifest.shots, options)?;
-    selection.find_photographs(folder)?;
-    Sequence::read(folder, selection)
+    let mut several = wide.joined(&measured, &pixels, registration);
+    let gates = gates.into_iter().map(|(_, gate)| gate);
+    several.all.diagnostics.gates.extend(gates);
+    Ok(several)
 }
 
 /// The frames of all projectors side by side.
@@ -242,6 +247,60 @@ impl WideFrame {
             .map(|(own, linear)| CellPixels::choose(&own.registration, &linear.saturated))
             .collect();
         CellPixels::joined(&self.of_cells(|projector, cell| (&own[projector], cell)))
+    }
+
+    /// Judges whether the captures belong together; each gate with the capture that it is of.
+    fn gates(
+        &self,
+        folders: &[PathBuf],
+        photographs: &[LinearPhotographs<'_>],
+    ) -> Vec<(usize, Gate)> {
+        let names: Vec<String> = (folders.iter())
+            .map(|folder| folder.display().to_string())
+            .collect();
+        let registration = &self.own[0].registration;
+        let (width, binning) = (registration.camera.0, registration.binning);
+        let cell = binning as f64 * registration.cell_side();
+        let black = photographs[0].black_as_seen();
+        let mut gates = Vec::new();
+        for (other, linear) in photographs.iter().enumerate().skip(1) {
+            let pair = between::Pair {
+                first: &names[0],
+                other: &names[other],
+            };
+            let compared = black_shift::compare(&black, &linear.black_as_seen(), width);
+            gates.push((other, between::movement(&pair, (binning, cell), compared)));
+            gates.push((other, between::black(&pair, compared)));
+        }
+        for other in 0..self.own.len() {
+            for first in 0..other {
+                let pair = between::Pair {
+                    first: &names[first],
+                    other: &names[other],
+                };
+                let same = same_places(&self.own[first], &self.own[other]);
+                let gate = between::same_projector(&pair, same);
+                gates.extend(gate.map(|gate| (other, gate)));
+            }
+            let reached = self.pixel_shares[other]
+                .iter()
+                .filter(|share| **share > 0.0);
+            let (mut all, mut shared) = (0, 0);
+            for share in reached {
+                all += 1;
+                shared += usize::from(*share < 1.0);
+            }
+            let shared = shared as f64 / f64::from(all.max(1));
+            gates.extend(between::shared(&names[other], shared).map(|gate| (other, gate)));
+        }
+        // A picture that is the same is no other's.
+        if gates
+            .iter()
+            .any(|(_, gate)| gate.fails() && gate.name == GateName::Coverage)
+        {
+            gates.retain(|(_, gate)| gate.fails() || gate.name != GateName::Coverage);
+        }
+        gates
     }
 
     /// The projector with the largest share of each camera pixel.
@@ -517,6 +576,24 @@ fn place(own: &Measurements, pixel: usize) -> Option<[f32; 2]> {
     let cell = (cell != NO_CELL).then_some(cell as usize)?;
     let centre = |at: usize| at as f32 + 0.5;
     Some([centre(cell % grid.cols()), centre(cell / grid.cols())])
+}
+
+/// Part of the pixels that either projector reaches which see the same place in both pictures, to
+/// within half a cell.
+fn same_places(one: &Measurements, other: &Measurements) -> f64 {
+    let (width, height) = one.registration.camera;
+    let (mut reached, mut same) = (0.0, 0.0);
+    for pixel in 0..width * height {
+        match (place(one, pixel), place(other, pixel)) {
+            (None, None) => {}
+            (Some([x, y]), Some([other_x, other_y])) => {
+                reached += 1.0;
+                same += f64::from(u8::from((x - other_x).hypot(y - other_y) < 0.5));
+            }
+            _ => reached += 1.0,
+        }
+    }
+    same / f64::max(reached, 1.0)
 }
 
 /// Share of each projector at each camera pixel, by projector and pixel; 0 where it does not reach.

@@ -81,6 +81,8 @@ pub struct UnfilledCapture {
     photos: Vec<PathBuf>,
     frames: Vec<ProjectedFrame>,
     place: SlidePlace,
+    /// Each projector's photographs are a session of their own.
+    session: u64,
 }
 
 /// Where slides stand in the frame of all projectors.
@@ -195,6 +197,7 @@ impl UnfilledCapture {
             indices: shots.iter().map(|shot| shot.index).collect(),
             photos: shots.into_iter().map(|shot| shot.photo).collect(),
             place,
+            session: projector.unwrap_or(0) as u64,
         })
     }
 
@@ -253,6 +256,7 @@ impl UnfilledCapture {
         let missing = self.missing()?;
         progress.begin("taking photographs", missing.len() as u64);
         let taken = AtomicUsize::new(0);
+        let camera = camera.in_session(self.session);
         camera.take(&self.frames, &missing, |place, photograph| {
             if let Some(photograph) = photograph {
                 write(&photograph, &paths[place])?;
@@ -280,6 +284,7 @@ impl UnfilledCapture {
             folder: self.folder.clone(),
             index,
         })?;
+        let camera = camera.in_session(self.session);
         camera.take(&self.frames, &[place], |_, photograph| match photograph {
             Some(photograph) => write(&photograph, file),
             None => Err(FillCaptureError::Missed { index }),

@@ -153,6 +153,14 @@ impl<'s> VirtualCamera<'s> {
         self
     }
 
+    /// The same with the noise of another session; the first is 0.
+    pub(super) fn in_session(&self, session: u64) -> Self {
+        Self {
+            seed: self.seed ^ (session << 32),
+            ..self.clone()
+        }
+    }
+
     /// Takes the photographs at `places` of a session that shows `frames`, and hands
     /// each to `keep` with its place; `None` where the camera missed it. Returns the
     /// most bounces that light was followed over.

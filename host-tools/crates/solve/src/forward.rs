@@ -247,7 +247,7 @@ pub(super) fn product(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64>
     result
 }
 
-fn scale_rows(matrix: &mut DMatrix<f64>, by: &DVector<f64>) {
+pub(super) fn scale_rows(matrix: &mut DMatrix<f64>, by: &DVector<f64>) {
     for mut column in matrix.column_iter_mut() {
         column.component_mul_assign(by);
     }

@@ -15,9 +15,13 @@
 //! | `response` | which curve makes it add up best? | `response.rs` |
 //! | `noise` | how much of the result will be the camera's noise? | `noise.rs` |
 //!
+//! Between captures of several projectors, `between.rs` asks `coverage`, `movement` and `drift` once
+//! more.
+//!
 //! A gate that fails refuses the capture; one that warns does not. What a gate was
 //! judged from goes along as [`Evidence`], for whoever draws it.
 
+pub(crate) mod between;
 mod coverage;
 mod drift;
 pub(crate) mod files;

@@ -25,12 +25,9 @@ const NEXT_STEP: &str = "Fix tripod, projector and scene, use a remote release, 
                          capture again; photographs from before and after a bump do not belong \
                          together.";
 
-/// Shifts from which a remark and a refusal are made, in pixels.
-fn limits(moved: &Moved) -> (f64, f64) {
-    (
-        (WARN * moved.cell).max(FLOOR),
-        (MOST * moved.cell).max(2.0 * FLOOR),
-    )
+/// Shifts from which a remark and a refusal are made, in pixels, by a cell's side.
+pub(super) fn limits(cell: f64) -> (f64, f64) {
+    ((WARN * cell).max(FLOOR), (MOST * cell).max(2.0 * FLOOR))
 }
 
 /// Judges how far white moved: a bump with few patterns on one side of it is no step in their shifts.
@@ -40,7 +37,7 @@ fn white(sequence: &Sequence, moved: &Moved) -> Option<Gate> {
     let white = moved.white.as_ref()?;
     let size = white.off.iter().map(|off| off.1).fold(0.0, f64::max);
     let sure = if white.step.is_some() { 1.0 } else { 2.0 };
-    let (warn, limit) = limits(moved);
+    let (warn, limit) = limits(moved.cell);
     let (warn, limit) = (sure * warn, sure * limit);
     let photo = |at: usize| sequence.shots[white.off[at].0].photo.display();
     let between = match white.step {
@@ -84,7 +81,7 @@ pub(super) fn judge(sequence: &Sequence, moved: Option<&Moved>) -> Gate {
     let Some((moved, bump)) = bump else {
         return Gate::not_judged(name, "too few photographs or edges to see movement by");
     };
-    let (warn, limit) = limits(moved);
+    let (warn, limit) = limits(moved.cell);
     let sure = (SURE * bump.scatter).min(2.0 * limit);
     // Wide stripes and random patterns do not lie alike: a few at one end are no bump yet.
     let side = bump.before.min(moved.shifts.len() - bump.before);

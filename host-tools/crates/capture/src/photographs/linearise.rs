@@ -10,6 +10,7 @@ use crate::format::settings::Reading;
 use iltm_picture::DeviceResponse;
 use iltm_picture::progress::{Progress, Silent};
 use iltm_picture::statistics::quantile;
+use nalgebra::Matrix3;
 use std::path::Path;
 
 /// Flood light of a pixel, as a share of the 95th percentile of all pixels, from which the
@@ -125,8 +126,7 @@ impl<'a> LinearPhotographs<'a> {
         };
         let known = std::mem::take(&mut self.saturated);
         // Their room is needed for the new ones.
-        self.photographs.kept.clear();
-        self.photographs.spool.give_up();
+        self.photographs.forget();
         *self = Self::read(self.photographs.folder, sequence, &reading, progress)?;
         self.keep_saturated(&known);
         Ok(())
@@ -162,6 +162,22 @@ impl<'a> LinearPhotographs<'a> {
         self.photographs.format.check_like(&others.format)?;
         others.unmixing.clone_from(&self.photographs.unmixing);
         Ok(others)
+    }
+
+    /// Black in the camera's own channels, summed over them.
+    pub(crate) fn black_as_seen(&self) -> Vec<f32> {
+        let mixing = (self.photographs.unmixing())
+            .and_then(|inverse| Matrix3::from(inverse).transpose().try_inverse());
+        let Some(mixing) = mixing else {
+            return channel_sum(&self.black);
+        };
+        let mut sum = vec![0.0; self.black[0].len()];
+        for (plane, column) in self.black.iter().zip(mixing.column_iter()) {
+            for (sum, light) in sum.iter_mut().zip(plane) {
+                *sum += column.sum() * light;
+            }
+        }
+        sum
     }
 
     /// The middle of white and black in every pixel, summed over the channels.

@@ -33,6 +33,7 @@ use photo::{Photo, PhotoFormat};
 use rayon::prelude::*;
 use spool::Spool;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Bytes of photographs that are kept decoded in memory: 14 of 12 megapixels in colour. Those
 /// beyond are kept in a file.
@@ -55,8 +56,8 @@ pub(crate) struct Photographs<'a> {
     kept: Vec<Option<Photo>>,
     /// How many more may be kept.
     room: usize,
-    /// Those that there is no room for.
-    spool: Spool,
+    /// Those that there is no room for; written while others are decoded.
+    spool: Mutex<Spool>,
     /// Photographs decoded at the same time.
     batch: usize,
 }
@@ -99,13 +100,17 @@ impl<'a> Photographs<'a> {
             saturated: times.fold(Photo::SATURATED, |most, time| most.max((1.0 / time) as f32)),
             kept: vec![None; brackets.len()],
             room: KEPT_BYTES / format.bytes(),
-            spool: Spool::new(brackets.len(), format.channels, format.pixels()),
+            spool: Mutex::new(Spool::new(brackets.len(), format.channels, format.pixels())),
             folder,
             brackets,
             format,
             unmixing: None,
             batch,
         })
+    }
+
+    fn spool_mut(&mut self) -> &mut Spool {
+        self.spool.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether photographs differ in exposure.
@@ -120,15 +125,37 @@ impl<'a> Photographs<'a> {
             photo.unmix(&inverse, self.saturated);
         }
         let saturated = self.saturated;
-        self.spool.change(|photo| photo.unmix(&inverse, saturated));
+        self.spool_mut()
+            .change(|photo| photo.unmix(&inverse, saturated));
         self.unmixing = Some(inverse);
+    }
+
+    /// From camera channels to the projector's, if photographs are turned into them.
+    pub(crate) const fn unmixing(&self) -> Option<[[f32; 3]; 3]> {
+        self.unmixing
     }
 
     /// Keeps no photograph after it was visited: for those that are read once.
     pub(crate) fn read_once(mut self) -> Self {
         self.room = 0;
-        self.spool.give_up();
+        self.spool_mut().give_up();
         self
+    }
+
+    /// Keeps no photograph at all, to be dropped.
+    fn forget(&mut self) {
+        self.kept.clear();
+        self.spool_mut().give_up();
+    }
+
+    /// Keeps no photograph in memory from now on, but all in a file.
+    pub(crate) fn leave_memory(&mut self) {
+        self.room = 0;
+        for at in 0..self.kept.len() {
+            if let Some(photo) = self.kept[at].take() {
+                self.spool_mut().write(at, &photo);
+            }
+        }
     }
 
     /// Leaves room in memory for this list, which has the same format, beside `other`.
@@ -182,19 +209,28 @@ impl<'a> Photographs<'a> {
         mut visit: impl FnMut(&[(usize, &Photo)]),
     ) -> Result<(), CaptureError> {
         for batch in shots.chunks(self.batch) {
-            let spool = &mut self.spool;
+            let spool = self.spool_mut();
             let mut passing: Vec<Option<Photo>> =
                 batch.iter().map(|shot| spool.read(*shot)).collect();
             let unknown = |at: &usize| self.kept[batch[*at]].is_none() && passing[*at].is_none();
             let new: Vec<usize> = (0..batch.len()).filter(unknown).collect();
-            let read: Vec<_> = new.par_iter().map(|&at| self.read(batch[at])).collect();
+            let read = |(place, at): (usize, &usize)| {
+                let photo = self.read(batch[*at])?;
+                if place >= self.room {
+                    let spool = self.spool.lock();
+                    let mut spool = spool.unwrap_or_else(PoisonError::into_inner);
+                    spool.write(batch[*at], &photo);
+                }
+                Ok(photo)
+            };
+            let read: Vec<Result<Photo, CaptureError>> =
+                new.par_iter().enumerate().map(read).collect();
             for (at, photo) in new.into_iter().zip(read) {
                 let photo = photo?;
                 if self.room > 0 {
                     self.room -= 1;
                     self.kept[batch[at]] = Some(photo);
                 } else {
-                    self.spool.write(batch[at], &photo);
                     passing[at] = Some(photo);
                 }
             }
@@ -296,16 +332,16 @@ mod tests {
             seen
         };
         let (first, kept) = (collect(&mut photographs), collect(&mut photographs));
-        photographs.kept.fill(None);
-        (photographs.room, photographs.batch) = (0, 3);
+        photographs.batch = 3;
         assert_eq!(first, kept);
-        // Decoded once more, then from the temporary file alone, and again without one.
-        assert_eq!(first, collect(&mut photographs));
+        // From the temporary file alone, and decoded once more without one.
+        photographs.leave_memory();
+        assert!(photographs.kept.iter().all(Option::is_none));
         let (taken, away) = (folder.path().join("photos"), folder.path().join("away"));
         std::fs::rename(&taken, &away).unwrap();
         assert_eq!(first, collect(&mut photographs));
         std::fs::rename(&away, &taken).unwrap();
-        photographs.spool.give_up();
+        photographs.spool_mut().give_up();
         assert_eq!(first, collect(&mut photographs));
         assert!(
             first

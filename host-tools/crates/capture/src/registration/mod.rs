@@ -8,6 +8,7 @@
 //! cells are left out ([`mixed_pixels`]). On the path-traced captures
 //! this lowers the error of the whole compensation more than any other step.
 
+pub(crate) mod black_shift;
 pub(crate) mod cell_map;
 pub(crate) mod gray_code;
 pub(crate) mod image_matching;

@@ -60,6 +60,8 @@ pub(super) struct Data {
     how: How,
     /// Cells that can be solved for.
     live: Vec<bool>,
+    /// Whether each block's row is solved, in one sweep; `None` for all of them, in two.
+    asked: Option<Vec<bool>>,
     /// Deviation of a lit cell's light, by channel and cell.
     noise: Vec<Vec<f32>>,
     /// Light of all blocks, a column each: channel after channel. Means are reduced.
@@ -100,6 +102,36 @@ pub(super) fn links(
     progress: &dyn Progress,
 ) -> Vec<Solution> {
     let data = Data::new(prepared, grid, chosen, how);
+    found(data, prepared, chosen, processes, progress)
+}
+
+/// Solves from all photographs for the rows of some cells, in one sweep, with few splits and the rows
+/// that all channels share; the other cells have no rows.
+pub(super) fn rows_of_cells(
+    cells: &[usize],
+    prepared: &Prepared,
+    grid: Grid,
+    processes: Processes,
+    progress: &dyn Progress,
+) -> Solution {
+    let how = How {
+        splits: Splits::Few,
+        own_rows: false,
+    };
+    let all = prepared.with_role(|_| true);
+    let mut data = Data::new(prepared, grid, &all, how);
+    data.asked = Some(data.tree.needed_for(cells));
+    let mut found = found(data, prepared, &all, processes, progress);
+    found.pop().expect("one answer at least")
+}
+
+fn found(
+    data: Data,
+    prepared: &Prepared,
+    chosen: &[usize],
+    processes: Processes,
+    progress: &dyn Progress,
+) -> Vec<Solution> {
     processes.ask(&data);
     let (state, own) = sweeps(&data, processes, progress);
     let tree = Arc::new(data.tree.clone());
@@ -132,7 +164,12 @@ fn sweeps(data: &Data, processes: Processes, progress: &dyn Progress) -> (State,
         sweep.fit_gains(level, &mut state);
     }
     // Gains of coarse rows are worse than those that the first sweep has ended with.
-    for level in (1..=SECOND_SWEEP.min(top)).rev() {
+    let second = if data.asked.is_none() {
+        SECOND_SWEEP
+    } else {
+        0
+    };
+    for level in (1..=second.min(top)).rev() {
         sweep.solve_level(level, &mut state);
     }
     let own = sweep.solve_cells(&mut state);
@@ -172,9 +209,9 @@ impl Data {
         };
         let mut sources = fill(tree.blocks(), &|channel| prepared.sources(channel, chosen));
         row::sum_cells(&tree, &mut sources);
+        let least: Vec<f64> = prepared.weights.row_iter().map(|row| row.min()).collect();
         let variances = DMatrix::from_fn(photographs, cells, |k, cell| {
-            let least = prepared.weights.row(cell).min();
-            (least / prepared.weights[(cell, chosen[k])]) as f32
+            (least[cell] / prepared.weights[(cell, chosen[k])]) as f32
         });
         let noise = (prepared.noise.iter()).map(|cells| {
             cells
@@ -187,6 +224,7 @@ impl Data {
             photographs,
             how,
             live: prepared.live.clone(),
+            asked: None,
             noise: noise.collect(),
             sources,
             light: fill(cells, &|channel| {
@@ -201,6 +239,11 @@ impl Data {
 
     const fn channels(&self) -> usize {
         self.noise.len()
+    }
+
+    /// Whether the row of a block is solved.
+    fn is_asked(&self, block: usize) -> bool {
+        self.asked.as_ref().is_none_or(|asked| asked[block])
     }
 
     /// Whether each channel has rows of its own.
@@ -246,13 +289,16 @@ impl Data {
     }
 
     /// What the row of a block must make of the light: the mean over its cells,
-    /// those with less noise counting more. `None` if no cell is live.
+    /// those with less noise counting more. `None` if no cell is live, or the row is not asked for.
     fn target<'t>(
         &'t self,
         block: usize,
         sources: &'t DMatrix<f32>,
         gains: &[Vec<f32>],
     ) -> Option<Target<'t>> {
+        if !self.is_asked(block) {
+            return None;
+        }
         let cells = self.tree.cells_of(block);
         let live = |cell: &usize| self.live[*cell];
         let cells: Vec<usize> = cells.into_iter().filter(live).collect();
@@ -424,7 +470,7 @@ impl Sweep<'_> {
         rows
     }
 
-    /// What is made of the fit of each block of a level; `None` if no cell of it is live.
+    /// What is made of the fit of each block of a level; `None` if it has no [`target`](Data::target).
     fn fit_level<T: Serialize + DeserializeOwned + Send>(
         &self,
         level: usize,
@@ -447,8 +493,14 @@ impl Sweep<'_> {
             if !self.data.live[cell] {
                 return vec![(0.0, 0.0, 0.0); self.data.channels()];
             }
+            let block = self.data.tree.ancestor(cell, level);
+            if !self.data.is_asked(block) {
+                // What a coarser row gave stays.
+                let gains = state.gains.iter().map(|gains| gains[cell]);
+                return gains.map(|gain| (gain, 0.0, 0.0)).collect();
+            }
             let mut reflected = vec![0.0; self.data.sources.nrows()];
-            let row = &state.rows[self.data.tree.ancestor(cell, level)];
+            let row = &state.rows[block];
             row.add_light(&self.data.sources, &mut reflected);
             let channel = |channel: usize| {
                 let segment = self.data.segment(channel);

@@ -172,6 +172,23 @@ impl Quadtree {
         }
     }
 
+    /// Whether the rows of some cells need that of each block: the cells themselves, and what
+    /// [surrounds](Self::around) them on every level.
+    pub(super) fn needed_for(&self, cells: &[usize]) -> Vec<bool> {
+        let mut needed = vec![false; self.blocks()];
+        for cell in cells {
+            needed[*cell] = true;
+        }
+        for block in 0..self.blocks() {
+            if needed[block] {
+                for (above, _) in self.around(block) {
+                    needed[above] = true;
+                }
+            }
+        }
+        needed
+    }
+
     /// The blocks whose centres surround that of `block`, one level above it, with their shares:
     /// its parent (9), the two beside that which are nearer (3 each) and the one between (1). None
     /// surround one of the coarsest level that links are of.
@@ -252,5 +269,12 @@ mod tests {
         assert_eq!(tree.around(5), [(16, 9.0), (17, 3.0), (18, 3.0), (19, 1.0)]);
         assert_eq!(tree.around(7), [(17, 9.0), (19, 3.0)]);
         assert!(tree.around(16).is_empty());
+        let needed = |cells: &[usize]| {
+            let needed = tree.needed_for(cells).into_iter().enumerate();
+            let needed = needed.filter_map(|(block, needed)| needed.then_some(block));
+            needed.collect::<Vec<_>>()
+        };
+        assert_eq!(needed(&[0, 7]), [0, 7, 16, 17, 19]);
+        assert!(needed(&[]).is_empty());
     }
 }

@@ -1,0 +1,176 @@
+//! Gates between captures of several projectors: one camera that stood still, one light in the
+//! room, and each projector once.
+
+use super::movement;
+use crate::gate::{Gate, GateName, Verdict};
+use crate::registration::black_shift::BlackShift;
+
+/// Part of the light under black that one has less, from which it is worth a word.
+const DARKER: f64 = 0.1;
+
+/// Share of a picture that others light too, from which it is worth a word.
+const MOST_SHARED: f64 = 0.5;
+
+const STAND_STILL: &str = "Fix the camera, let nobody touch it between the captures, and take the \
+                           one that came after the bump again.";
+
+const LEAVE_LIGHT: &str = "Make sure that nobody touched the camera. A little light in the room that \
+                           stays shows it next time.";
+
+/// The first capture and another one, by name.
+pub(crate) struct Pair<'p> {
+    pub(crate) first: &'p str,
+    pub(crate) other: &'p str,
+}
+
+/// Judges whether the camera stood still, by photographs of black; `binning` is pixels of the file
+/// along a pixel, and `cell` a cell's side in pixels of the file.
+pub(crate) fn movement(
+    pair: &Pair<'_>,
+    (binning, cell): (usize, f64),
+    black: Option<BlackShift>,
+) -> Gate {
+    let Pair { first, other } = pair;
+    let name = GateName::Movement;
+    let (warn, limit) = movement::limits(cell);
+    let untold = || Gate {
+        limit,
+        unit: "pixels",
+        what: format!(
+            "whether the camera stood still between {first} and {other} is not known: their \
+             photographs of black are too dark, too even, or lit differently"
+        ),
+        ..Gate::of_share(name, Verdict::Warn, (0.0, 0.0), LEAVE_LIGHT)
+    };
+    let Some(BlackShift { shift, unsure, .. }) = black else {
+        return untold();
+    };
+    let [size, unsure] = [shift[0].hypot(shift[1]), unsure].map(|pixels| binning as f64 * pixels);
+    let sure = (size - unsure).max(0.0);
+    let verdict = Verdict::of(sure, warn, limit);
+    if verdict == Verdict::Pass && unsure > limit {
+        return untold();
+    }
+    let what = match verdict {
+        Verdict::Pass => format!("the camera stood still between {first} and {other}"),
+        _ => format!("the camera moved by at least {sure:.2} pixels between {first} and {other}"),
+    };
+    Gate {
+        number: sure,
+        limit,
+        unit: "pixels",
+        what,
+        ..Gate::of_share(name, verdict, (0.0, 0.0), STAND_STILL)
+    }
+}
+
+/// Judges whether the light under black is the same. It tells changes of exposure, but the room's
+/// light may change without harm, so that it refuses nothing.
+pub(crate) fn black(pair: &Pair<'_>, black: Option<BlackShift>) -> Gate {
+    let Pair { first, other } = pair;
+    let name = GateName::Drift;
+    let Some(BlackShift { brighter, .. }) = black else {
+        let why = format!("{first} and {other} have no light under black to compare");
+        return Gate::not_judged(name, why);
+    };
+    let darker = 1.0 - brighter.min(brighter.recip());
+    let verdict = Verdict::of(darker, DARKER, 1.0);
+    let what = match verdict {
+        Verdict::Pass => format!("{first} and {other} have the same light under black"),
+        _ => format!(
+            "{other} has {brighter:.2} times the light of {first} under black: the exposure, the \
+             room's light, or what another projector showed has changed"
+        ),
+    };
+    Gate {
+        what,
+        ..Gate::of_share(
+            name,
+            verdict,
+            (darker, 1.0),
+            "Make sure that exposure, aperture and ISO are the same in both, and that all other \
+             projectors show black.",
+        )
+    }
+}
+
+/// Judges whether two captures are of two projectors. `same` is the part of the pixels that both
+/// know which see the same place in both pictures.
+pub(crate) fn same_projector(pair: &Pair<'_>, same: f64) -> Option<Gate> {
+    let Pair { first, other } = pair;
+    let next_step = "Check the cables and that the computer does not mirror its displays, and take \
+                     the capture again with the other projector alone. Projectors that show one \
+                     picture on purpose need one capture, with all of them on.";
+    (same > MOST_SHARED).then(|| Gate {
+        what: format!(
+            "{first} and {other} show one picture: the same projector, or mirrored displays"
+        ),
+        ..Gate::of_share(
+            GateName::Coverage,
+            Verdict::Fail,
+            (same, MOST_SHARED),
+            next_step,
+        )
+    })
+}
+
+/// Judges how much of a picture other projectors light too.
+pub(crate) fn shared(name: &str, shared: f64) -> Option<Gate> {
+    let next_step = "Turn the projectors further apart if they can be: what two light is only as \
+                     bright as one.";
+    (shared > MOST_SHARED).then(|| Gate {
+        what: format!(
+            "{:.0} % of the picture of {name} is lit by others too",
+            100.0 * shared
+        ),
+        ..Gate::of_share(GateName::Coverage, Verdict::Warn, (shared, 1.0), next_step)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAIR: Pair<'_> = Pair {
+        first: "left",
+        other: "right",
+    };
+
+    fn verdict(shift: [f64; 2], unsure: f64, brighter: f64) -> (Verdict, Verdict) {
+        let compared = Some(BlackShift {
+            shift,
+            unsure,
+            brighter,
+        });
+        // Cells of 10 pixels of the file: limits are .3 and .6 of them.
+        let stood = movement(&PAIR, (2, 10.0), compared);
+        (stood.verdict, black(&PAIR, compared).verdict)
+    }
+
+    #[test]
+    fn a_camera_that_surely_moved_refuses_and_one_that_may_have_is_said() {
+        use Verdict::{Fail, Pass, Warn};
+        assert_eq!(verdict([0.1, 0.0], 0.02, 1.0), (Pass, Pass));
+        // Of two pixels of the file each: .4 at least, then .64.
+        assert_eq!(verdict([0.15, 0.2], 0.05, 1.0), (Warn, Pass));
+        assert_eq!(verdict([0.0, -0.35], 0.03, 1.0), (Fail, Pass));
+        // Surely not more than nothing, but perhaps much.
+        assert_eq!(verdict([0.0, 0.2], 0.4, 1.0), (Warn, Pass));
+        for brighter in [1.15, 0.85, 50.0, 0.01] {
+            assert_eq!(verdict([0.0; 2], 0.02, brighter), (Pass, Warn));
+        }
+        assert_eq!(verdict([0.0; 2], 0.02, 1.08), (Pass, Pass));
+        let unknown = movement(&PAIR, (1, 10.0), None);
+        assert!(unknown.what.contains("left and right is not known"));
+        assert_eq!(unknown.verdict, Warn);
+        assert_eq!(black(&PAIR, None).verdict, Verdict::NotJudged);
+    }
+
+    #[test]
+    fn one_picture_in_two_captures_is_refused_and_a_large_overlap_is_said() {
+        let same = |part| same_projector(&PAIR, part).map(|gate| gate.verdict);
+        assert_eq!((same(0.5), same(0.6)), (None, Some(Verdict::Fail)));
+        let shared = |part| shared("left", part).map(|gate| gate.verdict);
+        assert_eq!((shared(0.5), shared(0.6)), (None, Some(Verdict::Warn)));
+    }
+}
