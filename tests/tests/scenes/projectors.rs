@@ -363,6 +363,7 @@ fn captures_between_which_something_changed_are_refused_or_said_by_name() {
     println!("{dark:?}");
     assert!(dark[0].0 == GateName::Movement && dark[0].1 == Verdict::Warn);
     assert!(dark[0].2.contains("is not known"), "{dark:?}");
+    assert!(dark[1].1 == Verdict::Warn, "{dark:?}");
 
     // The cables were not changed, or both displays show the left one's slides.
     let mut mirrored = scene.clone();

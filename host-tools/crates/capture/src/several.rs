@@ -268,9 +268,11 @@ impl WideFrame {
                 first: &names[0],
                 other: &names[other],
             };
-            let compared = black_shift::compare(&black, &linear.black_as_seen(), width);
-            gates.push((other, between::movement(&pair, (binning, cell), compared)));
-            gates.push((other, between::black(&pair, compared)));
+            let own = linear.black_as_seen();
+            let shift = black_shift::find(&black, &own, width);
+            gates.push((other, between::movement(&pair, (binning, cell), shift)));
+            let brighter = black_shift::brighter(&black, &own);
+            gates.push((other, between::black(&pair, brighter)));
         }
         for other in 0..self.own.len() {
             for first in 0..other {

@@ -42,7 +42,7 @@ pub(crate) fn movement(
         ),
         ..Gate::of_share(name, Verdict::Warn, (0.0, 0.0), LEAVE_LIGHT)
     };
-    let Some(BlackShift { shift, unsure, .. }) = black else {
+    let Some(BlackShift { shift, unsure }) = black else {
         return untold();
     };
     let [size, unsure] = [shift[0].hypot(shift[1]), unsure].map(|pixels| binning as f64 * pixels);
@@ -66,11 +66,11 @@ pub(crate) fn movement(
 
 /// Judges whether the light under black is the same. It tells changes of exposure, but the room's
 /// light may change without harm, so that it refuses nothing.
-pub(crate) fn black(pair: &Pair<'_>, black: Option<BlackShift>) -> Gate {
+pub(crate) fn black(pair: &Pair<'_>, brighter: Option<f64>) -> Gate {
     let Pair { first, other } = pair;
     let name = GateName::Drift;
-    let Some(BlackShift { brighter, .. }) = black else {
-        let why = format!("{first} and {other} have no light under black to compare");
+    let Some(brighter) = brighter else {
+        let why = format!("{first} or {other} has no light under black to compare");
         return Gate::not_judged(name, why);
     };
     let darker = 1.0 - brighter.min(brighter.recip());
@@ -137,14 +137,10 @@ mod tests {
     };
 
     fn verdict(shift: [f64; 2], unsure: f64, brighter: f64) -> (Verdict, Verdict) {
-        let compared = Some(BlackShift {
-            shift,
-            unsure,
-            brighter,
-        });
+        let found = Some(BlackShift { shift, unsure });
         // Cells of 10 pixels of the file: limits are .3 and .6 of them.
-        let stood = movement(&PAIR, (2, 10.0), compared);
-        (stood.verdict, black(&PAIR, compared).verdict)
+        let stood = movement(&PAIR, (2, 10.0), found);
+        (stood.verdict, black(&PAIR, Some(brighter)).verdict)
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Image registration of two photographs of black: whether a camera stood still between captures
-//! of one scene, and how much brighter the second one is.
+//! of one scene.
 //!
 //! Each capture has its own patterns, but black shows the same scene in the same light: the room's,
 //! and what projectors give off that show black. Both relative to their means, the photographs
@@ -27,20 +27,25 @@ const CHANCE: f64 = 12.0;
 /// How many times its deviation a shift is taken to be off.
 const SURE: f64 = 4.0;
 
-/// One photograph of black against another.
+/// How far a photograph of black lies beside another.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct BlackShift {
-    /// Shift right and down, in pixels.
+    /// Right and down, in pixels.
     pub(crate) shift: [f64; 2],
     /// How far that may be off, in pixels.
     pub(crate) unsure: f64,
-    /// Light of the second relative to the first.
-    pub(crate) brighter: f64,
 }
 
-/// Compares two photographs of one scene under black, of so many pixels a row; `None` where they
+/// Light of the second photograph relative to the first; `None` if one of them has none.
+pub(crate) fn brighter(first: &[f32], second: &[f32]) -> Option<f64> {
+    let [first, second] =
+        [first, second].map(|photo| photo.iter().map(|light| f64::from(*light)).sum::<f64>());
+    (first > 0.0 && second > 0.0).then(|| second / first)
+}
+
+/// Finds the shift of the second photograph of a scene under black, of so many pixels a row; `None` where they
 /// have too few pixels, no light, or no edges.
-pub(crate) fn compare(first: &[f32], second: &[f32], width: usize) -> Option<BlackShift> {
+pub(crate) fn find(first: &[f32], second: &[f32], width: usize) -> Option<BlackShift> {
     let (first, second) = (Squares::of(first, width)?, Squares::of(second, width)?);
     let near = first.most_alike(&second)?;
     let mut parts = vec![Equations::default(); PARTS * PARTS];
@@ -64,7 +69,6 @@ pub(crate) fn compare(first: &[f32], second: &[f32], width: usize) -> Option<Bla
     Some(BlackShift {
         shift: [0, 1].map(|axis| side * (near[axis] as f64 + shift[axis])),
         unsure: SURE * side * (variance(0) + variance(1)).sqrt(),
-        brighter: second.mean / first.mean,
     })
 }
 
@@ -72,8 +76,6 @@ pub(crate) fn compare(first: &[f32], second: &[f32], width: usize) -> Option<Bla
 struct Squares {
     rows: usize,
     cols: usize,
-    /// Of the photograph.
-    mean: f64,
     /// Relative to the mean, and a little smoothed: differences of sharp edges are no slopes.
     light: Vec<f64>,
     /// Slopes to the right and down, 0 along the border.
@@ -124,7 +126,6 @@ impl Squares {
             slopes: (0..light.len()).map(slope).collect(),
             rows,
             cols,
-            mean,
             light,
         })
     }
@@ -230,16 +231,17 @@ mod tests {
         for (seed, shift) in (0..).zip([[0.0, 0.0], [0.4, -0.2], [-1.0, 0.6], [0.15, 0.0]]) {
             let first = room([0.0; 2], 0.002, 0.0005, 10 + seed);
             let second = room(shift, 0.0024, 0.0005, 20 + seed);
-            let found = compare(&first, &second, WIDTH).unwrap();
+            let found = find(&first, &second, WIDTH).unwrap();
             let off = (found.shift[0] - shift[0]).hypot(found.shift[1] - shift[1]);
             // Sharp edges are told an eighth too far.
             let size = shift[0].hypot(shift[1]);
             assert!(off < found.unsure.max(0.125 * size), "{shift:?}: {found:?}");
             assert!(found.unsure < 0.2, "{shift:?}: {found:?}");
-            assert!((found.brighter - 1.2).abs() < 0.01, "{found:?}");
+            let brighter = brighter(&first, &second).unwrap();
+            assert!((brighter - 1.2).abs() < 0.01, "{brighter}");
         }
         let far = room([14.0, -9.0], 0.002, 0.0005, 7);
-        let found = compare(&room([0.0; 2], 0.002, 0.0005, 8), &far, WIDTH).unwrap();
+        let found = find(&room([0.0; 2], 0.002, 0.0005, 8), &far, WIDTH).unwrap();
         let off = (found.shift[0] - 14.0).hypot(found.shift[1] + 9.0);
         assert!(off < found.unsure.max(0.5), "{found:?}");
     }
@@ -248,7 +250,7 @@ mod tests {
     fn noise_alone_and_a_lamp_in_a_corner_are_no_shift() {
         let noise = |seed| room([0.0; 2], 0.0, 0.0005, seed);
         for seed in 0..20 {
-            let found = compare(&noise(2 * seed), &noise(2 * seed + 1), WIDTH);
+            let found = find(&noise(2 * seed), &noise(2 * seed + 1), WIDTH);
             assert_eq!(found, None);
         }
         let first = room([0.0; 2], 0.002, 0.0002, 3);
@@ -257,9 +259,9 @@ mod tests {
             let (x, y) = ((at % WIDTH) as f32, (at / WIDTH) as f32);
             *light += 0.01 * (-(x * x + y * y) / 900.0).exp();
         }
-        let found = compare(&first, &second, WIDTH).unwrap();
+        let found = find(&first, &second, WIDTH).unwrap();
         let [x, y] = found.shift;
         assert!(x.hypot(y) < found.unsure, "{found:?}");
-        assert_eq!(compare(&[0.0; 80], &[0.0; 80], 10), None);
+        assert_eq!(find(&[0.0; 80], &[0.0; 80], 10), None);
     }
 }
