@@ -124,8 +124,8 @@ pub(crate) fn read_keeping<'f>(
     progress: &dyn Progress,
 ) -> Result<(Measurements, Kept<'f>), CaptureError> {
     let (examined, kept) = examine_keeping(folder, options, progress)?;
-    let fails = |gate: &&Gate| gate.fails() && !options.ignore.contains(&gate.name);
-    let failed: Vec<Gate> = examined.gates.iter().filter(fails).cloned().collect();
+    let failed = examined.gates.iter().filter(|gate| options.refuses(gate));
+    let failed: Vec<Gate> = failed.cloned().collect();
     match (examined.measurements, kept) {
         (Some(mut measurements), Some(kept)) if failed.is_empty() => {
             measurements.diagnostics.gates = examined.gates;

@@ -10,7 +10,7 @@ use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Measurements};
 use crate::format::error::CaptureError;
 use crate::format::sequence::{CaptureOptions, Sequence};
-use crate::gate::{Gate, GateName};
+use crate::gate::Gate;
 use crate::gates::between;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::sampled::Sampled;
@@ -93,9 +93,7 @@ pub fn read_several(
     }
     let wide = WideFrame::new(folders, own)?;
     let gates = wide.gates(folders, &photographs);
-    let failed = gates
-        .iter()
-        .filter(|(_, gate)| gate.fails() && !options.ignore.contains(&gate.name));
+    let failed = gates.iter().filter(|(_, gate)| options.refuses(gate));
     let failed: Vec<_> = failed.cloned().collect();
     if let Some((at, _)) = failed.first() {
         return Err(CaptureError::Refused {
@@ -261,46 +259,30 @@ impl WideFrame {
         let registration = &self.own[0].registration;
         let (width, binning) = (registration.camera.0, registration.binning);
         let cell = binning as f64 * registration.cell_side();
+        let pair = |first: usize, other: usize| between::Pair {
+            first: &names[first],
+            other: &names[other],
+        };
         let black = photographs[0].black_as_seen();
         let mut gates = Vec::new();
         for (other, linear) in photographs.iter().enumerate().skip(1) {
-            let pair = between::Pair {
-                first: &names[0],
-                other: &names[other],
-            };
             let own = linear.black_as_seen();
             let shift = black_shift::find(&black, &own, width);
-            gates.push((other, between::movement(&pair, (binning, cell), shift)));
+            let movement = between::movement(&pair(0, other), (binning, cell), shift);
             let brighter = black_shift::brighter(&black, &own);
-            gates.push((other, between::black(&pair, brighter)));
+            gates.push((other, movement));
+            gates.push((other, between::black(&pair(0, other), brighter)));
         }
-        for other in 0..self.own.len() {
-            for first in 0..other {
-                let pair = between::Pair {
-                    first: &names[first],
-                    other: &names[other],
-                };
+        for (other, shares) in self.pixel_shares.iter().enumerate() {
+            let same = (0..other).filter_map(|first| {
                 let same = same_places(&self.own[first], &self.own[other]);
-                let gate = between::same_projector(&pair, same);
-                gates.extend(gate.map(|gate| (other, gate)));
-            }
-            let reached = self.pixel_shares[other]
-                .iter()
-                .filter(|share| **share > 0.0);
-            let (mut all, mut shared) = (0, 0);
-            for share in reached {
-                all += 1;
-                shared += usize::from(*share < 1.0);
-            }
-            let shared = shared as f64 / f64::from(all.max(1));
-            gates.extend(between::shared(&names[other], shared).map(|gate| (other, gate)));
-        }
-        // A picture that is the same is no other's.
-        if gates
-            .iter()
-            .any(|(_, gate)| gate.fails() && gate.name == GateName::Coverage)
-        {
-            gates.retain(|(_, gate)| gate.fails() || gate.name != GateName::Coverage);
+                between::same_projector(&pair(first, other), same)
+            });
+            let reached = shares.iter().filter(|share| **share > 0.0);
+            let shared = reached.clone().filter(|share| **share < 1.0).count();
+            let shared = shared as f64 / reached.count().max(1) as f64;
+            let found = same.chain(between::shared(&names[other], shared));
+            gates.extend(found.map(|gate| (other, gate)));
         }
         gates
     }

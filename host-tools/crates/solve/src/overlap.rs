@@ -37,13 +37,14 @@ pub fn solve_several(
     if !several.is_overlapping() {
         return solve(&several.all, options, progress);
     }
+    let overlapping = overlapping(several);
     for channel in 0..several.all.channels.len() {
-        by_light(several, channel);
+        by_light(several, &overlapping, channel);
     }
     for _ in 0..ROUNDS {
-        let given = given_by_rows(several, options, progress)?;
+        let given = given_by_rows(several, &overlapping, options, progress)?;
         for (channel, given) in given.iter().enumerate() {
-            by_rows(several, given, channel);
+            by_rows(several, &overlapping, (channel, given));
         }
     }
     solve(&several.all, options, progress)
@@ -53,11 +54,11 @@ pub fn solve_several(
 /// mean nothing.
 fn given_by_rows(
     several: &SeveralCaptures,
+    overlapping: &[Overlapping],
     options: &SolveOptions,
     progress: &dyn Progress,
 ) -> Result<Vec<DMatrix<f64>>, SolveError> {
     let prepared = Prepared::new(&(&several.all).into())?;
-    let overlapping = overlapping(several);
     let cells: Vec<usize> = overlapping.iter().map(|of| of.cell).collect();
     let (grid, processes) = (several.all.grid, options.processes);
     progress.begin("finding what each projector throws where they overlap", 0);
@@ -99,7 +100,7 @@ fn overlapping(several: &SeveralCaptures) -> Vec<Overlapping> {
 }
 
 /// Sets the right sides of one channel by the light of the cells.
-fn by_light(several: &mut SeveralCaptures, channel: usize) {
+fn by_light(several: &mut SeveralCaptures, overlapping: &[Overlapping], channel: usize) {
     let measured = &several.all.channels[channel];
     let (patterns, light) = (&measured.patterns, &measured.observations);
     // What bounces follows how much of the picture is lit.
@@ -111,14 +112,14 @@ fn by_light(several: &mut SeveralCaptures, channel: usize) {
         fit(&columns, &row(light, cell, &views))
     };
     let mut found = Vec::new();
-    for Overlapping { cell, others } in overlapping(several) {
+    for &Overlapping { cell, ref others } in overlapping {
         let own = &several.projectors[several.projector_of(cell)];
         let near = around(several.all.grid, own, cell);
         // Cells beside it light some of its pixels as well.
         let direct: f64 = follows(cell, own, &near)[..near.len()].iter().sum();
-        for (projector, cells) in others {
-            let of = follows(cell, &several.projectors[projector], &cells);
-            let parts = of.iter().zip(&cells);
+        for &(projector, ref cells) in others {
+            let of = follows(cell, &several.projectors[projector], cells);
+            let parts = of.iter().zip(cells);
             let parts: Vec<_> = parts
                 .map(|(part, other)| (*other, relative(*part, direct)))
                 .collect();
@@ -129,17 +130,21 @@ fn by_light(several: &mut SeveralCaptures, channel: usize) {
 }
 
 /// Sets the right sides of one channel by what the rows of an inverse give.
-fn by_rows(several: &mut SeveralCaptures, given: &DMatrix<f64>, channel: usize) {
+fn by_rows(
+    several: &mut SeveralCaptures,
+    overlapping: &[Overlapping],
+    (channel, given): (usize, &DMatrix<f64>),
+) {
     let measured = &several.all.channels[channel];
     let mut found = Vec::new();
-    for Overlapping { cell, others } in overlapping(several) {
-        for (projector, cells) in others {
+    for &Overlapping { cell, ref others } in overlapping {
+        for &(projector, ref cells) in others {
             let views = several.projectors[projector].views.clone();
-            let columns = rows(&measured.patterns, &cells, &views);
+            let columns = rows(&measured.patterns, cells, &views);
             let before = row(&measured.patterns, cell, &views);
             // The rows follow half of a change, so that twice the difference is nearly all of it.
             let of = fit(&columns, &(2.0 * row(given, cell, &views) - before));
-            let parts = of.iter().zip(&cells);
+            let parts = of.iter().zip(cells);
             let parts: Vec<_> = parts.map(|(part, other)| (*other, part.max(0.0))).collect();
             found.push((cell, projector, parts));
         }

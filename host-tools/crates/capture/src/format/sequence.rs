@@ -9,7 +9,7 @@ use super::pattern::Pattern;
 use super::photo_files::{PhotoFiles, find_all};
 use super::picture_file::Source;
 use super::role::{CodeAxis, Role};
-use crate::gate::GateName;
+use crate::gate::{Gate, GateName};
 use iltm_runtime::Grid;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -60,6 +60,13 @@ impl Default for CaptureOptions {
             coarsen: false,
             ignore: Vec::new(),
         }
+    }
+}
+
+impl CaptureOptions {
+    /// Whether a capture is refused for a gate.
+    pub(crate) fn refuses(&self, gate: &Gate) -> bool {
+        gate.fails() && !self.ignore.contains(&gate.name)
     }
 }
 

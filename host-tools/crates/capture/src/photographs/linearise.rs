@@ -166,7 +166,7 @@ impl<'a> LinearPhotographs<'a> {
 
     /// Black in the camera's own channels, summed over them.
     pub(crate) fn black_as_seen(&self) -> Vec<f32> {
-        let mixing = (self.photographs.unmixing())
+        let mixing = (self.photographs.unmixing)
             .and_then(|inverse| Matrix3::from(inverse).transpose().try_inverse());
         let Some(mixing) = mixing else {
             return channel_sum(&self.black);

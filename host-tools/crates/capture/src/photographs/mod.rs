@@ -130,11 +130,6 @@ impl<'a> Photographs<'a> {
         self.unmixing = Some(inverse);
     }
 
-    /// From camera channels to the projector's, if photographs are turned into them.
-    pub(crate) const fn unmixing(&self) -> Option<[[f32; 3]; 3]> {
-        self.unmixing
-    }
-
     /// Keeps no photograph after it was visited: for those that are read once.
     pub(crate) fn read_once(mut self) -> Self {
         self.room = 0;

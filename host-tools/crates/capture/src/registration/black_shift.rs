@@ -43,8 +43,8 @@ pub(crate) fn brighter(first: &[f32], second: &[f32]) -> Option<f64> {
     (first > 0.0 && second > 0.0).then(|| second / first)
 }
 
-/// Finds the shift of the second photograph of a scene under black, of so many pixels a row; `None` where they
-/// have too few pixels, no light, or no edges.
+/// Finds the shift of the second photograph of a scene under black, of so many pixels a row; `None`
+/// where they have too few pixels, no light, or no edges.
 pub(crate) fn find(first: &[f32], second: &[f32], width: usize) -> Option<BlackShift> {
     let (first, second) = (Squares::of(first, width)?, Squares::of(second, width)?);
     let near = first.most_alike(&second)?;
