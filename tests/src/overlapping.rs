@@ -6,7 +6,8 @@
 
 use crate::simulated::simulation;
 use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
-use iltm::capture::{CameraSettings, CaptureOptions, read_several};
+use iltm::capture::{CameraSettings, CaptureOptions, camera_places, read_several};
+use iltm::compile::Provenance;
 use iltm::compile::reference_white::WhiteRequest;
 use iltm::picture::{ContactSheet, Picture, Response, Samples, Tile};
 use iltm::progress::Silent;
@@ -15,6 +16,7 @@ use iltm::scene::fill_capture::UnfilledCapture;
 use iltm::scene::{Forced, Photograph, Pinhole, ProjectedFrame, SimulationError, VirtualCamera};
 use iltm::session::{self, Layout, OrderOptions};
 use iltm::solve::{SolveOptions, natural_images};
+use iltm::verify::{self, Readings, Slides, TableVerdict};
 use iltm::video::{CompensateOptions, Compensator};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
@@ -121,6 +123,33 @@ pub fn learned_alone(captures: &[PathBuf], white: f64) -> Vec<BuiltTable> {
         .iter()
         .map(|capture| learned(capture).expect("a table"));
     tables.collect()
+}
+
+/// Verifies the table of all projectors in the scene as it is `now`, from photographs in the new folder
+/// `proof`.
+pub fn verified(captures: &[PathBuf], image: &[u8], now: &Scene, proof: &Path) -> TableVerdict {
+    let table = Table::check(image).expect("a table");
+    let places = camera_places(captures, &Silent).expect("captures with stripes");
+    let layout = Layout::new(table.grid(), places.frame, 0).expect("whole cells");
+    let settings = Provenance::read(table.provenance()).capture;
+    let slides = (&settings.expect("settings"), Slides::Several(&places));
+    verify::write(&table, &layout, slides, proof, &Silent).expect("written");
+    let simulation = simulation(now, Forced::default());
+    // Other noise than that of the captures.
+    let camera = VirtualCamera::new(now, &simulation, 2).expect("light");
+    let unfilled = UnfilledCapture::read(proof, now, None).expect("slides");
+    unfilled.take_missing(&camera, &Silent).expect("taken");
+    let readings = Readings::read(proof, &table, &Silent).expect("photographs");
+    verify::judge(proof, &table, &readings, None).expect("a verdict")
+}
+
+/// The table with the photographs of a verification fed back.
+pub fn refined(image: &[u8], proof: &Path) -> Vec<u8> {
+    let table = Table::check(image).expect("a table");
+    let readings = Readings::read(proof, &table, &Silent).expect("photographs");
+    verify::refine(proof, image, &table, &readings)
+        .expect("a step")
+        .image
 }
 
 /// What a camera sees of compensated pictures, by pixels.

@@ -735,6 +735,10 @@ pub(super) struct Verify {
     /// compensate them: the verdict is then on the chain that really runs
     #[arg(long, requires = "output")]
     pub(super) wanted: bool,
+    /// Captures that the table was solved from, from left to right, where projectors overlap: they say
+    /// which places two of them light
+    #[arg(long, value_name = "CAPTURE", num_args = 1.., requires = "output")]
+    pub(super) captures: Vec<PathBuf>,
     /// Resolution of the projector; by default as the patterns of the scene had it, which
     /// the table remembers, or 1920x1080
     #[arg(long, value_name = "WxH", value_parser = frame_size, requires = "output")]

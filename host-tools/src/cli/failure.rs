@@ -402,6 +402,7 @@ impl From<VerifyError> for Failure {
             | VerifyError::Unpaired { .. }
             | VerifyError::NoImages { .. }
             | VerifyError::Picture { .. }
+            | VerifyError::Before { .. }
             | VerifyError::Channels { .. } => Kind::Capture,
         };
         Self::new(kind, &error, error.next_step())

@@ -150,7 +150,7 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
         let file = crate::solve_page::quoted(path);
         let next = if provenance.overlapping {
             format!(
-                "iltm compensate {file} FRAMES -o INPUT; projectors overlap, so iltm verify cannot tell"
+                "prove it on the wall: iltm verify {file} -o VERIFY --captures LEFT RIGHT, its captures"
             )
         } else {
             format!("prove it on the wall: iltm verify {file} -o VERIFY")

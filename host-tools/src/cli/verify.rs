@@ -8,12 +8,13 @@ use super::progress::progress;
 use super::summary::gates;
 use super::tables::{check, read_table};
 use super::words::{number, table_in_use};
+use crate::capture::{CameraPlaces, camera_places};
 use crate::compile::Provenance;
 use crate::session::Layout;
 use crate::verify::{
-    Cause, Handover, ImageVerdict, Outcome, Readings, Recognised, Slides, TableVerdict, TestImage,
-    brightness_words, fixed_words, html, judge, pictures, reason, recognise, shift_words,
-    test_images, write,
+    Cause, Handover, ImageVerdict, Outcome, Readings, Recognised, Slides, TableVerdict,
+    brightness_words, fixed_words, html, judge, moved_words, overlap_words, pictures, reason,
+    recognise, shift_words, write,
 };
 use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
@@ -44,16 +45,7 @@ fn prepare(
     output: &Output,
 ) -> Result<(), Failure> {
     let provenance = Provenance::read(table.provenance());
-    if provenance.overlapping {
-        return Err(Failure::new(
-            Kind::Usage,
-            format!(
-                "{}: projectors overlap, and stripes of two on one place cannot be told apart",
-                arguments.table.display()
-            ),
-            "Look at compensated pictures on the wall.",
-        ));
-    }
+    let places = places(arguments, table, provenance.overlapping, bars)?;
     let settings = provenance.capture.unwrap_or_default();
     let own = settings.projector.size;
     let projector = arguments
@@ -65,12 +57,12 @@ fn prepare(
     };
     let border = arguments.border.unwrap_or(settings.projector.border);
     let layout = Layout::new(table.grid(), projector, border)?;
-    let kind = if arguments.wanted {
-        Slides::Wanted
-    } else {
-        Slides::Both {
+    let kind = match &places {
+        Some(places) => Slides::Several(places),
+        None if arguments.wanted => Slides::Wanted,
+        None => Slides::Both {
             fine: !arguments.no_dense,
-        }
+        },
     };
     let written = write(table, &layout, (&settings, kind), out, bars)?;
     bars.end();
@@ -93,8 +85,18 @@ fn prepare(
     } else {
         "each as it is and compensated"
     };
+    let count = written.images.len()
+        + if places.is_some() {
+            written.fine.len()
+        } else {
+            0
+        };
     let fine = match written.fine.len() {
         0 => String::new(),
+        _ if places.is_some() => format!(
+            "{} stripes of the projectors' own pixels are among them. ",
+            written.stripes
+        ),
         count => format!(
             "{count} images and {} stripes of the projector's own pixels are among them: the error \
              is seen pixel by pixel, and `iltm refine` can use it.\n",
@@ -112,12 +114,72 @@ fn prepare(
          iltm verify {} {}\n",
         out.display(),
         written.pictures,
-        written.images.len(),
+        count,
         arguments.table.display(),
         out.display(),
     );
     output.result(&data, &text);
     Ok(())
+}
+
+/// Where the camera of the captures sees the pixels of projectors that overlap.
+fn places(
+    arguments: &Verify,
+    table: &Table<'_>,
+    overlapping: bool,
+    bars: &dyn Progress,
+) -> Result<Option<CameraPlaces>, Failure> {
+    let refuse = |what: &str, next_step: &str| {
+        let message = format!("{}: {what}", arguments.table.display());
+        Err(Failure::new(Kind::Usage, message, next_step))
+    };
+    if arguments.captures.is_empty() && !overlapping {
+        return Ok(None);
+    }
+    if !overlapping {
+        return refuse(
+            "its projectors do not overlap, and its pictures need no captures",
+            "Leave --captures away.",
+        );
+    }
+    if arguments.captures.is_empty() {
+        return refuse(
+            "its projectors overlap, and test images must show the same where two light one place",
+            "Name the captures that it was solved from, in their order: --captures LEFT RIGHT. They \
+             say which places these are.",
+        );
+    }
+    if arguments.wanted || arguments.no_dense || arguments.border.is_some_and(|border| border > 0) {
+        return refuse(
+            "where projectors overlap, slides are for the projectors alone, with fine stripes and no \
+             border",
+            "Leave --wanted, --no-dense and --border away.",
+        );
+    }
+    let places = camera_places(&arguments.captures, bars)?;
+    if places.grid != table.grid() {
+        let what = format!(
+            "it is for {} cells, and these captures have {} side by side",
+            table.grid(),
+            places.grid
+        );
+        return refuse(
+            &what,
+            "Name the captures that it was solved from, in their order.",
+        );
+    }
+    if arguments
+        .projector
+        .is_some_and(|projector| projector != places.frame)
+    {
+        let what = format!(
+            "the captures' projectors have {} x {} pixels side by side",
+            places.frame.width(),
+            places.frame.height()
+        );
+        return refuse(&what, "Leave --projector away.");
+    }
+    Ok(Some(places))
 }
 
 fn size(size: FrameSize) -> Value {
@@ -137,7 +199,6 @@ fn verdict(
     let recognised = recognised.transpose()?;
     let readings = Readings::read(folder, table, bars)?;
     let verdict = judge(folder, table, &readings, arguments.bound)?;
-    let images = test_images(table)?;
     let out = arguments
         .report
         .clone()
@@ -148,9 +209,9 @@ fn verdict(
         date: chrono::Local::now().format("%Y-%m-%d %H:%M").to_string(),
         device: device.transpose()?,
     };
-    let page = report(table, &readings, &verdict, (&images, &handover), &out)?;
+    let page = report(table, &readings, &verdict, &handover, &out)?;
     bars.end();
-    let mut data = data(arguments, folder, &verdict, &images, &page);
+    let mut data = data(arguments, folder, &verdict, &page);
     data["recognised"] = recognised.map_or(Value::Null, |found| {
         json!({
             "photographs": found.photographs,
@@ -171,7 +232,7 @@ fn verdict(
         }
         Some(Ok(_)) | None => String::new(),
     };
-    let text = recognised.unwrap_or_default() + &blind + &text(&verdict, &images, &page);
+    let text = recognised.unwrap_or_default() + &blind + &text(&verdict, &page);
     if verdict.outcome == Outcome::Passed {
         output.result(&data, &text);
         return Ok(());
@@ -187,7 +248,12 @@ fn verdict(
             let (error, limit) = (percent(verdict.error[1]), percent(verdict.bound.limit));
             format!("error {error}, at most {limit} passes")
         };
-        let what = at_pixels.and_then(fixed_words).unwrap_or_else(by_cells);
+        let exchanged = verdict
+            .exchanged
+            .map(|_| reason(&verdict).trim_end_matches('.').to_owned());
+        let moved = exchanged.or_else(|| verdict.moved().map(moved_words));
+        let what = moved.or_else(|| at_pixels.and_then(fixed_words));
+        let what = what.unwrap_or_else(by_cells);
         let says = format!("it does not keep its promise: {what}");
         (Kind::Verdict, says)
     };
@@ -237,42 +303,31 @@ fn report(
     table: &Table<'_>,
     readings: &Readings,
     verdict: &TableVerdict,
-    (images, handover): (&[TestImage], &Handover),
+    handover: &Handover,
     out: &Path,
 ) -> Result<PathBuf, Failure> {
     let drawn = pictures(table, readings, verdict);
-    let page = html(table, verdict, images, &drawn, handover);
+    let page = html(table, verdict, &drawn, handover);
     let mut files = output::pictures(&drawn);
     files.push((PAGE.into(), page.as_bytes()));
     write_files(out, &files)?;
     Ok(out.join(PAGE))
 }
 
-fn title<'i>(images: &'i [TestImage], image: &ImageVerdict) -> &'i str {
-    let test = images.get(usize::from(image.image));
-    test.map_or("test image", |test| test.title.as_str())
-}
-
-fn data(
-    arguments: &Verify,
-    folder: &Path,
-    verdict: &TableVerdict,
-    images: &[TestImage],
-    page: &Path,
-) -> Value {
+fn data(arguments: &Verify, folder: &Path, verdict: &TableVerdict, page: &Path) -> Value {
     let bound = &verdict.bound;
     let white = verdict.drift.white.as_ref();
     let of_image = |image: &ImageVerdict| {
         json!({
             "image": image.image,
-            "title": title(images, image),
+            "title": image.title,
             "before": image.error[0],
             "after": image.error[1],
             "modelled_before": image.modelled.map(|modelled| modelled[0]),
             "modelled_after": image.modelled.map(|modelled| modelled[1]),
             "after_at_table_white": image.at_table_white,
             "white": image.white,
-            "clipped": images.get(usize::from(image.image)).map(|test| test.clipped),
+            "clipped": image.clipped,
         })
     };
     let worst = verdict
@@ -321,6 +376,13 @@ fn data(
             "shape": white.map(|white| white.shape),
             "session": verdict.drift.session,
         },
+        "exchanged": verdict.exchanged.map(|pair| pair.map(|number| number + 1)),
+        "overlaps": verdict.shifts.iter().map(|shift| json!({
+            "projectors": shift.projectors.map(|number| number + 1),
+            "moved": shift.pixels,
+            "right": shift.shift[0],
+            "down": shift.shift[1],
+        })).collect::<Vec<_>>(),
         "worst_cells": worst.collect::<Vec<_>>(),
         "cells": { "compared": verdict.cells.0, "known": verdict.cells.1 },
         "page": page.display().to_string(),
@@ -328,11 +390,11 @@ fn data(
     })
 }
 
-fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
+fn text(verdict: &TableVerdict, page: &Path) -> String {
     let mut text = String::new();
     let _ = writeln!(text, "test image            before    after");
     for image in &verdict.images {
-        let title = title(images, image);
+        let title = &image.title;
         let [before, after] = image.error;
         let _ = writeln!(text, "{title:20}  {before:.4}    {after:.4}");
     }
@@ -385,6 +447,14 @@ fn text(verdict: &TableVerdict, images: &[TestImage], page: &Path) -> String {
                 shift_words(shift)
             );
         }
+    }
+    if let Some(farthest) = verdict.farthest() {
+        let others = match verdict.shifts.len() - 1 {
+            0 => "",
+            1 => "; those of the other pair no farther",
+            _ => "; those of the other pairs no farther",
+        };
+        let _ = writeln!(text, "overlap     {}{others}", overlap_words(farthest));
     }
     match &verdict.drift.white {
         None => {

@@ -22,3 +22,4 @@ mod table_words;
 mod tradeoff;
 mod user;
 mod verify;
+mod verify_several;

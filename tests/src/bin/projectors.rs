@@ -2,11 +2,14 @@
 //! alone, and with gains alone; and by pixels on all scenes of several projectors.
 //!
 //! `cargo run --release -p iltm-tests --bin projectors` prints the tables of
-//! `docs/several-projectors.md`; with `-- FOLDER` it draws the pictures there, and nothing else.
+//! `docs/several-projectors.md`; with `-- verdicts` that of verifications, and with `-- FOLDER` it draws
+//! the pictures there, and nothing else.
 
 use iltm::picture::png;
+use iltm::verify::{Cause, TableVerdict};
 use iltm_tests::overlapping::{
     Screen, SeenOnScreen, learned_alone, learned_together, photograph_each, photograph_together,
+    refined, verified,
 };
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, overlaps, photograph, scene, showable,
@@ -20,8 +23,10 @@ const DRAWN: [(&str, &str); 2] = [
 ];
 
 fn main() {
-    if let Some(folder) = std::env::args_os().nth(1) {
-        return draw(Path::new(&folder));
+    match std::env::args_os().nth(1) {
+        Some(word) if word == "verdicts" => return verdicts(),
+        Some(folder) => return draw(Path::new(&folder)),
+        None => {}
     }
     side_by_side();
     println!();
@@ -71,6 +76,70 @@ fn by_pixels() {
         row(name, "each alone", screen.seen_of_each(&alone));
         row(name, "together", screen.seen(&together));
     }
+}
+
+/// What verifications say of the folded screen's table after something has changed.
+fn verdicts() {
+    let nudged = |to| ("look_at = [0.937, 0.8, 0.656]", to);
+    let painted = "[0, 1.6, 0], [1.966, 1.6, 1.3766], [1.966, 0, 1.3766], [0, 0, 0]]\nalbedo = 0.7";
+    let half = format!("{painted}5");
+    let elsewhere = ("position = [0.0, 1.0, 4.6]", "position = [0.5, 1.3, 4.4]");
+    let changes = [
+        ("nothing", None),
+        ("the camera stands elsewhere", Some(elsewhere)),
+        (
+            "the right projector looks 3 mm farther",
+            Some(nudged("look_at = [0.94, 0.8, 0.656]")),
+        ),
+        (
+            "10 mm farther and 10 mm up",
+            Some(nudged("look_at = [0.947, 0.81, 0.656]")),
+        ),
+        (
+            "half of the screen has the albedo .70",
+            Some((&half[..], painted)),
+        ),
+    ];
+    let place = tempfile::tempdir().expect("a folder");
+    let folded = |change: Option<(&str, &str)>| scene("folded-screen", change.as_slice());
+    let captures = photograph_each(&folded(None), 60, &place.path().join("captures"));
+    let built = learned_together(&captures);
+    let image = &built.compiled.image;
+    println!("| since the table was made | a viewer sees off | pictures moved | verdict |");
+    println!("|---|---|---|---|");
+    for (at, (words, change)) in changes.into_iter().enumerate() {
+        let (now, proof) = (folded(change), place.path().join(at.to_string()));
+        verdict(words, &verified(&captures, image, &now, &proof));
+        if words.contains("albedo") {
+            let again = place.path().join("again");
+            let better = refined(image, &proof);
+            verdict("... refined", &verified(&captures, &better, &now, &again));
+        }
+    }
+    let mut exchanged = folded(None);
+    exchanged.projectors.swap(0, 1);
+    let proof = place.path().join("exchanged");
+    verdict(
+        "cables are exchanged",
+        &verified(&captures, image, &exchanged, &proof),
+    );
+}
+
+fn verdict(words: &str, verdict: &TableVerdict) {
+    let seen = verdict
+        .pixels
+        .as_ref()
+        .map_or(f64::NAN, |pixels| pixels.error[1]);
+    let moved = match verdict.farthest() {
+        Some(shift) if shift.pixels.is_finite() => format!("{:.1}", shift.pixels),
+        _ => "elsewhere".to_owned(),
+    };
+    let cause = verdict.cause.map_or("", Cause::name);
+    println!(
+        "| {words} | {:.2} % | {moved} | {} {cause} |",
+        100.0 * seen,
+        verdict.outcome.name()
+    );
 }
 
 /// Photographs before and after, a file for each scene.

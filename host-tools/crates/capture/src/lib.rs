@@ -20,6 +20,7 @@
 #[cfg(test)]
 extern crate self as iltm_capture;
 
+mod camera_places;
 mod cells;
 mod devices;
 mod evidence;
@@ -39,7 +40,9 @@ mod several;
 mod test_capture;
 #[cfg(test)]
 mod tests;
+mod wide_frame;
 
+pub use camera_places::{CameraPlaces, camera_places};
 pub use cells::cell_pixels::{LeftOut, Why};
 pub use cells::fine_flood::FineFlood;
 pub use cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
@@ -58,7 +61,7 @@ pub use format::code::Code;
 pub use format::error::CaptureError;
 pub use format::manifest::{
     CALIBRATION_FILE, ListedRole, MANIFEST_FILE, Manifest, ManifestOf, RoleName, Shot, ShotOf,
-    VERIFY_FILE, listed, numbered,
+    VERIFY_FILE, listed, numbered, projector_file, projector_stripes_file,
 };
 pub use format::pattern::Pattern;
 pub use format::pattern_set::{columns, pattern_set};
@@ -77,10 +80,14 @@ pub use linear_photograph::LinearPhotograph;
 pub use photographs::grey_view::grey_view;
 pub use photographs::photo_stats::PhotoStats;
 pub use registration::cell_map::{NO_CELL, Registration};
+pub use registration::correspondence::{Correspondence, PictureShift};
 pub use registration::map_file::{MapFormat, exr};
 pub use registration::projector_map::{MapError, MapSource, ProjectorMap};
 pub use registration::{MIN_REGRESSION, PixelCount, RegistrationMethod};
-pub use remeasure::{CellPlanes, CellReadings, PixelReadings, Remeasured, remeasure};
+pub use remeasure::{
+    CellPlanes, CellReadings, PixelReadings, Remeasured, RemeasuredSeveral, remeasure,
+    remeasure_several,
+};
 pub use several::{OneOfSeveral, SeveralCaptures, read_several};
 
 use cells::images;

@@ -16,10 +16,8 @@ use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::sampled::Sampled;
 use crate::registration::black_shift;
 use crate::registration::cell_map::{NO_CELL, Registration};
-use crate::registration::projector_map::ProjectorMap;
+use crate::wide_frame::{WideFrame, place};
 use iltm_picture::progress::Progress;
-use iltm_runtime::placement::ProjectorPixels;
-use iltm_runtime::{FrameSize, Grid};
 use nalgebra::DMatrix;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -68,19 +66,7 @@ pub fn read_several(
     options: &CaptureOptions,
     progress: &dyn Progress,
 ) -> Result<SeveralCaptures, CaptureError> {
-    for (at, folder) in folders.iter().enumerate() {
-        let same = |other: &PathBuf| match (other.canonicalize(), folder.canonicalize()) {
-            (Ok(other), Ok(own)) => other == own,
-            _ => false,
-        };
-        if folders[..at].iter().any(same) {
-            return Err(CaptureError::Unlike {
-                path: folder.clone(),
-                reason: "given twice".to_owned(),
-                next_step: "Name the capture of each projector once, from left to right.",
-            });
-        }
-    }
+    check_once(folders)?;
     let (mut own, mut sequences, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
     for folder in folders {
         let (measurements, (sequence, mut linear)) =
@@ -101,7 +87,8 @@ pub fn read_several(
             gates: failed.into_iter().map(|(_, gate)| gate).collect(),
         });
     }
-    let pixels = wide.pixels(&photographs);
+    let saturated = photographs.iter().map(|linear| &linear.saturated[..]);
+    let pixels = wide.pixels(&saturated.collect::<Vec<_>>());
     let registration = wide.registration();
     let mut measured = Vec::new();
     for (index, (sequence, linear)) in sequences.iter().zip(&mut photographs).enumerate() {
@@ -124,109 +111,25 @@ pub fn read_several(
     Ok(several)
 }
 
-/// The frames of all projectors side by side.
-struct WideFrame {
-    grid: Grid,
-    own: Vec<Measurements>,
-    columns: Vec<Range<usize>>,
-    pixel_shares: Vec<Vec<f32>>,
+/// Refuses a folder that is given twice.
+pub(crate) fn check_once(folders: &[PathBuf]) -> Result<(), CaptureError> {
+    for (at, folder) in folders.iter().enumerate() {
+        let same = |other: &PathBuf| match (other.canonicalize(), folder.canonicalize()) {
+            (Ok(other), Ok(own)) => other == own,
+            _ => false,
+        };
+        if folders[..at].iter().any(same) {
+            return Err(CaptureError::Unlike {
+                path: folder.clone(),
+                reason: "given twice".to_owned(),
+                next_step: "Name the capture of each projector once, from left to right.",
+            });
+        }
+    }
+    Ok(())
 }
 
 impl WideFrame {
-    fn new(folders: &[PathBuf], own: Vec<Measurements>) -> Result<Self, CaptureError> {
-        let first = &own[0];
-        for (folder, other) in folders.iter().zip(&own) {
-            let refuse = |reason: String, next_step| {
-                Err(CaptureError::Unlike {
-                    path: folder.clone(),
-                    reason,
-                    next_step,
-                })
-            };
-            let camera = |of: &Measurements| (of.registration.camera, of.registration.binning);
-            if camera(first) != camera(other) || first.channels.len() != other.channels.len() {
-                let reason = format!("other photographs than in {}", folders[0].display());
-                return refuse(
-                    reason,
-                    "Photograph all projectors with one camera that stays.",
-                );
-            }
-            if first.grid.rows() != other.grid.rows() {
-                let (rows, others) = (first.grid.rows(), other.grid.rows());
-                let reason = format!("{others} rows of cells beside {rows}");
-                return refuse(
-                    reason,
-                    "Make patterns with the same --rows for all projectors.",
-                );
-            }
-            let cell = |of: &Measurements| {
-                let pixels = of.settings.projector.pixels()?;
-                let (inner, grid) = (pixels.inner(), of.grid);
-                let whole = pixels.border() == 0 && inner.width() % grid.cols() == 0;
-                let width = whole.then(|| inner.width() / grid.cols());
-                Some((width, inner.height()))
-            };
-            let fits = matches!(cell(other), None | Some((Some(_), _)));
-            if cell(first) != cell(other) || !fits {
-                let reason = "its cells have not as many pixels as those of the others, or a \
-                              border lies around them"
-                    .to_owned();
-                let next_step = "Use projectors of one height without a border, and columns that \
-                                 divide their widths into cells of the same number of pixels.";
-                return refuse(reason, next_step);
-            }
-            if other.diagnostics.images > 0 {
-                let reason = "it has photographs of images".to_owned();
-                return refuse(reason, "Use Bernoulli patterns for several projectors.");
-            }
-        }
-        let mut columns = Vec::new();
-        let mut cols = 0;
-        for own in &own {
-            columns.push(cols..cols + own.grid.cols());
-            cols += own.grid.cols();
-        }
-        let side = |side: usize| u16::try_from(side).unwrap_or(u16::MAX);
-        let grid =
-            Grid::new(side(first.grid.rows()), side(cols)).map_err(|_| CaptureError::Unlike {
-                path: folders[0].clone(),
-                reason: format!("{} x {cols} cells in all", first.grid.rows()),
-                next_step: "Make patterns with fewer cells.",
-            })?;
-        Ok(Self {
-            pixel_shares: pixel_shares(&own),
-            grid,
-            own,
-            columns,
-        })
-    }
-
-    /// The cell in the wide frame of a projector's own.
-    fn place(&self, projector: usize, cell: usize) -> usize {
-        let cols = self.own[projector].grid.cols();
-        cell / cols * self.grid.cols() + self.columns[projector].start + cell % cols
-    }
-
-    /// The projector of a cell, and its number there.
-    fn own_cell(&self, cell: usize) -> (usize, usize) {
-        let (row, col) = (cell / self.grid.cols(), cell % self.grid.cols());
-        let projector = self.columns.iter().position(|all| all.contains(&col));
-        let projector = projector.expect("all columns are a projector's");
-        let columns = &self.columns[projector];
-        (projector, row * columns.len() + col - columns.start)
-    }
-
-    /// An entry a cell from those of each projector's own cells.
-    fn of_cells<T>(&self, of: impl Fn(usize, usize) -> T) -> Vec<T> {
-        let cells = 0..self.grid.cells();
-        cells
-            .map(|cell| {
-                let (projector, own) = self.own_cell(cell);
-                of(projector, own)
-            })
-            .collect()
-    }
-
     /// The patterns of one projector with the others dark.
     fn sequence(&self, projector: usize, own: &Sequence) -> Sequence {
         let mut wide = own.clone();
@@ -236,15 +139,6 @@ impl WideFrame {
             view.lit = self.of_cells(|of, cell| of == projector && lit[cell]);
         }
         wide
-    }
-
-    /// Pixels of all cells; one may be of a cell of each projector.
-    fn pixels(&self, photographs: &[LinearPhotographs<'_>]) -> CellPixels {
-        let own = self.own.iter().zip(photographs);
-        let own: Vec<CellPixels> = own
-            .map(|(own, linear)| CellPixels::choose(&own.registration, &linear.saturated))
-            .collect();
-        CellPixels::joined(&self.of_cells(|projector, cell| (&own[projector], cell)))
     }
 
     /// Judges whether the captures belong together; each gate with the capture that it is of.
@@ -285,75 +179,6 @@ impl WideFrame {
             gates.extend(found.map(|gate| (other, gate)));
         }
         gates
-    }
-
-    /// The projector with the largest share of each camera pixel.
-    fn owners(&self) -> Vec<Option<usize>> {
-        let shares = &self.pixel_shares;
-        let owner = |pixel: usize| {
-            let shares = shares.iter().map(|shares| shares[pixel]).enumerate();
-            let most = shares.max_by(|(_, a), (_, b)| a.total_cmp(b));
-            most.filter(|(_, share)| *share > 0.0)
-                .map(|(projector, _)| projector)
-        };
-        (0..shares[0].len()).map(owner).collect()
-    }
-
-    fn registration(&self) -> Registration {
-        let owners = self.owners();
-        let labels = |of: fn(&Registration) -> &Vec<u32>| {
-            let pixels = owners.iter().enumerate();
-            let label = |(pixel, owner): (usize, &Option<usize>)| {
-                let Some(projector) = *owner else {
-                    return NO_CELL;
-                };
-                match of(&self.own[projector].registration)[pixel] {
-                    NO_CELL => NO_CELL,
-                    cell => self.place(projector, cell as usize) as u32,
-                }
-            };
-            pixels.map(label).collect()
-        };
-        Registration {
-            cell_of_pixel: labels(|registration| &registration.cell_of_pixel),
-            seen_cell: labels(|registration| &registration.seen_cell),
-            centre: self.of_cells(|projector, cell| self.own[projector].registration.centre[cell]),
-            ..self.own[0].registration.clone()
-        }
-    }
-
-    /// The projector map of the wide frame, if all projectors have one.
-    fn map(&self) -> Option<ProjectorMap> {
-        let maps = self.own.iter().map(|own| match &own.map {
-            Some(Ok(map)) => Some(map),
-            _ => None,
-        });
-        let maps: Vec<&ProjectorMap> = maps.collect::<Option<_>>()?;
-        let size = |of: fn(FrameSize) -> usize, map: &ProjectorMap| of(map.projector.size());
-        let width: usize = maps.iter().map(|map| size(FrameSize::width, map)).sum();
-        let height = size(FrameSize::height, maps[0]);
-        let frame = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
-        let mut before = Vec::new();
-        let mut pixels = 0;
-        for map in &maps {
-            before.push(pixels as f32);
-            pixels += size(FrameSize::width, map);
-        }
-        let unknown = ([f32::NAN; 2], f32::NAN);
-        let place = |(pixel, owner): (usize, Option<usize>)| {
-            owner.map_or(unknown, |projector| {
-                let [x, y] = maps[projector].position[pixel];
-                let place = [x + before[projector], y];
-                (place, maps[projector].uncertainty[pixel])
-            })
-        };
-        let (position, uncertainty) = self.owners().into_iter().enumerate().map(place).unzip();
-        Some(ProjectorMap {
-            projector: ProjectorPixels::new(frame, 0)?,
-            position,
-            uncertainty,
-            ..maps[0].clone()
-        })
     }
 
     /// Cells of other projectors that light the same place, by cell.
@@ -492,6 +317,21 @@ impl SeveralCaptures {
         self.projectors.iter().position(of).unwrap_or(0)
     }
 
+    /// Light at a camera pixel under white of all projectors that reach it, of that under white of one of
+    /// them; 1 where no other one reaches.
+    #[must_use]
+    pub fn light_together(&self, projector: usize, pixel: usize) -> f64 {
+        let light = |one: &OneOfSeveral| {
+            let planes = one.own.flood.iter();
+            planes.map(|plane| f64::from(plane[pixel])).sum::<f64>()
+        };
+        let reach = self.projectors.iter().enumerate();
+        let reach = reach.filter(|(at, _)| *at == projector || self.pixel_shares[*at][pixel] > 0.0);
+        let all: f64 = reach.map(|(_, one)| light(one)).sum();
+        let own = light(&self.projectors[projector]);
+        if own > 0.0 { all / own } else { 1.0 }
+    }
+
     /// Share of the light that each projector has at each sample of the wide frame, 0 to 1, with so
     /// many samples along a cell's width and height, row by row: the mean over the camera pixels
     /// that see the sample.
@@ -546,22 +386,6 @@ impl SeveralCaptures {
     }
 }
 
-/// Where a camera pixel lies in a projector's picture, in cells from the left and upper edge of the
-/// first; `None` where the projector does not reach.
-fn place(own: &Measurements, pixel: usize) -> Option<[f32; 2]> {
-    let grid = own.grid;
-    if let Some(Ok(map)) = &own.map {
-        let place = map.position[pixel];
-        if place.iter().all(|side| side.is_finite()) {
-            return Some(map.in_cells(place, grid));
-        }
-    }
-    let cell = own.registration.seen_cell[pixel];
-    let cell = (cell != NO_CELL).then_some(cell as usize)?;
-    let centre = |at: usize| at as f32 + 0.5;
-    Some([centre(cell % grid.cols()), centre(cell / grid.cols())])
-}
-
 /// Part of the pixels that either projector reaches which see the same place in both pictures, to
 /// within half a cell.
 fn same_places(one: &Measurements, other: &Measurements) -> f64 {
@@ -578,89 +402,6 @@ fn same_places(one: &Measurements, other: &Measurements) -> f64 {
         }
     }
     same / f64::max(reached, 1.0)
-}
-
-/// Share of each projector at each camera pixel, by projector and pixel; 0 where it does not reach.
-fn pixel_shares(own: &[Measurements]) -> Vec<Vec<f32>> {
-    let (width, height) = own[0].registration.camera;
-    let pixels = width * height;
-    let lit: Vec<Vec<bool>> = own
-        .iter()
-        .map(|own| {
-            let lit: Vec<bool> = (0..pixels)
-                .map(|pixel| place(own, pixel).is_some())
-                .collect();
-            // Single pixels that tell no place are no border.
-            closed(&lit, width, own.registration.cell_side() as f32)
-        })
-        .collect();
-    let apart = |index: usize| {
-        let alone = (0..pixels).map(|pixel| {
-            let others = lit
-                .iter()
-                .enumerate()
-                .any(|(at, lit)| at != index && lit[pixel]);
-            others && !lit[index][pixel]
-        });
-        let mut apart = distances(&alone.collect::<Vec<_>>(), width);
-        for (distance, lit) in apart.iter_mut().zip(&lit[index]) {
-            // Finite, so that projectors which cover the same have equal shares.
-            *distance = if *lit {
-                distance.min(pixels as f32)
-            } else {
-                0.0
-            };
-        }
-        apart
-    };
-    let mut shares: Vec<Vec<f32>> = (0..own.len()).map(apart).collect();
-    for pixel in 0..pixels {
-        let sum: f32 = shares.iter().map(|shares| shares[pixel]).sum();
-        if sum > 0.0 {
-            for shares in &mut shares {
-                shares[pixel] /= sum;
-            }
-        }
-    }
-    shares
-}
-
-/// A region without its holes and notches up to `reach` pixels.
-fn closed(region: &[bool], width: usize, reach: f32) -> Vec<bool> {
-    let near = distances(region, width);
-    let outside: Vec<bool> = near.iter().map(|distance| *distance > reach).collect();
-    let away = distances(&outside, width);
-    let within = away.iter().zip(region);
-    within.map(|(away, own)| *own || *away > reach).collect()
-}
-
-/// Distance of each pixel to the nearest of a region, in pixels along the eight directions;
-/// infinite if it is empty.
-fn distances(region: &[bool], width: usize) -> Vec<f32> {
-    let mut found: Vec<f32> = (region.iter())
-        .map(|within| if *within { 0.0 } else { f32::INFINITY })
-        .collect();
-    let height = found.len() / width;
-    let diagonal = std::f32::consts::SQRT_2;
-    let mut visit = |pixel: usize, row: isize, side: isize| {
-        let (x, y) = (pixel % width, pixel / width);
-        let beside = [
-            (row, -1, diagonal),
-            (row, 0, 1.0),
-            (row, 1, diagonal),
-            (0, side, 1.0),
-        ];
-        for (down, right, step) in beside {
-            let x = x.checked_add_signed(right).filter(|x| *x < width);
-            let y = y.checked_add_signed(down).filter(|y| *y < height);
-            if let (Some(x), Some(y)) = (x, y) {
-                found[pixel] = found[pixel].min(found[y * width + x] + step);
-            }
-        }
-    };
-    (0..region.len()).for_each(|pixel| visit(pixel, -1, -1));
-    (0..region.len()).rev().for_each(|pixel| visit(pixel, 1, 1));
-    found
 }
 
 /// What is not known becomes the mean of what is known beside it, from there outwards.
@@ -694,34 +435,6 @@ fn filled(mut values: Vec<Option<f64>>, cols: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn distances_go_along_the_eight_directions_and_are_infinite_without_a_region() {
-        let mut region = vec![false; 7 * 5];
-        assert!(distances(&region, 7).iter().all(|way| way.is_infinite()));
-        region[2 * 7 + 3] = true;
-        let found = distances(&region, 7);
-        let diagonal = std::f32::consts::SQRT_2;
-        for (pixel, way) in found.iter().enumerate() {
-            let (x, y) = ((pixel % 7).abs_diff(3), (pixel / 7).abs_diff(2));
-            let (least, most) = (x.min(y) as f32, x.max(y) as f32);
-            let expected = diagonal * least + most - least;
-            assert!((way - expected).abs() < 1e-5, "{pixel}: {way} {expected}");
-        }
-    }
-
-    #[test]
-    fn holes_are_closed_and_what_lies_far_from_a_region_stays_outside() {
-        let (width, height) = (24, 20);
-        let within = |pixel: usize| (4..20).contains(&(pixel % width)) && pixel / width >= 6;
-        let whole: Vec<bool> = (0..width * height).map(within).collect();
-        let mut holed = whole.clone();
-        for (x, y) in [(10, 10), (11, 10), (12, 14), (6, 12)] {
-            holed[y * width + x] = false;
-        }
-        assert_eq!(closed(&holed, width, 3.0), whole);
-        assert_eq!(closed(&whole, width, 3.0), whole);
-    }
 
     #[test]
     fn unknown_values_are_filled_from_their_neighbours_outwards() {

@@ -177,9 +177,8 @@ pub fn build_table_from(
         None => FineFlood::new(measurements, table.gain_resolution),
     };
     let gain_only = iltm_solve::gain_only(&measurements.into(), &report)?;
-    // Pixels in which projectors overlap see two places of the frame.
     let viewer = match several {
-        Some(_) => None,
+        Some(several) => ViewerError::predict_several(several, &trials, &gain_only, &flood),
         None => ViewerError::predict(measurements, &trials, &gain_only, &flood),
     };
     let as_even = |viewer: ViewerError| viewer.uncompensated.relative <= viewer.gain_only.relative;

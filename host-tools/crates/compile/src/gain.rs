@@ -148,6 +148,26 @@ pub(crate) fn fine_gains_of_several(
     flood: &FineFlood,
     several: &SeveralCaptures,
 ) -> Option<FineGains> {
+    let shares = [several.shares(flood.factor), several.shares_of_cells()];
+    shared_gains(inverse, (flood, several), shares)
+}
+
+/// The same of projectors that each show all of the light.
+pub(crate) fn unshared_gains_of_several(
+    inverse: &InverseTransport,
+    flood: &FineFlood,
+    several: &SeveralCaptures,
+) -> Option<FineGains> {
+    let shares = [flood.rows * flood.cols, inverse.grid.cells()].map(|count| vec![1.0; count]);
+    shared_gains(inverse, (flood, several), shares)
+}
+
+/// The same for these shares of samples and of cells.
+fn shared_gains(
+    inverse: &InverseTransport,
+    (flood, several): (&FineFlood, &SeveralCaptures),
+    [shares, shares_of_cells]: [Vec<f64>; 2],
+) -> Option<FineGains> {
     let grid = inverse.grid;
     let by_operator = inverse.channels.len() == flood.channels.len()
         && flood.mapped
@@ -155,14 +175,13 @@ pub(crate) fn fine_gains_of_several(
     if !by_operator {
         let mut fine = fine_gains(inverse, flood)?;
         for gains in &mut fine.channels {
-            let gains = gains.iter_mut().zip(several.shares(flood.factor));
+            let gains = gains.iter_mut().zip(&shares);
             gains.for_each(|(gain, share)| *gain *= share);
         }
         return Some(fine);
     }
     let size = FrameSize::new(flood.cols as u16, flood.rows as u16)?;
     let between = BetweenCells::new(inverse, flood)?;
-    let (shares, shares_of_cells) = (several.shares(flood.factor), several.shares_of_cells());
     let even = inverse.live.iter().map(|live| f64::from(u8::from(*live)));
     let even = DVector::from_iterator(grid.cells(), even);
     let of_channel = |(index, channel): (usize, &ChannelInverse)| {

@@ -12,14 +12,18 @@
 //! | the rest, which is the operator's and differs from photograph to photograph | held-out photographs: products of neighbouring pixels, which have no noise either | less, by the contrast of the image's cells |
 
 use crate::FineGains;
-use crate::gain::fine_gains;
-use iltm_capture::{ChannelMeasurements, FineFlood, Measurements, PixelLight};
+use crate::gain::{fine_gains, unshared_gains_of_several};
+use iltm_capture::{
+    ChannelMeasurements, FineFlood, Measurements, OneOfSeveral, PixelLight, SeveralCaptures,
+};
 use iltm_picture::{LightPicture, PictureError};
 use iltm_runtime::{FrameSize, Grid};
 use iltm_solve::{
     DARKEST_WANTED, Inverse, InverseTransport, SUPERSAMPLING, Trial, fine_natural_images,
 };
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Natural images that are looked at.
 const LOOKED_AT: usize = 6;
@@ -71,24 +75,129 @@ impl ViewerError {
         gain_only: &InverseTransport,
         flood: &FineFlood,
     ) -> Option<Self> {
-        let images = Images::new(measurements.grid);
-        let mut compensated = Vec::new();
-        for trial in trials {
-            let scene = Scene::new(measurements, &trial.inverse, flood);
-            let fits = scene.fits(measurements, trial);
-            compensated.extend(scene.with_errors(&images, &fits?));
+        let one = Photographed::of(measurements);
+        let fine = |inverse: &InverseTransport| fine_gains(inverse, flood);
+        Self::of(&[one], trials, gain_only, fine)
+    }
+
+    /// The same of several projectors, by the photographs of each while the others are dark. Where they
+    /// overlap, it is what would be seen if one of them showed all of the light.
+    #[must_use]
+    pub(crate) fn predict_several(
+        several: &SeveralCaptures,
+        trials: &[Trial],
+        gain_only: &InverseTransport,
+        flood: &FineFlood,
+    ) -> Option<Self> {
+        let photographed =
+            (0..several.projectors.len()).map(|at| Photographed::of_one(several, at));
+        let photographed: Vec<Photographed<'_>> = photographed.collect::<Option<_>>()?;
+        let fine = |inverse: &InverseTransport| unshared_gains_of_several(inverse, flood, several);
+        Self::of(&photographed, trials, gain_only, fine)
+    }
+
+    fn of(
+        photographed: &[Photographed<'_>],
+        trials: &[Trial],
+        gain_only: &InverseTransport,
+        fine: impl Fn(&InverseTransport) -> Option<FineGains>,
+    ) -> Option<Self> {
+        let images = Images::new(gain_only.grid);
+        let gains: Vec<Option<FineGains>> =
+            trials.iter().map(|trial| fine(&trial.inverse)).collect();
+        let each = trials.iter().zip(&gains);
+        let each = each
+            .flat_map(|(trial, gains)| photographed.iter().map(move |seen| (trial, gains, seen)));
+        let errors = each
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|(trial, gains, seen)| {
+                let scene = Scene::new(seen, &trial.inverse, gains.as_ref());
+                let fits = scene.fits(seen, trial)?;
+                Some(scene.with_errors(&images, &fits))
+            });
+        let compensated: Vec<Vec<PictureError>> = errors.collect::<Option<_>>()?;
+        let compensated = compensated.concat();
+        let (mut corrected, mut uncompensated) = (Vec::new(), Vec::new());
+        let first = &trials.first()?.inverse;
+        let (of_first, of_gains) = (&gains[0], fine(gain_only));
+        for seen in photographed {
+            let scene = Scene::new(seen, first, of_first.as_ref());
+            let of_gains = Scene::new(seen, gain_only, of_gains.as_ref());
+            uncompensated.extend(scene.projected(&images, |_, _| (1.0, None), true)?);
+            let gains = |channel: usize, site: usize| {
+                let gain = of_gains.gains[channel][site];
+                (gain, Some(&gain_only.channels[channel].gain))
+            };
+            corrected.extend(scene.projected(&images, gains, false)?);
         }
-        let scene = Scene::new(measurements, &trials.first()?.inverse, flood);
-        let corrected = Scene::new(measurements, gain_only, flood);
-        let uncompensated = scene.projected(&images, |_, _| (1.0, None), true)?;
-        let gains = |channel: usize, site: usize| {
-            let gain = corrected.gains[channel][site];
-            (gain, Some(&gain_only.channels[channel].gain))
-        };
         Some(Self {
             uncompensated: PictureError::mean(&uncompensated)?,
-            gain_only: PictureError::mean(&scene.projected(&images, gains, false)?)?,
+            gain_only: PictureError::mean(&corrected)?,
             compensated: PictureError::mean(&compensated)?,
+        })
+    }
+}
+
+/// Photographs of a projector's patterns, and where some pixels look.
+struct Photographed<'m> {
+    grid: Grid,
+    light: &'m PixelLight,
+    /// In cells, by pixel.
+    places: Vec<Option<[f32; 2]>>,
+    /// Light of all projectors that reach a pixel under their white, of this one's.
+    together: Vec<f64>,
+    /// How far off places are, in cells, root mean square in each direction.
+    off: f32,
+    /// Side of a cell in camera pixels.
+    cell_side: f32,
+    blur: f64,
+    channels: &'m [ChannelMeasurements],
+    /// Its columns of patterns and observations.
+    views: Range<usize>,
+    /// The first of its views that is an image.
+    first_image: usize,
+}
+
+impl<'m> Photographed<'m> {
+    fn of(measurements: &'m Measurements) -> Self {
+        let views = measurements.roles.len();
+        Self {
+            grid: measurements.grid,
+            light: &measurements.pixel_light,
+            places: measurements.places(),
+            together: vec![1.0; measurements.pixel_light.pixels.len()],
+            off: places_off(measurements),
+            cell_side: measurements.registration.cell_side() as f32,
+            blur: measurements.devices.blur,
+            channels: &measurements.channels,
+            views: 0..views,
+            first_image: views - measurements.diagnostics.images,
+        }
+    }
+
+    /// One of several projectors; `None` without its projector map.
+    fn of_one(several: &'m SeveralCaptures, index: usize) -> Option<Self> {
+        let OneOfSeveral {
+            own,
+            columns,
+            views,
+        } = &several.projectors[index];
+        own.map.as_ref()?.as_ref().ok()?;
+        let beside = |place: Option<[f32; 2]>| {
+            let [x, y] = place?;
+            Some([x + columns.start as f32, y])
+        };
+        let pixels = own.pixel_light.pixels.iter();
+        Some(Self {
+            grid: several.all.grid,
+            places: own.places().into_iter().map(beside).collect(),
+            together: pixels
+                .map(|pixel| several.light_together(index, *pixel as usize))
+                .collect(),
+            channels: &several.all.channels,
+            views: views.clone(),
+            ..Self::of(own)
         })
     }
 }
@@ -160,6 +269,8 @@ impl Corners {
 struct Site {
     /// Its number among the measured pixels.
     at: usize,
+    /// Light of all projectors that reach it under their white, of its own one's.
+    together: f64,
     /// Where it looks, in cells.
     place: [f32; 2],
     cells: Corners,
@@ -199,18 +310,22 @@ struct SiteFit {
 }
 
 impl Scene {
-    fn new(measurements: &Measurements, inverse: &InverseTransport, flood: &FineFlood) -> Self {
-        let grid = measurements.grid;
-        let places = measurements.places();
-        let fine = fine_gains(inverse, flood);
+    fn new(seen: &Photographed<'_>, inverse: &InverseTransport, fine: Option<&FineGains>) -> Self {
+        let grid = seen.grid;
+        let places = &seen.places;
         let site = |(at, place): (usize, &Option<[f32; 2]>)| {
             let place = (*place)?;
             let cells = Corners::new(place, grid, [1; 2]);
             let live = cells.0.iter().all(|(cell, _)| inverse.live[*cell]);
-            live.then_some(Site { at, place, cells })
+            live.then_some(Site {
+                at,
+                together: seen.together[at],
+                place,
+                cells,
+            })
         };
         let sites: Vec<Site> = places.iter().enumerate().filter_map(site).collect();
-        let gain_at = |channel: usize, place: [f32; 2]| match &fine {
+        let gain_at = |channel: usize, place: [f32; 2]| match fine {
             Some(FineGains { size, channels }) => {
                 let factor = [size.width() / grid.cols(), size.height() / grid.rows()];
                 Corners::new(place, grid, factor).of(&channels[channel])
@@ -221,7 +336,7 @@ impl Scene {
             let sites = sites.iter();
             sites.map(|site| gain_at(channel, site.place)).collect()
         };
-        let off = places_off(measurements);
+        let off = seen.off;
         let unsteady = |channel: usize| {
             let at = |site: &Site| {
                 let [x, y] = site.place;
@@ -267,21 +382,19 @@ impl Scene {
     }
 
     /// What photographs show beyond what the table believes.
-    fn fits(&self, measurements: &Measurements, trial: &Trial) -> Option<Fits> {
-        let light = &measurements.pixel_light;
-        let clear = CLEAR / measurements.registration.cell_side() as f32;
-        let blur = measurements.devices.blur;
+    fn fits(&self, photographed: &Photographed<'_>, trial: &Trial) -> Option<Fits> {
+        let (light, views) = (photographed.light, &photographed.views);
+        let clear = CLEAR / photographed.cell_side;
+        let blur = photographed.blur;
         let blurring = (blur > 0.0).then(|| iltm_solve::blur(self.grid, blur));
-        let first_image = measurements.roles.len() - measurements.diagnostics.images;
+        let first_image = photographed.first_image;
         let (mut varying, mut contrast) = (Mean::default(), Mean::default());
         let mut channels = Vec::new();
         for (channel, inverse) in self.inverses.iter().enumerate() {
-            let ChannelMeasurements {
-                patterns,
-                observations: observed,
-                ..
-            } = &measurements.channels[channel];
-            let blurred = blurring.as_ref().map(|blur| blur * patterns);
+            let of_all = &photographed.channels[channel];
+            let own = |all: &DMatrix<f64>| all.columns_range(views.clone()).into_owned();
+            let (patterns, observed) = (own(&of_all.patterns), own(&of_all.observations));
+            let blurred = blurring.as_ref().map(|blur| blur * &patterns);
             let thrown_at = |site: &Site, view: usize| {
                 if let Some(blurred) = &blurred {
                     return Some(site.cells.of(blurred.column(view).as_slice()));
@@ -295,13 +408,13 @@ impl Scene {
             };
             let mut sums = vec![[[Sums::default(); 2]; HALVINGS]; self.sites.len()];
             let mut held_out = vec![Vec::new(); self.sites.len()];
-            let mut received = &inverse.operator * observed;
+            let mut received = &inverse.operator * &observed;
             if let Some(thrown) = &trial.thrown[channel] {
-                received += thrown;
+                received += own(thrown);
             }
             // White tells no more than the gains, which come from it.
             for view in Measurements::WHITE + 1..patterns.ncols() {
-                let is_held_out = trial.held_out.contains(&view);
+                let is_held_out = trial.held_out.contains(&(views.start + view));
                 if is_held_out {
                     contrast.add(observed.column(view).variance());
                 }
@@ -448,7 +561,7 @@ impl Scene {
                     let direct = drive(channel, at).0 * wanted[at] / gain;
                     let ambient = self.sites[at].cells.of(&self.ambient[channel]) / gain;
                     if as_it_is {
-                        return bounced + direct + ambient;
+                        return bounced + self.sites[at].together * direct + ambient;
                     }
                     let unsteady = self.unsteady[channel][at] * wanted[at] * wanted[at];
                     bounced + direct + either_sign(at) * (unsteady + CODES * CODES).sqrt()

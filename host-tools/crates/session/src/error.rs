@@ -110,7 +110,7 @@ pub enum SessionError {
         /// The place.
         index: u32,
         /// The lists.
-        lists: [&'static str; 2],
+        lists: [String; 2],
     },
     /// A photograph was asked for that no list has.
     #[error("{}: nothing is shown at index {index}; the last one is {last}", folder.display())]

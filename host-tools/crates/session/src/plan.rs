@@ -44,7 +44,7 @@ pub fn planned(folder: &Path) -> Result<Vec<Planned>, SessionError> {
         path: folder.to_owned(),
         source,
     })?;
-    let mut all: BTreeMap<u32, (&str, Planned)> = BTreeMap::new();
+    let mut all: BTreeMap<u32, (String, Planned)> = BTreeMap::new();
     for (list, shot) in listed(&root)? {
         // A pattern that is listed twice, for a bracket, has one slide.
         let name = shot.pattern.file_name().unwrap_or_default();
@@ -56,7 +56,7 @@ pub fn planned(folder: &Path) -> Result<Vec<Planned>, SessionError> {
             exposure: shot.exposure,
         };
         let index = planned.index;
-        if let Some((first, _)) = all.insert(index, (list, planned)) {
+        if let Some((first, _)) = all.insert(index, (list.clone(), planned)) {
             return Err(SessionError::IndexTwice {
                 folder: folder.to_owned(),
                 index,

@@ -71,6 +71,12 @@ impl PixelViews {
         Self::of_places(size, scaled(self.side), places)
     }
 
+    /// The same and further pixels, before these, at places in samples of the same grid.
+    pub(crate) fn after(&self, others: impl Iterator<Item = (u32, [f32; 2])>) -> Self {
+        let own = self.pixels.iter().map(|view| (view.pixel, view.place));
+        Self::of_places(self.size, self.side, others.chain(own))
+    }
+
     /// Without the pixels that are marked, by their indices.
     pub(crate) fn without(mut self, marked: &[bool]) -> Self {
         self.pixels.retain(|view| !marked[view.pixel as usize]);

@@ -384,8 +384,21 @@ fn inside_folder(file: &str) -> Option<PathBuf> {
 /// Name of the list in a folder that was made to verify a table.
 pub const VERIFY_FILE: &str = "verify.csv";
 
+/// List of the patterns that tell the cells of one of several projectors in a folder made to verify
+/// their table, counted from 1: as `capture.csv`, but that a pattern has the columns of all projectors.
+#[must_use]
+pub fn projector_file(projector: usize) -> String {
+    format!("projector-{projector}.csv")
+}
+
+/// List of that projector's fine stripes: as `stripes.csv`, but of slides of all projectors.
+#[must_use]
+pub fn projector_stripes_file(projector: usize) -> String {
+    format!("projector-{projector}-stripes.csv")
+}
+
 /// Lists that a folder may hold: a capture's, and those of a folder made to verify a
-/// table.
+/// table. There may be those of [`projector_file`] too.
 const LISTS: [&str; 4] = [MANIFEST_FILE, CALIBRATION_FILE, STRIPES_FILE, VERIFY_FILE];
 
 /// A role by its name alone: whoever photographs need not know more.
@@ -414,12 +427,23 @@ impl ListedRole for RoleName {
 ///
 /// # Errors
 /// [`CaptureError::NoManifest`] if there is no line, or what a list's line says.
-pub fn listed(folder: &Path) -> Result<Vec<(&'static str, ShotOf<RoleName>)>, CaptureError> {
+pub fn listed(folder: &Path) -> Result<Vec<(String, ShotOf<RoleName>)>, CaptureError> {
     let mut all = Vec::new();
+    let mut add = |list: String| {
+        let Some(manifest) = ManifestOf::<RoleName>::read_named(folder, &list)? else {
+            return Ok(false);
+        };
+        let shots = manifest.shots.into_iter();
+        all.extend(shots.map(|shot| (list.clone(), shot)));
+        Ok(true)
+    };
     for list in LISTS {
-        if let Some(manifest) = ManifestOf::<RoleName>::read_named(folder, list)? {
-            all.extend(manifest.shots.into_iter().map(|shot| (list, shot)));
-        }
+        add(list.to_owned())?;
+    }
+    let mut projector = 1;
+    while add(projector_file(projector))? {
+        add(projector_stripes_file(projector))?;
+        projector += 1;
     }
     if all.is_empty() {
         let path = folder.join(MANIFEST_FILE);

@@ -107,8 +107,43 @@ pub(crate) struct Sequence {
     pub(crate) finer: Vec<Bracket>,
     /// Columns and rows of the patterns, and their codes.
     pub(crate) shown: [(usize, Code); 2],
+    /// The projector's part of the frame, if the patterns are of a wide frame.
+    pub(crate) part: Option<FramePart>,
     /// Where the Gray code ends and the Bernoulli patterns begin in `views`.
     bernoulli_from: usize,
+}
+
+/// The part of a wide frame that one of several projectors shows: the columns of cells that its white
+/// lights.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct FramePart {
+    /// Its columns of cells.
+    pub(crate) columns: Range<usize>,
+    /// Columns of cells of the whole frame.
+    pub(crate) of: usize,
+    /// Name of the list of its fine stripes.
+    pub(crate) stripes: String,
+}
+
+impl FramePart {
+    /// The part that white lights; `None` if its columns do not lie side by side.
+    fn lit_by(white: &Pattern, stripes: String) -> Option<Self> {
+        let lit = &white.lit[..white.cols];
+        let start = lit.iter().position(|lit| *lit)?;
+        let end = lit.iter().rposition(|lit| *lit)? + 1;
+        lit[start..end].iter().all(|lit| *lit).then_some(Self {
+            columns: start..end,
+            of: white.cols,
+            stripes,
+        })
+    }
+
+    /// The projector's pixels of a frame that is so many wide; `None` if it would have no whole
+    /// number of them.
+    pub(crate) fn pixels(&self, wide: usize) -> Option<usize> {
+        let pixels = wide * self.columns.len();
+        pixels.is_multiple_of(self.of).then_some(pixels / self.of)
+    }
 }
 
 /// The brackets that a capture is learned from.
@@ -120,6 +155,8 @@ pub(crate) struct Selection {
     longest: Option<f64>,
     /// [`CaptureOptions::coarsen`], if there is nothing that forbids it.
     coarsen: bool,
+    /// Of patterns of a wide frame, the list of the projector's fine stripes.
+    part: Option<String>,
 }
 
 impl Selection {
@@ -153,7 +190,18 @@ impl Selection {
             images,
             longest,
             coarsen,
+            part: None,
         })
+    }
+
+    /// The same of patterns of a wide frame, of which those of one projector are read; `stripes` is the
+    /// list of its fine stripes.
+    pub(crate) fn of_part(self, stripes: String) -> Self {
+        Self {
+            coarsen: false,
+            part: Some(stripes),
+            ..self
+        }
     }
 
     /// Names in each shot the file that stands for its photograph; shots without one are
@@ -178,12 +226,22 @@ impl Sequence {
             images,
             longest,
             coarsen,
+            part,
         } = chosen;
         let first = |bracket: &Bracket| bracket.shots[0].clone();
         let mut shots: Vec<Shot> = brackets.iter().map(first).collect();
         check_levels(&shots, &manifest)?;
         let mut patterns = read_patterns(folder, &shots, coarsen)?;
-        let (rows, cols) = common_size(folder, &shots, &patterns)?;
+        let (rows, mut cols) = common_size(folder, &shots, &patterns)?;
+        let part = part.map(|stripes| frame_part(folder, &shots, &patterns, stripes));
+        let part = part.transpose()?;
+        if let Some(part) = &part {
+            let columns: Vec<usize> = part.columns.clone().collect();
+            let all: Vec<usize> = (0..rows).collect();
+            let of_part = |pattern: &Pattern| pattern.sampled(&all, &columns);
+            patterns = patterns.iter().map(of_part).collect();
+            cols = columns.len();
+        }
         let sides = [(CodeAxis::Column, cols), (CodeAxis::Row, rows)];
         let mut given = [0; 2];
         for (given, (axis, _)) in given.iter_mut().zip(sides) {
@@ -255,6 +313,7 @@ impl Sequence {
             coarser,
             finer,
             shown,
+            part,
             bernoulli_from,
         })
     }
@@ -409,6 +468,24 @@ fn chosen(
         .into_iter()
         .filter(|bracket| wanted(bracket))
         .collect())
+}
+
+/// The part of the frame that the first pattern of white lights.
+fn frame_part(
+    folder: &Path,
+    shots: &[Shot],
+    patterns: &[Pattern],
+    stripes: String,
+) -> Result<FramePart, CaptureError> {
+    let white = shots.iter().zip(patterns);
+    let mut white = white.filter(|(shot, _)| shot.role == Role::White);
+    // `check_levels` refuses a capture without white.
+    let (shot, white) = white.next().unwrap_or((&shots[0], &patterns[0]));
+    FramePart::lit_by(white, stripes).ok_or_else(|| CaptureError::Picture {
+        path: folder.join(&shot.pattern),
+        reason: "white lights no columns of cells that lie side by side".to_owned(),
+        next_step: "Make the folder again with `iltm verify`.",
+    })
 }
 
 /// Rows and columns that all patterns have.

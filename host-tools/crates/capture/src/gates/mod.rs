@@ -30,7 +30,7 @@ mod movement;
 mod noise;
 pub(crate) mod order;
 mod response;
-mod saturation;
+pub(crate) mod saturation;
 mod superposition;
 
 use crate::cells::nonlinearity::{CurveOfPixels, Nonlinearity};

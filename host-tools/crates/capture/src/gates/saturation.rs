@@ -15,7 +15,7 @@ const MOST_PIXELS: f64 = 0.1;
 const MOST_CELLS: f64 = 0.05;
 
 /// Judges what was found, and the cells that were lost by it.
-pub(super) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gate {
+pub(crate) fn judge(clipped: &Clipped, left_out: &[LeftOut], live: usize) -> Gate {
     // Where white is clipped nowhere, what cells are lost by are photographs of other patterns.
     let is_saturated =
         |out: &&LeftOut| clipped.count > 0 && matches!(out.why, Why::Saturated { .. });

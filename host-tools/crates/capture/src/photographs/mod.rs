@@ -138,7 +138,7 @@ impl<'a> Photographs<'a> {
     }
 
     /// Keeps no photograph at all, to be dropped.
-    fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.kept.clear();
         self.spool_mut().give_up();
     }

@@ -10,9 +10,11 @@
 
 pub(crate) mod black_shift;
 pub(crate) mod cell_map;
+pub(crate) mod correspondence;
 pub(crate) mod gray_code;
 pub(crate) mod image_matching;
 pub(crate) mod image_tracking;
+mod inverse_map;
 mod local_planes;
 pub(crate) mod map_file;
 mod mixed_pixels;

@@ -245,9 +245,12 @@ pub(crate) fn decode(
     registration: &Registration,
     progress: &dyn Progress,
 ) -> Result<Option<Result<DecodedStripes, MapError>>, CaptureError> {
-    match StripeManifest::read_if_there(folder)? {
+    let list = (sequence.part.as_ref()).map_or(STRIPES_FILE, |part| &part.stripes);
+    match StripeManifest::read_named(folder, list)? {
         Some(manifest) => {
-            let found = listed(folder, sequence, settings, manifest, linear, progress)?;
+            let list = folder.join(list);
+            let of = (list.as_path(), sequence, settings);
+            let found = listed(folder, of, manifest, linear, progress)?;
             Ok(Some(found.map(|found| {
                 let pixel = registration.pixel_in_cells(sequence.grid);
                 found.told_apart(pixel.map(|pixel| pixel as f32))
@@ -269,11 +272,10 @@ pub(crate) struct DecodedStripes {
     light: [AxisLight; 2],
 }
 
-/// Stripes of `stripes.csv`.
+/// Stripes of a `list`.
 fn listed(
     folder: &Path,
-    sequence: &Sequence,
-    settings: &ProjectorSettings,
+    (list, sequence, settings): (&Path, &Sequence, &ProjectorSettings),
     manifest: StripeManifest,
     linear: &LinearPhotographs<'_>,
     progress: &dyn Progress,
@@ -303,7 +305,10 @@ fn listed(
         what: "pattern",
         line: slide.line,
     })?;
-    let (width, height) = picture.size();
+    let (mut width, height) = picture.size();
+    if let Some(part) = &sequence.part {
+        width = part.pixels(width as usize).unwrap_or(0) as u32;
+    }
     let side = |side: u32| u16::try_from(side).unwrap_or(0);
     let size = FrameSize::new(side(width), side(height));
     let projector = size.and_then(|size| ProjectorPixels::new(size, settings.border));
@@ -314,8 +319,7 @@ fn listed(
     let Some(projector) = projector.filter(|_| enough) else {
         return Ok(Err(MapError::Slides(width, height)));
     };
-    let list = folder.join(STRIPES_FILE);
-    let brackets = Bracket::of_list(&shots, &list, sequence.longest)?;
+    let brackets = Bracket::of_list(&shots, list, sequence.longest)?;
     let fine = Fine {
         roles: shots.iter().map(|shot| shot.role).collect(),
         light: light(folder, brackets, linear, progress)?,

@@ -82,6 +82,12 @@ pub enum VerifyError {
         /// The manifest.
         path: PathBuf,
     },
+    /// The file that says what the captures showed is not what `iltm verify` wrote.
+    #[error("{}: it does not say the light of white for each cell of the table", path.display())]
+    Before {
+        /// The file.
+        path: PathBuf,
+    },
     /// A picture has another size, depth or number of colours than the table's cells ask
     /// for.
     #[error("{}: it is no 8-bit picture of one pixel a cell with the table's {channels} channel(s)", path.display())]
@@ -224,7 +230,10 @@ impl VerifyError {
                  under names that come after the others, and run the command again.",
                 folder.display()
             ),
-            Self::Unpaired { .. } | Self::NoImages { .. } | Self::Picture { .. } => {
+            Self::Unpaired { .. }
+            | Self::NoImages { .. }
+            | Self::Before { .. }
+            | Self::Picture { .. } => {
                 "Make the folder anew with `iltm verify TABLE.iltm -o FOLDER`.".to_owned()
             }
             Self::Untold { .. } => {

@@ -5,6 +5,7 @@
 //! `p` makes is the `l` with `l = (p + K l) / g`, which iterating it converges to.
 
 use iltm_capture::CellPlanes;
+use iltm_compile::Provenance;
 use iltm_runtime::{
     image::Table,
     pipeline::stages::correct,
@@ -32,6 +33,8 @@ pub struct Expected<'t, 'a> {
     gain: CellPlanes,
     /// `a`, relative to reference white.
     ambient: CellPlanes,
+    /// Whether cells of several projectors light one place.
+    overlapping: bool,
 }
 
 impl<'t, 'a> Expected<'t, 'a> {
@@ -59,6 +62,7 @@ impl<'t, 'a> Expected<'t, 'a> {
             memory: OperatorMemory::new(table),
             gain: channels().map(gain).collect(),
             ambient: channels().map(ambient).collect(),
+            overlapping: Provenance::read(table.provenance()).overlapping,
         }
     }
 
@@ -102,9 +106,13 @@ impl<'t, 'a> Expected<'t, 'a> {
     /// The light of every cell, ambient light included, relative to reference white, of an
     /// input relative to the projector's white; both one entry a channel. `None` if the
     /// table's bounces do not fade: it may compensate what is projected, but it does not
-    /// tell what light comes of an input.
+    /// tell what light comes of an input. Nor does that of projectors that overlap: it says how much of
+    /// wanted light each shows, not how bright either makes the place that both light.
     #[must_use]
     pub fn photograph(&mut self, input: &CellPlanes) -> Option<CellPlanes> {
+        if self.overlapping {
+            return None;
+        }
         let mut light = self.reflect(input, None);
         let mut fading = false;
         for _ in 0..MOST_BOUNCES {

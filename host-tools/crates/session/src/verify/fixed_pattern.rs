@@ -13,7 +13,7 @@ use super::pixels::{counted_light, cut_at_pixels, wanted_light};
 use super::readings::FineShown;
 use super::refine::OwnGains;
 use iltm_capture::PixelReadings;
-use iltm_compile::FineGains;
+use iltm_compile::{FineGains, Provenance};
 use iltm_runtime::image::Table;
 use rayon::prelude::*;
 
@@ -107,7 +107,10 @@ impl FixedPattern {
         let sites = Sites::new(table, pixels, step, looked_at);
         (wanted > 0.0).then(|| Self {
             error: (error / wanted).max(0.0).sqrt(),
-            shift: sites.shift(),
+            // Projectors that overlap move each by itself.
+            shift: (!Provenance::read(table.provenance()).overlapping)
+                .then(|| sites.shift())
+                .flatten(),
         })
     }
 }

@@ -1,14 +1,14 @@
 //! Verification folder: writes the pictures that a table is verified with.
 
 use super::card::Card;
-use super::images::{MOST_CLIPPED, RANGES, fine_images, test_images};
+use super::images::{MOST_CLIPPED, RANGES, fine_images, screen_images, test_images};
 use super::manifest::{VerifyManifest, VerifyRole};
 use super::response::ProjectorCurves;
-use super::{TestImage, VerifyError};
+use super::{TestImage, VerifyError, several};
 use crate::{Layout, SLIDES_FOLDER, Slide, fine_stripes, slide_name};
 use iltm_capture::{
-    Pattern, Role, SETTINGS_FILE, STRIPES_FILE, Settings, StripeManifest, StripeRole, VERIFY_FILE,
-    numbered, pattern_set,
+    CameraPlaces, Pattern, Role, SETTINGS_FILE, STRIPES_FILE, Settings, StripeManifest, StripeRole,
+    VERIFY_FILE, numbered, pattern_set,
 };
 use iltm_picture::{Picture, Response, WholeFolder, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 
 /// What stands in the folder for whoever takes the photographs.
 const README: &str = include_str!("README.txt");
+
+/// The same for several projectors that overlap.
+const README_SEVERAL: &str = include_str!("README-several.txt");
 
 /// The same for a chain that compensates.
 const README_WANTED: &str = include_str!("README-wanted.txt");
@@ -40,32 +43,36 @@ pub struct Written {
 
 /// Random patterns beside the Gray code: without them camera pixels are found so roughly
 /// that a good table seems four times worse than it is, and more of them bring little.
-const BERNOULLI: usize = 32;
+pub(super) const BERNOULLI: usize = 32;
 
 /// Random patterns after the last image: as many as movement is found by.
-const AFTER_IMAGES: usize = 4;
+pub(super) const AFTER_IMAGES: usize = 4;
 
 /// What they follow from: any number but those of captures.
-const SEED: u64 = 0x5EE;
+pub(super) const SEED: u64 = 0x5EE;
 
 /// A picture to project.
-struct VerifySlide {
-    listed: ListedAs,
+#[derive(Clone)]
+pub(super) struct VerifySlide {
+    pub(super) listed: ListedAs,
     /// One pixel a cell; `None` if the slide says more than that.
-    cells: Option<Picture>,
+    pub(super) cells: Option<Picture>,
     /// What the projector is sent.
-    full: Picture,
+    pub(super) full: Picture,
 }
 
 /// In which list a slide stands, and as what.
 #[derive(Clone, Copy)]
-enum ListedAs {
+pub(super) enum ListedAs {
     Verify(VerifyRole),
     Stripes(StripeRole),
+    /// Patterns and stripes of one of several projectors, which are counted from 1.
+    Code(usize, Role),
+    CodeStripes(usize, StripeRole),
 }
 
 impl VerifySlide {
-    fn cells(role: VerifyRole, cells: Picture, full: Picture) -> Self {
+    pub(super) fn cells(role: VerifyRole, cells: Picture, full: Picture) -> Self {
         let (listed, cells) = (ListedAs::Verify(role), Some(cells));
         Self {
             listed,
@@ -76,13 +83,16 @@ impl VerifySlide {
 }
 
 /// What the slides of a folder are.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Slides {
+#[derive(Clone, Copy, Debug)]
+pub enum Slides<'p> {
     /// Each test image as it is and as the table compensates it: for a projector alone.
     Both {
         /// Whether there are stripes and images of the projector's own pixels too.
         fine: bool,
     },
+    /// The same for several projectors that overlap, whose pixels the camera of their captures sees at
+    /// these places.
+    Several(&'p CameraPlaces),
     /// Each test image as it should look: for a chain that compensates.
     Wanted,
 }
@@ -106,12 +116,17 @@ pub(super) const TABLE_FILE: &str = "table.txt";
 pub fn write(
     table: &Table<'_>,
     layout: &Layout,
-    (settings, kind): (&Settings, Slides),
+    (settings, kind): (&Settings, Slides<'_>),
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Written, VerifyError> {
-    let images = test_images(table)?;
+    let images = match kind {
+        // Cells of one do not lie on those of the other.
+        Slides::Several(_) => Vec::new(),
+        Slides::Both { .. } | Slides::Wanted => test_images(table)?,
+    };
     let fine = match kind {
+        Slides::Several(places) => screen_images(table, places)?,
         Slides::Both { fine: true } => fine_images(table, layout.inner())?,
         Slides::Both { fine: false } | Slides::Wanted => Vec::new(),
     };
@@ -125,6 +140,7 @@ pub fn write(
     }
     let slides = match kind {
         Slides::Both { .. } => slides(table, layout, &images, &fine)?,
+        Slides::Several(places) => several::slides(table, layout, &fine, &places.columns)?,
         Slides::Wanted => wanted_slides(table, layout, &images)?,
     };
     progress.begin("writing the pictures", slides.len() as u64);
@@ -143,11 +159,14 @@ pub fn write(
     for (image, test) in fine.iter().enumerate() {
         folder.picture(fine_file(image as u8), &test.wanted)?;
     }
-    let (manifest, stripes) = lists(&slides);
+    let (manifest, own) = lists(&slides);
     folder.file(VERIFY_FILE, manifest.to_csv())?;
-    let stripes = (stripes.shots.len(), stripes);
-    if stripes.0 > 0 {
-        folder.file(STRIPES_FILE, stripes.1.to_csv())?;
+    if !own.shots.is_empty() {
+        folder.file(STRIPES_FILE, own.to_csv())?;
+    }
+    let mut stripes = own.shots.len();
+    if let Slides::Several(places) = kind {
+        stripes = several::write_lists(&folder, &slides, places)?;
     }
     // Numbers and strings always have a TOML form.
     folder.file(
@@ -155,11 +174,12 @@ pub fn write(
         toml::to_string(&settings).unwrap_or_default(),
     )?;
     let film = match kind {
-        Slides::Both { .. } => 0,
+        Slides::Both { .. } | Slides::Several(_) => 0,
         Slides::Wanted => write_film(table, layout, &slides, &folder)?,
     };
     let readme = match kind {
         Slides::Both { .. } => README,
+        Slides::Several(_) => README_SEVERAL,
         Slides::Wanted => {
             folder.file(TABLE_FILE, format!("{:08x}\n", table.id()))?;
             README_WANTED
@@ -172,7 +192,7 @@ pub fn write(
     Ok(Written {
         pictures: slides.len(),
         film,
-        stripes: stripes.0,
+        stripes,
         images,
         fine,
     })
@@ -194,7 +214,7 @@ fn lists(slides: &[VerifySlide]) -> (VerifyManifest, StripeManifest) {
     let stripes = (0..).zip(slides);
     let stripes = stripes.filter_map(|(index, slide)| match slide.listed {
         ListedAs::Stripes(role) => Some((index, role)),
-        ListedAs::Verify(_) => None,
+        ListedAs::Verify(_) | ListedAs::Code(..) | ListedAs::CodeStripes(..) => None,
     });
     let stripes = StripeManifest::numbered(SLIDES_FOLDER, stripes);
     (verify, stripes)
@@ -287,21 +307,31 @@ fn slides(
         slides.extend(rest.next().map(code).transpose()?);
     }
     for (image, test) in (0..).zip(fine) {
-        let plain = plain(&test.wanted, &curves);
-        for (role, picture) in [
-            (VerifyRole::FinePlain(image), &plain),
-            (VerifyRole::FineCompensated(image), &test.compensated),
-        ] {
-            slides.push(VerifySlide {
-                listed: ListedAs::Verify(role),
-                cells: None,
-                full: layout.slide(picture)?,
-            });
-        }
+        slides.extend(fine_slides((image, test), layout, &curves)?);
     }
     slides.extend(all(rest.as_slice())?);
     slides.extend(ends()?);
     Ok(slides)
+}
+
+/// A test image of the projector's own pixels as it is and compensated.
+pub(super) fn fine_slides(
+    (image, test): (u8, &TestImage),
+    layout: &Layout,
+    curves: &ProjectorCurves,
+) -> Result<[VerifySlide; 2], VerifyError> {
+    let slide = |role, picture: &Picture| -> Result<VerifySlide, VerifyError> {
+        Ok(VerifySlide {
+            listed: ListedAs::Verify(role),
+            cells: None,
+            full: layout.slide(picture)?,
+        })
+    };
+    let plain = plain(&test.wanted, curves);
+    Ok([
+        slide(VerifyRole::FinePlain(image), &plain)?,
+        slide(VerifyRole::FineCompensated(image), &test.compensated)?,
+    ])
 }
 
 /// Stripes finer than the cells.

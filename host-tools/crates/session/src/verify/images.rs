@@ -6,7 +6,7 @@
 //! contrast is lowered, so that the error is that of the table and not of the image.
 
 use super::Expected;
-use iltm_capture::CellPlanes;
+use iltm_capture::{CameraPlaces, CellPlanes};
 use iltm_picture::{Lattice, Picture};
 use iltm_runtime::{FrameSize, Grid, image::Table};
 use iltm_solve::{SUPERSAMPLING, fine_natural_images, wanted_images};
@@ -14,6 +14,9 @@ use iltm_video::{CompensateOptions, Compensator, VideoError};
 
 /// Natural images among the test images.
 const NATURAL: usize = 3;
+
+/// Title of the test image without any shape.
+const EVEN_GREY: &str = "Even grey";
 
 /// Test images of one pixel a pixel of the projector.
 const FINE: usize = 4;
@@ -84,6 +87,70 @@ pub fn fine_images(table: &Table<'_>, size: FrameSize) -> Result<Vec<TestImage>,
     compensated(table, size, drawn)
 }
 
+/// The same for several projectors that overlap: drawn on the camera's picture, so that what both show
+/// of a place is one; and an even grey. None if the camera has fewer than four pixels along a cell's
+/// sides.
+///
+/// # Errors
+/// [`VideoError`] if the table cannot compensate a picture of this size.
+pub fn screen_images(
+    table: &Table<'_>,
+    places: &CameraPlaces,
+) -> Result<Vec<TestImage>, VideoError> {
+    let drawn = drawn_on_camera(places, usize::from(table.channels()));
+    compensated(table, places.frame, drawn)
+}
+
+/// Titles and shapes of images of a wide frame, drawn on the camera's picture.
+fn drawn_on_camera(places: &CameraPlaces, channels: usize) -> Vec<(String, CellPlanes)> {
+    let seen = || places.places.iter().flatten();
+    let ends = |axis: usize| {
+        let sides = seen().map(move |place| f64::from(place[axis]));
+        let start = (f64::INFINITY, f64::NEG_INFINITY);
+        sides.fold(start, |(least, most), at| (least.min(at), most.max(at)))
+    };
+    let ends = [ends(0), ends(1)];
+    let pixels = ends.map(|(least, most)| (most - least).floor() + 1.0);
+    let cells = pixels.map(|pixels| (pixels / places.cell_side).round().max(1.0) as u16);
+    let size = FrameSize::new(pixels[0] as u16, pixels[1] as u16);
+    let grid = Grid::new(cells[1], cells[0]).ok();
+    let Some((size, grid)) = size.zip(grid) else {
+        return Vec::new();
+    };
+    let on_frame = |plane: &Vec<f64>| -> Vec<f64> {
+        let light = |place: &Option<[f32; 2]>| {
+            let at = |axis: usize, place: &[f32; 2]| f64::from(place[axis]) - ends[axis].0;
+            // Where the camera sees nothing, anything is as good.
+            (place.as_ref()).map_or(0.5, |place| {
+                between(plane, size, [at(0, place), at(1, place)])
+            })
+        };
+        places.places.iter().map(light).collect()
+    };
+    let mut drawn = drawn_finely(grid, size, channels);
+    for (_, planes) in &mut drawn {
+        *planes = planes.iter().map(on_frame).collect();
+    }
+    if !drawn.is_empty() {
+        let grey = vec![0.5; places.frame.pixels()];
+        drawn.push((screen_title(drawn.len()), vec![grey; channels]));
+    }
+    drawn
+}
+
+/// Value of a plane between its pixels, linear.
+fn between(plane: &[f64], size: FrameSize, place: [f64; 2]) -> f64 {
+    let sides = [size.width(), size.height()];
+    let first = [0, 1].map(|axis: usize| {
+        let at = place[axis].clamp(0.0, sides[axis] as f64 - 1.0);
+        (at as usize, at.fract())
+    });
+    let [(x, right), (y, down)] = first;
+    let value = |x: usize, y: usize| plane[y.min(sides[1] - 1) * sides[0] + x.min(sides[0] - 1)];
+    let row = |y: usize| value(x, y) + right * (value(x + 1, y) - value(x, y));
+    row(y) + down * (row(y + 1) - row(y))
+}
+
 /// Shapes as images that the table can show.
 fn compensated(
     table: &Table<'_>,
@@ -145,10 +212,18 @@ fn drawn_finely(grid: Grid, size: FrameSize, channels: usize) -> Vec<(String, Ce
         let own = |channel: usize| &natural[(image * 3 + channel) % FIRST_FINE][..];
         coloured(&natural[FIRST_FINE + image], own, channels)
     };
-    let title = |image: usize| format!("Natural, pixels {}", image + 1);
     (0..FINE)
-        .map(|image| (title(image), shape(image)))
+        .map(|image| (screen_title(image), shape(image)))
         .collect()
+}
+
+/// Title of the image with this number among [`screen_images`].
+pub(super) fn screen_title(image: usize) -> String {
+    if image < FINE {
+        format!("Natural, pixels {}", image + 1)
+    } else {
+        EVEN_GREY.to_owned()
+    }
 }
 
 /// Titles and shapes, 0 where darkest and 1 where brightest, one entry a channel.
@@ -170,7 +245,7 @@ fn drawn(grid: Grid, channels: usize) -> Vec<(String, CellPlanes)> {
         })
         .collect();
     drawn.push((
-        "Even grey".to_owned(),
+        EVEN_GREY.to_owned(),
         vec![vec![0.5; grid.cells()]; channels],
     ));
     let fields =
@@ -248,5 +323,68 @@ mod tests {
         }
         let fewer = FrameSize::new(5 * 4 - 1, 3 * 4).unwrap();
         assert!(drawn_finely(grid, fewer, 3).is_empty());
+    }
+
+    #[test]
+    fn two_projectors_show_the_same_of_the_places_that_both_light() {
+        // Two pictures of 40 x 24 pixels. The first has the camera's pixels; the second is turned and
+        // smaller on the camera's picture, which does not show one row of it.
+        let (width, height) = (40, 24);
+        let place = |x: usize, y: usize| {
+            let (x, y) = (x as f32, y as f32);
+            if x < width as f32 {
+                Some([10.0 + x, 20.0 + y])
+            } else {
+                let (x, y) = (x - width as f32, y);
+                (y > 0.0).then_some([35.0 + 0.6 * x - 0.25 * y, 22.0 + 0.7 * y + 0.1 * x])
+            }
+        };
+        let all = (0..height).flat_map(|y| (0..2 * width).map(move |x| place(x, y)));
+        let places = CameraPlaces {
+            grid: Grid::new(3, 10).unwrap(),
+            frame: FrameSize::new(2 * width as u16, height as u16).unwrap(),
+            columns: vec![0..5, 5..10],
+            places: all.collect(),
+            cell_side: 8.0,
+            white: Vec::new(),
+            correspondences: Vec::new(),
+        };
+        let drawn = drawn_on_camera(&places, 3);
+        assert_eq!(drawn.len(), FINE + 1);
+        for (title, planes) in &drawn {
+            assert_eq!(planes.len(), 3);
+            let spread = planes[0]
+                .iter()
+                .fold(0.0_f64, |most, v| most.max((v - 0.5).abs()));
+            assert_eq!(spread < 1e-9, title == EVEN_GREY, "{title}: {spread}");
+            let mut met = 0;
+            for (at, value) in planes[1].iter().enumerate() {
+                let (x, y) = (at % (2 * width), at / (2 * width));
+                let Some([u, v]) = place(x, y).filter(|_| x >= width) else {
+                    continue;
+                };
+                // The pixel of the first picture at the same place, if there is one.
+                let (x, y) = (u - 10.0, v - 20.0);
+                if x <= width as f32 - 1.0 && y <= height as f32 - 1.0 {
+                    met += 1;
+                    let around = [0, 1].map(|dy| {
+                        [0, 1].map(|dx| {
+                            let (x, y) = (x as usize + dx, y as usize + dy);
+                            planes[1][y.min(height - 1) * 2 * width + x.min(width - 1)]
+                        })
+                    });
+                    let least = around.concat().into_iter().fold(f64::INFINITY, f64::min);
+                    let most = around.concat().into_iter().fold(0.0, f64::max);
+                    let within = (least - 1e-6..=most + 1e-6).contains(value);
+                    assert!(within, "{title} {u} {v}: {value} not in {least}..{most}");
+                }
+            }
+            assert!(met > 300, "{met}");
+        }
+        let coarse = CameraPlaces {
+            cell_side: 2.0,
+            ..places
+        };
+        assert!(drawn_on_camera(&coarse, 1).is_empty());
     }
 }

@@ -6,14 +6,15 @@
 //! known: the table's own predicted error, what the projector's range and its 8-bit codes
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
-use super::outcome::{decide, decide_by_pixels};
+use super::outcome::{MOST_SHIFTED, decide, decide_by_pixels, decide_by_shifts};
 use super::readings::Shown;
 use super::{Cause, ChainFault, Expected, Outcome, PixelVerdict, Readings, VerifyError};
-use iltm_capture::{CellPlanes, Gate};
+use iltm_capture::{CellPlanes, Gate, PictureShift};
 use iltm_compile::Provenance;
 use iltm_picture::LightPicture;
 use iltm_report::{Comparison, tier_costs};
 use iltm_runtime::{FrameSize, image::Table};
+use std::borrow::Cow;
 use std::path::Path;
 
 /// How much larger than expected an error may be.
@@ -103,6 +104,10 @@ impl Bound {
 pub struct ImageVerdict {
     /// Its number.
     pub image: u8,
+    /// What it is, for people.
+    pub title: String,
+    /// Share of its samples that the table has to cut.
+    pub clipped: f64,
     /// Error without and with compensation.
     pub error: [f64; 2],
     /// Both as the table read backwards would have them, without its own error; `None` if
@@ -201,6 +206,10 @@ pub struct TableVerdict {
     pub pixels: Option<PixelVerdict>,
     /// What has changed.
     pub drift: Drift,
+    /// How far pictures that overlap lie from where they lay against each other.
+    pub shifts: Vec<PictureShift>,
+    /// Two projectors, from 0, that show each other's pictures.
+    pub exchanged: Option<[usize; 2]>,
     /// Light of wanted white on the wall, of that under the projector's own white; mean over
     /// the cells and colours.
     pub brightness: f64,
@@ -211,6 +220,21 @@ pub struct TableVerdict {
 }
 
 impl TableVerdict {
+    /// The pictures that moved farthest against each other, if that keeps the table from passing.
+    #[must_use]
+    pub fn moved(&self) -> Option<&PictureShift> {
+        let nudged = self.cause == Some(Cause::Nudged);
+        self.farthest()
+            .filter(|shift| nudged && shift.pixels > MOST_SHIFTED)
+    }
+
+    /// The pictures that moved farthest against each other, if any overlap.
+    #[must_use]
+    pub fn farthest(&self) -> Option<&PictureShift> {
+        let shifts = self.shifts.iter();
+        shifts.max_by(|a, b| a.pixels.total_cmp(&b.pixels))
+    }
+
     /// Whether it is the error within the cells that keeps the table from passing.
     #[must_use]
     pub const fn fails_within_cells(&self) -> bool {
@@ -241,9 +265,11 @@ pub fn judge(
             ])
         })
         .collect();
-    if let Some(models) = &models {
-        check_order(folder, readings, models, &lit)?;
-    }
+    // What the table does not tell of a photograph, its picture does, roughly.
+    let wanted = |shown: &Shown| [shown.wanted.clone(), shown.wanted.clone()];
+    let shows = models.as_ref().map(Cow::Borrowed);
+    let shows = shows.unwrap_or_else(|| Cow::Owned(readings.shown.iter().map(wanted).collect()));
+    check_order(folder, readings, &shows, &lit)?;
     let white = table.reference_white().to_num::<f64>();
     let images: Vec<ImageVerdict> = readings
         .shown
@@ -276,6 +302,8 @@ pub fn judge(
     if chain.is_some() {
         (outcome, cause) = (Outcome::Failed, Some(Cause::Chain));
     }
+    let moved = (&readings.shifts[..], readings.exchanged.is_some());
+    (outcome, cause) = decide_by_shifts(moved, (outcome, cause));
     // Photographs that cannot tell by cells tell less by pixels.
     let pixels = (outcome != Outcome::Inconclusive)
         .then(|| PixelVerdict::new(table, readings, &bound))
@@ -294,6 +322,8 @@ pub fn judge(
         bound,
         pixels,
         drift,
+        shifts: readings.shifts.clone(),
+        exchanged: readings.exchanged,
         brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),
         cells: (lit.0.len(), known),
@@ -378,6 +408,8 @@ fn image(
     let scale = compared[1].scale;
     ImageVerdict {
         image: shown.image,
+        title: shown.title.clone(),
+        clipped: shown.clipped,
         error: compared.each_ref().map(|compared| compared.error),
         modelled,
         at_table_white: at_scale(&shown.seen[1], &shown.wanted, 1.0 / white, lit),
@@ -563,9 +595,11 @@ fn drift(
     };
     let first = seen.first().map_or(0.0, total).max(1e-12);
     let changes = seen.iter().map(|light| (total(light) / first - 1.0).abs());
-    let flood = expected.photograph(&readings.flood);
+    let photographed = readings.expected_white.clone().map(|light| (light, 1.0));
+    let expected = || Some((expected.photograph(&readings.flood)?, white));
+    let flood = photographed.or_else(expected);
     Drift {
-        white: flood.map(|flood| white_change(readings, &flood, white, cols, lit)),
+        white: flood.map(|(flood, white)| white_change(readings, &flood, white, cols, lit)),
         session: changes.fold(0.0, f64::max),
     }
 }
@@ -795,6 +829,7 @@ mod tests {
                 channels: 2,
                 live: vec![true; 4],
                 left_out: Vec::new(),
+                pixels_of_cells: vec![Vec::new(); 4],
                 registration,
                 gates: Vec::new(),
                 cause: None,
@@ -804,9 +839,13 @@ mod tests {
                 views: Vec::new(),
                 step: 1,
                 pixels: None,
+                correspondences: Vec::new(),
             },
             live: vec![true; 4],
             wanted: false,
+            expected_white: None,
+            shifts: Vec::new(),
+            exchanged: None,
             flood: Vec::new(),
         }
     }
@@ -855,6 +894,8 @@ mod tests {
     fn verdict(cells: [Vec<Option<f64>>; 2]) -> ImageVerdict {
         ImageVerdict {
             image: 0,
+            title: String::new(),
+            clipped: 0.0,
             error: [0.0; 2],
             modelled: None,
             at_table_white: 0.0,

@@ -7,6 +7,7 @@
 //! ```text
 //! table -> images     wanted light that the table can show
 //!          folder     pictures to project, verify.csv, README.md
+//!          several    the same for projectors that overlap
 //!          card       numbers the slides of a film
 //! photographs -> recognise  which slide each photograph of a film shows
 //!                readings   what verify.csv and the pictures say, read back and checked
@@ -36,6 +37,7 @@ mod readings;
 mod recognise;
 mod refine;
 mod response;
+mod several;
 #[cfg(test)]
 #[path = "../../../compile/src/test_scene.rs"]
 mod test_scene;
@@ -45,12 +47,14 @@ pub use error::VerifyError;
 pub use expected::Expected;
 pub use fixed_pattern::FixedPattern;
 pub use folder::{Slides, Written, write};
-pub use images::{TestImage, fine_images, test_images};
+pub use images::{TestImage, fine_images, screen_images, test_images};
 pub use judge::{Bound, Curve, Drift, ImageVerdict, TableVerdict, WhiteChange, WorstCell, judge};
 pub use manifest::{VerifyManifest, VerifyRole, VerifyShot};
 pub use maps::pictures;
 pub use outcome::{Cause, Outcome, refused};
-pub use page::{Handover, brightness_words, fixed_words, html, reason, shift_words};
+pub use page::{
+    Handover, brightness_words, fixed_words, html, moved_words, overlap_words, reason, shift_words,
+};
 pub use pixels::{PixelBound, PixelVerdict};
 pub use readings::{FineShown, Readings, Shown};
 pub use recognise::{Recognised, recognise};

@@ -6,7 +6,7 @@
 //! knows.
 
 use super::{Bound, Curve, Drift, PixelVerdict};
-use iltm_capture::{CellReadings, Gate, GateName, Nonlinearity};
+use iltm_capture::{CellReadings, Gate, GateName, Nonlinearity, PictureShift};
 use strum::IntoStaticStr;
 
 /// What a verification says of a table.
@@ -56,6 +56,8 @@ pub enum Cause {
     Scene,
     /// The picture lies elsewhere on the wall than when the table was made.
     Nudged,
+    /// Two projectors show each other's pictures.
+    Exchanged,
     /// White is as it was from cell to cell, and not within the cells: paint, dirt, or a screen that
     /// hangs otherwise.
     Texture,
@@ -148,6 +150,10 @@ impl Cause {
             Self::Nudged => {
                 "Put the projector back, or its lens shift, keystone and zoom, until the picture lies \
                  where it lay, and verify again; or take a new capture and solve it."
+            }
+            Self::Exchanged => {
+                "Exchange their cables, or their displays in the computer's settings, and photograph \
+                 again."
             }
             Self::Texture => {
                 "Look at the page's map of the pixels' errors for what has changed on the wall. If it \
@@ -259,6 +265,33 @@ pub(super) fn decide_by_pixels(
     }
 }
 
+/// Pixels that pictures which overlap may lie from where they lay against each other: at one pixel, a
+/// line as wide as that is seen twice.
+pub(super) const MOST_SHIFTED: f64 = 1.0;
+
+/// What follows from pictures that moved against each other where cells have said this. From where the
+/// camera stands does not matter to it.
+pub(super) fn decide_by_shifts(
+    (shifts, exchanged): (&[PictureShift], bool),
+    (outcome, cause): (Outcome, Option<Cause>),
+) -> (Outcome, Option<Cause>) {
+    let moved = shifts.iter().any(|shift| shift.pixels > MOST_SHIFTED);
+    let told = match outcome {
+        Outcome::Passed | Outcome::Failed => true,
+        Outcome::Inconclusive => cause == Some(Cause::Viewpoint),
+    };
+    // A changed colour is no matter of places.
+    match cause {
+        _ if told && exchanged => (Outcome::Failed, Some(Cause::Exchanged)),
+        None | Some(Cause::Viewpoint | Cause::Scene | Cause::ProjectorResponse)
+            if told && moved =>
+        {
+            (Outcome::Failed, Some(Cause::Nudged))
+        }
+        _ => (outcome, cause),
+    }
+}
+
 /// Part of which the levels of white's colours may differ.
 const SAME_COLOUR: f64 = 0.03;
 
@@ -324,6 +357,36 @@ mod tests {
         );
         let noisy = (Outcome::Inconclusive, Some(Cause::Noise));
         assert_eq!(decide(0.1, shift, noisy), noisy);
+    }
+
+    #[test]
+    fn pictures_that_moved_against_each_other_by_more_than_a_pixel_fail() {
+        let shifted = |pixels: f64, found| {
+            let shift = |pixels| PictureShift {
+                projectors: [0, 1],
+                pixels,
+                shift: [pixels, 0.0],
+            };
+            decide_by_shifts((&[shift(0.1), shift(pixels)], false), found)
+        };
+        let passed = (Outcome::Passed, None);
+        let nudged = (Outcome::Failed, Some(Cause::Nudged));
+        assert_eq!(shifted(0.99, passed), passed);
+        assert_eq!(shifted(1.01, passed), nudged);
+        let scene = (Outcome::Failed, Some(Cause::Scene));
+        assert_eq!(shifted(0.5, scene), scene);
+        assert_eq!(shifted(5.0, scene), nudged);
+        let viewpoint = (Outcome::Inconclusive, Some(Cause::Viewpoint));
+        assert_eq!(shifted(1.01, viewpoint), nudged);
+        assert_eq!(shifted(0.99, viewpoint), viewpoint);
+        // Photographs that cannot be compared tell no places either.
+        let moved = (Outcome::Inconclusive, Some(Cause::Moved));
+        assert_eq!(shifted(5.0, moved), moved);
+        assert_eq!(decide_by_shifts((&[], false), passed), passed);
+        let exchanged = (Outcome::Failed, Some(Cause::Exchanged));
+        for found in [passed, scene, viewpoint] {
+            assert_eq!(decide_by_shifts((&[], true), found), exchanged);
+        }
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 use super::judge::{MOST_NOISE, MOST_VIEWPOINT};
 use super::maps::{MARKED, drift_scale, error_scale, pixel_scale};
-use super::outcome::colour;
-use super::{Cause, ImageVerdict, Outcome, PixelVerdict, TableVerdict, TestImage};
+use super::outcome::{MOST_SHIFTED, colour};
+use super::{Cause, Outcome, PixelVerdict, TableVerdict};
+use iltm_capture::PictureShift;
 use iltm_compile::Provenance;
 use iltm_picture::PictureError;
 use iltm_picture::html::{PictureFile, capitalised, colour_bar, document, img_named, percent};
@@ -23,13 +24,11 @@ pub struct Handover {
     pub device: Option<Vec<(String, String)>>,
 }
 
-/// The page of a verdict. `images` are those that the table makes, in the order of their
-/// numbers; `files` the [`pictures`](super::pictures). Complete in itself.
+/// The page of a verdict; `files` are the [`pictures`](super::pictures). Complete in itself.
 #[must_use]
 pub fn html(
     table: &Table<'_>,
     verdict: &TableVerdict,
-    images: &[TestImage],
     files: &[PictureFile],
     handover: &Handover,
 ) -> String {
@@ -38,7 +37,7 @@ pub fn html(
         (opening(answer, verdict))
         (identity(table, verdict, handover))
         @if let Some(judged) = &verdict.pixels { (viewer(judged, files)) }
-        (pictures(verdict, images, files))
+        (pictures(verdict, files))
         (worst(verdict, files))
         (unchecked(verdict, handover))
         (drift(verdict, files))
@@ -53,7 +52,11 @@ fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
     let mut limit = verdict.bound.limit;
     let mut of = "with the table, by the mean light of cells";
     let by_cells = verdict.outcome == Outcome::Failed && !verdict.fails_within_cells();
-    let pixels = verdict.pixels.as_ref().filter(|_| !by_cells);
+    let moved = verdict.moved();
+    let pixels = verdict
+        .pixels
+        .as_ref()
+        .filter(|_| !by_cells && moved.is_none());
     let judged = pixels.and_then(|pixels| Some((pixels, pixels.fixed?, pixels.bound?)));
     if let Some((pixels, fixed, bound)) = judged {
         [before, after, limit] = [pixels.error[0], fixed.error, bound.limit];
@@ -71,8 +74,16 @@ fn opening(answer: &str, verdict: &TableVerdict) -> Markup {
         @if let Some(cause) = verdict.cause { p { b { "Next: " } (cause.next_step()) } }
         div .numbers {
             div .number { b { (percent(before)) } span { @if verdict.wanted { "error without the table, expected" } @else { "error of the wall as it is" } } }
-            div .number.(colour) { b { (percent(after)) } span { (of) } }
-            div .number { b { (percent(limit)) } span { "the most that passes" } }
+            @match moved {
+                Some(moved) => {
+                    div .number.(colour) { b { @if moved.pixels.is_finite() { (format!("{:.1} px", moved.pixels)) } @else { "far" } } span { "between pictures that overlap" } }
+                    div .number { b { (format!("{MOST_SHIFTED:.0} px")) } span { "the most that passes" } }
+                }
+                None => {
+                    div .number.(colour) { b { (percent(after)) } span { (of) } }
+                    div .number { b { (percent(limit)) } span { "the most that passes" } }
+                }
+            }
         }
         p { (brightness_words(verdict)) }
     } }
@@ -85,7 +96,7 @@ pub fn brightness_words(verdict: &TableVerdict) -> String {
         return "Not judged by these photographs.".to_owned();
     }
     format!(
-        "White is {:.0} % of what the projector makes alone.",
+        "White is {:.0} % as bright as without the table.",
         100.0 * verdict.brightness
     )
 }
@@ -251,11 +262,43 @@ pub fn shift_words([right, down]: [f64; 2]) -> String {
     )
 }
 
+/// How pictures that overlap lie against each other, in words.
+#[must_use]
+pub fn overlap_words(shift: &PictureShift) -> String {
+    let [first, second] = shift.projectors.map(|number| number + 1);
+    if shift.pixels.is_infinite() {
+        return format!(
+            "the pictures of projectors {first} and {second} overlap at other pixels than when the table \
+             was made"
+        );
+    }
+    format!(
+        "the pictures of projectors {first} and {second} lie {:.1} pixels from where they lay against \
+         each other when the table was made",
+        shift.pixels
+    )
+}
+
+/// The same of those that lie too far.
+#[must_use]
+pub fn moved_words(shift: &PictureShift) -> String {
+    if shift.pixels.is_infinite() {
+        return overlap_words(shift);
+    }
+    format!(
+        "{}; at most {MOST_SHIFTED:.0} pixel passes",
+        overlap_words(shift)
+    )
+}
+
 /// What is wrong within the cells.
 fn within_cells(verdict: &TableVerdict) -> String {
     let pixels = verdict.pixels.as_ref();
     let fixed = pixels.and_then(fixed_words).unwrap_or_default();
     let shift = pixels.and_then(|pixels| pixels.fixed?.shift);
+    if let Some(moved) = verdict.moved() {
+        return format!("{}.", capitalised(&moved_words(moved)));
+    }
     let what = match (verdict.cause, shift, verdict.outcome) {
         (Some(Cause::Nudged), Some(shift), _) => format!(
             "The picture lies {} of where it lay when the table was made, and the wall's own detail is \
@@ -298,6 +341,13 @@ pub fn reason(verdict: &TableVerdict) -> String {
         None => return good(verdict),
         Some(Cause::Noise) => apart("Photographs of the same picture differ among themselves by"),
         Some(Cause::Nudged | Cause::Texture) => within_cells(verdict),
+        Some(Cause::Exchanged) => {
+            let [first, second] = verdict
+                .exchanged
+                .unwrap_or_default()
+                .map(|number| number + 1);
+            format!("Projectors {first} and {second} show each other's pictures.")
+        }
         Some(Cause::Viewpoint) => apart(
             "From where the camera stands, white differs from what the table expects from cell to \
              cell by",
@@ -364,18 +414,13 @@ pub fn reason(verdict: &TableVerdict) -> String {
     }
 }
 
-fn pictures(verdict: &TableVerdict, images: &[TestImage], files: &[PictureFile]) -> Markup {
-    let title = |image: &ImageVerdict| {
-        images
-            .get(usize::from(image.image))
-            .map(|test| test.title.as_str())
-    };
+fn pictures(verdict: &TableVerdict, files: &[PictureFile]) -> Markup {
     html! { section {
         h2 { "The wall in the photographs, cell by cell" }
         p { "All at the same brightness. On the left the wanted light, drawn where the camera sees each cell." }
         @for image in &verdict.images {
             div .example {
-                h3 { (title(image).unwrap_or("Test image")) }
+                h3 { (image.title) }
                 div .three {
                     figure { (img_named(files, &format!("{}-wanted", image.image), "Wanted")) figcaption { "Wanted" } }
                     @if !verdict.wanted { figure {

@@ -193,8 +193,27 @@ pub(super) fn cut_at_pixels(
     seen.map(|cut| cut > 0.0).collect()
 }
 
+/// Means over the pixels that each cell is measured by and that see a known place, length `N`; 0 of a cell
+/// without any.
+pub(super) fn means_of_cells(
+    pixels: &PixelReadings,
+    pixels_of_cells: &[Vec<u32>],
+    values: &[f32],
+) -> Vec<f64> {
+    let mut on_camera = vec![None; pixels.camera.0 * pixels.camera.1];
+    for (view, value) in pixels.views.pixels().iter().zip(values) {
+        on_camera[view.pixel as usize] = Some(f64::from(*value));
+    }
+    let mean = |own: &Vec<u32>| {
+        let known = own.iter().filter_map(|pixel| on_camera[*pixel as usize]);
+        let (sum, count) = known.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+        if count > 0.0 { sum / count } else { 0.0 }
+    };
+    pixels_of_cells.iter().map(mean).collect()
+}
+
 /// Mean of what each pixel sees of a plane of the projector's pixels.
-fn at_pixels(pixels: &PixelReadings, plane: &[f32]) -> Vec<f32> {
+pub(super) fn at_pixels(pixels: &PixelReadings, plane: &[f32]) -> Vec<f32> {
     let views = &pixels.views;
     let seen = |view| {
         let seen = views.seen(view);

@@ -3,11 +3,11 @@
 use super::folder::{TABLE_FILE, fine_file, grey, levels, plain, wanted_file};
 use super::manifest::{VerifyManifest, VerifyRole, VerifyShot};
 use super::response::ProjectorCurves;
-use super::{Cause, Expected, VerifyError, refused};
+use super::{Cause, Expected, VerifyError, refused, several, test_images};
 use crate::Layout;
-use iltm_capture::VERIFY_FILE;
 use iltm_capture::{
-    CaptureError, CellPlanes, CellReadings, Remeasured, Settings, Shot, find_photo, remeasure,
+    CaptureError, CellPlanes, CellReadings, PictureShift, Remeasured, Settings, Shot, VERIFY_FILE,
+    find_photo, projector_file, remeasure,
 };
 use iltm_compile::Provenance;
 use iltm_picture::{
@@ -24,6 +24,10 @@ use std::path::{Path, PathBuf};
 pub struct Shown {
     /// Its number in `verify.csv`.
     pub image: u8,
+    /// What it is, for people.
+    pub title: String,
+    /// Share of its samples that the table has to cut.
+    pub clipped: f64,
     /// The light that was wanted, relative to reference white, one entry a channel.
     pub wanted: CellPlanes,
     /// Input of the projector for the picture as it is, and compensated, relative to its
@@ -47,6 +51,8 @@ pub struct FineShown {
     pub wanted: LightPicture,
     /// The same, compensated: codes for the projector.
     pub compensated: Picture,
+    /// Share of its samples that the table has to cut.
+    pub clipped: f64,
 }
 
 impl FineShown {
@@ -77,6 +83,14 @@ pub struct Readings {
     pub wanted: bool,
     /// The projector's input under what stands for white, relative to its white.
     pub flood: CellPlanes,
+    /// Light under white when the table was made, camera units, where photographs say it; otherwise
+    /// the table does.
+    pub expected_white: Option<CellPlanes>,
+    /// How far pictures that overlap lie from where they lay against each other when the table was
+    /// made.
+    pub shifts: Vec<PictureShift>,
+    /// Two projectors, from 0, that show each other's pictures.
+    pub exchanged: Option<[usize; 2]>,
 }
 
 /// Share of the table's cells that must be found.
@@ -98,6 +112,9 @@ impl Readings {
             },
             other => other.into(),
         })?;
+        if folder.join(projector_file(1)).exists() {
+            return several::read(folder, manifest, table, progress);
+        }
         let settings = Settings::read(folder)?;
         let mixing = Provenance::read(table.provenance()).mixing;
         let mut code: Vec<Shot> = Vec::new();
@@ -151,6 +168,8 @@ impl Readings {
         };
         let revisited = remeasure(folder, &settings, mixing, photographs, progress)?;
         let live = live(folder, table, &revisited)?;
+        let tests = test_images(table)?;
+        let test = |image: u8| tests.get(usize::from(image));
         let mut expected = Expected::new(table);
         let photographed = if wanted { 1 } else { 2 };
         let mut shown = Vec::with_capacity(pairs.len());
@@ -166,6 +185,9 @@ impl Readings {
             };
             shown.push(Shown {
                 image,
+                title: test(image)
+                    .map_or_else(|| "Test image".to_owned(), |test| test.title.clone()),
+                clipped: test(image).map_or(0.0, |test| test.clipped),
                 wanted: picture.wanted,
                 input: picture.input,
                 seen: [plain, revisited.pictures[last].clone()],
@@ -180,12 +202,15 @@ impl Readings {
             flood: flood(table, wanted)?,
             wanted,
             revisited,
+            expected_white: None,
+            shifts: Vec::new(),
+            exchanged: None,
         })
     }
 }
 
 /// Both pictures of each test image.
-fn paired(
+pub(super) fn paired(
     images: BTreeMap<u8, [Option<VerifyShot>; 2]>,
     folder: &Path,
 ) -> Result<Vec<(u8, [VerifyShot; 2])>, VerifyError> {
@@ -241,7 +266,7 @@ fn wanted_pictures(
     pairs.iter().map(of_image).collect()
 }
 
-fn with_role(shot: &VerifyShot, role: iltm_capture::Role) -> Shot {
+pub(super) fn with_role(shot: &VerifyShot, role: iltm_capture::Role) -> Shot {
     Shot {
         index: shot.index,
         role,
@@ -252,7 +277,7 @@ fn with_role(shot: &VerifyShot, role: iltm_capture::Role) -> Shot {
     }
 }
 
-fn check_all_there<'p>(
+pub(super) fn check_all_there<'p>(
     folder: &Path,
     code: &[Shot],
     pairs: impl Iterator<Item = &'p (u8, [VerifyShot; 2])>,
@@ -320,7 +345,7 @@ fn pictures(
 }
 
 /// The same of test images of the projector's own pixels.
-fn fine_pictures(
+pub(super) fn fine_pictures(
     folder: &Path,
     table: &Table<'_>,
     settings: &Settings,
@@ -337,7 +362,7 @@ fn fine_pictures(
     let of_pair = |(image, shots): &(u8, [VerifyShot; 2])| {
         let wanted = read_of_size(folder, &fine_file(*image), table, layout.inner())?;
         let mut made = wanted.clone();
-        compensator.picture(&mut made)?;
+        let summary = compensator.picture(&mut made)?;
         let expected = [&plain(&wanted, &curves), &made];
         for (shot, expected) in shots.iter().zip(expected) {
             let given = read_of_size(folder, &shot.pattern, table, size)?;
@@ -352,6 +377,7 @@ fn fine_pictures(
             image: *image,
             wanted: LightPicture::decode(&wanted, Response::Srgb),
             compensated: made,
+            clipped: summary.clipped as f64 / summary.samples.max(1) as f64,
         })
     };
     pairs.iter().map(of_pair).collect()
@@ -421,7 +447,7 @@ pub(super) fn input(picture: &Picture, curves: &ProjectorCurves) -> CellPlanes {
 }
 
 /// The cells that can be compared.
-fn live(
+pub(super) fn live(
     folder: &Path,
     table: &Table<'_>,
     revisited: &CellReadings,

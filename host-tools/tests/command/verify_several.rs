@@ -1,0 +1,227 @@
+//! `iltm verify` where pictures of two projectors overlap: good photographs from anywhere, what has
+//! changed since, and what is not as it must be.
+
+use super::user::{User, contains};
+use std::fs;
+use std::sync::OnceLock;
+
+const SCENE: &str = "SCENES/folded-screen.toml";
+
+/// With a table of two projectors, and a folder `v` to verify it with, not yet photographed.
+fn prepared() -> &'static User {
+    static USER: OnceLock<User> = OnceLock::new();
+    USER.get_or_init(|| {
+        let user = User::new();
+        for name in ["left", "right"] {
+            user.says(&format!(
+                "patterns -o {name} --rows 15 --cols 24 --photos 60 --projector 480x300"
+            ));
+            user.says(&format!(
+                "simulate {SCENE} --photograph {name} --projector {name}"
+            ));
+        }
+        user.says("solve left right -o t.iltm");
+        contains(
+            &user.says("verify t.iltm -o v --captures left right"),
+            &["5 test images", "stripes of the projectors' own pixels"],
+        );
+        let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/folded-screen.toml");
+        fs::copy(scene, user.path("scene.toml")).unwrap();
+        user
+    })
+}
+
+/// The scene with `from` replaced in the table that is called `name`.
+fn changed(name: &str, (from, to): (&str, &str)) -> String {
+    let scene = prepared().text("scene.toml");
+    let start = scene.find(&format!("name = \"{name}\"")).unwrap();
+    let (before, after) = scene.split_at(start);
+    assert!(after.contains(from), "{from}");
+    format!("{before}{}", after.replacen(from, to, 1))
+}
+
+/// Photographs of a copy of the folder in this scene, in a place of their own.
+fn photographed(scene: &str) -> User {
+    let user = User::new();
+    user.write("t.iltm", prepared().read("t.iltm"));
+    for part in ["v", "v/patterns", "v/photos", "v/slides", "v/wanted"] {
+        user.copy(&prepared().path(part), part);
+    }
+    user.write("now.toml", scene);
+    user.says("simulate now.toml --photograph v --seed 9");
+    user
+}
+
+fn moved(verdict: &serde_json::Value) -> f64 {
+    assert_eq!(
+        verdict["overlaps"].as_array().unwrap().len(),
+        1,
+        "{verdict}"
+    );
+    assert_eq!(
+        verdict["overlaps"][0]["projectors"],
+        serde_json::json!([1, 2])
+    );
+    verdict["overlaps"][0]["moved"].as_f64().unwrap()
+}
+
+#[test]
+fn a_good_table_passes_from_where_the_camera_stood_and_from_elsewhere() {
+    let elsewhere = ("position = [0.0, 1.0, 4.6]", "position = [0.5, 1.3, 4.4]");
+    let scenes = [
+        prepared().text("scene.toml"),
+        // The camera has no name.
+        prepared()
+            .text("scene.toml")
+            .replacen(elsewhere.0, elsewhere.1, 1),
+    ];
+    assert_ne!(scenes[0], scenes[1]);
+    for scene in &scenes {
+        let user = photographed(scene);
+        let verdict = user.json("verify t.iltm v");
+        assert_eq!(verdict["outcome"], "passed", "{verdict}");
+        let after = verdict["viewer"]["after"].as_f64().unwrap();
+        assert!(after < 0.01, "{verdict}");
+        // Where both light the screen, pictures without a table are twice as bright.
+        assert!(
+            verdict["viewer"]["before"].as_f64().unwrap() > 0.15,
+            "{verdict}"
+        );
+        assert!(moved(&verdict) < 0.2, "{verdict}");
+        assert_eq!(verdict["cells"]["compared"], 720);
+        assert!(user.path("v/verdict/verdict.html").is_file());
+        contains(
+            &user.says("verify t.iltm v"),
+            &["overlap     the pictures of projectors 1 and 2 lie 0."],
+        );
+    }
+}
+
+#[test]
+fn a_projector_that_was_nudged_by_two_pixels_fails_and_by_half_a_pixel_passes() {
+    // 5.5 mm are a pixel where it looks.
+    let nudged = |to: &str| {
+        let scene = changed("right", ("look_at = [0.937, 0.8, 0.656]", to));
+        photographed(&scene).run("--json verify t.iltm v")
+    };
+    let little = nudged("look_at = [0.939, 0.8, 0.656]");
+    assert_eq!(little.code, 0, "{}", little.with_code());
+    let far = nudged("look_at = [0.937, 0.811, 0.656]");
+    let verdict = far.json();
+    assert_eq!(
+        (far.code, verdict["cause"].as_str()),
+        (31, Some("nudged")),
+        "{verdict}"
+    );
+    assert!((moved(&verdict) - 2.0).abs() < 0.3, "{verdict}");
+    let up = verdict["overlaps"][0]["down"].as_f64().unwrap();
+    assert!((up + 2.0).abs() < 0.3, "{verdict}");
+    contains(
+        &verdict["error"]["message"].to_string(),
+        &["projectors 1 and 2 lie 2.", "at most 1 pixel passes"],
+    );
+}
+
+#[test]
+fn exchanged_cables_are_named() {
+    let scene = prepared().text("scene.toml");
+    let (left, right) = ("name = \"left\"", "name = \"right\"");
+    let exchanged = scene
+        .replacen(left, "name = \"other\"", 1)
+        .replacen(right, left, 1)
+        .replacen("name = \"other\"", right, 1);
+    // Frames go to projectors in the order of the scene, not by name.
+    let swap = |text: &str, a: &str, b: &str| text.replace(a, "@").replace(b, a).replace('@', b);
+    let exchanged = swap(&exchanged, "[0.5, 0.8, 3.6]", "[-0.5, 0.8, 3.6]");
+    let exchanged = swap(&exchanged, "[-0.937, 0.8, 0.656]", "[0.937, 0.8, 0.656]");
+    let user = photographed(&exchanged);
+    let said = user.fails(31, "verify t.iltm v");
+    contains(
+        &said,
+        &[
+            "Projectors 1 and 2 show each other's pictures",
+            "Exchange their cables",
+        ],
+    );
+}
+
+#[test]
+fn a_half_that_was_painted_is_a_changed_scene() {
+    let scene = changed("right half", ("albedo = 0.75", "albedo = 0.70"));
+    let user = photographed(&scene);
+    let ended = user.run("--json verify t.iltm v");
+    let verdict = ended.json();
+    assert_eq!(
+        (ended.code, verdict["cause"].as_str()),
+        (31, Some("scene")),
+        "{verdict}"
+    );
+    assert!(moved(&verdict) < 0.2, "{verdict}");
+}
+
+#[test]
+fn photographs_that_are_missing_exchanged_or_too_bright_are_named() {
+    let user = photographed(&prepared().text("scene.toml"));
+    let list = user.text("v/verify.csv");
+    let photo = |role: &str| {
+        let line = list
+            .lines()
+            .find(|line| line.split(',').nth(1) == Some(role));
+        line.unwrap().rsplit(',').next().unwrap().to_owned()
+    };
+    let [first, second] = ["fine-compensated-0", "fine-compensated-1"].map(photo);
+    let path = |photo: &str| user.path(&format!("v/{photo}"));
+    fs::rename(path(&first), user.path("kept.png")).unwrap();
+    contains(&user.fails(4, "verify t.iltm v"), &[&first, "missing"]);
+    fs::rename(path(&second), path(&first)).unwrap();
+    fs::rename(user.path("kept.png"), path(&second)).unwrap();
+    contains(&user.fails(5, "verify t.iltm v"), &["shows the picture of"]);
+
+    let bright = changed("left", ("bits = 12", "bits = 12\nwhite = 1.3"));
+    let said = photographed(&bright).run("verify t.iltm v");
+    contains(
+        &said.with_code(),
+        &["All projectors together: white is overexposed"],
+    );
+}
+
+#[test]
+fn a_table_of_overlapping_projectors_asks_for_its_captures() {
+    let user = prepared();
+    for (line, says) in [
+        ("verify t.iltm -o w", "--captures LEFT RIGHT"),
+        (
+            "verify t.iltm -o w --captures left",
+            "these captures have 15 x 24",
+        ),
+        ("verify t.iltm -o w --captures left left", "given twice"),
+        (
+            "verify t.iltm -o w --wanted --captures left right",
+            "Leave --wanted",
+        ),
+        (
+            "verify t.iltm -o w --projector 640x300 --captures left right",
+            "960 x 300",
+        ),
+        (
+            "verify t.iltm -o w --border 3 --captures left right",
+            "no border",
+        ),
+    ] {
+        let said = user.run(line);
+        assert_ne!(said.code, 0, "{line}");
+        contains(&said.with_code(), &[says]);
+        assert!(!user.path("w").exists(), "{line}");
+    }
+    let one = User::with_table();
+    contains(
+        &one.fails(2, "verify t.iltm -o w --captures c"),
+        &["do not overlap"],
+    );
+    let harmed = photographed(&user.text("scene.toml"));
+    harmed.write("v/before.toml", "white = [[1.0]]\n");
+    contains(
+        &harmed.fails(4, "verify t.iltm v"),
+        &["before.toml", "light of white"],
+    );
+}
