@@ -207,16 +207,18 @@ pub(super) struct Simulate {
 
 #[derive(Debug, Args)]
 pub(super) struct Check {
-    /// Folder with `capture.csv`, patterns and photographs
-    pub(super) capture: PathBuf,
-    /// Folder to make, with a page that shows what each gate saw
+    /// Folder with `capture.csv`, patterns and photographs; of several projectors, one for each, from
+    /// left to right, which are compared with each other too
+    #[arg(value_name = "CAPTURE", required = true)]
+    pub(super) captures: Vec<PathBuf>,
+    /// Folder to make, with a page that shows what each gate saw; of one capture
     #[arg(short, long, value_name = "DIR")]
     pub(super) output: Option<PathBuf>,
     /// Look only at the first M Bernoulli photographs beside all others
     #[arg(long, value_name = "M")]
     pub(super) photos: Option<usize>,
     /// File to write, .npy or .exr, with the place of the projector's picture that every camera
-    /// pixel sees
+    /// pixel sees; of one capture
     #[arg(long, value_name = "FILE", value_parser = map_file)]
     pub(super) map: Option<(PathBuf, MapFormat)>,
 }

@@ -5,10 +5,14 @@ use super::failure::{Failure, Kind};
 use super::output::{Output, printable, write_file, write_files};
 use super::progress::progress;
 use super::summary::{gates, map_fault};
-use crate::capture::{self, CaptureOptions, Examined, Gate, MapSource, ProjectorMap, Verdict};
+use crate::capture::{
+    self, CaptureOptions, Examined, ExaminedSeveral, Gate, MapSource, ProjectorMap, Verdict,
+};
 use crate::report;
 use console::{Term, style};
+use iltm_picture::progress::Progress;
 use serde_json::{Value, json};
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::Path;
 use textwrap::Options;
@@ -25,37 +29,125 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         ..CaptureOptions::default()
     };
     let bars = progress(output);
-    let examined = capture::examine(&arguments.capture, &options, bars.as_ref());
+    let [capture] = &arguments.captures[..] else {
+        let several = several(arguments, &options, bars.as_ref(), output);
+        bars.end();
+        return several;
+    };
+    let examined = capture::examine(capture, &options, bars.as_ref());
     bars.end();
     let examined = examined?;
     let failed = failed(&examined.gates);
     let page = arguments.output.as_deref().map(|folder| {
-        let html = report::gates::page(&name(&arguments.capture), &examined);
+        let html = report::gates::page(&name(capture), &examined);
         write_files(folder, &[(PAGE_FILE, html)])?;
         Ok::<_, Failure>(folder.join(PAGE_FILE))
     });
     let page = page.transpose()?;
-    let map = map(arguments, &examined)?;
+    let map = map(arguments, capture, &examined)?;
+    let (mut data, mut text, remarks) = found(capture, &examined);
+    data["map"] = json!(map.as_ref().map(|map| json!({
+        "source": map.source.name(),
+        "projector": [map.projector.size().width(), map.projector.size().height()],
+        "camera": [map.camera.0, map.camera.1],
+        "binning": map.binning,
+        "known": map.known(),
+        "uncertainty": map.usual_uncertainty(),
+    })));
+    data["page"] = json!(page.as_ref().map(|page| page.display().to_string()));
+    if let (Some(map), Some((path, _))) = (&map, &arguments.map) {
+        let _ = writeln!(text, "{}: {}", path.display(), words(map));
+    }
+    if let Some(page) = &page {
+        let _ = writeln!(text, "{}: what each gate saw", page.display());
+    }
+    if failed.is_empty() {
+        text += &passed(&remarks, &not_judged(&examined.gates));
+        output.dressed_result(&data, &dressed(&text));
+        return Ok(());
+    }
+    output.dressed_findings(&dressed(&text));
+    let failure = refusal(&capture.display().to_string(), &failed);
+    Err(failure.with_result(data))
+}
+
+/// Checks captures of several projectors, and that they belong together.
+fn several(
+    arguments: &Check,
+    options: &CaptureOptions,
+    bars: &dyn Progress,
+    output: &Output,
+) -> Result<(), Failure> {
+    if arguments.output.is_some() || arguments.map.is_some() {
+        return Err(Failure::new(
+            Kind::Usage,
+            "--output and --map are of the capture of one projector".to_owned(),
+            "Leave them away, or check the captures one by one.",
+        ));
+    }
+    let ExaminedSeveral { each, between } =
+        capture::examine_several(&arguments.captures, options, bars)?;
+    bars.end();
+    let (mut captures, mut lines, mut remarks) = (Vec::new(), String::new(), Vec::new());
+    for (capture, examined) in arguments.captures.iter().zip(&each) {
+        let (data, own, noted) = found(capture, examined);
+        captures.push(data);
+        let _ = write!(lines, "{}\n{own}\n", capture.display());
+        remarks.extend(noted);
+    }
+    let names: Vec<String> = (arguments.captures.iter())
+        .map(|capture| capture.display().to_string())
+        .collect();
+    let together = names.join(" and ");
+    if between.is_empty() {
+        let _ = writeln!(
+            lines,
+            "{together}: not compared, since one was not measured\n"
+        );
+    } else {
+        let _ = write!(lines, "{together}\n{}\n", text(&between));
+    }
+    remarks.extend(warned(&between));
+    let all: Vec<Gate> = each
+        .iter()
+        .flat_map(|examined| &examined.gates)
+        .chain(&between)
+        .cloned()
+        .collect();
+    let (failed, open) = (failed(&all), not_judged(&all));
+    let data = json!({
+        "captures": captures,
+        "between": gates(&between),
+        "pass": failed.is_empty(),
+    });
+    let once = |mut names: Vec<&'static str>| {
+        let mut seen = HashSet::new();
+        names.retain(|name| seen.insert(*name));
+        names
+    };
+    if failed.is_empty() {
+        lines += &passed(&once(remarks), &once(open));
+        output.dressed_result(&data, &dressed(&lines));
+        return Ok(());
+    }
+    output.dressed_findings(&dressed(&lines));
+    Err(refusal(&together, &failed).with_result(data))
+}
+
+/// What was found in a capture: for programs, for people, and names of what can be lived with.
+fn found(capture: &Path, examined: &Examined) -> (Value, String, Vec<&'static str>) {
+    let failed = failed(&examined.gates);
     let fault = match examined.measurements.as_ref().map(|m| &m.map) {
         Some(Some(Err(fault))) => Some(map_fault(fault)),
         _ => None,
     };
     let data = json!({
-        "capture": arguments.capture.display().to_string(),
+        "capture": capture.display().to_string(),
         "pass": failed.is_empty(),
         "not_judged": not_judged(&examined.gates),
         "gates": gates(&examined.gates),
-        "cells": cells(&examined),
+        "cells": cells(examined),
         "map_fault": fault,
-        "map": map.as_ref().map(|map| json!({
-            "source": map.source.name(),
-            "projector": [map.projector.size().width(), map.projector.size().height()],
-            "camera": [map.camera.0, map.camera.1],
-            "binning": map.binning,
-            "known": map.known(),
-            "uncertainty": map.usual_uncertainty(),
-        })),
-        "page": page.as_ref().map(|page| page.display().to_string()),
     });
     let mut text = text(&examined.gates);
     let mut remarks = warned(&examined.gates);
@@ -69,28 +161,19 @@ pub(super) fn run(arguments: &Check, output: &Output) -> Result<(), Failure> {
         let _ = writeln!(text, "warn calibration   {missing}");
         remarks.push("calibration");
     }
-    if let (Some(map), Some((path, _))) = (&map, &arguments.map) {
-        let _ = writeln!(text, "{}: {}", path.display(), words(map));
-    }
-    if let Some(page) = &page {
-        let _ = writeln!(text, "{}: what each gate saw", page.display());
-    }
-    if failed.is_empty() {
-        text += &passed(&remarks, &not_judged(&examined.gates));
-        output.dressed_result(&data, &dressed(&text));
-        return Ok(());
-    }
-    output.dressed_findings(&dressed(&text));
-    let failure = refusal(&arguments.capture.display().to_string(), &failed);
-    Err(failure.with_result(data))
+    (data, text, remarks)
 }
 
 /// Writes the projector map where one is asked for.
-fn map(arguments: &Check, examined: &Examined) -> Result<Option<ProjectorMap>, Failure> {
+fn map(
+    arguments: &Check,
+    capture: &Path,
+    examined: &Examined,
+) -> Result<Option<ProjectorMap>, Failure> {
     let Some((path, format)) = &arguments.map else {
         return Ok(None);
     };
-    let capture = arguments.capture.display();
+    let capture = capture.display();
     // Without cells, the gates say why.
     let Some(measurements) = &examined.measurements else {
         return Ok(None);
@@ -178,7 +261,8 @@ fn passed(remarks: &[&str], open: &[&str]) -> String {
 
 /// What scripts get for a capture that does not pass.
 fn refusal(capture: &str, failed: &[&Gate]) -> Failure {
-    let names: Vec<&str> = failed.iter().map(|gate| gate.name.name()).collect();
+    let mut names: Vec<&str> = failed.iter().map(|gate| gate.name.name()).collect();
+    names.dedup();
     let message = format!(
         "{capture}: the photographs do not pass {}",
         names.join(", ")

@@ -1,5 +1,5 @@
-//! `iltm verify` where pictures of two projectors overlap: good photographs from anywhere, what has
-//! changed since, and what is not as it must be.
+//! `iltm check` and `iltm verify` where pictures of two projectors overlap: good photographs from anywhere,
+//! what has changed since, and what is not as it must be.
 
 use super::user::{User, contains};
 use std::fs;
@@ -63,6 +63,51 @@ fn moved(verdict: &serde_json::Value) -> f64 {
         serde_json::json!([1, 2])
     );
     verdict["overlaps"][0]["moved"].as_f64().unwrap()
+}
+
+#[test]
+fn captures_of_two_projectors_are_checked_beside_each_other() {
+    let user = prepared();
+    contains(
+        &user.says("check left right"),
+        &[
+            "left and right\n",
+            "the camera stood still between left and right",
+            "passed",
+        ],
+    );
+    let data = user.json("check left right");
+    assert_eq!(
+        (&data["pass"], data["captures"].as_array().unwrap().len()),
+        (&true.into(), 2)
+    );
+    assert_eq!(data["captures"][1]["cells"]["live"], 360);
+    assert!(!data["between"].as_array().unwrap().is_empty());
+    for part in ["", "patterns", "photos", "calibration", "slides"] {
+        user.copy(&user.path("left").join(part), &format!("again/{part}"));
+    }
+    let again = user.run("--json check left again");
+    let data = again.json();
+    assert_eq!((again.code, &data["pass"]), (5, &false.into()), "{data}");
+    contains(
+        &data["error"]["message"].to_string(),
+        &["left and again", "coverage"],
+    );
+    for (line, says) in [
+        ("check left left", "given twice"),
+        (
+            "check left right -o page",
+            "--output and --map are of the capture of one",
+        ),
+        (
+            "check left right --map map.npy",
+            "--output and --map are of the capture of one",
+        ),
+    ] {
+        let said = user.run(line);
+        assert_ne!(said.code, 0, "{line}");
+        contains(&said.with_code(), &[says]);
+    }
 }
 
 #[test]

@@ -88,7 +88,7 @@ pub use remeasure::{
     CellPlanes, CellReadings, PixelReadings, Remeasured, RemeasuredSeveral, remeasure,
     remeasure_several,
 };
-pub use several::{OneOfSeveral, SeveralCaptures, read_several};
+pub use several::{ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_several, read_several};
 
 use cells::images;
 use evidence::CaptureEvidence;

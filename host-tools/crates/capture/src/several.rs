@@ -5,6 +5,7 @@
 //! the photographs of each, because what one projector shows lights the others' cells: directly,
 //! where they overlap, and by bounces everywhere.
 
+use crate::Examined;
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Measurements};
@@ -109,6 +110,48 @@ pub fn read_several(
     let gates = gates.into_iter().map(|(_, gate)| gate);
     several.all.diagnostics.gates.extend(gates);
     Ok(several)
+}
+
+/// What gates say of captures of several projectors.
+#[derive(Clone, Debug)]
+pub struct ExaminedSeveral {
+    /// Each capture by itself.
+    pub each: Vec<Examined>,
+    /// What is said of two of them, or of one beside the others; none where one was not measured.
+    pub between: Vec<Gate>,
+}
+
+/// Looks at captures of several projectors, from left to right in the wide frame, as closely as
+/// [`read_several`] and says what every gate says of them.
+///
+/// # Errors
+/// Those of [`examine`](crate::examine) for each; [`CaptureError::Unlike`] where they do not fit beside each
+/// other.
+pub fn examine_several(
+    folders: &[PathBuf],
+    options: &CaptureOptions,
+    progress: &dyn Progress,
+) -> Result<ExaminedSeveral, CaptureError> {
+    check_once(folders)?;
+    let (mut each, mut own, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
+    for folder in folders {
+        let (examined, kept) = crate::examine_keeping(folder, options, progress)?;
+        if let (Some(measurements), Some((_, mut linear))) = (&examined.measurements, kept) {
+            linear.photographs.forget();
+            own.push(measurements.clone());
+            photographs.push(linear);
+        }
+        each.push(examined);
+    }
+    let gates = if own.len() == folders.len() {
+        WideFrame::new(folders, own)?.gates(folders, &photographs)
+    } else {
+        Vec::new()
+    };
+    Ok(ExaminedSeveral {
+        each,
+        between: gates.into_iter().map(|(_, gate)| gate).collect(),
+    })
 }
 
 /// Refuses a folder that is given twice.
