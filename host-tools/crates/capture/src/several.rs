@@ -360,6 +360,12 @@ impl SeveralCaptures {
         self.projectors.iter().position(of).unwrap_or(0)
     }
 
+    /// Whether a projector lights a camera pixel itself.
+    #[must_use]
+    pub fn reaches(&self, projector: usize, pixel: usize) -> bool {
+        self.pixel_shares[projector][pixel] > 0.0
+    }
+
     /// Light at a camera pixel under white of all projectors that reach it, of that under white of one of
     /// them; 1 where no other one reaches.
     #[must_use]
@@ -369,7 +375,7 @@ impl SeveralCaptures {
             planes.map(|plane| f64::from(plane[pixel])).sum::<f64>()
         };
         let reach = self.projectors.iter().enumerate();
-        let reach = reach.filter(|(at, _)| *at == projector || self.pixel_shares[*at][pixel] > 0.0);
+        let reach = reach.filter(|(at, _)| *at == projector || self.reaches(*at, pixel));
         let all: f64 = reach.map(|(_, one)| light(one)).sum();
         let own = light(&self.projectors[projector]);
         if own > 0.0 { all / own } else { 1.0 }

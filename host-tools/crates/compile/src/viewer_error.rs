@@ -105,19 +105,17 @@ impl ViewerError {
         let images = Images::new(gain_only.grid);
         let gains: Vec<Option<FineGains>> =
             trials.iter().map(|trial| fine(&trial.inverse)).collect();
-        let each = trials.iter().zip(&gains);
-        let each = each
-            .flat_map(|(trial, gains)| photographed.iter().map(move |seen| (trial, gains, seen)));
-        let errors = each
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|(trial, gains, seen)| {
+        let mut compensated = Vec::new();
+        for (trial, gains) in trials.iter().zip(&gains) {
+            let received = received(photographed.first()?.channels, trial);
+            let errors = photographed.par_iter().map(|seen| {
                 let scene = Scene::new(seen, &trial.inverse, gains.as_ref());
-                let fits = scene.fits(seen, trial)?;
+                let fits = scene.fits(seen, (trial, &received))?;
                 Some(scene.with_errors(&images, &fits))
             });
-        let compensated: Vec<Vec<PictureError>> = errors.collect::<Option<_>>()?;
-        let compensated = compensated.concat();
+            let errors: Vec<Vec<PictureError>> = errors.collect::<Option<_>>()?;
+            compensated.extend(errors.into_iter().flatten());
+        }
         let (mut corrected, mut uncompensated) = (Vec::new(), Vec::new());
         let first = &trials.first()?.inverse;
         let (of_first, of_gains) = (&gains[0], fine(gain_only));
@@ -139,10 +137,23 @@ impl ViewerError {
     }
 }
 
-/// Photographs of a projector's patterns, and where some pixels look.
+/// What cells receive of all others under each pattern, by channel, cell and pattern.
+fn received(channels: &[ChannelMeasurements], trial: &Trial) -> Vec<DMatrix<f64>> {
+    let of_channel = |(index, channel): (usize, &ChannelMeasurements)| {
+        let mut received = &trial.inverse.channel(index).operator * &channel.observations;
+        if let Some(thrown) = &trial.thrown[index] {
+            received += thrown;
+        }
+        received
+    };
+    channels.iter().enumerate().map(of_channel).collect()
+}
+
+/// Photographs of patterns, and where some pixels look in a projector's picture.
 struct Photographed<'m> {
     grid: Grid,
-    light: &'m PixelLight,
+    /// Those of the projector itself first, then those of others while it is dark.
+    sessions: Vec<PatternSession<'m>>,
     /// In cells, by pixel.
     places: Vec<Option<[f32; 2]>>,
     /// Light of all projectors that reach a pixel under their white, of this one's.
@@ -153,50 +164,74 @@ struct Photographed<'m> {
     cell_side: f32,
     blur: f64,
     channels: &'m [ChannelMeasurements],
+}
+
+/// Photographs of one projector's patterns.
+struct PatternSession<'m> {
+    /// Light of the pixels.
+    light: &'m PixelLight,
     /// Its columns of patterns and observations.
     views: Range<usize>,
     /// The first of its views that is an image.
     first_image: usize,
+    /// Of another projector, whether it lights a pixel itself.
+    lit: Option<Vec<bool>>,
 }
 
 impl<'m> Photographed<'m> {
     fn of(measurements: &'m Measurements) -> Self {
         let views = measurements.roles.len();
+        let own = PatternSession {
+            light: &measurements.pixel_light,
+            views: 0..views,
+            first_image: views - measurements.diagnostics.images,
+            lit: None,
+        };
         Self {
             grid: measurements.grid,
-            light: &measurements.pixel_light,
+            sessions: vec![own],
             places: measurements.places(),
             together: vec![1.0; measurements.pixel_light.pixels.len()],
             off: places_off(measurements),
             cell_side: measurements.registration.cell_side() as f32,
             blur: measurements.devices.blur,
             channels: &measurements.channels,
-            views: 0..views,
-            first_image: views - measurements.diagnostics.images,
         }
     }
 
     /// One of several projectors; `None` without its projector map.
     fn of_one(several: &'m SeveralCaptures, index: usize) -> Option<Self> {
-        let OneOfSeveral {
-            own,
-            columns,
-            views,
-        } = &several.projectors[index];
+        let OneOfSeveral { own, columns, .. } = &several.projectors[index];
         own.map.as_ref()?.as_ref().ok()?;
         let beside = |place: Option<[f32; 2]>| {
             let [x, y] = place?;
             Some([x + columns.start as f32, y])
         };
-        let pixels = own.pixel_light.pixels.iter();
+        let pixels = || own.pixel_light.pixels.iter().map(|pixel| *pixel as usize);
+        let session = |(at, one): (usize, &'m OneOfSeveral)| {
+            let lit = || pixels().map(|pixel| several.reaches(at, pixel)).collect();
+            PatternSession {
+                light: &one.own.pixel_light,
+                views: one.views.clone(),
+                // All show patterns.
+                first_image: one.views.len(),
+                lit: (at != index).then(lit),
+            }
+        };
+        let sessions = several.projectors.iter().enumerate();
+        // Captures of unlike numbers of photographs may have looked at other pixels.
+        let sessions =
+            sessions.filter(|(_, one)| one.own.pixel_light.pixels == own.pixel_light.pixels);
+        let mut sessions: Vec<PatternSession<'m>> = sessions.map(session).collect();
+        sessions.sort_by_key(|session| session.lit.is_some());
         Some(Self {
             grid: several.all.grid,
+            sessions,
             places: own.places().into_iter().map(beside).collect(),
-            together: pixels
-                .map(|pixel| several.light_together(index, *pixel as usize))
+            together: pixels()
+                .map(|pixel| several.light_together(index, pixel))
                 .collect(),
             channels: &several.all.channels,
-            views: views.clone(),
             ..Self::of(own)
         })
     }
@@ -381,50 +416,62 @@ impl Scene {
         sites.map(bounced).collect()
     }
 
-    /// What photographs show beyond what the table believes.
-    fn fits(&self, photographed: &Photographed<'_>, trial: &Trial) -> Option<Fits> {
-        let (light, views) = (photographed.light, &photographed.views);
+    /// What photographs show beyond what the table believes, given what cells receive in them.
+    fn fits(
+        &self,
+        photographed: &Photographed<'_>,
+        (trial, received): (&Trial, &[DMatrix<f64>]),
+    ) -> Option<Fits> {
         let clear = CLEAR / photographed.cell_side;
         let blur = photographed.blur;
         let blurring = (blur > 0.0).then(|| iltm_solve::blur(self.grid, blur));
-        let first_image = photographed.first_image;
         let (mut varying, mut contrast) = (Mean::default(), Mean::default());
         let mut channels = Vec::new();
-        for (channel, inverse) in self.inverses.iter().enumerate() {
-            let of_all = &photographed.channels[channel];
-            let own = |all: &DMatrix<f64>| all.columns_range(views.clone()).into_owned();
-            let (patterns, observed) = (own(&of_all.patterns), own(&of_all.observations));
-            let blurred = blurring.as_ref().map(|blur| blur * &patterns);
-            let thrown_at = |site: &Site, view: usize| {
-                if let Some(blurred) = &blurred {
-                    return Some(site.cells.of(blurred.column(view).as_slice()));
+        for (channel, received) in received.iter().enumerate() {
+            let ChannelMeasurements {
+                patterns,
+                observations: observed,
+                ..
+            } = &photographed.channels[channel];
+            let blurred = blurring.as_ref().map(|blur| blur * patterns);
+            let thrown_at = |session: &PatternSession<'_>, site: &Site, view: usize| {
+                if let Some(lit) = &session.lit {
+                    return (!lit[site.at]).then_some(0.0);
                 }
-                let image = light.thrown[channel].get(view.wrapping_sub(first_image));
+                let column = session.views.start + view;
+                if let Some(blurred) = &blurred {
+                    return Some(site.cells.of(blurred.column(column).as_slice()));
+                }
+                let images = &session.light.thrown[channel];
+                let image = images.get(view.wrapping_sub(session.first_image));
                 let thrown = image.map(|image| image[site.at]).filter(|v| v.is_finite());
                 thrown.map(f64::from).or_else(|| {
-                    let pattern = patterns.column(view);
+                    let pattern = patterns.column(column);
                     lit(self.grid, site.place, clear, pattern.as_slice())
                 })
             };
             let mut sums = vec![[[Sums::default(); 2]; HALVINGS]; self.sites.len()];
             let mut held_out = vec![Vec::new(); self.sites.len()];
-            let mut received = &inverse.operator * &observed;
-            if let Some(thrown) = &trial.thrown[channel] {
-                received += own(thrown);
-            }
-            // White tells no more than the gains, which come from it.
-            for view in Measurements::WHITE + 1..patterns.ncols() {
-                let is_held_out = trial.held_out.contains(&(views.start + view));
+            let sessions = photographed.sessions.iter();
+            let views = sessions.flat_map(|session| {
+                // White tells no more than the gains, which come from it.
+                let own = session.lit.is_none();
+                let first = Measurements::WHITE + usize::from(own);
+                (first..session.views.len()).map(move |view| (session, view))
+            });
+            for (session, view) in views {
+                let column = session.views.start + view;
+                let is_held_out = trial.held_out.contains(&column);
                 if is_held_out {
-                    contrast.add(observed.column(view).variance());
+                    contrast.add(observed.column(column).variance());
                 }
-                let bounced = self.bounced(channel, received.column(view).as_slice());
+                let bounced = self.bounced(channel, received.column(column).as_slice());
                 for (at, site) in self.sites.iter().enumerate() {
                     let gain = self.gains[channel][at];
-                    let thrown = thrown_at(site, view).filter(|_| gain > 0.0);
+                    let thrown = thrown_at(session, site, view).filter(|_| gain > 0.0);
                     let sample = thrown.map(|thrown| {
                         let (direct, bounced) = (thrown / gain, bounced[at]);
-                        let seen = f64::from(light.channels[channel][view][site.at]);
+                        let seen = f64::from(session.light.channels[channel][view][site.at]);
                         Sample {
                             direct,
                             bounced,
@@ -436,7 +483,7 @@ impl Scene {
                     }
                     if let Some(sample) = sample {
                         for (bit, halves) in sums[at].iter_mut().enumerate() {
-                            halves[view >> bit & 1].add(sample);
+                            halves[column >> bit & 1].add(sample);
                         }
                     }
                 }

@@ -88,8 +88,7 @@ pub fn fine_images(table: &Table<'_>, size: FrameSize) -> Result<Vec<TestImage>,
 }
 
 /// The same for several projectors that overlap: drawn on the camera's picture, so that what both show
-/// of a place is one; and an even grey. None if the camera has fewer than four pixels along a cell's
-/// sides.
+/// of a place is one; and an even grey.
 ///
 /// # Errors
 /// [`VideoError`] if the table cannot compensate a picture of this size.
@@ -112,14 +111,19 @@ fn drawn_on_camera(places: &CameraPlaces, channels: usize) -> Vec<(String, CellP
     let ends = [ends(0), ends(1)];
     let pixels = ends.map(|(least, most)| (most - least).floor() + 1.0);
     let cells = pixels.map(|pixels| (pixels / places.cell_side).round().max(1.0) as u16);
-    let size = FrameSize::new(pixels[0] as u16, pixels[1] as u16);
+    // Of a camera with few pixels, the images are finer than its own.
+    let finer = [0, 1].map(|axis| (SUPERSAMPLING * usize::from(cells[axis])) as f64 / pixels[axis]);
+    let finer = finer[0].max(finer[1]).max(1.0);
+    let [width, height] = pixels.map(|pixels| (pixels * finer).ceil() as u16);
+    let size = FrameSize::new(width, height);
     let grid = Grid::new(cells[1], cells[0]).ok();
     let Some((size, grid)) = size.zip(grid) else {
         return Vec::new();
     };
     let on_frame = |plane: &Vec<f64>| -> Vec<f64> {
         let light = |place: &Option<[f32; 2]>| {
-            let at = |axis: usize, place: &[f32; 2]| f64::from(place[axis]) - ends[axis].0;
+            let at =
+                |axis: usize, place: &[f32; 2]| finer * (f64::from(place[axis]) - ends[axis].0);
             // Where the camera sees nothing, anything is as good.
             (place.as_ref()).map_or(0.5, |place| {
                 between(plane, size, [at(0, place), at(1, place)])
@@ -385,6 +389,6 @@ mod tests {
             cell_side: 2.0,
             ..places
         };
-        assert!(drawn_on_camera(&coarse, 1).is_empty());
+        assert_eq!(drawn_on_camera(&coarse, 1).len(), FINE + 1);
     }
 }
