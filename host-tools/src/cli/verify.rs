@@ -48,8 +48,8 @@ fn prepare(
     let places = places(arguments, table, provenance.overlapping, bars)?;
     let settings = provenance.capture.unwrap_or_default();
     let own = settings.projector.size;
-    let projector = arguments
-        .projector
+    let projector = (places.as_ref().map(|places| places.frame))
+        .or(arguments.projector)
         .or_else(|| own.and_then(|[width, height]| FrameSize::new(width, height)))
         .or_else(|| FrameSize::new(1920, 1080));
     let Some(projector) = projector else {
@@ -85,12 +85,12 @@ fn prepare(
     } else {
         "each as it is and compensated"
     };
-    let count = written.images.len()
-        + if places.is_some() {
-            written.fine.len()
-        } else {
-            0
-        };
+    // Those of overlapping projectors are all finer than the cells.
+    let tested = if places.is_some() {
+        &written.fine
+    } else {
+        &written.images
+    };
     let fine = match written.fine.len() {
         0 => String::new(),
         _ if places.is_some() => format!(
@@ -114,7 +114,7 @@ fn prepare(
          iltm verify {} {}\n",
         out.display(),
         written.pictures,
-        count,
+        tested.len(),
         arguments.table.display(),
         out.display(),
     );
