@@ -6,11 +6,12 @@ use super::output::{Output, printable, write_file, write_files};
 use super::progress::progress;
 use super::summary::{gates, map_fault};
 use crate::capture::{
-    self, CaptureOptions, Examined, ExaminedSeveral, Gate, MapSource, ProjectorMap, Verdict,
+    self, CaptureOptions, CrossingLight, Examined, ExaminedSeveral, Gate, MapSource, ProjectorMap,
+    Verdict,
 };
 use crate::report;
 use console::{Term, style};
-use iltm_picture::progress::Progress;
+use iltm_picture::{numbers::percent, progress::Progress};
 use serde_json::{Value, json};
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -85,8 +86,11 @@ fn several(
             "Leave them away, or check the captures one by one.",
         ));
     }
-    let ExaminedSeveral { each, between } =
-        capture::examine_several(&arguments.captures, options, bars)?;
+    let ExaminedSeveral {
+        each,
+        between,
+        light,
+    } = capture::examine_several(&arguments.captures, options, bars)?;
     bars.end();
     let (mut captures, mut lines, mut remarks) = (Vec::new(), String::new(), Vec::new());
     for (capture, examined) in arguments.captures.iter().zip(&each) {
@@ -105,7 +109,11 @@ fn several(
             "{together}: not compared, since one was not measured\n"
         );
     } else {
-        let _ = write!(lines, "{together}\n{}\n", text(&between));
+        let _ = write!(lines, "{together}\n{}", text(&between));
+        for crossing in &light {
+            let _ = writeln!(lines, "{}", crossing_words(crossing, &names));
+        }
+        lines.push('\n');
     }
     remarks.extend(warned(&between));
     let all: Vec<Gate> = each
@@ -118,6 +126,12 @@ fn several(
     let data = json!({
         "captures": captures,
         "between": gates(&between),
+        "light": light.iter().map(|crossing| json!({
+            "from": crossing.from + 1,
+            "to": crossing.to + 1,
+            "bounced": crossing.bounced,
+            "overlap": crossing.overlap,
+        })).collect::<Vec<_>>(),
         "pass": failed.is_empty(),
     });
     let once = |mut names: Vec<&'static str>| {
@@ -132,6 +146,21 @@ fn several(
     }
     output.dressed_findings(&dressed(&lines));
     Err(refusal(&together, &failed).with_result(data))
+}
+
+/// Who lights whom, a line of the names of captures.
+fn crossing_words(crossing: &CrossingLight, names: &[String]) -> String {
+    let (from, to) = (&names[crossing.from], &names[crossing.to]);
+    let bounced = percent(crossing.bounced);
+    let overlap = if crossing.overlap > 0.0 {
+        format!(
+            ", and {:.0} % of {to}'s picture, as the camera sees it, is lit by both",
+            100.0 * crossing.overlap
+        )
+    } else {
+        String::new()
+    };
+    format!("     light         {from}'s white adds {bounced} to what {to} lights alone{overlap}")
 }
 
 /// What was found in a capture: for programs, for people, and names of what can be lived with.

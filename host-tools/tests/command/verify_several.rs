@@ -83,6 +83,15 @@ fn captures_of_two_projectors_are_checked_beside_each_other() {
     );
     assert_eq!(data["captures"][1]["cells"]["live"], 360);
     assert!(!data["between"].as_array().unwrap().is_empty());
+    // A fifth of each picture's width is lit by both, far from the camera, and the halves of the screen
+    // light each other.
+    let light = data["light"].as_array().unwrap();
+    assert_eq!(light.len(), 2);
+    for crossing in light {
+        let number = |key: &str| crossing[key].as_f64().unwrap();
+        assert!((number("overlap") - 0.15).abs() < 0.03, "{crossing}");
+        assert!((0.02..0.2).contains(&number("bounced")), "{crossing}");
+    }
     for part in ["", "patterns", "photos", "calibration", "slides"] {
         user.copy(&user.path("left").join(part), &format!("again/{part}"));
     }

@@ -88,7 +88,9 @@ pub use remeasure::{
     CellPlanes, CellReadings, PixelReadings, Remeasured, RemeasuredSeveral, remeasure,
     remeasure_several,
 };
-pub use several::{ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_several, read_several};
+pub use several::{
+    CrossingLight, ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_several, read_several,
+};
 
 use cells::images;
 use evidence::CaptureEvidence;

@@ -119,6 +119,22 @@ pub struct ExaminedSeveral {
     pub each: Vec<Examined>,
     /// What is said of two of them, or of one beside the others; none where one was not measured.
     pub between: Vec<Gate>,
+    /// Who lights whom; none where one was not measured.
+    pub light: Vec<CrossingLight>,
+}
+
+/// Light that one projector throws on what another one lights.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct CrossingLight {
+    /// Number of the one that throws it, from 0.
+    pub from: usize,
+    /// Number of the other one.
+    pub to: usize,
+    /// Light that bounces from the first one's white to where the second one lights alone, of the
+    /// light there under its own white; 0 if it lights nothing alone.
+    pub bounced: f64,
+    /// Part of the second one's picture, as the camera sees it, that the first one lights itself.
+    pub overlap: f64,
 }
 
 /// Looks at captures of several projectors, from left to right in the wide frame, as closely as
@@ -143,14 +159,16 @@ pub fn examine_several(
         }
         each.push(examined);
     }
-    let gates = if own.len() == folders.len() {
-        WideFrame::new(folders, own)?.gates(folders, &photographs)
-    } else {
-        Vec::new()
-    };
+    let (mut gates, mut light) = (Vec::new(), Vec::new());
+    if own.len() == folders.len() {
+        let wide = WideFrame::new(folders, own)?;
+        gates = wide.gates(folders, &photographs);
+        light = wide.crossing_light();
+    }
     Ok(ExaminedSeveral {
         each,
         between: gates.into_iter().map(|(_, gate)| gate).collect(),
+        light,
     })
 }
 
@@ -222,6 +240,35 @@ impl WideFrame {
             gates.extend(found.map(|gate| (other, gate)));
         }
         gates
+    }
+
+    /// Who lights whom, of all pairs.
+    fn crossing_light(&self) -> Vec<CrossingLight> {
+        let shares = &self.pixel_shares;
+        let pairs = (0..shares.len()).flat_map(|from| (0..shares.len()).map(move |to| (from, to)));
+        let of_pair = |(from, to): (usize, usize)| {
+            let light = |of: usize, pixel: usize| {
+                let planes = self.own[of].flood.iter();
+                planes.map(|plane| f64::from(plane[pixel])).sum::<f64>()
+            };
+            let (mut reached, mut both, mut bounced, mut own) = (0.0, 0.0, 0.0, 0.0);
+            for pixel in (0..shares[to].len()).filter(|pixel| shares[to][*pixel] > 0.0) {
+                reached += 1.0;
+                if shares[from][pixel] > 0.0 {
+                    both += 1.0;
+                } else if shares[to][pixel] >= 1.0 {
+                    bounced += light(from, pixel);
+                    own += light(to, pixel);
+                }
+            }
+            CrossingLight {
+                from,
+                to,
+                bounced: if own > 0.0 { bounced / own } else { 0.0 },
+                overlap: both / f64::max(reached, 1.0),
+            }
+        };
+        pairs.filter(|(from, to)| from != to).map(of_pair).collect()
     }
 
     /// Cells of other projectors that light the same place, by cell.
