@@ -75,7 +75,7 @@ impl ViewerError {
         gain_only: &InverseTransport,
         flood: &FineFlood,
     ) -> Option<Self> {
-        let one = Photographed::of(measurements);
+        let one = PixelPhotographs::of(measurements);
         let fine = |inverse: &InverseTransport| fine_gains(inverse, flood);
         Self::of(&[one], trials, gain_only, fine)
     }
@@ -90,14 +90,14 @@ impl ViewerError {
         flood: &FineFlood,
     ) -> Option<Self> {
         let photographed =
-            (0..several.projectors.len()).map(|at| Photographed::of_one(several, at));
-        let photographed: Vec<Photographed<'_>> = photographed.collect::<Option<_>>()?;
+            (0..several.projectors.len()).map(|at| PixelPhotographs::of_one(several, at));
+        let photographed: Vec<PixelPhotographs<'_>> = photographed.collect::<Option<_>>()?;
         let fine = |inverse: &InverseTransport| unshared_gains_of_several(inverse, flood, several);
         Self::of(&photographed, trials, gain_only, fine)
     }
 
     fn of(
-        photographed: &[Photographed<'_>],
+        photographed: &[PixelPhotographs<'_>],
         trials: &[Trial],
         gain_only: &InverseTransport,
         fine: impl Fn(&InverseTransport) -> Option<FineGains>,
@@ -150,7 +150,7 @@ fn received(channels: &[ChannelMeasurements], trial: &Trial) -> Vec<DMatrix<f64>
 }
 
 /// Photographs of patterns, and where some pixels look in a projector's picture.
-struct Photographed<'m> {
+struct PixelPhotographs<'m> {
     grid: Grid,
     /// Those of the projector itself first, then those of others while it is dark.
     sessions: Vec<PatternSession<'m>>,
@@ -178,7 +178,7 @@ struct PatternSession<'m> {
     lit: Option<Vec<bool>>,
 }
 
-impl<'m> Photographed<'m> {
+impl<'m> PixelPhotographs<'m> {
     fn of(measurements: &'m Measurements) -> Self {
         let views = measurements.roles.len();
         let own = PatternSession {
@@ -345,7 +345,11 @@ struct SiteFit {
 }
 
 impl Scene {
-    fn new(seen: &Photographed<'_>, inverse: &InverseTransport, fine: Option<&FineGains>) -> Self {
+    fn new(
+        seen: &PixelPhotographs<'_>,
+        inverse: &InverseTransport,
+        fine: Option<&FineGains>,
+    ) -> Self {
         let grid = seen.grid;
         let places = &seen.places;
         let site = |(at, place): (usize, &Option<[f32; 2]>)| {
@@ -419,7 +423,7 @@ impl Scene {
     /// What photographs show beyond what the table believes, given what cells receive in them.
     fn fits(
         &self,
-        photographed: &Photographed<'_>,
+        photographed: &PixelPhotographs<'_>,
         (trial, received): (&Trial, &[DMatrix<f64>]),
     ) -> Option<Fits> {
         let clear = CLEAR / photographed.cell_side;

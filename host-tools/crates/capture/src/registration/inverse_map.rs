@@ -23,7 +23,7 @@ impl ProjectorMap {
     #[must_use]
     pub fn inverse(&self) -> Vec<Option<[f32; 2]>> {
         let size = self.projector.size();
-        let mut found = Found::new(size.width(), size.height());
+        let mut found = InversePlaces::new(size.width(), size.height());
         let (width, height) = self.camera;
         // Projector pixels along the side of a camera pixel.
         let usual = (size.pixels() as f32 / self.known().max(1) as f32)
@@ -49,16 +49,16 @@ impl ProjectorMap {
 }
 
 /// A place of the projector's picture, and where the camera sees it.
-type Pair = ([f32; 2], [f32; 2]);
+type PlacePair = ([f32; 2], [f32; 2]);
 
-struct Found {
+struct InversePlaces {
     width: usize,
     height: usize,
     /// Place in the camera's picture and size of the triangle that said it.
     places: Vec<Option<([f32; 2], f32)>>,
 }
 
-impl Found {
+impl InversePlaces {
     fn new(width: usize, height: usize) -> Self {
         Self {
             width,
@@ -68,7 +68,7 @@ impl Found {
     }
 
     /// Adds the pixels of a triangle; where two overlap, the smaller one is right.
-    fn add(&mut self, [a, b, c]: [Pair; 3], most: f32) {
+    fn add(&mut self, [a, b, c]: [PlacePair; 3], most: f32) {
         let axis = |axis: usize| [a.0[axis], b.0[axis], c.0[axis]];
         let least = [0, 1].map(|at| axis(at).into_iter().fold(f32::INFINITY, f32::min));
         let last = [0, 1].map(|at| axis(at).into_iter().fold(f32::NEG_INFINITY, f32::max));

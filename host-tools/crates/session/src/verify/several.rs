@@ -59,7 +59,7 @@ pub(super) fn slides(
     let mut rest = Vec::new();
     let between = (2 * images.len()).div_ceil(columns.len().max(1)) + AFTER_IMAGES;
     for (index, columns) in columns.iter().enumerate() {
-        let part = Part::new(table.grid(), layout, columns)?;
+        let part = ProjectorPart::new(table.grid(), layout, columns)?;
         let mut codes = Vec::new();
         for (role, pattern) in pattern_set(part.own.grid(), BERNOULLI, SEED + index as u64) {
             let cells = part.of_cells(&pattern);
@@ -93,7 +93,7 @@ pub(super) fn slides(
 }
 
 /// What one projector shows of the wide frame.
-struct Part {
+struct ProjectorPart {
     /// Its own cells and pixels.
     own: Layout,
     /// Cells and pixels of the wide frame.
@@ -102,7 +102,7 @@ struct Part {
     columns: [Range<usize>; 2],
 }
 
-impl Part {
+impl ProjectorPart {
     fn new(grid: Grid, layout: &Layout, columns: &Range<usize>) -> Result<Self, VerifyError> {
         let frame = layout.projector();
         let pixels = |column: usize| column * frame.width() / grid.cols();
