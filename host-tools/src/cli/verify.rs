@@ -14,7 +14,7 @@ use crate::session::Layout;
 use crate::verify::{
     Cause, Handover, ImageVerdict, Outcome, Readings, Recognised, Slides, TableVerdict,
     brightness_words, fixed_words, html, judge, moved_words, overlap_words, pictures, reason,
-    recognise, shift_words, write,
+    recognise, shift_words, unseen_words, write,
 };
 use iltm_picture::{numbers::percent, progress::Progress};
 use iltm_runtime::{FrameSize, image::Table};
@@ -377,6 +377,7 @@ fn data(arguments: &Verify, folder: &Path, verdict: &TableVerdict, page: &Path) 
             "session": verdict.drift.session,
         },
         "exchanged": verdict.exchanged.map(|pair| pair.map(|number| number + 1)),
+        "overlaps_unseen": verdict.unseen.iter().map(|pair| pair.map(|number| number + 1)).collect::<Vec<_>>(),
         "overlaps": verdict.shifts.iter().map(|shift| json!({
             "projectors": shift.projectors.map(|number| number + 1),
             "moved": shift.pixels,
@@ -388,6 +389,23 @@ fn data(arguments: &Verify, folder: &Path, verdict: &TableVerdict, page: &Path) 
         "page": page.display().to_string(),
         "map": page.with_file_name("worst-cells.png").display().to_string(),
     })
+}
+
+/// How pictures that overlap lie, as far as the photographs tell.
+fn overlap(verdict: &TableVerdict) -> String {
+    let mut text = String::new();
+    if let Some(farthest) = verdict.farthest() {
+        let others = match verdict.shifts.len() - 1 {
+            0 => "",
+            1 => "; those of the other pair no farther",
+            _ => "; those of the other pairs no farther",
+        };
+        let _ = writeln!(text, "overlap     {}{others}", overlap_words(farthest));
+    }
+    for pair in &verdict.unseen {
+        let _ = writeln!(text, "overlap     not known {}", unseen_words(*pair));
+    }
+    text
 }
 
 fn text(verdict: &TableVerdict, page: &Path) -> String {
@@ -448,14 +466,7 @@ fn text(verdict: &TableVerdict, page: &Path) -> String {
             );
         }
     }
-    if let Some(farthest) = verdict.farthest() {
-        let others = match verdict.shifts.len() - 1 {
-            0 => "",
-            1 => "; those of the other pair no farther",
-            _ => "; those of the other pairs no farther",
-        };
-        let _ = writeln!(text, "overlap     {}{others}", overlap_words(farthest));
-    }
+    text += &overlap(verdict);
     match &verdict.drift.white {
         None => {
             text += "drift       not known: the table does not tell what light comes of an input\n";

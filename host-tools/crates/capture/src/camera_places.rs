@@ -7,10 +7,9 @@ use crate::format::error::CaptureError;
 use crate::format::sequence::CaptureOptions;
 use crate::gate::GateName;
 use crate::registration::correspondence::{self, Correspondence};
-use crate::registration::projector_map::MapError;
 use crate::remeasure::CellPlanes;
 use crate::several::check_once;
-use crate::wide_frame::WideFrame;
+use crate::wide_frame::{WideFrame, wide_size};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{FrameSize, Grid};
 use std::ops::Range;
@@ -60,40 +59,33 @@ pub fn camera_places(
         linear.push(photographs);
     }
     let wide = WideFrame::new(folders, own)?;
-    let (mut inverse, mut maps) = (Vec::new(), Vec::new());
     for (folder, own) in folders.iter().zip(&wide.own) {
-        let refuse = |reason: String, next_step| CaptureError::Unlike {
+        let (reason, next_step) = match &own.map {
+            Some(Ok(_)) => continue,
+            Some(Err(error)) => (error.to_string(), error.next_step()),
+            None => (
+                "it has no stripes finer than the cells".to_owned(),
+                "Make the captures with `iltm patterns`, which has them unless --no-dense is given.",
+            ),
+        };
+        return Err(CaptureError::Unlike {
             path: folder.clone(),
             reason,
             next_step,
-        };
-        match &own.map {
-            Some(Ok(map)) => {
-                inverse.push((map.projector.size(), map.inverse()));
-                maps.push(map);
-            }
-            Some(Err(error)) => return Err(refuse(error.to_string(), MapError::next_step(error))),
-            None => {
-                return Err(refuse(
-                    "it has no stripes finer than the cells".to_owned(),
-                    "Make the captures with `iltm patterns`, which has them unless --no-dense is \
-                     given.",
-                ));
-            }
-        }
+        });
     }
-    let height = inverse[0].0.height();
-    let width: usize = inverse.iter().map(|(size, _)| size.width()).sum();
-    let side = |pixels: usize| u16::try_from(pixels).unwrap_or(0);
-    let frame = FrameSize::new(side(width), side(height)).ok_or_else(|| CaptureError::Unlike {
+    let maps = wide.maps().unwrap_or_default();
+    let frame = wide_size(&maps).ok_or_else(|| CaptureError::Unlike {
         path: folders[0].clone(),
-        reason: format!("{width} x {height} pixels in all"),
+        reason: "its frame and those beside it have more pixels than any".to_owned(),
         next_step: "Use projectors of fewer pixels.",
     })?;
-    let rows = 0..height;
+    let inverse: Vec<_> = maps.iter().map(|map| map.inverse()).collect();
     let row = |row: usize| {
-        inverse.iter().flat_map(move |(size, places)| {
-            places[row * size.width()..(row + 1) * size.width()].iter()
+        let each = maps.iter().zip(&inverse);
+        each.flat_map(move |(map, places)| {
+            let width = map.projector.size().width();
+            places[row * width..(row + 1) * width].iter()
         })
     };
     let saturated: Vec<&[bool]> = linear.iter().map(|linear| &linear.saturated[..]).collect();
@@ -101,9 +93,9 @@ pub fn camera_places(
     let black = linear.iter().map(|linear| &linear.black[..]);
     let flood = wide.own.iter().map(|own| &own.flood[..]);
     Ok(CameraPlaces {
-        places: rows.flat_map(row).copied().collect(),
+        places: (0..frame.height()).flat_map(row).copied().collect(),
         cell_side: wide.registration().cell_side(),
-        correspondences: correspondence::find(&maps),
+        correspondences: correspondence::find(&maps, &inverse),
         white: white(&pixels, flood, black),
         grid: wide.grid,
         frame,

@@ -305,8 +305,8 @@ pub fn remeasure_several(
     let step = view_step(&registration);
     let of_views = (&mut photographs, &of_pictures[..]);
     let views = views(of_views, (&registration, step), progress)?;
-    let maps = wide.own.iter().map(|own| own.map.as_ref()?.as_ref().ok());
-    let maps: Vec<&ProjectorMap> = maps.collect::<Option<_>>().unwrap_or_default();
+    let maps = wide.maps().unwrap_or_default();
+    let inverse: Vec<_> = maps.iter().map(|map| map.inverse()).collect();
     let live = (&registration, &cells.live[..]);
     let mut pixels = wide.map().map(|map| {
         let pixels = PixelReadings::new(&map, wide.grid, live, &saturated);
@@ -338,7 +338,7 @@ pub fn remeasure_several(
         views,
         step,
         pixels,
-        correspondences: correspondence::find(&maps),
+        correspondences: correspondence::find(&maps, &inverse),
     })
 }
 

@@ -247,10 +247,7 @@ impl WideFrame {
         let shares = &self.pixel_shares;
         let pairs = (0..shares.len()).flat_map(|from| (0..shares.len()).map(move |to| (from, to)));
         let of_pair = |(from, to): (usize, usize)| {
-            let light = |of: usize, pixel: usize| {
-                let planes = self.own[of].flood.iter();
-                planes.map(|plane| f64::from(plane[pixel])).sum::<f64>()
-            };
+            let light = |of: usize, pixel: usize| white_at(&self.own[of], pixel);
             let (mut reached, mut both, mut bounced, mut own) = (0.0, 0.0, 0.0, 0.0);
             for pixel in (0..shares[to].len()).filter(|pixel| shares[to][*pixel] > 0.0) {
                 reached += 1.0;
@@ -417,14 +414,10 @@ impl SeveralCaptures {
     /// them; 1 where no other one reaches.
     #[must_use]
     pub fn light_together(&self, projector: usize, pixel: usize) -> f64 {
-        let light = |one: &OneOfSeveral| {
-            let planes = one.own.flood.iter();
-            planes.map(|plane| f64::from(plane[pixel])).sum::<f64>()
-        };
         let reach = self.projectors.iter().enumerate();
         let reach = reach.filter(|(at, _)| *at == projector || self.reaches(*at, pixel));
-        let all: f64 = reach.map(|(_, one)| light(one)).sum();
-        let own = light(&self.projectors[projector]);
+        let all: f64 = reach.map(|(_, one)| white_at(&one.own, pixel)).sum();
+        let own = white_at(&self.projectors[projector].own, pixel);
         if own > 0.0 { all / own } else { 1.0 }
     }
 
@@ -480,6 +473,12 @@ impl SeveralCaptures {
         };
         (0..grid.cells()).map(share).collect()
     }
+}
+
+/// White's light at a camera pixel, over all channels.
+fn white_at(own: &Measurements, pixel: usize) -> f64 {
+    let planes = own.flood.iter();
+    planes.map(|plane| f64::from(plane[pixel])).sum()
 }
 
 /// Part of the pixels that either projector reaches which see the same place in both pictures, to

@@ -201,22 +201,21 @@ impl WideFrame {
         maps.find_map(|map| map.as_ref().err())
     }
 
+    /// The projector map of each, if all have one.
+    pub(crate) fn maps(&self) -> Option<Vec<&ProjectorMap>> {
+        let maps = self.own.iter().map(|own| own.map.as_ref()?.as_ref().ok());
+        maps.collect()
+    }
+
     /// The projector map of the wide frame, if all projectors have one.
     pub(crate) fn map(&self) -> Option<ProjectorMap> {
-        let maps = self.own.iter().map(|own| match &own.map {
-            Some(Ok(map)) => Some(map),
-            _ => None,
-        });
-        let maps: Vec<&ProjectorMap> = maps.collect::<Option<_>>()?;
-        let size = |of: fn(FrameSize) -> usize, map: &ProjectorMap| of(map.projector.size());
-        let width: usize = maps.iter().map(|map| size(FrameSize::width, map)).sum();
-        let height = size(FrameSize::height, maps[0]);
-        let frame = FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)?;
+        let maps = self.maps()?;
+        let frame = wide_size(&maps)?;
         let mut before = Vec::new();
         let mut pixels = 0;
         for map in &maps {
             before.push(pixels as f32);
-            pixels += size(FrameSize::width, map);
+            pixels += map.projector.size().width();
         }
         let unknown = ([f32::NAN; 2], f32::NAN);
         let place = |(pixel, owner): (usize, Option<usize>)| {
@@ -234,6 +233,14 @@ impl WideFrame {
             ..maps[0].clone()
         })
     }
+}
+
+/// Pixels of frames side by side; `None` if no frame has so many.
+pub(crate) fn wide_size(maps: &[&ProjectorMap]) -> Option<FrameSize> {
+    let sizes = maps.iter().map(|map| map.projector.size());
+    let width: usize = sizes.clone().map(FrameSize::width).sum();
+    let height = sizes.map(FrameSize::height).next()?;
+    FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)
 }
 
 /// Where a camera pixel lies in a projector's picture, in cells from the left and upper edge of the

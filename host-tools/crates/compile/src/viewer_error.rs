@@ -224,15 +224,16 @@ impl<'m> PixelPhotographs<'m> {
             sessions.filter(|(_, one)| one.own.pixel_light.pixels == own.pixel_light.pixels);
         let mut sessions: Vec<PatternSession<'m>> = sessions.map(session).collect();
         sessions.sort_by_key(|session| session.lit.is_some());
+        let alone = Self::of(own);
         Some(Self {
             grid: several.all.grid,
             sessions,
-            places: own.places().into_iter().map(beside).collect(),
+            places: alone.places.into_iter().map(beside).collect(),
             together: pixels()
                 .map(|pixel| several.light_together(index, pixel))
                 .collect(),
             channels: &several.all.channels,
-            ..Self::of(own)
+            ..alone
         })
     }
 }

@@ -143,16 +143,7 @@ impl Layout {
     /// its channels; `None` if it has another size or depth.
     #[must_use]
     pub fn cell_light(&self, picture: &Picture, response: Response) -> Option<Vec<Vec<f64>>> {
-        self.mean_of_cells(&LightPicture::decode(&self.unframed(picture)?, response))
-    }
-
-    /// Mean light of every cell in a picture of [`inner`](Self::inner), `N` entries for each of its
-    /// channels; `None` if it has another size.
-    #[must_use]
-    pub fn mean_of_cells(&self, inner: &LightPicture) -> Option<Vec<Vec<f64>>> {
-        if inner.size() != self.inner {
-            return None;
-        }
+        let inner = LightPicture::decode(&self.unframed(picture)?, response);
         let plane = |plane: &Vec<f32>| {
             let mut sums = vec![(0.0, 0_u32); self.grid.cells()];
             for (at, light) in plane.iter().enumerate() {

@@ -20,12 +20,15 @@ pub struct Correspondence {
     pub place: [f32; 2],
 }
 
-/// Correspondences of all pairs of projectors, both ways, at some of the pixels of the first.
-pub(crate) fn find(maps: &[&ProjectorMap]) -> Vec<Correspondence> {
+/// Correspondences of all pairs of projectors, both ways, at some of the pixels of the first, given each
+/// map's [`inverse`](ProjectorMap::inverse).
+pub(crate) fn find(
+    maps: &[&ProjectorMap],
+    inverse: &[Vec<Option<[f32; 2]>>],
+) -> Vec<Correspondence> {
     let mut found = Vec::new();
-    for (first, map) in maps.iter().enumerate() {
+    for (first, (map, inverse)) in maps.iter().zip(inverse).enumerate() {
         let size = map.projector.size();
-        let inverse = map.inverse();
         let step = [size.width(), size.height()];
         let step = [0, 1].map(|axis: usize| step[axis].div_ceil(LOOKED_AT[axis]).max(1));
         for y in (0..size.height()).step_by(step[1]) {
@@ -87,6 +90,16 @@ pub struct PictureShift {
 const LEAST_KNOWN: usize = 16;
 
 impl PictureShift {
+    /// Pairs of projectors, from 0, whose pictures overlapped `before`, and of which `now` shows too few
+    /// places that both light.
+    #[must_use]
+    pub fn unseen(before: &[Correspondence], now: &[Correspondence]) -> Vec<[usize; 2]> {
+        let known = |list: &[Correspondence], pair| of_pair(list, pair).len() >= LEAST_KNOWN;
+        let all = pairs(before).into_iter();
+        all.filter(|pair| known(before, *pair) && !known(now, *pair))
+            .collect()
+    }
+
     /// Of every pair of projectors whose pictures overlapped `before` and overlap `now`.
     #[must_use]
     pub fn find(before: &[Correspondence], now: &[Correspondence]) -> Vec<Self> {
@@ -169,33 +182,14 @@ fn of_pair(known: &[Correspondence], projectors: [usize; 2]) -> HashMap<[u16; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registration::projector_map::MapSource;
-    use iltm_runtime::FrameSize;
-    use iltm_runtime::placement::ProjectorPixels;
+    use crate::registration::inverse_map::tests::map;
 
     /// Maps of two projectors of 60 x 40 pixels on a wall, as a camera at `camera` with so many pixels
     /// of the wall in one of its own sees them; the second lies at `second`, turned by `turn`.
     fn seen((camera, scale): ([f32; 2], f32), second: [f32; 2], turn: f32) -> [ProjectorMap; 2] {
         let map = |place: &dyn Fn(f32, f32) -> [f32; 2]| {
-            let (width, height) = (120, 80);
-            let of_pixel = |at: usize| {
-                let (x, y) = ((at % width) as f32, (at / width) as f32);
-                let [x, y] = place(camera[0] + scale * x, camera[1] + scale * y);
-                let inside = (-0.5..59.5).contains(&x) && (-0.5..39.5).contains(&y);
-                if inside { [x, y] } else { [f32::NAN; 2] }
-            };
-            let position: Vec<[f32; 2]> = (0..width * height).map(of_pixel).collect();
-            ProjectorMap {
-                source: MapSource::Waves,
-                projector: ProjectorPixels::whole(FrameSize::new(60, 40).unwrap()),
-                camera: (width, height),
-                binning: 1,
-                uncertainty: position
-                    .iter()
-                    .map(|place| 0.1 * place[0] / place[0])
-                    .collect(),
-                position,
-            }
+            let of_pixel = |x, y| place(camera[0] + scale * x, camera[1] + scale * y);
+            map((60, 40), (120, 80), of_pixel)
         };
         let (sin, cos) = turn.sin_cos();
         [
@@ -208,8 +202,12 @@ mod tests {
     }
 
     fn found(camera: ([f32; 2], f32), second: [f32; 2], turn: f32) -> Vec<Correspondence> {
-        let [first, second] = &seen(camera, second, turn);
-        find(&[first, second])
+        let [first, second] = seen(camera, second, turn);
+        between([&first, &second])
+    }
+
+    fn between(maps: [&ProjectorMap; 2]) -> Vec<Correspondence> {
+        find(&maps, &maps.map(ProjectorMap::inverse))
     }
 
     #[test]
@@ -243,7 +241,7 @@ mod tests {
         let camera = ([-10.0, -8.0], 1.0);
         let before = found(camera, [40.0, 2.0], 0.02);
         let [first, second] = &seen(([-6.5, -7.3], 1.13), [40.0, 2.0], 0.02);
-        let swapped = find(&[second, first]);
+        let swapped = between([second, first]);
         assert_eq!(
             PictureShift::exchanged(&before, &swapped, 0.1),
             Some([0, 1])
@@ -255,7 +253,7 @@ mod tests {
         );
         for now in [
             &before,
-            &find(&[first, second]),
+            &between([first, second]),
             &found(camera, [44.0, 2.0], 0.02),
         ] {
             assert_eq!(PictureShift::exchanged(&before, now, 0.1), None);
@@ -269,6 +267,8 @@ mod tests {
         assert_eq!(apart, Vec::new());
         let overlapping = found(([-10.0, -8.0], 1.0), [40.0, 2.0], 0.0);
         assert_eq!(PictureShift::find(&overlapping, &apart), Vec::new());
+        assert_eq!(PictureShift::unseen(&overlapping, &apart), [[0, 1]]);
+        assert!(PictureShift::unseen(&overlapping, &overlapping).is_empty());
         assert_eq!(PictureShift::find(&apart, &overlapping), Vec::new());
     }
 }

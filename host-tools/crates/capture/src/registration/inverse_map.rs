@@ -142,14 +142,14 @@ fn mean_beside(places: &[Option<[f32; 2]>], at: usize, width: usize) -> Option<[
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::registration::projector_map::MapSource;
     use iltm_runtime::FrameSize;
     use iltm_runtime::placement::ProjectorPixels;
 
     /// The map of a camera of this size that sees `place` of the projector's picture.
-    fn map(
+    pub(crate) fn map(
         projector: (u16, u16),
         camera: (usize, usize),
         place: impl Fn(f32, f32) -> [f32; 2],

@@ -92,7 +92,7 @@ pub fn fine_images(table: &Table<'_>, size: FrameSize) -> Result<Vec<TestImage>,
 ///
 /// # Errors
 /// [`VideoError`] if the table cannot compensate a picture of this size.
-pub fn screen_images(
+pub(super) fn screen_images(
     table: &Table<'_>,
     places: &CameraPlaces,
 ) -> Result<Vec<TestImage>, VideoError> {

@@ -210,6 +210,8 @@ pub struct TableVerdict {
     pub shifts: Vec<PictureShift>,
     /// Two projectors, from 0, that show each other's pictures.
     pub exchanged: Option<[usize; 2]>,
+    /// Pairs of projectors, from 0, whose overlap the photographs do not show.
+    pub unseen: Vec<[usize; 2]>,
     /// Light of wanted white on the wall, of that under the projector's own white; mean over
     /// the cells and colours.
     pub brightness: f64,
@@ -324,6 +326,7 @@ pub fn judge(
         drift,
         shifts: readings.shifts.clone(),
         exchanged: readings.exchanged,
+        unseen: readings.unseen.clone(),
         brightness: brightness(readings, &images, &mut expected, &lit),
         worst: worst(table, &images),
         cells: (lit.0.len(), known),
@@ -846,6 +849,7 @@ mod tests {
             expected_white: None,
             shifts: Vec::new(),
             exchanged: None,
+            unseen: Vec::new(),
             flood: Vec::new(),
         }
     }

@@ -47,13 +47,14 @@ pub use error::VerifyError;
 pub use expected::Expected;
 pub use fixed_pattern::FixedPattern;
 pub use folder::{Slides, Written, write};
-pub use images::{TestImage, fine_images, screen_images, test_images};
+pub use images::{TestImage, fine_images, test_images};
 pub use judge::{Bound, Curve, Drift, ImageVerdict, TableVerdict, WhiteChange, WorstCell, judge};
 pub use manifest::{VerifyManifest, VerifyRole, VerifyShot};
 pub use maps::pictures;
 pub use outcome::{Cause, Outcome, refused};
 pub use page::{
     Handover, brightness_words, fixed_words, html, moved_words, overlap_words, reason, shift_words,
+    unseen_words,
 };
 pub use pixels::{PixelBound, PixelVerdict};
 pub use readings::{FineShown, Readings, Shown};

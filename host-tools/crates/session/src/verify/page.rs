@@ -139,6 +139,7 @@ fn unchecked(verdict: &TableVerdict, handover: &Handover) -> Markup {
             @if handover.device.is_none() { li { "Which table is on a device: none was asked." } }
             li { "Tiers below the table's top one, which a device uses when time is short." }
             @if compared < known { li { (known - compared) " of the table's " (known) " cells, which the camera did not see clearly." } }
+            @for pair in &verdict.unseen { li { (capitalised(&unseen_words(*pair))) "." } }
             @if verdict.pixels.is_none() { li { "Detail within a cell, and creases: a cell's mean light is compared." } }
             li { "Content other than the test images: darker or more saturated pictures may be cut." }
             li { "Other places to stand, glossy surfaces from there, and other light in the room than during these photographs." }
@@ -276,6 +277,16 @@ pub fn overlap_words(shift: &PictureShift) -> String {
         "the pictures of projectors {first} and {second} lie {:.1} pixels from where they lay against \
          each other when the table was made",
         shift.pixels
+    )
+}
+
+/// What is not known of pictures whose overlap the photographs do not show, in words.
+#[must_use]
+pub fn unseen_words(pair: [usize; 2]) -> String {
+    let [first, second] = pair.map(|number| number + 1);
+    format!(
+        "whether the pictures of projectors {first} and {second} lie where they lay against each other: \
+         the photographs show too few places that both light"
     )
 }
 

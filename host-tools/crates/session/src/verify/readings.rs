@@ -91,6 +91,8 @@ pub struct Readings {
     pub shifts: Vec<PictureShift>,
     /// Two projectors, from 0, that show each other's pictures.
     pub exchanged: Option<[usize; 2]>,
+    /// Pairs of projectors, from 0, whose overlap these photographs do not show.
+    pub unseen: Vec<[usize; 2]>,
 }
 
 /// Share of the table's cells that must be found.
@@ -205,6 +207,7 @@ impl Readings {
             expected_white: None,
             shifts: Vec::new(),
             exchanged: None,
+            unseen: Vec::new(),
         })
     }
 }

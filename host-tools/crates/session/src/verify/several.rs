@@ -294,6 +294,7 @@ pub(super) fn read(
             &revisited.correspondences,
             MOST_SHIFTED,
         ),
+        unseen: PictureShift::unseen(&correspondences, &revisited.correspondences),
         shifts: PictureShift::find(&correspondences, &revisited.correspondences),
         expected_white,
         revisited,
