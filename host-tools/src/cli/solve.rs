@@ -40,13 +40,6 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     // So is a place that cannot be written to.
     check_place(&arguments.output)?;
-    if arguments.report.is_some() && arguments.captures.len() > 1 {
-        return Err(Failure::new(
-            Kind::Usage,
-            "--report draws the capture of one projector, not of several".to_owned(),
-            "Leave --report away.",
-        ));
-    }
     let options = SolveOptions {
         method: arguments.method,
         lambda: arguments.lambda,
@@ -214,13 +207,7 @@ fn report(
     folder: &Path,
     bars: &dyn Progress,
 ) -> Result<PathBuf, Failure> {
-    let report = solve_page::report(
-        built,
-        &arguments.captures[0],
-        &arguments.output,
-        content,
-        bars,
-    );
+    let report = solve_page::report(built, &arguments.captures, &arguments.output, content, bars);
     let report = report.map_err(|error| {
         Failure::new(
             Kind::Frames,

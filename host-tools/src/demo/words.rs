@@ -34,6 +34,7 @@ pub(super) fn words(out: &Path, seconds: &[(&'static str, f64)]) -> Words {
                 ),
             ),
         ],
+        projectors: None,
         sections: Vec::new(),
         seconds: seconds.iter().map(|(what, seconds)| ((*what).to_owned(), *seconds)).collect(),
     }

@@ -22,6 +22,7 @@ extern crate self as iltm_capture;
 
 mod camera_places;
 mod cells;
+mod crossing_light;
 mod devices;
 mod evidence;
 mod format;
@@ -50,6 +51,7 @@ pub use cells::noise::{NoiseModel, NoiseSource};
 pub use cells::nonlinearity::Nonlinearity;
 pub use cells::pixel_light::PixelLight;
 pub use cells::pixel_views::{PixelView, PixelViews};
+pub use crossing_light::{CrossingLight, ProjectorAreas};
 pub use devices::{
     CameraFit, CameraSource, ColourMixingMatrix, Devices, Fall, Probe, Ramp, RampPoint,
 };
@@ -88,9 +90,7 @@ pub use remeasure::{
     CellPlanes, CellReadings, PixelReadings, Remeasured, RemeasuredSeveral, remeasure,
     remeasure_several,
 };
-pub use several::{
-    CrossingLight, ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_several, read_several,
-};
+pub use several::{ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_several, read_several};
 
 use cells::images;
 use evidence::CaptureEvidence;

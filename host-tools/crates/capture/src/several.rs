@@ -9,6 +9,7 @@ use crate::Examined;
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Measurements};
+use crate::crossing_light::{CrossingLight, ProjectorAreas, crossing_light};
 use crate::format::error::CaptureError;
 use crate::format::sequence::{CaptureOptions, Sequence};
 use crate::gate::Gate;
@@ -123,20 +124,6 @@ pub struct ExaminedSeveral {
     pub light: Vec<CrossingLight>,
 }
 
-/// Light that one projector throws on what another one lights.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct CrossingLight {
-    /// Number of the one that throws it, from 0.
-    pub from: usize,
-    /// Number of the other one.
-    pub to: usize,
-    /// Light that bounces from the first one's white to where the second one lights alone, of the
-    /// light there under its own white; 0 if it lights nothing alone.
-    pub bounced: f64,
-    /// Part of the second one's picture, as the camera sees it, that the first one lights itself.
-    pub overlap: f64,
-}
-
 /// Looks at captures of several projectors, from left to right in the wide frame, as closely as
 /// [`read_several`] and says what every gate says of them.
 ///
@@ -163,7 +150,9 @@ pub fn examine_several(
     if own.len() == folders.len() {
         let wide = WideFrame::new(folders, own)?;
         gates = wide.gates(folders, &photographs);
-        light = wide.crossing_light();
+        light = crossing_light(&wide.pixel_shares, |of, pixel| {
+            white_at(&wide.own[of], pixel)
+        });
     }
     Ok(ExaminedSeveral {
         each,
@@ -240,32 +229,6 @@ impl WideFrame {
             gates.extend(found.map(|gate| (other, gate)));
         }
         gates
-    }
-
-    /// Who lights whom, of all pairs.
-    fn crossing_light(&self) -> Vec<CrossingLight> {
-        let shares = &self.pixel_shares;
-        let pairs = (0..shares.len()).flat_map(|from| (0..shares.len()).map(move |to| (from, to)));
-        let of_pair = |(from, to): (usize, usize)| {
-            let light = |of: usize, pixel: usize| white_at(&self.own[of], pixel);
-            let (mut reached, mut both, mut bounced, mut own) = (0.0, 0.0, 0.0, 0.0);
-            for pixel in (0..shares[to].len()).filter(|pixel| shares[to][*pixel] > 0.0) {
-                reached += 1.0;
-                if shares[from][pixel] > 0.0 {
-                    both += 1.0;
-                } else if shares[to][pixel] >= 1.0 {
-                    bounced += light(from, pixel);
-                    own += light(to, pixel);
-                }
-            }
-            CrossingLight {
-                from,
-                to,
-                bounced: if own > 0.0 { bounced / own } else { 0.0 },
-                overlap: both / f64::max(reached, 1.0),
-            }
-        };
-        pairs.filter(|(from, to)| from != to).map(of_pair).collect()
     }
 
     /// Cells of other projectors that light the same place, by cell.
@@ -402,6 +365,22 @@ impl SeveralCaptures {
         let col = cell % self.all.grid.cols();
         let of = |one: &OneOfSeveral| one.columns.contains(&col);
         self.projectors.iter().position(of).unwrap_or(0)
+    }
+
+    /// What several projectors light and how they share it, and the measurements of all.
+    #[must_use]
+    pub fn into_areas(self) -> (Measurements, ProjectorAreas) {
+        let white = |of: usize, pixel: usize| white_at(&self.projectors[of].own, pixel);
+        let areas = ProjectorAreas {
+            overlap: self.is_overlapping(),
+            crossing: crossing_light(&self.pixel_shares, white),
+            cell_shares: self.shares_of_cells(),
+            columns: (self.projectors.iter())
+                .map(|one| one.columns.clone())
+                .collect(),
+            pixel_shares: self.pixel_shares,
+        };
+        (self.all, areas)
     }
 
     /// Whether a projector lights a camera pixel itself.

@@ -3,7 +3,9 @@
 use crate::provenance::{PredictedError, Provenance};
 use crate::reference_white::{ReferenceWhite, WhiteRequest};
 use crate::{CompileError, CompileOptions, Compiled, FineGains, ViewerError};
-use iltm_capture::{CaptureError, CaptureOptions, FineFlood, Measurements, SeveralCaptures};
+use iltm_capture::{
+    CaptureError, CaptureOptions, FineFlood, Measurements, ProjectorAreas, SeveralCaptures,
+};
 use iltm_picture::progress::Progress;
 use iltm_runtime::FrameSize;
 use iltm_solve::{Compensation, InverseTransport, SolveError, SolveOptions, SolveReport, Solved};
@@ -15,6 +17,8 @@ use thiserror::Error;
 pub struct BuiltTable {
     /// The registered photographs.
     pub measurements: Measurements,
+    /// Who lights what, of several projectors with a capture each.
+    pub projectors: Option<ProjectorAreas>,
     /// The inverse light transport that the table has: without an operator, or with the same gain
     /// everywhere, if [`SolveReport::compensation`] says so.
     pub inverse: InverseTransport,
@@ -35,6 +39,13 @@ impl BuiltTable {
     #[must_use]
     pub fn predicted_error(&self) -> f64 {
         self.predicted.of(self.report.compensation)
+    }
+
+    /// Whether it is for projectors whose pictures overlap: two places of its frame are one place on
+    /// the wall then.
+    #[must_use]
+    pub fn is_overlapping(&self) -> bool {
+        self.projectors.as_ref().is_some_and(|areas| areas.overlap)
     }
 }
 
@@ -228,11 +239,16 @@ pub fn build_table_from(
     };
     let compiled = crate::compile(&inverse, fine.as_ref(), &options)?;
     progress.end();
+    let (measurements, projectors) = match learned {
+        LearnedFrom::One(measurements) => (*measurements, None),
+        LearnedFrom::Several(several) => {
+            let (all, areas) = several.into_areas();
+            (all, Some(areas))
+        }
+    };
     Ok(BuiltTable {
-        measurements: match learned {
-            LearnedFrom::One(measurements) => *measurements,
-            LearnedFrom::Several(several) => several.all,
-        },
+        measurements,
+        projectors,
         inverse,
         fine,
         report,

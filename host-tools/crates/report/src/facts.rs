@@ -1,6 +1,6 @@
 //! Table of facts: what a capture and its solve say about themselves, line by line.
 
-use iltm_capture::{Measurements, NoiseSource, RegistrationMethod};
+use iltm_capture::{NoiseSource, RegistrationMethod};
 use iltm_compile::build_table::BuiltTable;
 use iltm_picture::{
     html::{grouped, number, percent},
@@ -55,6 +55,11 @@ fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
         grouped(pixels.mixed as u64),
         grouped(pixels.weak as u64)
     );
+    // Of several projectors, these are known of the first one's capture.
+    let of_first = |fact: String| {
+        let several = learned.projectors.is_some();
+        fact + if several { " (first projector)" } else { "" }
+    };
     let registration = match diagnostics.method {
         RegistrationMethod::Regression {
             photographs,
@@ -77,20 +82,20 @@ fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
     let noise = format!(
         "{} of a cell\u{2019}s light under white, {}",
         percent(noise(learned)),
-        noise_source(diagnostics.noise)
+        of_first(noise_source(diagnostics.noise))
     );
     let mut facts = vec![
         ("photographs", photographs),
         ("cells", cells),
         ("camera pixels", pixels),
-        ("registration", registration),
+        ("registration", of_first(registration)),
         ("exposure", exposure),
         ("noise", noise),
     ];
     if let Some(excess) = diagnostics.superposition {
         let within = percent(excess.abs());
         let linearity = format!("patterns and their inverses add up to white within {within}");
-        facts.push(("linearity", linearity));
+        facts.push(("linearity", of_first(linearity)));
     }
     facts
 }
@@ -151,11 +156,12 @@ fn listed<'s>(seconds: impl IntoIterator<Item = (&'s str, f64)>) -> String {
 /// Median over cells and channels of the noise of one observation under white,
 /// relative to it.
 fn noise(learned: &BuiltTable) -> f64 {
-    let channels = learned.measurements.channels.iter();
-    let ratios = channels.flat_map(|channel| {
-        let white = channel.observations.column(Measurements::WHITE);
-        let cells = channel.noise.iter().zip(white.iter());
-        let lit = cells.filter(|(_, light)| **light > 0.0);
+    let channels = learned.measurements.channels.iter().enumerate();
+    let ratios = channels.flat_map(|(index, channel)| {
+        // Of several projectors, the first view lights only the first one's cells.
+        let white = learned.measurements.white(index);
+        let cells = channel.noise.iter().zip(white);
+        let lit = cells.filter(|(_, light)| *light > 0.0);
         lit.map(|(noise, light)| noise / light).collect::<Vec<_>>()
     });
     median(ratios.collect()).unwrap_or(0.0)

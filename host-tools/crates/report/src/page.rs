@@ -21,6 +21,8 @@ pub struct Words {
     pub commands: Vec<Command>,
     /// Wall-clock seconds by what they were spent on, beside the solve's own.
     pub seconds: Vec<(String, f64)>,
+    /// The section about several projectors, after what was photographed.
+    pub projectors: Option<Markup>,
     /// Sections of this report alone, before how it was solved.
     pub sections: Vec<Markup>,
 }
@@ -54,8 +56,13 @@ impl Report<'_> {
             main {
                 (self.opening(words))
                 (self.scene())
-                (self.pictures_section())
-                (self.bounces())
+                @if let Some(projectors) = &words.projectors { (projectors) }
+                @if self.examples.is_empty() {
+                    (without_pictures())
+                } @else {
+                    (self.pictures_section())
+                    (self.bounces())
+                }
                 (self.operator())
                 (self.accuracy())
                 @for section in &words.sections { (section) }
@@ -91,6 +98,9 @@ impl Report<'_> {
                     span .formula { "\u{2016}s\u{b7}photograph \u{2212} wanted\u{2016} / \u{2016}wanted\u{2016}" }
                     ", with the one factor s for all pixels and colours that suits the photograph best, so that a "
                     "dim projection alone is no error."
+                    @if self.learned.is_overlapping() {
+                        " Where projectors overlap, corrected images are predicted as if one of them showed all of the light."
+                    }
                 }
                 @if let Some(brightness) = self.brightness() {
                     p { (capitalised(&brightness.words())) "." }
@@ -116,17 +126,25 @@ impl Report<'_> {
     fn scene(&self) -> Markup {
         let grid = self.learned.inverse.grid;
         let counts = self.learned.report.photographs;
+        let several = self.learned.projectors.is_some();
         html! {
             section .split {
                 figure {
                     (self.image("flood", "The scene under white light"))
-                    figcaption { "The flood photograph: the whole projection white, seen by the camera. Black is subtracted." }
+                    figcaption {
+                        @if several {
+                            "The flood photographs of all projectors, added up: all of the projection white, seen by the camera. "
+                        } @else {
+                            "The flood photograph: the whole projection white, seen by the camera. "
+                        }
+                        "Black is subtracted."
+                    }
                 }
                 div {
                     h2 { "What was photographed" }
                     p {
-                        "The projector is taken as " (grid.rows()) " \u{d7} " (grid.cols())
-                        " lights. Every light reaches not only its own patch of the scene: what falls there is "
+                        @if several { "The projectors are, side by side, " } @else { "The projector is " }
+                        "taken as " (grid.rows()) " \u{d7} " (grid.cols()) " lights. Every light reaches not only its own patch of the scene: what falls there is "
                         "scattered onto the patches opposite, and their light shows where it was not asked for. "
                         "Contrast drops, and colours bleed."
                     }
@@ -413,6 +431,21 @@ impl Report<'_> {
                 "Written by iltm " (env!("CARGO_PKG_VERSION"))
                 ". Method after Chu, Ng, Pahwa, Quek and Huang, Compressive Inverse Light Transport, BMVC 2011. "
                 "Colours of the maps: magma and viridis."
+            }
+        }
+    }
+}
+
+/// What stands for pictures of projectors that overlap.
+fn without_pictures() -> Markup {
+    html! {
+        section {
+            h2 { "What it does to images" }
+            p {
+                "This page predicts images only where each place of a frame has a place of its own on the wall. Where "
+                "projectors overlap, two places of the wide frame are one, so no images and no bounced light are drawn "
+                "here. The errors above are predicted for these projectors all the same, and a verification shows "
+                "images on them."
             }
         }
     }

@@ -2,9 +2,11 @@
 //! content, in a file that a browser shows without network.
 //!
 //! [`Report`] draws what every report has; here are where the cells are, the images for a
-//! scene nobody knows (`wanted`) and how bright white may be (`headroom`).
+//! scene nobody knows (`wanted`), how bright white may be (`headroom`) and who lights whom, of
+//! several projectors (`projectors`).
 
 mod headroom;
+mod projectors;
 mod wanted;
 
 use crate::{Command, Report, ReportError, Words, frame_size};
@@ -18,7 +20,8 @@ use iltm_picture::{
 };
 use iltm_runtime::image::Table;
 use maud::{Markup, html};
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 /// Pictures or videos that the user is going to show.
 #[derive(Clone, Debug)]
@@ -47,26 +50,37 @@ pub struct SolvePage {
     pub files: Vec<PictureFile>,
 }
 
-/// The report of a scene that was learned from the folder `capture` into the file `table`.
+/// The report of a scene that was learned from the folders `captures` into the file `table`: one, or
+/// one of each projector.
 ///
 /// # Errors
 /// [`ReportError`] if the table cannot show an image.
 pub fn report(
     learned: &BuiltTable,
-    capture: &Path,
+    captures: &[PathBuf],
     table: &Path,
     content: &[Content],
     progress: &dyn Progress,
 ) -> Result<SolvePage, ReportError> {
     let checked = Table::check(&learned.compiled.image).map_err(ReportError::Table)?;
-    let wanted = wanted::wanted(&checked, content);
+    let wanted = if learned.is_overlapping() {
+        Vec::new()
+    } else {
+        wanted::wanted(&checked, content)
+    };
     let report = Report::new(learned, wanted, progress)?;
     let mut files = report.files.clone();
     let mut sections = vec![cell_map(learned, &mut files)];
     sections.push(headroom::section(learned, &checked, content, &mut files));
+    let names = names(captures);
+    let projectors = learned
+        .projectors
+        .as_ref()
+        .map(|areas| projectors::section(learned, areas, &names, &mut files));
     let words = Words {
+        projectors,
         sections,
-        ..words(learned, capture, table)
+        ..words(learned, captures, &names, table)
     };
     let page = report.html(&words);
     Ok(SolvePage { page, files })
@@ -106,8 +120,12 @@ fn cell_map(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Markup {
         div {
             h2 { "Where the cells are" }
             p {
-                (live) " of " (measurements.live.len()) " cells were found. Each square of the map is one cell of the projector as "
-                "the camera sees it; pixels between the squares see two cells at once and are not used."
+                (live) " of " (measurements.live.len()) " cells were found. Each square of the map is one cell of "
+                @if learned.projectors.is_some() { "a" } @else { "the" }
+                " projector as the camera sees it; pixels between the squares see two cells at once and are not used."
+                @if learned.is_overlapping() {
+                    " Where projectors overlap, the map has the cells of the one with the largest share of the light."
+                }
             }
             p .quiet {
                 "White reaches " (percent(measurements.diagnostics.exposure)) " of the camera's full scale."
@@ -121,13 +139,31 @@ fn cell_map(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Markup {
     markup
 }
 
-fn words(learned: &BuiltTable, capture: &Path, table: &Path) -> Words {
-    let named = &learned.measurements.settings.scene.name;
-    let title = named.clone().unwrap_or_else(|| {
+/// Names of the captures' folders: without what leads to them, if that tells them apart.
+fn names(captures: &[PathBuf]) -> Vec<String> {
+    let last = |capture: &PathBuf| {
         let name = capture.file_name().unwrap_or(capture.as_os_str());
         name.to_string_lossy().into_owned()
-    });
-    let (capture, table) = (quoted(capture), quoted(table));
+    };
+    let names: Vec<String> = captures.iter().map(last).collect();
+    if names.iter().collect::<BTreeSet<_>>().len() == names.len() {
+        return names;
+    }
+    let whole = captures.iter().map(|capture| capture.display().to_string());
+    whole.collect()
+}
+
+fn words(learned: &BuiltTable, captures: &[PathBuf], names: &[String], table: &Path) -> Words {
+    let named = &learned.measurements.settings.scene.name;
+    let title = named.clone().unwrap_or_else(|| names.join(" and "));
+    let captures: Vec<String> = captures.iter().map(|capture| quoted(capture)).collect();
+    let (captures, table) = (captures.join(" "), quoted(table));
+    // Test images of projectors that overlap are drawn by their captures.
+    let drawn = if learned.is_overlapping() {
+        format!(" --captures {captures}")
+    } else {
+        String::new()
+    };
     Words {
         title,
         scene: "What the photographs of this scene say, what the table makes of it, and what it \
@@ -136,11 +172,13 @@ fn words(learned: &BuiltTable, capture: &Path, table: &Path) -> Words {
         commands: vec![
             Command::new(
                 "This table again, without new photographs:",
-                format!("iltm solve {capture} -o {table}"),
+                format!("iltm solve {captures} -o {table}"),
             ),
             Command::new(
                 "Proof on the wall: pictures to project and to photograph, then a verdict:",
-                format!("iltm verify {table} -o verification\niltm verify {table} verification"),
+                format!(
+                    "iltm verify {table} -o verification{drawn}\niltm verify {table} verification"
+                ),
             ),
             Command::new(
                 "Live:",
@@ -150,6 +188,7 @@ fn words(learned: &BuiltTable, capture: &Path, table: &Path) -> Words {
             ),
         ],
         seconds: Vec::new(),
+        projectors: None,
         sections: Vec::new(),
     }
 }
