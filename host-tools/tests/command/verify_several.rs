@@ -20,7 +20,8 @@ fn prepared() -> &'static User {
                 "simulate {SCENE} --photograph {name} --projector {name}"
             ));
         }
-        user.says("solve left right -o t.iltm");
+        let data = user.json("solve left right -o t.iltm --report report");
+        assert_eq!(data["report"], "report/report.html");
         contains(
             &user.says("verify t.iltm -o v --captures left right"),
             &["5 test images", "stripes of the projectors' own pixels"],
@@ -120,6 +121,76 @@ fn captures_of_two_projectors_are_checked_beside_each_other() {
         ),
     ] {
         refused(user, line, says);
+    }
+}
+
+#[test]
+fn a_report_of_two_projectors_draws_both_and_says_who_lights_whom_as_a_check_does() {
+    let user = prepared();
+    let page = user.text("report/report.html").replace('\u{202f}', " ");
+    assert!(page.len() < 1 << 20);
+    contains(
+        &page,
+        &[
+            "<h1>left and right</h1>",
+            "The projectors",
+            "\u{a0}left</span>",
+            "\u{a0}right</span>",
+            "iltm solve left right -o t.iltm",
+            "--captures left right",
+        ],
+    );
+    let said = user.says("check left right");
+    let lines: Vec<&str> = said
+        .lines()
+        .filter(|line| line.contains("white adds"))
+        .collect();
+    assert_eq!(lines.len(), 2);
+    for line in lines {
+        let between = |before: &str, after: &str| {
+            let (_, rest) = line.split_once(before).unwrap();
+            rest.split_once(after).unwrap().0.to_owned()
+        };
+        let bounced = between("white adds ", " to what");
+        let overlap = between(", and ", " of ");
+        contains(&page, &[&format!("bounces {bounced}<br>overlap {overlap}")]);
+    }
+    // The left projector lights what the camera sees on the left. Its colour is orange, the other blue.
+    let room = user.picture("report/projectors.png").into_rgb8();
+    let middle = room.width() / 2;
+    let counts = |orange: bool| {
+        let pixels = room.enumerate_pixels();
+        let coloured = pixels.filter(|(_, _, pixel)| {
+            let [red, _, blue] = pixel.0.map(i32::from);
+            if orange {
+                red > blue + 40
+            } else {
+                blue > red + 40
+            }
+        });
+        let (left, right): (Vec<_>, Vec<_>) = coloured.partition(|(x, ..)| *x < middle);
+        (left.len() as f64, right.len() as f64)
+    };
+    let ((own, other), (others, rights)) = (counts(true), counts(false));
+    // Beyond the middle a tenth of its picture, every other stripe of it.
+    assert!((0.01..0.15).contains(&(other / own)), "{other} of {own}");
+    assert!(
+        (0.01..0.15).contains(&(others / rights)),
+        "{others} of {rights}"
+    );
+    // A place in the middle of the overlap is half of each one's light.
+    for (name, edge) in [("blend-1", 0.9), ("blend-2", 0.1)] {
+        let blend = user.picture(&format!("report/{name}.png")).into_rgb8();
+        let at = |across: f64| {
+            let x = (across * f64::from(blend.width())) as u32;
+            i32::from(blend.get_pixel(x, blend.height() / 2).0[1])
+        };
+        // Viridis gets greener with the share.
+        let (alone, half, none) = (at(0.5), at(edge), at(if edge > 0.5 { 0.999 } else { 0.0 }));
+        assert!(
+            alone > half + 30 && half > none + 30,
+            "{alone} {half} {none}"
+        );
     }
 }
 

@@ -104,7 +104,7 @@ pages! {
     the_page_of_players, "docs/players.md", |clone| there(clone, &["SHADER/iltm.glsl", "MAPS/alpha.png"]);
     the_page_of_several_projectors, "docs/several-projectors.md", |clone| {
         there(clone, &["proof/verdict/verdict.html", "wide.png"]);
-        there(clone, &["screen-proof/verdict/verdict.html", "better.iltm"]);
+        there(clone, &["screen-proof/verdict/verdict.html", "better.iltm", "screen-report/report.html"]);
     };
     the_page_of_scenes, "docs/scenes.md", |_| ();
     the_page_of_figures, "docs/measured.md", |_| ();

@@ -25,11 +25,11 @@ const COLOURS: [Colour; 6] = [
 ];
 
 /// Width of the camera's picture on the page, about.
-const WIDTH: usize = 800;
+const WIDTH: usize = 640;
 /// Width of a stripe where several projectors light the same.
-const STRIPE: usize = 7;
-/// Shades of one colour: few make a small file.
-const SHADES: u16 = 12;
+const STRIPE: usize = 6;
+/// Shades of one colour: so few that all fit into a palette.
+const SHADES: u8 = 32;
 /// Part of a colour that stays where the photograph is dark, so that it can be told.
 const LEAST: f64 = 0.3;
 /// Width of the pictures of shares, about.
@@ -75,14 +75,16 @@ pub(super) fn section(
             }
             div {
                 h3 { "Who lights whom" }
-                (matrix(areas, names))
-                p .quiet {
-                    "Bounces: light that the white of the upper one adds to what the one on the left lights alone, of its "
-                    "own light there. Overlap: part of the picture of the one on the left, as the camera sees it, that "
-                    "the upper one lights too. " code { "iltm check" } " states the same."
+                p { "A row of the table is a projector's picture, a column is a projector that lights it." }
+                p {
+                    b { "Bounces" } ": light that white of the column's projector adds to what the row's projector lights "
+                    "alone, of its own white there. " b { "Overlap" } ": part of the row's picture, as the camera sees it, that "
+                    "the column's projector lights too. " b { "Alone" } ": part that no other one lights."
                 }
+                p .quiet { code { "iltm check" } " states the same of bounces and overlaps." }
             }
         }
+        (matrix(areas, names))
         @if areas.overlap { (blend(learned.inverse.grid, areas, names, files)) }
     } };
     files.extend(room);
@@ -97,8 +99,8 @@ fn matrix(areas: &ProjectorAreas, names: &[String]) -> Markup {
     };
     html! { div .scroll { table {
         thead { tr {
-            th { "lit" }
-            @for (from, name) in names.iter().enumerate() { th { "by " (named(from, name)) } }
+            th { "picture of" }
+            @for (from, name) in names.iter().enumerate() { th { "lit by " (named(from, name)) } }
         } }
         tbody { @for (to, name) in names.iter().enumerate() { tr {
             @let alone = areas.alone(to);
@@ -123,7 +125,7 @@ fn named(projector: usize, name: &str) -> Markup {
     let style = format!(
         "display:inline-block;width:.75em;height:.75em;border-radius:2px;background:#{red:02x}{green:02x}{blue:02x}"
     );
-    html! { span style=(style) {} "\u{a0}" (name) }
+    html! { span .formula { span style=(style) {} "\u{a0}" (name) } }
 }
 
 fn colour(projector: usize) -> Colour {
@@ -211,7 +213,7 @@ fn coloured(
 ) -> Option<Picture> {
     let size = frame_size(WIDTH, (WIDTH * camera.height()).div_ceil(camera.width()))?;
     let mut canvas = Canvas::new(size, BACKGROUND);
-    // Sums of the places that a projector lights most, for its name.
+    // Where no other one has a larger share, for a projector's name: sums of places, and how many.
     let mut places = vec![[0; 3]; shares.len()];
     for (x, y) in (0..size.pixels()).map(|at| (at % size.width(), at / size.width())) {
         let of_camera = |at: usize, of: usize, to: usize| at * to / of;
@@ -230,14 +232,16 @@ fn coloured(
         };
         let shade = |code: u8| (f64::from(code) * bright).round() as u8;
         canvas.set(x, y, colour.map(shade));
-        for projector in lit.into_iter().filter(|of| shares[*of][pixel] > 0.5) {
+        let share = |projector: &usize| shares[*projector][pixel];
+        let most = lit.iter().map(share).fold(0.0, f32::max);
+        for projector in lit.into_iter().filter(|of| share(of) >= most) {
             let place = &mut places[projector];
             *place = [place[0] + x, place[1] + y, place[2] + 1];
         }
     }
     for (name, [x, y, count]) in names.iter().zip(places) {
-        if count > 0 {
-            label(&mut canvas, [x / count, y / count], name);
+        if let (Some(x), Some(y)) = (x.checked_div(count), y.checked_div(count)) {
+            label(&mut canvas, [x, y], name);
         }
     }
     Some(canvas.finish())
