@@ -76,7 +76,12 @@ fn of_photographs(learned: &BuiltTable) -> Vec<Fact> {
         }
     };
     let exposure = format!(
-        "white reaches {} of full scale",
+        "white{} {} of full scale",
+        if learned.projectors.is_some() {
+            " of one projector reaches at most"
+        } else {
+            " reaches"
+        },
         percent(diagnostics.exposure)
     );
     let noise = format!(

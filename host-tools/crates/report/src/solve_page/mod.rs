@@ -128,7 +128,8 @@ fn cell_map(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Markup {
                 }
             }
             p .quiet {
-                "White reaches " (percent(measurements.diagnostics.exposure)) " of the camera's full scale."
+                @if learned.projectors.is_some() { "White of one projector reaches at most " } @else { "White reaches " }
+                (percent(measurements.diagnostics.exposure)) " of the camera's full scale."
             }
         }
         @if let Some(file) = &file {

@@ -84,7 +84,7 @@ pub(super) fn section(
                 p .quiet { code { "iltm check" } " states the same of bounces and overlaps." }
             }
         }
-        (matrix(areas, names))
+        div .example { (matrix(areas, names)) }
         @if areas.overlap { (blend(learned.inverse.grid, areas, names, files)) }
     } };
     files.extend(room);
