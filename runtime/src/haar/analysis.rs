@@ -112,7 +112,7 @@ fn merge<'c, T: Coefficient>(
     }
     let mut details = details;
     let mut rows = values.rows().take(level.rows.nodes);
-    let merged = to.chunks_exact_mut(level.merged_cols());
+    let merged = to.chunks_exact_mut(level.merged_cols().max(1));
     for (index, sums) in merged.take(level.merged_rows()).enumerate() {
         let pair = level.row_pair(index);
         let Some(top) = rows.next() else { break };

@@ -83,7 +83,7 @@ fn split<T: Copy + Default, R: Rule<T>>(
     }
     let cols = level.cols.nodes;
     let mut pairs = to.chunks_mut(2 * cols);
-    let merged = from.chunks_exact(level.merged_cols());
+    let merged = from.chunks_exact(level.merged_cols().max(1));
     for (index, values) in merged.take(level.merged_rows()).enumerate() {
         let pair = level.row_pair(index);
         let to = pairs.next().unwrap_or_default();

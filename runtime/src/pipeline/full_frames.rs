@@ -84,13 +84,13 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
     pub(super) fn prepare_row_of(&self, channels: usize, y: usize, memory: &mut FullMemory<'_>) {
         let width = self.frame().width() * channels;
         for channel in 0..channels {
-            if let Some(line) = memory.gains.chunks_exact_mut(width).nth(y) {
+            if let Some(line) = memory.gains.chunks_exact_mut(width.max(1)).nth(y) {
                 self.gain_row(y, channel, &mut memory.row, memory.values);
                 store(line, channel, channels, memory.values);
             }
             if self.table().ambient().is_some()
                 && self.ambient_row(y, channel, &mut memory.row, memory.values)
-                && let Some(line) = memory.ambient.chunks_exact_mut(width).nth(y)
+                && let Some(line) = memory.ambient.chunks_exact_mut(width.max(1)).nth(y)
             {
                 store(line, channel, channels, memory.values);
             }
@@ -136,8 +136,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let (cells, width) = (self.table().grid().cells(), self.frame().width());
         memory.sums.fill(0);
         let (ambient, _) = memory.ambient.as_chunks();
-        let sums = memory.sums.chunks_exact_mut(cells);
-        let columns = memory.columns.chunks_exact_mut(2 * width);
+        let sums = memory.sums.chunks_exact_mut(cells.max(1));
+        let columns = memory.columns.chunks_exact_mut((2 * width).max(1));
         for (channel, (sums, columns)) in sums.zip(columns).enumerate().take(C) {
             let curves = S::curves(self.table(), encoding, channel);
             self.average(columns, sums, |y, weight, columns| {
@@ -181,8 +181,8 @@ impl<const C: usize> FullPipeline<'_, '_, C> {
         let lines = lines.take(self.frame().height());
         let (gains, _) = memory.gains.as_chunks();
         let (ambient, _) = memory.ambient.as_chunks();
-        for (y, (line, gains)) in lines.zip(gains.chunks_exact(width)).enumerate() {
-            let corrections = memory.corrections.chunks_exact(cells);
+        for (y, (line, gains)) in lines.zip(gains.chunks_exact(width.max(1))).enumerate() {
+            let corrections = memory.corrections.chunks_exact(cells.max(1));
             for (channel, (corrections, curves)) in corrections.zip(curves).enumerate() {
                 if operates {
                     self.correct_row(y, corrections, &mut memory.row);

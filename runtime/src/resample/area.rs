@@ -58,7 +58,7 @@ impl AreaAverage {
         let row = start / height;
         let split = ((row + 1) * height).min(end);
         let cols = self.grid.cols();
-        let mut lines = sums.chunks_exact_mut(cols).skip(row);
+        let mut lines = sums.chunks_exact_mut(cols.max(1)).skip(row);
         let first = lines.next().unwrap_or_default();
         // Rows are at least as many as cells, so a row of pixels crosses into
         // one more row of cells at most.
@@ -94,7 +94,7 @@ impl AreaAverage {
         let (mut columns, mut next) = columns.split_at_mut(half);
         columns.fill(0);
         next.fill(0);
-        let mut lines = sums.chunks_exact_mut(self.grid.cols());
+        let mut lines = sums.chunks_exact_mut(self.grid.cols().max(1));
         let mut end = height;
         for y in 0..height {
             // Row y of pixels is `rows` units high, a row of cells `height` units.
