@@ -75,6 +75,7 @@ more=${ILTM_FIRMWARE_FEATURES:-}
 features=$board${stages:+,$stages}${more:+,$more}
 case $stages in
 stages) some= ;;
+stages,neighbours) some=-several ;;
 '') some=-lean ;;
 *) some=-some ;;
 esac

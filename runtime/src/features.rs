@@ -23,16 +23,19 @@ pub enum Stage {
     Colour,
     /// Frames larger than the grid, and gains finer than its cells.
     FullResolution,
+    /// Light that other projectors throw on this one's surfaces.
+    Neighbours,
 }
 
 impl Stage {
     /// All, in the order of their numbers.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Operator,
         Self::Ambient,
         Self::Response,
         Self::Colour,
         Self::FullResolution,
+        Self::Neighbours,
     ];
 
     /// Whether this build has it.
@@ -45,6 +48,7 @@ impl Stage {
             Self::Response => cfg!(feature = "response"),
             Self::Colour => cfg!(feature = "colour"),
             Self::FullResolution => cfg!(feature = "full-resolution"),
+            Self::Neighbours => cfg!(feature = "neighbours"),
         }
     }
 
@@ -57,6 +61,7 @@ impl Stage {
             Self::Response => "response",
             Self::Colour => "colour",
             Self::FullResolution => "full-resolution",
+            Self::Neighbours => "neighbours",
         }
     }
 }
@@ -69,6 +74,7 @@ impl fmt::Display for Stage {
             Self::Response => "a projector's response",
             Self::Colour => "three channels",
             Self::FullResolution => "frames larger than the grid",
+            Self::Neighbours => "the light of other projectors",
         })
     }
 }

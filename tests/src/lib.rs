@@ -21,6 +21,7 @@ pub mod hard_frames;
 pub mod instructions;
 pub mod line_faults;
 pub mod made_up;
+pub mod neighbours;
 pub mod overlapping;
 pub mod reference_pages;
 pub mod rights;

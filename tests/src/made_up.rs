@@ -3,7 +3,9 @@
 
 use fastrand::Rng;
 use fixed::types::{U0F32, U1F15, U8F24};
-use iltm::compile::image::{ImageWriter, StoredRow, projector_section, segment_bytes};
+use iltm::compile::image::{
+    ImageWriter, StoredRow, neighbours_section, projector_section, segment_bytes,
+};
 use iltm::compile::response;
 use iltm::picture::{ProjectorResponse, Response};
 use iltm_runtime::Grid;
@@ -40,6 +42,9 @@ pub struct MadeUp {
     pub tiers: Vec<Vec<StoredRow>>,
     /// Scale of the operator in each channel that there is.
     pub scales: [U1F15; 3],
+    /// Cells of the projectors on the left and on the right, and their ambient light where the own
+    /// cells have some.
+    pub neighbours: Option<(Grid, [u8; 2], Vec<u16>)>,
 }
 
 impl MadeUp {
@@ -59,7 +64,31 @@ impl MadeUp {
             projector: None,
             tiers: Vec::new(),
             scales,
+            neighbours: None,
         }
+    }
+
+    /// The same as one of several projectors: with a random entry more in each row, of one of these
+    /// cells of its neighbours.
+    pub fn with_neighbours(mut self, grid: Grid, around: [u8; 2], seed: u64) -> Self {
+        let mut random = Rng::with_seed(seed);
+        let own = self.grid.cells();
+        for row in self.tiers.iter_mut().flatten() {
+            let at = random.usize(own..own + grid.cells()) as u16;
+            let most = row.entries.iter().map(|(_, value)| value.abs()).max();
+            row.entries.push((at, most.unwrap_or(1).max(1)));
+        }
+        let samples = grid.cells() * self.channels;
+        let light = self.ambient.as_ref().map_or(0, |_| samples);
+        let ambient = (0..light).map(|_| random.u16(..900)).collect();
+        self.neighbours = Some((grid, around, ambient));
+        self
+    }
+
+    /// Input coefficients of a channel.
+    fn inputs(&self) -> usize {
+        let others = self.neighbours.as_ref();
+        self.grid.cells() + others.map_or(0, |(grid, ..)| grid.cells())
     }
 
     /// Just under gain 1, so that natural frames are not clipped more than usual, and with
@@ -127,7 +156,12 @@ impl MadeUp {
             Segment::new(usize::from(tier) - 1, tier, Channels::All, bytes)
         };
         let segments: Result<_, _> = (1..).zip(segments).map(segment).collect();
-        Operator::new(&Basis::new(self.grid), segments?, self.scales)
+        Operator::new(
+            &Basis::new(self.grid),
+            self.inputs(),
+            segments?,
+            self.scales,
+        )
     }
 
     /// The bytes of the image. Where the runtime refuses the operator, so does it the
@@ -135,7 +169,7 @@ impl MadeUp {
     pub fn image(&self) -> Vec<u8> {
         let tiers = self.tiers.iter();
         let segments: Vec<_> = tiers
-            .map(|rows| segment_bytes(self.grid.cells(), rows))
+            .map(|rows| segment_bytes(self.inputs(), rows))
             .collect();
         let operator = (!segments.is_empty()).then(|| self.operator(&segments));
         let operator = operator.and_then(Result::ok);
@@ -181,6 +215,10 @@ impl MadeUp {
         }
         if let Some(projector) = self.projector {
             image.section(SectionKind::Projector, 0, projector_section(projector));
+        }
+        if let Some((grid, around, ambient)) = &self.neighbours {
+            let bytes = neighbours_section(*grid, *around, ambient.clone());
+            image.section(SectionKind::Neighbours, 0, bytes);
         }
         image.finish()
     }

@@ -9,6 +9,7 @@ use crate::firmware::{elf, elf_of, flash_bytes};
 use crate::grid;
 use crate::instructions::{bench, cases};
 use crate::made_up::{MadeUp, pairs};
+use crate::neighbours::OF_SEVERAL;
 use iltm::compile::image::StoredRow;
 use iltm::device::emulator::Board;
 use iltm_runtime::features::Stage;
@@ -16,6 +17,15 @@ use iltm_runtime::image::Table;
 use iltm_runtime::operator::{Row, Segment};
 use iltm_runtime::{FrameSize, Grid};
 use std::fmt::Write as _;
+
+/// Those of a projector alone.
+pub const ALONE: [Stage; 5] = [
+    Stage::Operator,
+    Stage::Ambient,
+    Stage::Response,
+    Stage::Colour,
+    Stage::FullResolution,
+];
 
 /// Entries of each row of a made-up operator, in pairs.
 const ENTRIES: usize = 8;
@@ -29,6 +39,11 @@ pub fn table(grid: Grid, stages: &[Stage]) -> MadeUp {
     table.response = stages.contains(&Stage::Response);
     if stages.contains(&Stage::Operator) {
         table.tiers = vec![rows(grid)];
+    }
+    if stages.contains(&Stage::Neighbours) {
+        let side = |cells: usize| cells.div_ceil(4) as u16;
+        let others = crate::grid(side(grid.rows()), 2 * side(grid.cols()));
+        table = table.with_neighbours(others, [1, 1], 0x9E16);
     }
     table
 }
@@ -61,7 +76,7 @@ pub fn listed(stages: &[Stage]) -> MadeUp {
 }
 
 /// The rows of a segment as a table stores them, with values of 1 and -1.
-fn stored(segment: &Segment<'_>) -> Vec<StoredRow> {
+pub(crate) fn stored(segment: &Segment<'_>) -> Vec<StoredRow> {
     let entries = |row: &Row<'_>| {
         row.fold(Vec::new(), |mut entries, pair| {
             let both = [
@@ -163,9 +178,10 @@ pub fn features(stages: &[Stage]) -> String {
 
 /// Bytes of flash of a product with these features, none of which is lean.
 pub fn flash(features: &str) -> u64 {
-    let all = features == self::features(&Stage::ALL);
-    flash_bytes(&if all {
+    flash_bytes(&if features == self::features(&ALONE) {
         elf(Board::An500, "firmware")
+    } else if features == self::features(&Stage::ALL) {
+        elf_of(Board::An500, OF_SEVERAL, "firmware")
     } else {
         elf_of(Board::An500, features, "firmware")
     })
@@ -182,14 +198,15 @@ pub fn size_line(stages: &[Stage]) -> String {
     format!("{name},{bytes}")
 }
 
-/// All choices of stages, none first, all last.
+/// All choices of the stages of a projector alone, none first, and then all that there are.
 pub fn choices() -> Vec<Vec<Stage>> {
     let choice = |bits: usize| {
         let chosen = |place: &usize| bits >> place & 1 == 1;
-        (0..Stage::ALL.len())
+        (0..ALONE.len())
             .filter(chosen)
-            .map(|place| Stage::ALL[place])
+            .map(|place| ALONE[place])
             .collect()
     };
-    (0..1 << Stage::ALL.len()).map(choice).collect()
+    let alone = (0..1 << ALONE.len()).map(choice);
+    alone.chain([Stage::ALL.to_vec()]).collect()
 }

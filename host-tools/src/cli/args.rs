@@ -4,6 +4,7 @@ use super::failure::Kind;
 use super::named::Named;
 use super::simulate_chain::Chain;
 use crate::capture::{CameraSettings, GateName, MapFormat};
+use crate::compile::NEIGHBOURS_FACTOR;
 #[cfg(unix)]
 use crate::device::emulator::Board;
 use crate::scene::{CaptureFault, Effect, InjectedFault};
@@ -82,6 +83,8 @@ pub(super) enum Command {
     Verify(Verify),
     /// Feed photographs of compensated images back into a table
     Refine(Refine),
+    /// Make a table for the device of each projector from that of several
+    Split(Split),
     /// Sign a table, so that devices with the key take it
     Sign(Sign),
     /// List the serial ports and the devices that answer there
@@ -785,6 +788,22 @@ pub(super) struct Refine {
     pub(super) key: Option<PathBuf>,
     #[command(flatten)]
     pub(super) seal: SealTerms,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Split {
+    /// Table of several projectors, whose frames stand side by side
+    pub(super) table: PathBuf,
+    /// Folder for the tables, numbered from left to right
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(super) output: PathBuf,
+    /// How many projectors there are
+    #[arg(long, value_name = "COUNT")]
+    pub(super) projectors: usize,
+    /// Cells along each side of a frame that become one for its neighbours: more make less light to
+    /// pass on and a coarser correction
+    #[arg(long, value_name = "CELLS", default_value_t = NEIGHBOURS_FACTOR)]
+    pub(super) neighbours: usize,
 }
 
 #[derive(Clone, Debug, Args)]

@@ -4,7 +4,7 @@ use super::args::Compensate;
 use super::failure::{Failure, Kind, cannot_read};
 use super::output::Output;
 use super::progress::progress;
-use super::tables::{check, read_table, watch_table};
+use super::tables::{check_whole, read_table, watch_table};
 use super::words::advice_for_white;
 use crate::compile::Provenance;
 use crate::video::live::{Live, LiveEvent, LiveSummary, words};
@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Compensate, output: &Output) -> Result<(), Failure
     } else {
         (read_table(path)?, None)
     };
-    let table = check(path, &image)?;
+    let table = check_whole(path, &image)?;
     let settings = settings(arguments);
     let compensator = Compensator::new(&table, settings)?;
     let input = opened(&arguments.input)?;

@@ -3,7 +3,7 @@
 use super::args::{Export, Player};
 use super::failure::{Failure, Kind};
 use super::output::Output;
-use super::tables::{check, chosen_tier, read_table};
+use super::tables::{check_whole, chosen_tier, read_table};
 use crate::capture::exr;
 use crate::compile::shader::{glsl_files, isf_files, user_shader};
 use crate::video::{CompensateOptions, Compensator};
@@ -21,7 +21,7 @@ pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     let out = &arguments.output;
     check_free(out)?;
     let image = read_table(&arguments.table)?;
-    let table = check(&arguments.table, &image)?;
+    let table = check_whole(&arguments.table, &image)?;
     let tier = chosen_tier(&table, arguments.tier)?;
     let (files, next) = match arguments.player {
         Player::Mpv => {

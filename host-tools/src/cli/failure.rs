@@ -5,8 +5,8 @@ use super::output::printable;
 use super::summary::gates;
 use crate::build_table::BuildError;
 use crate::capture::CaptureError;
-use crate::compile::CompileError;
 use crate::compile::sign::KeyError;
+use crate::compile::{CompileError, SplitTableError};
 use crate::demo::DemoError;
 use crate::device::DeviceError;
 use crate::device::logs::LogsError;
@@ -323,6 +323,21 @@ impl From<CompileError> for Failure {
             _ => Kind::Solve,
         };
         Self::new(kind, &error, error.next_step())
+    }
+}
+
+impl From<SplitTableError> for Failure {
+    fn from(error: SplitTableError) -> Self {
+        let next_step = match error {
+            SplitTableError::Compile(error) => return error.into(),
+            SplitTableError::Columns { .. } => "Give the number of projectors with --projectors.",
+            SplitTableError::Frames { .. } => {
+                "Take the photographs again with `iltm patterns --projector WxH` of the wide frame, without a border."
+            }
+            SplitTableError::Split => "Give the table that `iltm solve` made of all projectors.",
+            SplitTableError::NeighboursCells { .. } => "Give a larger --neighbours.",
+        };
+        Self::new(Kind::Usage, error, next_step)
     }
 }
 

@@ -59,7 +59,7 @@ pub(super) fn ask_fit<L: Line>(client: &mut Client<L>) -> Result<Fit, DeviceErro
         };
         let over = start.elapsed() >= wait;
         match status.mode {
-            Mode::Compensating if seen => return Ok(Fit::Compensating),
+            Mode::Compensating | Mode::Alone if seen => return Ok(Fit::Compensating),
             Mode::PassThrough(_) if over => return Ok(Fit::PassThrough(Box::new(status))),
             _ if over => return Ok(Fit::NoFrames),
             _ => thread::sleep(STEP),

@@ -41,6 +41,16 @@ pub(super) fn run(arguments: &Inspect, output: &Output) -> Result<(), Failure> {
     if arguments.detail.verbose {
         let _ = write!(text, "\n{}", self::text(&table));
     }
+    data["neighbours"] = json!(table.neighbours().map(|neighbours| {
+        let [before, after] = neighbours.around();
+        json!({
+            "rows": neighbours.grid().rows(),
+            "cols": neighbours.grid().cols(),
+            "before": before,
+            "after": after,
+            "bytes": neighbours.bytes(),
+        })
+    }));
     data["file_bytes"] = json!(file.len());
     data["seal"] = json!(
         seal.as_ref()
@@ -118,6 +128,7 @@ fn effects(table: &Table<'_>) -> Vec<&'static str> {
         (table.ambient_row(0, 0).is_some(), "ambient light"),
         (table.operator().is_some(), "interreflection"),
         (table.has_response(), "projector response"),
+        (table.neighbours().is_some(), "light of other projectors"),
     ];
     let listed = listed.into_iter().filter(|(there, _)| *there);
     listed.map(|(_, name)| name).collect()

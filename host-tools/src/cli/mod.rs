@@ -36,6 +36,7 @@ mod refine;
 mod simulate;
 mod simulate_chain;
 mod solve;
+mod split;
 mod status;
 mod summary;
 mod support_bundle;
@@ -102,6 +103,7 @@ fn run_alone(meter: Option<Meter>, processes: Processes) -> ExitCode {
         Command::Tradeoff(tradeoff) => tradeoff::run(tradeoff, &output),
         Command::Verify(verify) => verify::run(verify, &output),
         Command::Refine(refine) => refine::run(refine, &output),
+        Command::Split(split) => split::run(split, &output),
         Command::Sign(sign) => key::sign(sign, &output),
         Command::Ports(ports) => ports::run(ports, &output),
         Command::Flash(flash) => flash::run(flash, &output),

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::output::{Output, write_file};
 use super::progress::progress;
 use super::solve::check_place;
-use super::tables::{check_date, check_sealed, read_table, seal};
+use super::tables::{check_date, check_sealed, check_whole, read_table, seal};
 use crate::compile::sign::read_key;
 use crate::verify::{Readings, refine};
 use iltm_picture::numbers::percent;
@@ -17,6 +17,7 @@ pub(super) fn run(arguments: &Refine, output: &Output) -> Result<(), Failure> {
     let key = arguments.key.as_deref().map(read_key).transpose()?;
     check_place(&arguments.output)?;
     let file = read_table(&arguments.table)?;
+    let _ = check_whole(&arguments.table, &file)?;
     let (table, sealed) = check_sealed(&arguments.table, &file)?;
     let bars = progress(output);
     let readings = Readings::read(&arguments.capture, &table, bars.as_ref())?;

@@ -3,7 +3,7 @@
 use crate::compile::{Provenance, cost::CLOCK};
 use crate::report::tier_costs;
 use crate::solve::Compensation;
-use iltm_picture::numbers::percent;
+use iltm_picture::numbers::{grouped, percent};
 use iltm_runtime::image::Table;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -138,6 +138,17 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
         table.grid(),
         table.bytes()
     );
+    if let Some(neighbours) = table.neighbours() {
+        let [before, after] = neighbours.around();
+        let plural = if before == 1 { "" } else { "s" };
+        let _ = writeln!(
+            text,
+            "neighbours  {} cells of {before} projector{plural} on the left and {after} on the right: {} bytes \
+             of their light a frame",
+            neighbours.grid(),
+            grouped(neighbours.bytes() as u64),
+        );
+    }
     if let Some(top) = tier_costs(table).last() {
         let _ = writeln!(
             text,
@@ -148,7 +159,9 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
     // Of a device or a pipe, the table is wherever its reader has put it.
     if path.is_file() && !path.starts_with("/dev") {
         let file = crate::solve_page::quoted(path);
-        let next = if provenance.overlapping {
+        let next = if table.neighbours().is_some() {
+            format!("flash it to the device of its projector: iltm flash {file}")
+        } else if provenance.overlapping {
             format!(
                 "prove it on the wall: iltm verify {file} -o VERIFY --captures LEFT RIGHT, its captures"
             )

@@ -49,6 +49,24 @@ pub(super) fn check<'a>(path: &Path, file: &'a [u8]) -> Result<Table<'a>, Failur
     Ok(check_sealed(path, file)?.0)
 }
 
+/// The same of a table that a computer uses: not of one that is for the device of one projector of
+/// several.
+pub(super) fn check_whole<'a>(path: &Path, file: &'a [u8]) -> Result<Table<'a>, Failure> {
+    let table = check(path, file)?;
+    if table.neighbours().is_none() {
+        return Ok(table);
+    }
+    Err(Failure::new(
+        Kind::Table,
+        format!(
+            "{}: the table is for the device of one projector of several, which gets the light of \
+             the others beside its frames",
+            path.display()
+        ),
+        "Give the table of all projectors, which it was split from: a computer makes all frames.",
+    ))
+}
+
 /// The same, with the seal if there is one.
 pub(super) fn check_sealed<'a>(
     path: &Path,

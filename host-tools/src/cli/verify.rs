@@ -6,7 +6,7 @@ use super::failure::{Failure, Kind};
 use super::output::{self, Output, write_files};
 use super::progress::progress;
 use super::summary::gates;
-use super::tables::{check, read_table};
+use super::tables::{check_whole, read_table};
 use super::words::{number, table_in_use};
 use crate::capture::{CameraPlaces, camera_places};
 use crate::compile::Provenance;
@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &Verify, output: &Output) -> Result<(), Failure> {
     let image = read_table(&arguments.table)?;
-    let table = check(&arguments.table, &image)?;
+    let table = check_whole(&arguments.table, &image)?;
     let bars = progress(output);
     let result = match (&arguments.output, &arguments.capture) {
         (Some(out), _) => prepare(arguments, &table, out, bars.as_ref(), output),

@@ -106,6 +106,7 @@ pub(super) fn frame_kind(frames: FrameKind) -> Value {
 pub(super) fn status_data(status: &Status) -> Value {
     let (mode, reason) = match status.mode {
         Mode::Compensating => ("compensating", None),
+        Mode::Alone => ("alone", None),
         Mode::PassThrough(why) => ("pass-through", Some(why)),
     };
     let name = |why: PassThrough| match why {
@@ -172,6 +173,9 @@ pub(super) fn called(name: TableName, slots: Option<&Slots>) -> CalledTable {
 pub(super) fn mode(status: &Status, slots: Option<&Slots>) -> String {
     let Mode::PassThrough(why) = status.mode else {
         return match status.input {
+            Some(input) if status.mode == Mode::Alone => {
+                format!("compensating {input} alone: its neighbours are silent")
+            }
             Some(input) => format!("compensating {input}"),
             None => "ready to compensate: no frames have come in yet".to_owned(),
         };

@@ -377,3 +377,70 @@ fn a_table_of_overlapping_projectors_asks_for_its_captures() {
         &["before.toml", "light of white"],
     );
 }
+
+#[test]
+fn a_table_is_split_for_the_device_of_each_projector() {
+    let user = prepared();
+    let data = user.json("split t.iltm --projectors 2 -o devices");
+    for (number, part) in (1..).zip(data["projectors"].as_array().unwrap()) {
+        assert_eq!(part["table"], format!("devices/t-{number}.iltm"));
+        assert_eq!(part["cells"]["cols"], 24);
+        // One for 4 x 4 of the other's 15 x 24, 16 bits of grey each.
+        assert_eq!(part["neighbours"]["bytes"], 2 * 4 * 6);
+        let top = part["tiers"].as_array().unwrap().last().unwrap();
+        let error = |name: &str| top[name].as_f64().unwrap();
+        assert!(
+            error("wide") < 1e-6,
+            "it is what the others are measured by"
+        );
+        assert!(error("together") < 0.01 && error("alone") > 0.03, "{top}");
+    }
+    let said = user.says("inspect devices/t-2.iltm");
+    let neighbours = "4 x 6 cells of 1 projector on the left and 0 on the right: 48 bytes";
+    contains(
+        &said,
+        &[
+            "2/2",
+            "15 x 24 cells",
+            "480 x 300",
+            neighbours,
+            "iltm flash",
+        ],
+    );
+    let finer = user.json("split t.iltm --projectors 2 --neighbours 1 -o finer");
+    let together = |data: &serde_json::Value| {
+        let tiers = data["projectors"][0]["tiers"].as_array().unwrap();
+        tiers.last().unwrap()["together"].as_f64().unwrap()
+    };
+    assert!(together(&finer) < 0.2 * together(&data));
+}
+
+#[test]
+fn what_cannot_be_split_or_is_for_a_device_is_refused() {
+    let user = prepared();
+    let own = User::new();
+    own.write("t.iltm", user.read("t.iltm"));
+    own.says("split t.iltm --projectors 2 -o d");
+    for (line, says) in [
+        ("split t.iltm --projectors 5 -o e", "5 projectors alike"),
+        ("split t.iltm --projectors 1 -o e", "1 projectors alike"),
+        ("split d/t-1.iltm --projectors 2 -o e", "already"),
+        (
+            "split t.iltm --projectors 4 --neighbours 1 -o e",
+            "the neighbours have 540 cells",
+        ),
+        ("split none.iltm --projectors 2 -o e", "none.iltm"),
+    ] {
+        refused(&own, line, says);
+        assert!(!own.path("e").exists(), "{line}");
+    }
+    for line in [
+        "compensate d/t-1.iltm wide.png -o own.png",
+        "play d/t-1.iltm wide.y4m",
+        "verify d/t-1.iltm -o v",
+        "export d/t-1.iltm --as mpv -o shader",
+        "refine d/t-1.iltm v -o r.iltm",
+    ] {
+        refused(&own, line, "for the device of one projector of several");
+    }
+}

@@ -9,6 +9,7 @@ use embedded_storage::nor_flash::NorFlash;
 use iltm_runtime::frame_buffers::{Broken, Format, InputCounts};
 use iltm_runtime::link::SourceFault;
 use iltm_runtime::store::{Map, MapError, Slot};
+use iltm_runtime::units::Halfword;
 
 /// A board.
 pub trait Board: Sized {
@@ -84,6 +85,15 @@ pub trait FrameSource {
 
     /// The pixels of the claimed frame, or none.
     fn wanted(&self) -> &[u8];
+
+    /// Light of the neighbours' cells that came with the claimed frame ([`Workspace::heard`]
+    /// says how it lies); `None` if none did. A board that is never one of several projectors' has
+    /// none.
+    ///
+    /// [`Workspace::heard`]: iltm_runtime::pipeline::Workspace::heard
+    fn heard(&self) -> Option<&[Halfword]> {
+        None
+    }
 
     /// Gives the claimed frame back.
     ///

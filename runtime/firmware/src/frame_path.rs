@@ -6,7 +6,7 @@ use iltm_runtime::image::Table;
 use iltm_runtime::link::PassThrough;
 use iltm_runtime::pipeline::{Encoding, FrameError, FrameJob, compensate_cells};
 use iltm_runtime::placement::PixelArea;
-use iltm_runtime::units::ClippedSamples;
+use iltm_runtime::units::{ClippedSamples, Halfword};
 use iltm_runtime::{FrameSize, features};
 
 /// What is done to the frames of a format.
@@ -32,7 +32,7 @@ impl FramePath {
         if table.channels() != format.channels() || !size.holds(table.grid()) {
             return Self::PassThrough(PassThrough::OtherFrames);
         }
-        if table.grid().cells() > MAX_CELLS {
+        if table.inputs() > MAX_CELLS {
             return Self::PassThrough(PassThrough::Memory);
         }
         if size == FrameSize::of_grid(table.grid()) {
@@ -59,7 +59,7 @@ impl FramePath {
         }
     }
 
-    /// Makes the projector's input of a wanted frame with the table that the stage
+    /// Makes the projector's input of a wanted frame, and of the neighbours' light that came with it, with the table that the stage
     /// was made for; returns how many samples were clipped.
     ///
     /// # Errors
@@ -69,6 +69,7 @@ impl FramePath {
         table: Option<&Table<'static>>,
         tier: u8,
         wanted: &[u8],
+        heard: Option<&[Halfword]>,
         input: &mut [u8],
         memory: &mut Memory,
     ) -> Result<ClippedSamples, FrameError> {
@@ -80,7 +81,7 @@ impl FramePath {
                 Ok(ClippedSamples::default())
             }
             (Self::Grid(encoding), Some(table)) => {
-                let mut workspace = memory.workspace();
+                let mut workspace = memory.workspace(heard);
                 compensate_cells(table, tier, encoding, wanted, input, &mut workspace)
             }
             (Self::Full(encoding, size, area), Some(table)) => {
@@ -91,7 +92,7 @@ impl FramePath {
                     tier,
                     encoding,
                 };
-                memory.compensate(&job, wanted, input)
+                memory.compensate(&job, wanted, heard, input)
             }
         }
     }

@@ -19,7 +19,7 @@ use embedded_hal::digital::OutputPin;
 use heapless::Deque;
 use iltm_runtime::frame_buffers::{Format, Lateness};
 use iltm_runtime::governor::{Governor, Reason, TierChange};
-use iltm_runtime::image::{Recheck, Table};
+use iltm_runtime::image::{Neighbours, Recheck, Table};
 use iltm_runtime::link::{Event, Fault, Mode, PassThrough, TableName, TableReason, TierReason};
 use iltm_runtime::store::Slot;
 
@@ -256,7 +256,7 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         self.telemetry.set_mode(mode, top, samples, budget);
         // Nothing to do about a lamp that fails.
         let _ = match mode {
-            Mode::Compensating => self.lamp.set_high(),
+            Mode::Compensating | Mode::Alone => self.lamp.set_high(),
             Mode::PassThrough(_) => self.lamp.set_low(),
         };
         defmt::info!("compensated: {=bool}", mode == Mode::Compensating);
@@ -307,8 +307,15 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
         let chosen = stream.governor.tier();
         let tier = self.hooks.tier(chosen);
         let wanted = self.source.wanted();
+        // The light of other cells than the table's neighbours have is of no use to it.
+        let others = table.and_then(Table::neighbours).map(Neighbours::grid);
+        let alike = others.is_some() && stream.format.neighbours() == others;
+        let heard = self.source.heard().filter(|_| alike);
+        let alone = others.is_some() && heard.is_none();
         let input = self.sink.begin(sequence);
-        let result = stream.path.frame(table, tier, wanted, input, self.memory);
+        let result = stream
+            .path
+            .frame(table, tier, wanted, heard, input, self.memory);
         self.hooks.during_frame(sequence, tier, &self.clock);
         let whole = self.source.release();
         if whole.is_ok() {
@@ -332,6 +339,9 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
             (Err(_), _) => {}
         }
         self.count();
+        if self.telemetry.set_alone(alone) {
+            self.fault(Fault::Neighbours { sequence });
+        }
         self.hooks.after_frame(outcome, &self.telemetry);
         if let Some(change) = change {
             self.changed(sequence, change);
@@ -365,6 +375,9 @@ impl<B: Board, H: FrameHooks> Frames<B, H> {
             }
             Fault::Source(cause) => {
                 defmt::warn!("the source cannot be followed, cause {=u8}", cause as u8);
+            }
+            Fault::Neighbours { sequence } => {
+                defmt::warn!("frame {=u32} came without its neighbours' light", sequence);
             }
             Fault::Table { .. } | Fault::Watchdog | Fault::Crash | Fault::KeyLost => {}
         }

@@ -2,6 +2,7 @@
 
 use core::mem::offset_of;
 use iltm_runtime::features::Stage;
+use iltm_runtime::haar::Basis;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::{
     FrameError, FrameJob, FullMemory, RowBuffers, Workspace, compensate_pixels, prepare_pixels,
@@ -46,6 +47,8 @@ pub struct Memory {
     line: [i32; MAX_WIDTH],
     spread: [i32; MAX_WIDTH],
     values: [u16; MAX_WIDTH],
+    /// Of the neighbours' cells.
+    neighbours: Option<Basis>,
     /// Of the table in use, and of the one that comes next.
     pixels: [PixelMaps; 2],
 }
@@ -90,6 +93,7 @@ static FRAME_WORKSPACE: ConstStaticCell<Memory> = ConstStaticCell::new(Memory {
     line: [0; MAX_WIDTH],
     spread: [0; MAX_WIDTH],
     values: [0; MAX_WIDTH],
+    neighbours: None,
     pixels: [
         PixelMaps {
             gains: [[0; 2]; CHANNELS * PIXELS],
@@ -113,14 +117,16 @@ impl Memory {
         FRAME_WORKSPACE.try_take()
     }
 
-    /// What the operator needs.
-    pub fn workspace(&mut self) -> Workspace<'_> {
+    /// What the operator needs, and the neighbours' light that came.
+    pub fn workspace<'m>(&'m mut self, heard: Option<&'m [Halfword]>) -> Workspace<'m> {
         let [first, second] = &mut self.buffers;
         Workspace {
             buffers: [first, second],
             cells: &mut self.cells,
             inputs: &mut self.inputs,
             sums: &mut self.coefficients,
+            heard,
+            neighbours: &mut self.neighbours,
         }
     }
 
@@ -168,12 +174,14 @@ impl Memory {
         &mut self,
         job: &FrameJob<'_, '_>,
         wanted: &[u8],
+        heard: Option<&[Halfword]>,
         input: &mut [u8],
     ) -> Result<ClippedSamples, FrameError> {
         let [first, _] = &self.pixels;
         let at = usize::from(!first.is_ready(job.table, job.area.size));
         let (channels, cells) = (job.table.channels().into(), job.table.grid().cells());
         let (mut frame, mut workspace) = self.full(at, channels, cells, job.area.size.width());
+        workspace.heard = heard;
         compensate_pixels(job, wanted, input, &mut frame, &mut workspace)
     }
 
@@ -205,6 +213,8 @@ impl Memory {
             cells: &mut self.cells,
             inputs: &mut self.inputs,
             sums: &mut self.coefficients,
+            heard: None,
+            neighbours: &mut self.neighbours,
         };
         (frame, workspace)
     }

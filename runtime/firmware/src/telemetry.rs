@@ -73,6 +73,21 @@ impl Telemetry {
         self.status.frame_time.budget_us = budget / self.ticks_per_microsecond;
     }
 
+    /// Whether the neighbours of the table in use are silent; says whether they have just become so.
+    pub fn set_alone(&mut self, alone: bool) -> bool {
+        match self.status.mode {
+            Mode::Compensating if alone => {
+                self.status.mode = Mode::Alone;
+                true
+            }
+            Mode::Alone if !alone => {
+                self.status.mode = Mode::Compensating;
+                false
+            }
+            _ => false,
+        }
+    }
+
     /// Frames of this format come in.
     pub fn set_input(&mut self, format: Format) {
         self.status.input = Some(FrameKind {

@@ -96,15 +96,21 @@ impl<W: ControlWords> Source<W> {
         self.layout.input(filling.buffer)
     }
 
-    /// Hands a whole frame to the device.
+    /// Where the light of the neighbours' cells goes; empty if the format has none.
+    #[must_use]
+    pub fn light(&self, filling: &Filling) -> Range<usize> {
+        self.layout.light(filling.buffer)
+    }
+
+    /// Hands a whole frame to the device, with the neighbours' light if that has been filled in.
     #[allow(
         clippy::needless_pass_by_value,
         reason = "the buffer is not the source's any more"
     )]
-    pub fn finish(&mut self, filling: Filling) {
+    pub fn finish(&mut self, filling: Filling, with_light: bool) {
         let Filling { buffer, sequence } = filling;
         let at = descriptor::input(buffer);
-        let length = self.layout.frame_bytes() as u32;
+        let length = self.layout.input_bytes(with_light) as u32;
         self.words.store(at + descriptor::LENGTH, length);
         self.words.store(at + descriptor::END, sequence);
         self.words.store(at + descriptor::OWNER, owner::DEVICE);
@@ -212,6 +218,7 @@ pub struct InputCounts {
 pub struct Claim {
     buffer: usize,
     sequence: u32,
+    with_light: bool,
 }
 
 impl Claim {
@@ -281,10 +288,14 @@ impl<W: ControlWords> Receiver<W> {
         loop {
             let buffer = self.oldest()?;
             match self.inspect(buffer) {
-                Ok(sequence) => {
+                Ok((sequence, with_light)) => {
                     self.account_for(sequence);
                     self.hold(buffer, true);
-                    return Some(Claim { buffer, sequence });
+                    return Some(Claim {
+                        buffer,
+                        sequence,
+                        with_light,
+                    });
                 }
                 Err((sequence, broken)) => {
                     self.refuse(sequence, broken);
@@ -300,6 +311,12 @@ impl<W: ControlWords> Receiver<W> {
         self.layout.input(claim.buffer)
     }
 
+    /// Where the light of the neighbours' cells is that came with a frame; `None` if none came.
+    #[must_use]
+    pub fn light(&self, claim: &Claim) -> Option<Range<usize>> {
+        claim.with_light.then(|| self.layout.light(claim.buffer))
+    }
+
     /// Gives a frame back and says whether it was the same frame all the time it
     /// was worked on.
     ///
@@ -310,7 +327,9 @@ impl<W: ControlWords> Receiver<W> {
         reason = "the buffer is not the device's any more"
     )]
     pub fn release(&mut self, claim: Claim) -> Result<(), Broken> {
-        let Claim { buffer, sequence } = claim;
+        let Claim {
+            buffer, sequence, ..
+        } = claim;
         self.hold(buffer, false);
         // The pixels were read before the numbers are looked at again.
         fence(Ordering::SeqCst);
@@ -352,21 +371,22 @@ impl<W: ControlWords> Receiver<W> {
         waiting.min_by_key(|buffer| number(*buffer).wrapping_sub(last).cast_signed())
     }
 
-    /// The number of a waiting frame that is whole and new; else its number as far
-    /// as it has one, and what is wrong.
-    fn inspect(&self, buffer: usize) -> Result<u32, (u32, Broken)> {
+    /// The number of a waiting frame that is whole and new, and whether its neighbours' light came
+    /// with it; else its number as far as it has one, and what is wrong.
+    fn inspect(&self, buffer: usize) -> Result<(u32, bool), (u32, Broken)> {
         let at = descriptor::input(buffer);
         let start = self.words.load(at + descriptor::START);
         let length = self.words.load(at + descriptor::LENGTH) as usize;
+        let with_light = self.format.light_bytes() > 0 && length == self.layout.input_bytes(true);
         let newer = |last: u32| start.wrapping_sub(last).cast_signed() > 0;
         let broken = if start != self.words.load(at + descriptor::END) {
             Broken::Torn
-        } else if length != self.layout.frame_bytes() {
+        } else if !with_light && length != self.layout.frame_bytes() {
             Broken::Short
         } else if !self.last.is_none_or(newer) {
             Broken::Stale
         } else {
-            return Ok(start);
+            return Ok((start, with_light));
         };
         Err((start, broken))
     }

@@ -5,10 +5,16 @@
 //! byte 64    four descriptors of 16 bytes, see `descriptor`: inputs, then outputs
 //! byte 256   four frames in the same order, each from a multiple of 32 bytes
 //! ```
+//!
+//! Where the device is one of several projectors', the light that is wanted of its neighbours'
+//! cells ([`Neighbours`](crate::image::Neighbours)) follows the pixels of an input, from a multiple
+//! of 4 bytes. A source that has none for a frame hands it over with the length of the pixels alone.
 
 use super::AttachError;
-use crate::FrameSize;
+use crate::features::Stage;
 use crate::pipeline::Encoding;
+use crate::units::Halfword;
+use crate::{FrameSize, Grid};
 use core::fmt;
 use core::ops::Range;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -17,7 +23,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 pub const MAGIC: u32 = u32::from_le_bytes(*b"ILTF");
 
 /// Version of the layout described here.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Bytes of the header and descriptors.
 pub const CONTROL_BYTES: usize = 256;
@@ -49,6 +55,9 @@ pub mod word {
     pub const EPOCH: usize = 5;
     /// The [`EPOCH`] that the device works with; the device writes it.
     pub const ATTACHED: usize = 6;
+    /// Rows of the neighbours' cells in the low half, columns in the high half; 0 if no light of
+    /// theirs comes.
+    pub const NEIGHBOURS: usize = 7;
 }
 
 /// Words of a descriptor, counted from its first.
@@ -59,7 +68,7 @@ pub mod descriptor {
     pub const START: usize = 1;
     /// Sequence number, written after the last pixel.
     pub const END: usize = 2;
-    /// Bytes of the frame.
+    /// Bytes of the frame: its pixels, and the neighbours' light if that came.
     pub const LENGTH: usize = 3;
     /// Words of a descriptor.
     pub const SIZE: usize = 4;
@@ -90,6 +99,9 @@ pub mod owner {
 pub struct Layout {
     frame: usize,
     stride: usize,
+    /// Bytes of the neighbours' light.
+    light: usize,
+    input_stride: usize,
 }
 
 impl Layout {
@@ -98,35 +110,52 @@ impl Layout {
     /// # Errors
     /// [`RegionError`] if four frames do not fit.
     pub const fn new(format: Format, region: usize) -> Result<Self, RegionError> {
-        let frame = format.bytes();
-        let needed = match frame.checked_next_multiple_of(ALIGNMENT) {
-            Some(stride) => {
-                let needed = stride
-                    .saturating_mul(2 * BUFFERS)
-                    .saturating_add(CONTROL_BYTES);
-                if needed <= region {
-                    return Ok(Self { frame, stride });
-                }
-                needed
-            }
-            None => usize::MAX,
+        let (frame, light) = (format.bytes(), format.light_bytes());
+        let given = region;
+        let Some(stride) = frame.checked_next_multiple_of(ALIGNMENT) else {
+            let needed = usize::MAX;
+            return Err(RegionError { needed, given });
         };
-        Err(RegionError {
-            needed,
-            given: region,
+        let input_stride = if light == 0 {
+            stride
+        } else {
+            (light_start(frame).saturating_add(light)).next_multiple_of(ALIGNMENT)
+        };
+        let needed = stride
+            .saturating_add(input_stride)
+            .saturating_mul(BUFFERS)
+            .saturating_add(CONTROL_BYTES);
+        if needed > region {
+            return Err(RegionError { needed, given });
+        }
+        Ok(Self {
+            frame,
+            stride,
+            light,
+            input_stride,
         })
     }
 
-    /// Bytes of input `buffer` in the region.
+    /// The pixels of input `buffer` in the region.
     #[must_use]
     pub const fn input(&self, buffer: usize) -> Range<usize> {
-        self.frame(buffer % BUFFERS)
+        let start = CONTROL_BYTES + buffer % BUFFERS * self.input_stride;
+        start..start + self.frame
+    }
+
+    /// The neighbours' light of input `buffer`; empty if the format has none.
+    #[must_use]
+    pub const fn light(&self, buffer: usize) -> Range<usize> {
+        let start = light_start(self.input(buffer).end);
+        start..start + self.light
     }
 
     /// Bytes of output `buffer` in the region.
     #[must_use]
     pub const fn output(&self, buffer: usize) -> Range<usize> {
-        self.frame(BUFFERS + buffer % BUFFERS)
+        let start = CONTROL_BYTES + BUFFERS * self.input_stride;
+        let start = start + buffer % BUFFERS * self.stride;
+        start..start + self.frame
     }
 
     /// Bytes of the largest frame that a region of `region` bytes can exchange.
@@ -136,16 +165,22 @@ impl Layout {
         each - each % ALIGNMENT
     }
 
-    /// Bytes of a frame.
+    /// Bytes of a frame's pixels.
     #[must_use]
     pub const fn frame_bytes(&self) -> usize {
         self.frame
     }
 
-    const fn frame(&self, index: usize) -> Range<usize> {
-        let start = CONTROL_BYTES + index * self.stride;
-        start..start + self.frame
+    /// Bytes of an input with the neighbours' light, or without.
+    #[must_use]
+    pub const fn input_bytes(&self, with_light: bool) -> usize {
+        self.frame + if with_light { self.light } else { 0 }
     }
+}
+
+/// Where the light behind pixels begins that end here.
+const fn light_start(end: usize) -> usize {
+    end.saturating_add(3) & !3
 }
 
 /// The region is too small for its frames.
@@ -177,6 +212,7 @@ pub struct Format {
     channels: u8,
     encoding: Encoding,
     period_us: u32,
+    neighbours: Option<Grid>,
 }
 
 impl Format {
@@ -197,7 +233,33 @@ impl Format {
             channels,
             encoding,
             period_us,
+            neighbours: None,
         })
+    }
+
+    /// The same with light of the neighbours' cells.
+    #[must_use]
+    pub const fn with_neighbours(self, neighbours: Option<Grid>) -> Self {
+        Self { neighbours, ..self }
+    }
+
+    /// The neighbours' cells whose light comes with the frames.
+    #[must_use]
+    pub const fn neighbours(self) -> Option<Grid> {
+        if Stage::Neighbours.is_built() {
+            self.neighbours
+        } else {
+            None
+        }
+    }
+
+    /// Bytes of that light.
+    #[must_use]
+    pub const fn light_bytes(self) -> usize {
+        match self.neighbours() {
+            Some(grid) => grid.cells() * self.channels as usize * size_of::<Halfword>(),
+            None => 0,
+        }
     }
 
     /// Pixels of a frame.
@@ -224,7 +286,7 @@ impl Format {
         self.period_us
     }
 
-    /// Bytes of a frame.
+    /// Bytes of a frame's pixels.
     #[must_use]
     pub const fn bytes(self) -> usize {
         // At most 65,535 * 65,535 * 3, which a 32-bit `usize` does not hold.
@@ -253,7 +315,18 @@ impl Format {
             1 => Encoding::Linear,
             _ => return Err(AttachError::Format),
         };
+        let neighbours = words.load(word::NEIGHBOURS);
+        let neighbours = match neighbours {
+            0 => None,
+            // Firmware without the stage would look for the pixels in the wrong place.
+            _ if !Stage::Neighbours.is_built() => return Err(AttachError::Format),
+            sides => match Grid::new(sides as u16, (sides >> 16) as u16) {
+                Ok(grid) => Some(grid),
+                Err(_) => return Err(AttachError::Format),
+            },
+        };
         size.and_then(|size| Self::new(size, channels, encoding, words.load(word::PERIOD)))
+            .map(|format| format.with_neighbours(neighbours))
             .ok_or(AttachError::Format)
     }
 
@@ -269,6 +342,10 @@ impl Format {
         words.store(word::GEOMETRY, width | (height << 16));
         words.store(word::SAMPLES, samples);
         words.store(word::PERIOD, self.period_us);
+        let neighbours = self
+            .neighbours()
+            .map_or(0, |grid| grid.rows() as u32 | ((grid.cols() as u32) << 16));
+        words.store(word::NEIGHBOURS, neighbours);
     }
 }
 

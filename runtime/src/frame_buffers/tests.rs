@@ -5,8 +5,8 @@ use super::{
     AttachError, Broken, ControlWords, Display, Format, Layout, NativeWords, Presenter, Receiver,
     Source,
 };
-use crate::FrameSize;
 use crate::pipeline::Encoding;
+use crate::{FrameSize, Grid};
 use core::ops::Range;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use proptest::prelude::*;
@@ -68,12 +68,53 @@ fn buffers_never_overlap_and_stay_in_the_region() {
 }
 
 #[test]
+fn the_neighbours_light_lies_behind_the_pixels_and_may_be_missing() {
+    let memory = words();
+    let words = NativeWords(&memory);
+    let grid = Grid::new(2, 5).expect("small");
+    // 45 bytes of pixels, so that there is a gap before the light.
+    let format = format(5, 3).with_neighbours(Some(grid));
+    assert_eq!((format.bytes(), format.light_bytes()), (45, 60));
+    let mut source = Source::announce(words, REGION, format).expect("it fits");
+    let mut receiver = Receiver::attach(words, REGION).expect("announced");
+    assert_eq!(receiver.format(), format);
+    let layout = receiver.layout();
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for buffer in 0..BUFFERS {
+        let (pixels, light) = (layout.input(buffer), layout.light(buffer));
+        assert_eq!((pixels.len(), light.len()), (45, 60));
+        assert!(light.start.is_multiple_of(4));
+        ranges.extend([pixels, light, layout.output(buffer)]);
+    }
+    ranges.sort_by_key(|range| range.start);
+    assert!(ranges.windows(2).all(|pair| pair[0].end <= pair[1].start));
+    for with_light in [true, false, true] {
+        let filling = source.begin().expect("room");
+        let place = source.light(&filling);
+        source.finish(filling, with_light);
+        let claim = receiver.claim().expect("a frame");
+        assert_eq!(receiver.light(&claim), with_light.then_some(place));
+        receiver.release(claim).expect("nobody touched it");
+    }
+    // Neither the pixels alone nor all of the light.
+    let filling = source.begin().expect("room");
+    let buffer = (0..BUFFERS)
+        .find(|buffer| layout.input(*buffer) == source.pixels(&filling))
+        .expect("one of them");
+    source.finish(filling, true);
+    words.store(descriptor::input(buffer) + descriptor::LENGTH, 104);
+    assert!(receiver.claim().is_none());
+    let broken = receiver.counts().last_broken.map(|(_, broken)| broken);
+    assert_eq!(broken, Some(Broken::Short));
+}
+
+#[test]
 fn a_source_without_room_drops_frames_and_the_device_counts_them() {
     let memory = words();
     let (mut source, mut receiver) = pair(&memory);
     for _ in 0..5 {
         if let Some(filling) = source.begin() {
-            source.finish(filling);
+            source.finish(filling, false);
         }
     }
     let first = receiver.claim().expect("the first frame");
@@ -85,7 +126,7 @@ fn a_source_without_room_drops_frames_and_the_device_counts_them() {
     );
     receiver.release(first).expect("whole");
     let sixth = source.begin().expect("a buffer is free again");
-    source.finish(sixth);
+    source.finish(sixth, false);
     assert!(receiver.claim().is_some_and(|sixth| sixth.sequence() == 6));
     assert_eq!(receiver.counts().dropped, 3);
     assert_eq!(receiver.counts().received, 3);
@@ -97,12 +138,12 @@ fn torn_short_and_stale_frames_are_refused_and_counted_once() {
     let (mut source, mut receiver) = pair(&memory);
     let break_next = |source: &mut Source<NativeWords<'_>>, field: usize, value: u32| {
         let filling = source.begin().expect("room");
-        source.finish(filling);
+        source.finish(filling, false);
         // Both buffers are free, so it is the first.
         memory[descriptor::input(0) + field].store(value, Ordering::Relaxed);
     };
     let good = source.begin().expect("room");
-    source.finish(good);
+    source.finish(good, false);
     let claim = receiver.claim().expect("a good frame");
     receiver.release(claim).expect("whole");
     break_next(&mut source, descriptor::END, 77);
@@ -111,13 +152,13 @@ fn torn_short_and_stale_frames_are_refused_and_counted_once() {
     assert!(receiver.claim().is_none());
     // Frame 4 says that it is frame 1 again.
     let stale = source.begin().expect("room");
-    source.finish(stale);
+    source.finish(stale, false);
     for at in [descriptor::START, descriptor::END] {
         memory[descriptor::input(0) + at].store(1, Ordering::Relaxed);
     }
     assert!(receiver.claim().is_none());
     let good = source.begin().expect("room");
-    source.finish(good);
+    source.finish(good, false);
     assert!(receiver.claim().is_some_and(|claim| claim.sequence() == 5));
     let counts = receiver.counts();
     assert_eq!((counts.received, counts.broken), (2, 3));
@@ -132,7 +173,7 @@ fn a_frame_written_to_while_it_is_worked_on_is_torn() {
         let memory = words();
         let (mut source, mut receiver) = pair(&memory);
         let filling = source.begin().expect("room");
-        source.finish(filling);
+        source.finish(filling, false);
         let claim = receiver.claim().expect("whole so far");
         memory[descriptor::input(0) + field].store(9, Ordering::Relaxed);
         assert_eq!(receiver.release(claim), Err(Broken::Torn));
@@ -145,7 +186,7 @@ fn a_new_announcement_ends_the_old_one() {
     let memory = words();
     let (mut source, mut receiver) = pair(&memory);
     let filling = source.begin().expect("room");
-    source.finish(filling);
+    source.finish(filling, false);
     let claim = receiver.claim().expect("a frame");
     let mut next = Source::announce(NativeWords(&memory), REGION, format(5, 5)).expect("it fits");
     assert!(!receiver.is_current());
@@ -269,7 +310,7 @@ fn play(steps: &[Step]) -> Vec<(u32, Option<u32>)> {
             Step::Finish => {
                 if let Some(filling) = filling.take() {
                     inputs[at(&source.pixels(&filling))] = Some(filling.sequence());
-                    source.finish(filling);
+                    source.finish(filling, false);
                 }
             }
             Step::Claim if working.is_none() => {
@@ -389,7 +430,7 @@ fn three_threads_never_mix_two_frames() {
                 for (at, pixel) in pixels[source.pixels(&filling)].iter().enumerate() {
                     pixel.store(wanted(filling.sequence(), at), Ordering::Relaxed);
                 }
-                source.finish(filling);
+                source.finish(filling, false);
             }
         });
         let device = scope.spawn(move || {

@@ -4,7 +4,7 @@ use super::bytes::{Halfwords, u16_at, u32_at};
 use super::layout::{MAX_PROVENANCE, MAX_TIERS, SectionKind, fine_gain, header, projector, tier};
 use super::sections::{Section, Whole};
 use super::table::curve;
-use super::{FineGain, ImageError, Meta, SectionProblem, Table, TierInfo};
+use super::{FineGain, ImageError, Meta, Neighbours, SectionProblem, Table, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::layout::MAX_SEGMENTS;
@@ -31,6 +31,7 @@ pub struct Checked<'a> {
     fine_gain: Option<FineGain<'a>>,
     provenance: &'a [u8],
     projector: Option<ProjectorPixels>,
+    neighbours: Option<Neighbours<'a>>,
 }
 
 impl<'a> Checked<'a> {
@@ -65,7 +66,10 @@ impl<'a> Checked<'a> {
         let fine_gain = of_stage(Stage::FullResolution, &whole, SectionKind::FineGain)
             .map(|section| fine_gains(section, grid, meta.channels))
             .transpose()?;
-        check_operator(&whole, &meta, budget)?;
+        let neighbours = of_stage(Stage::Neighbours, &whole, SectionKind::Neighbours)
+            .map(|section| Neighbours::parse(section, &meta, ambient.is_some(), budget))
+            .transpose()?;
+        check_operator(&whole, &meta, inputs(grid, neighbours), budget)?;
         Ok(Self {
             whole,
             meta,
@@ -73,6 +77,7 @@ impl<'a> Checked<'a> {
             ambient,
             response,
             fine_gain,
+            neighbours,
             provenance: whole
                 .optional(SectionKind::Provenance)
                 .map_or(Ok(&[][..]), |section| provenance(section, budget))?,
@@ -115,12 +120,14 @@ impl<'a> Checked<'a> {
             codes: self.codes,
             fine_gain: self.fine_gain,
             operator: if Stage::Operator.is_built() {
-                operator(&self.whole, &self.meta).unwrap_or_default()
+                let inputs = inputs(self.meta.grid, self.neighbours);
+                operator(&self.whole, &self.meta, inputs).unwrap_or_default()
             } else {
                 None
             },
             provenance: self.provenance,
             projector: self.projector,
+            neighbours: self.neighbours,
             bytes: self.whole.image.len(),
             id: self.id(),
             label: self.meta.label,
@@ -271,6 +278,7 @@ fn check_stages(whole: &Whole<'_>, meta: &Meta) -> Result<(), ImageError> {
             Stage::Response => &[SectionKind::Response, SectionKind::Codes],
             Stage::Colour => &[],
             Stage::FullResolution => &[SectionKind::FineGain],
+            Stage::Neighbours => &[SectionKind::Neighbours],
         };
         let by_section = sections.iter().any(|kind| whole.optional(*kind).is_some());
         let listed = by_section || stage == Stage::Colour && meta.channels > 1;
@@ -295,8 +303,18 @@ fn of_stage<'a>(stage: Stage, whole: &Whole<'a>, kind: SectionKind) -> Option<Se
     }
 }
 
+/// Input coefficients of a channel: of its own cells, and of its neighbours'.
+fn inputs(grid: Grid, neighbours: Option<Neighbours<'_>>) -> usize {
+    let neighbours = neighbours.filter(|_| Stage::Neighbours.is_built());
+    grid.cells() + neighbours.map_or(0, |neighbours| neighbours.grid().cells())
+}
+
 /// The operator with the bounds that the image states; `None` for a scene without.
-fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, ImageError> {
+fn operator<'a>(
+    whole: &Whole<'a>,
+    meta: &Meta,
+    inputs: usize,
+) -> Result<Option<Operator<'a>>, ImageError> {
     let tiers = tiers(whole.required(SectionKind::Tiers)?)?.len();
     let mut segments: Vec<Segment<'a>, MAX_SEGMENTS> = Vec::new();
     for (index, section) in whole.of_kind(SectionKind::Operator).enumerate() {
@@ -322,6 +340,7 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
     }
     Ok(Some(Operator::stated(
         meta.grid,
+        inputs,
         segments,
         meta.channel_scales,
         meta.bounds,
@@ -336,10 +355,11 @@ fn operator<'a>(whole: &Whole<'a>, meta: &Meta) -> Result<Option<Operator<'a>>, 
 fn check_operator(
     whole: &Whole<'_>,
     meta: &Meta,
+    inputs: usize,
     budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
 ) -> Result<(), ImageError> {
     let operator = if Stage::Operator.is_built() {
-        operator(whole, meta)?
+        operator(whole, meta, inputs)?
     } else {
         None
     };

@@ -104,6 +104,8 @@ pub enum SectionKind {
     Provenance = 9,
     /// The projector that the photographs were taken with; see [`projector`].
     Projector = 10,
+    /// Cells of the other projectors' frames; see [`neighbours`].
+    Neighbours = 11,
 }
 
 impl SectionKind {
@@ -121,6 +123,7 @@ impl SectionKind {
             8 => Self::Operator,
             9 => Self::Provenance,
             10 => Self::Projector,
+            11 => Self::Neighbours,
             _ => return None,
         })
     }
@@ -139,6 +142,7 @@ impl SectionKind {
             Self::Operator => "operator",
             Self::Provenance => "provenance",
             Self::Projector => "projector",
+            Self::Neighbours => "neighbours",
         }
     }
 }
@@ -216,6 +220,24 @@ pub mod projector {
     /// Zero.
     pub const RESERVED: Range<usize> = 6..8;
     /// Length of the section.
+    pub const SIZE: usize = 8;
+}
+
+/// The head of the neighbours section, 8 bytes. In a table with an ambient section, the ambient
+/// light of the neighbours' cells follows as there.
+pub mod neighbours {
+    use super::Range;
+    /// Rows of their cells, `u16`.
+    pub const ROWS: Range<usize> = 0..2;
+    /// Columns of the cells of all of them side by side, `u16`.
+    pub const COLS: Range<usize> = 2..4;
+    /// How many of them are on the left of this projector, `u8`.
+    pub const BEFORE: usize = 4;
+    /// How many are on its right, `u8`.
+    pub const AFTER: usize = 5;
+    /// Zero.
+    pub const RESERVED: Range<usize> = 6..8;
+    /// Length of the head.
     pub const SIZE: usize = 8;
 }
 

@@ -17,6 +17,7 @@ pub mod layout;
 #[cfg(test)]
 pub(crate) mod made_up;
 mod meta;
+mod neighbours;
 mod recheck;
 pub mod seal;
 mod sections;
@@ -27,6 +28,7 @@ pub(crate) use crc32::Crc32;
 pub use error::{ImageError, SealError, SectionProblem};
 pub use label::Label;
 pub use meta::{Meta, TierInfo};
+pub use neighbours::Neighbours;
 pub use recheck::Recheck;
 pub use seal::{Seal, content, unseal};
 pub(crate) use sections::Whole;

@@ -2,7 +2,7 @@
 
 use super::bytes::Halfwords;
 use super::layout::MAX_TIERS;
-use super::{Checked, ImageError, Label, TierInfo};
+use super::{Checked, ImageError, Label, Neighbours, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
@@ -33,6 +33,7 @@ pub struct Table<'a> {
     pub(super) operator: Option<Operator<'a>>,
     pub(super) provenance: &'a [u8],
     pub(super) projector: Option<ProjectorPixels>,
+    pub(super) neighbours: Option<Neighbours<'a>>,
     pub(super) bytes: usize,
     pub(super) id: u32,
     pub(super) label: Label,
@@ -271,6 +272,24 @@ impl<'a> Table<'a> {
     #[must_use]
     pub const fn projector(&self) -> Option<ProjectorPixels> {
         self.projector
+    }
+
+    /// The other projectors, if this is the table of one of several.
+    #[must_use]
+    #[inline]
+    pub const fn neighbours(&self) -> Option<&Neighbours<'a>> {
+        if Stage::Neighbours.is_built() {
+            self.neighbours.as_ref()
+        } else {
+            None
+        }
+    }
+
+    /// Input coefficients of a channel: of its own cells, then of its neighbours'.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        let others = self.neighbours().map_or(0, |others| others.grid().cells());
+        self.grid().cells() + others
     }
 
     /// The pixels that cells cover of a frame of more than one pixel a cell: all, where

@@ -47,7 +47,9 @@ pub(crate) fn takes(words: &[[u8; 4]]) -> bool {
 pub(crate) struct Sums<'s> {
     /// Coefficients of a channel, `N`.
     pub(crate) cells: usize,
-    /// `N` input coefficients for each channel.
+    /// Input coefficients of a channel, `N` or more.
+    pub(crate) of_channel: usize,
+    /// So many input coefficients for each channel.
     pub(crate) inputs: &'s [InputCoefficient],
     /// `N` sums for each channel that rows are added to.
     pub(crate) outputs: &'s mut [i32],

@@ -15,8 +15,8 @@ pub(crate) mod gather {
     /// has to be done the plain way ([`operator`](crate::operator)).
     ///
     /// `fresh` says that the sums are all zero: a row is then stored, not added. The rows
-    /// are those of a segment that was checked against a grid of `sums.cells` cells, and
-    /// inputs and sums have that many elements for each scale.
+    /// are those of a segment that was checked against a grid of `sums.cells` cells and
+    /// `sums.of_channel` inputs; sums and inputs have that many elements for each scale.
     pub(crate) fn gather<'a>(
         _rows: impl Iterator<Item = GroupRows<'a>>,
         _scales: &[I2F30],

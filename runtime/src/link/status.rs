@@ -101,6 +101,8 @@ pub enum Mode {
     Compensating,
     /// It shows them as they are.
     PassThrough(PassThrough),
+    /// It compensates the light of its own projector alone: none of its neighbours' has come.
+    Alone,
 }
 
 /// Why frames are shown as they are.
@@ -124,6 +126,9 @@ impl fmt::Display for Mode {
         match self {
             Self::Compensating => f.write_str("compensating"),
             Self::PassThrough(why) => write!(f, "pass-through: {why}"),
+            Self::Alone => {
+                f.write_str("compensating its own light alone: its neighbours are silent")
+            }
         }
     }
 }
@@ -254,6 +259,11 @@ pub enum Fault {
     Crash,
     /// The device was given a key that it cannot read any more: it takes no table.
     KeyLost,
+    /// A frame came without the light of the neighbours, which the table takes.
+    Neighbours {
+        /// Number of the first such frame.
+        sequence: u32,
+    },
 }
 
 /// Why a frame is not shown.
@@ -315,6 +325,12 @@ impl fmt::Display for Fault {
             Self::Watchdog => f.write_str("the watchdog restarted the device"),
             Self::Crash => f.write_str("the firmware crashed and started anew"),
             Self::KeyLost => f.write_str("the key cannot be read: no table is taken"),
+            Self::Neighbours { sequence } => {
+                write!(
+                    f,
+                    "frame {sequence} came without the light of the neighbours"
+                )
+            }
         }
     }
 }

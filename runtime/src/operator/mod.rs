@@ -38,6 +38,7 @@ pub use error::OperatorError;
 pub use segment::{Channels, Group, Groups, Pair, Row, Rows, Segment};
 
 use crate::Grid;
+use crate::features::Stage;
 use crate::haar::Basis;
 use crate::kernel::{self, Sums};
 use crate::units::InputCoefficient;
@@ -50,6 +51,7 @@ use layout::MAX_SEGMENTS;
 #[derive(Clone, Debug)]
 pub struct Operator<'a> {
     cells: usize,
+    inputs: usize,
     segments: Vec<Segment<'a>, MAX_SEGMENTS>,
     channel_scales: [U1F15; 3],
     bounds: Bounds,
@@ -58,6 +60,7 @@ pub struct Operator<'a> {
 impl<'a> Operator<'a> {
     /// Checks segments against the grid of `basis` and proves the bounds.
     ///
+    /// `inputs` are the input coefficients of a channel: those of the grid, and any behind them.
     /// `channel_scales` multiply the result of each channel (1 for a projector whose
     /// channels are equally bright) and are at most 1.
     ///
@@ -65,11 +68,12 @@ impl<'a> Operator<'a> {
     /// [`OperatorError`] with the segment and row at fault.
     pub fn new(
         basis: &Basis,
+        inputs: usize,
         segments: Vec<Segment<'a>, MAX_SEGMENTS>,
         channel_scales: [U1F15; 3],
     ) -> Result<Self, OperatorError> {
         let grid = basis.grid();
-        let mut operator = Self::stated(grid, segments, channel_scales, Bounds::default());
+        let mut operator = Self::stated(grid, inputs, segments, channel_scales, Bounds::default());
         operator.bounds = operator.prove(grid, &mut YieldBudget::new(&mut || {}))?;
         Ok(operator)
     }
@@ -77,12 +81,14 @@ impl<'a> Operator<'a> {
     /// An operator whose bounds have been proved before, or will be.
     pub(crate) const fn stated(
         grid: Grid,
+        inputs: usize,
         segments: Vec<Segment<'a>, MAX_SEGMENTS>,
         channel_scales: [U1F15; 3],
         bounds: Bounds,
     ) -> Self {
         Self {
             cells: grid.cells(),
+            inputs,
             segments,
             channel_scales,
             bounds,
@@ -100,7 +106,7 @@ impl<'a> Operator<'a> {
         }
         let mut top = 0;
         for (index, segment) in self.segments.iter().enumerate() {
-            segment.check(index, grid.cells(), budget)?;
+            segment.check(index, (grid.cells(), self.inputs()), budget)?;
             top = segment.tier.max(top);
         }
         let basis = Basis::new(grid);
@@ -109,6 +115,15 @@ impl<'a> Operator<'a> {
             bounds = bounds.max(Bounds::prove(&basis, &self.segments, tier, budget)?);
         }
         Ok(bounds)
+    }
+
+    /// Input coefficients of a channel.
+    const fn inputs(&self) -> usize {
+        if Stage::Neighbours.is_built() {
+            self.inputs
+        } else {
+            self.cells
+        }
     }
 
     /// The proved bounds.
@@ -163,8 +178,8 @@ impl<'a> Operator<'a> {
         self.segments.iter().filter(move |s| s.tier == tier)
     }
 
-    /// Computes `z` from `y` for a table of `channels` channels, `N` coefficients
-    /// of one channel after those of the other.
+    /// Computes `z` from `y` for a table of `channels` channels, the coefficients of one channel
+    /// after those of the other.
     ///
     /// `sums` receives [`Correction`](crate::units::Correction) bits. Where a slice
     /// is too short, `sums` is all zero.
@@ -189,39 +204,37 @@ impl<'a> Operator<'a> {
                 Channels::All => usize::from(channels),
                 Channels::One(_) => 1,
             };
-            let start = first * self.cells;
             let scales = scales.get(first..).unwrap_or_default();
-            let (Some(inputs), Some(sums)) = (inputs.get(start..), sums.get_mut(start..)) else {
+            let inputs = inputs.get(first * self.inputs()..);
+            let sums = sums.get_mut(first * self.cells..);
+            let (Some(inputs), Some(sums)) = (inputs, sums) else {
                 continue;
             };
             let mut sums = Sums {
                 cells: self.cells,
+                of_channel: self.inputs(),
                 inputs,
                 outputs: sums,
             };
-            match (count, scales) {
-                (3, &[red, green, blue]) => {
-                    add(segment, [red, green, blue], fresh, &mut sums);
-                }
-                (1, &[scale, ..]) => add(segment, [scale], fresh, &mut sums),
-                _ => {}
-            }
+            add(
+                segment,
+                scales.get(..count).unwrap_or_default(),
+                fresh,
+                &mut sums,
+            );
         }
     }
 }
 
-/// Adds a segment, scaled by channel, to the sums of `C` channels. The segment was
-/// checked against a grid of `sums.cells` cells; too short slices stay as they are.
+/// Adds a segment, scaled by channel, to the sums of as many channels, one or three. The segment was
+/// checked against a grid of `sums.cells` cells and `sums.of_channel` inputs; too short slices
+/// stay as they are.
 ///
 /// `fresh` says that the sums are all zero: a row is then stored, not added.
-fn add<const C: usize>(
-    segment: &Segment<'_>,
-    scales: [I2F30; C],
-    fresh: bool,
-    sums: &mut Sums<'_>,
-) {
-    let needed = C.saturating_mul(sums.cells);
-    if sums.inputs.len() < needed || sums.outputs.len() < needed {
+fn add(segment: &Segment<'_>, scales: &[I2F30], fresh: bool, sums: &mut Sums<'_>) {
+    let inputs = scales.len().saturating_mul(sums.of_channel);
+    let outputs = scales.len().saturating_mul(sums.cells);
+    if sums.inputs.len() < inputs || sums.outputs.len() < outputs {
         return;
     }
     let rows = segment.groups().map(|group| kernel::GroupRows {
@@ -230,11 +243,15 @@ fn add<const C: usize>(
     });
     // A tier's segment for all channels is its first, so the assembler has a loop for
     // every segment of a checked table.
-    if kernel::gather::gather(rows, &scales, fresh, sums) || !kernel::IS_PLAIN {
+    if kernel::gather::gather(rows, scales, fresh, sums) || !kernel::IS_PLAIN {
         return;
     }
     for group in segment.groups() {
-        reference::add(&group, &scales, sums);
+        match scales {
+            [red, green, blue] => reference::add(&group, &[*red, *green, *blue], sums),
+            [scale] => reference::add(&group, &[*scale], sums),
+            _ => {}
+        }
     }
 }
 

@@ -11,7 +11,7 @@ pub(super) fn add<const C: usize>(group: &Group<'_>, scales: &[I2F30; C], sums: 
     let mut inputs = [&[][..]; C];
     for (channel, of_channel) in inputs
         .iter_mut()
-        .zip(sums.inputs.chunks_exact(sums.cells.max(1)))
+        .zip(sums.inputs.chunks_exact(sums.of_channel.max(1)))
     {
         *channel = of_channel;
     }

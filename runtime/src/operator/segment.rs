@@ -101,12 +101,12 @@ impl<'a> Segment<'a> {
         self.groups().flat_map(|group| group.rows())
     }
 
-    /// Checks every group, row and index against a grid of `cells` cells. That no
+    /// Checks every group, row and index against a grid of `cells` cells and so many inputs. That no
     /// row is in two groups is left to the proof of the bounds.
     pub(super) fn check(
         &self,
         segment: usize,
-        cells: usize,
+        sizes: (usize, usize),
         budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let mut groups = self.groups();
@@ -124,7 +124,7 @@ impl<'a> Segment<'a> {
                 return Err(OperatorError::Group { segment });
             }
             least = pairs + 1;
-            group.check(segment, cells, budget)?;
+            group.check(segment, sizes, budget)?;
         }
         Ok(())
     }
@@ -149,7 +149,7 @@ impl<'a> Group<'a> {
     fn check(
         &self,
         segment: usize,
-        cells: usize,
+        (cells, inputs): (usize, usize),
         budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let mut least_row = 0;
@@ -168,7 +168,7 @@ impl<'a> Group<'a> {
                 return Err(malformed);
             }
             least_row = index + 1;
-            row.check(segment, cells, budget)?;
+            row.check(segment, inputs, budget)?;
             budget.spend(1, cost::ROW);
         }
         if rows.words.is_empty() {
@@ -234,17 +234,17 @@ impl Row<'_> {
         })
     }
 
-    /// Both coefficients of each pair are on the grid, and pairs ascend.
+    /// Both coefficients of each pair are among the inputs, and pairs ascend.
     fn check(
         &self,
         segment: usize,
-        cells: usize,
+        inputs: usize,
         budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
     ) -> Result<(), OperatorError> {
         let (least, fits) = self.fold((0, true), |(least, fits), pair| {
             budget.spend(1, cost::PAIR);
             let index = usize::from(pair.index);
-            (index + 1, fits && index >= least && index + 1 < cells)
+            (index + 1, fits && index >= least && index + 1 < inputs)
         });
         // Nothing follows the index of a last pair alone.
         let odd = self.pairs % 2 == 1;

@@ -94,7 +94,7 @@ fn case() -> impl Strategy<Value = Case> {
 fn operator<'a>(basis: &Basis, bytes: &'a [u8]) -> Result<Operator<'a>, OperatorError> {
     let segment = Segment::new(0, 1, Channels::All, bytes)?;
     let segments = core::iter::once(segment).collect();
-    Operator::new(basis, segments, [U1F15::ONE; 3])
+    Operator::new(basis, basis.grid().cells(), segments, [U1F15::ONE; 3])
 }
 
 proptest! {
@@ -147,7 +147,7 @@ proptest! {
         let basis = Basis::new(Grid::new(3, 4).expect("a small grid"));
         if let Ok(segment) = Segment::new(0, 1, Channels::One(2), &bytes) {
             let segments = core::iter::once(segment).collect();
-            if let Ok(operator) = Operator::new(&basis, segments, [U1F15::ONE; 3]) {
+            if let Ok(operator) = Operator::new(&basis, basis.grid().cells(), segments, [U1F15::ONE; 3]) {
                 operator.apply(1, 3, &[i16::MAX; 36], &mut [0; 36]);
             }
         }
@@ -313,7 +313,8 @@ fn a_channel_segment_and_a_channel_scale_touch_that_channel_only() {
         core::iter::once(Segment::new(0, 1, Channels::One(1), &bytes).expect("whole words"));
     let half = U1F15::from_num(0.5);
     let scales = [U1F15::ONE, half, U1F15::ONE];
-    let operator = Operator::new(&basis, segments.collect(), scales).expect("well-formed");
+    let operator = Operator::new(&basis, basis.grid().cells(), segments.collect(), scales)
+        .expect("well-formed");
     let mut sums = [7; 12];
     operator.apply(1, 3, &[100; 12], &mut sums);
     let mut expected = [0; 12];
@@ -344,7 +345,13 @@ fn a_tier_reads_its_own_segments_only() {
             .map(|(index, (tier, bytes))| {
                 Segment::new(index, tier, Channels::All, bytes).expect("whole words")
             });
-    let operator = Operator::new(&basis, segments.collect(), [U1F15::ONE; 3]).expect("well-formed");
+    let operator = Operator::new(
+        &basis,
+        basis.grid().cells(),
+        segments.collect(),
+        [U1F15::ONE; 3],
+    )
+    .expect("well-formed");
     let mut sums = [0; 4];
     operator.apply(2, 1, &[100; 4], &mut sums);
     assert_eq!(sums, [0, 200, 0, 0]);

@@ -82,8 +82,7 @@ impl<'t, 'a, const C: usize> GridPipeline<'t, 'a, C> {
     /// [`FrameError::Short`] if the workspace is too short.
     pub fn operate(&self, tier: u8, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         workspace.check(self.table)?;
-        workspace.operate(self.table, tier);
-        Ok(())
+        Ok(workspace.operate(self.table, tier)?)
     }
 
     /// Third stage: corrections, gain, clip and code; returns how many samples were

@@ -9,9 +9,12 @@
     reason = "a host compiles rows for its widest vectors, which a call would leave"
 )]
 
-use crate::haar::{CellSource, Cells, ShortSlice, analyse, synthesise};
-use crate::image::Table;
-use crate::units::{CORRECTION_GUARD_BITS, ClippedSamples, Drive, InputCoefficient, Light};
+use crate::Grid;
+use crate::haar::{Basis, CellSource, Cells, ShortSlice, analyse, synthesise};
+use crate::image::{Neighbours, Table};
+use crate::units::{
+    CORRECTION_GUARD_BITS, ClippedSamples, Drive, Halfword, InputCoefficient, Light,
+};
 
 /// Takes the ambient light away; light below it becomes none, since no projector
 /// input can reach it.
@@ -76,10 +79,16 @@ pub struct Workspace<'w> {
     pub buffers: [&'w mut [i32]; 2],
     /// Cells of one channel, `N` elements.
     pub cells: &'w mut [i32],
-    /// Input coefficients, `N` for each channel.
+    /// Input coefficients, [`Table::inputs`] for each channel.
     pub inputs: &'w mut [InputCoefficient],
     /// Coefficients of the corrections, `N` for each channel.
     pub sums: &'w mut [i32],
+    /// Light that is wanted of the neighbours' cells, [`Neighbours::samples`] as they describe it;
+    /// `None` where the neighbours are silent: they are taken for dark then, and what is left is
+    /// the part of the table that is its own. Tables without neighbours do not look at it.
+    pub heard: Option<&'w [Halfword]>,
+    /// The basis of the neighbours' cells, kept from frame to frame; `None` before the first.
+    pub neighbours: &'w mut Option<Basis>,
 }
 
 impl Workspace<'_> {
@@ -92,7 +101,7 @@ impl Workspace<'_> {
             ("first buffer", basis.scratch_len(), first.len()),
             ("second buffer", basis.scratch_len(), second.len()),
             ("cells", basis.grid().cells(), self.cells.len()),
-            ("inputs", values, self.inputs.len()),
+            ("inputs", channels * table.inputs(), self.inputs.len()),
             ("sums", values, self.sums.len()),
         ] {
             ShortSlice::check(what, needed, given)?;
@@ -107,25 +116,59 @@ impl Workspace<'_> {
         channel: usize,
         cells: &impl CellSource,
     ) -> Result<(), ShortSlice> {
-        let start = channel * table.grid().cells();
+        let start = channel * table.inputs();
         let inputs = self.inputs.get_mut(start..).unwrap_or_default();
         let [first, second] = &mut self.buffers;
         analyse(table.basis(), cells, [first, second], inputs)
     }
 
+    /// Computes the input coefficients of the neighbours' cells in all channels.
+    fn analyse_neighbours(
+        &mut self,
+        table: &Table<'_>,
+        neighbours: &Neighbours<'_>,
+    ) -> Result<(), ShortSlice> {
+        if let Some(heard) = self.heard {
+            ShortSlice::check("neighbours' light", neighbours.samples(), heard.len())?;
+        }
+        let grid = neighbours.grid();
+        let basis = kept_basis(self.neighbours, grid);
+        for channel in 0..usize::from(table.channels()) {
+            let start = channel * table.inputs() + table.grid().cells();
+            let inputs = self.inputs.get_mut(start..).unwrap_or_default();
+            let Some(heard) = self.heard else {
+                inputs.get_mut(..grid.cells()).unwrap_or_default().fill(0);
+                continue;
+            };
+            let cells = self.cells.get_mut(..grid.cells()).unwrap_or_default();
+            neighbours.fill(heard, channel, cells);
+            let values = Cells {
+                values: cells,
+                cols: grid.cols(),
+            };
+            let [first, second] = &mut self.buffers;
+            analyse(basis, &values, [first, second], inputs)?;
+        }
+        Ok(())
+    }
+
     /// Computes the corrections' coefficients of all channels at `tier`.
-    pub(super) fn operate(&mut self, table: &Table<'_>, tier: u8) {
+    pub(super) fn operate(&mut self, table: &Table<'_>, tier: u8) -> Result<(), ShortSlice> {
         let Some(operator) = table.operator() else {
-            return;
+            return Ok(());
         };
+        if let Some(neighbours) = table.neighbours() {
+            self.analyse_neighbours(table, neighbours)?;
+        }
         operator.apply(tier, table.channels(), self.inputs, self.sums);
         let cells = table.grid().cells();
-        let channels = self.sums.chunks_exact_mut(cells);
+        let channels = self.sums.chunks_exact_mut(cells.max(1));
         for sums in channels.take(table.channels().into()) {
             if let Some(constant) = sums.last_mut() {
                 *constant = constant.wrapping_add(CORRECTION_HALF);
             }
         }
+        Ok(())
     }
 
     /// Computes the corrections of one channel, which stay in `cells`.
@@ -139,6 +182,17 @@ impl Workspace<'_> {
         let [first, second] = &mut self.buffers;
         synthesise(table.basis(), sums, [first, second], self.cells)
     }
+}
+
+/// The basis of a grid: the one that is kept, or a new one in its place.
+///
+/// Not inlined: a new one passes over the stack, which the transform need not stand on.
+#[inline(never)]
+fn kept_basis(kept: &mut Option<Basis>, grid: Grid) -> &Basis {
+    if kept.as_ref().is_some_and(|basis| basis.grid() != grid) {
+        *kept = None;
+    }
+    kept.get_or_insert_with(|| Basis::new(grid))
 }
 
 /// Replaces the light of every cell (bits of [`Light`], `N` for each channel) by
@@ -166,15 +220,15 @@ pub fn correct(
     }
     workspace.check(table)?;
     let cols = table.grid().cols();
-    for (channel, light) in cells.chunks_exact(count).enumerate() {
+    for (channel, light) in cells.chunks_exact(count.max(1)).enumerate() {
         let values = Cells {
             values: light,
             cols,
         };
         workspace.analyse(table, channel, &values)?;
     }
-    workspace.operate(table, tier);
-    for (channel, corrections) in cells.chunks_exact_mut(count).enumerate() {
+    workspace.operate(table, tier)?;
+    for (channel, corrections) in cells.chunks_exact_mut(count.max(1)).enumerate() {
         workspace.synthesise(table, channel)?;
         for (slot, correction) in corrections.iter_mut().zip(workspace.cells.iter()) {
             *slot = *correction;

@@ -6,12 +6,14 @@
 //!     cargo run --release -p iltm-tests --bin counts -- stages > docs/stages.csv
 //!     cargo run --release -p iltm-tests --bin counts -- sizes > docs/firmware-sizes.csv
 //!     cargo run --release -p iltm-tests --bin counts -- rights
+//!     cargo run --release -p iltm-tests --bin counts -- neighbours
 //!
-//! `sizes` builds the firmware with every choice of stages, 32 in all. `rights` says what a device
-//! takes to look at a right (`docs/flashing.md`).
+//! `sizes` builds the firmware with every choice of stages, 33 in all. `rights` says what a device
+//! takes to look at a right (`docs/flashing.md`), `neighbours` what the light of other projectors takes
+//! (`docs/firmware.md`).
 
 use iltm_tests::instructions::{self, count};
-use iltm_tests::{costs, rights, stages};
+use iltm_tests::{costs, neighbours, rights, stages};
 
 fn main() {
     match std::env::args().nth(1).as_deref() {
@@ -32,6 +34,12 @@ fn main() {
             }
         }
         Some("rights") => rights::print(),
-        _ => panic!("name a list: instructions, costs, stages, sizes or rights"),
+        Some("neighbours") => {
+            neighbours::print_fixed();
+            for cells in [(24, 32), (48, 64)] {
+                neighbours::print(cells);
+            }
+        }
+        _ => panic!("name a list: instructions, costs, stages, sizes, rights or neighbours"),
     }
 }

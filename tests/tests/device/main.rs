@@ -8,6 +8,7 @@ mod firmware_update;
 mod found_by_fuzzing;
 mod identity;
 mod link;
+mod neighbours;
 mod power_cuts;
 mod protocol;
 mod rights;

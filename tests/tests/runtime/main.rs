@@ -7,6 +7,7 @@ mod foreign_bytes;
 mod governor;
 mod hard_frames;
 mod image;
+mod split;
 mod stages;
 mod tables;
 mod whole_frames;

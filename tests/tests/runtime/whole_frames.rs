@@ -1,50 +1,14 @@
 //! Frames larger than the grid: a device's way through a frame larger than the grid
 //! against the host's.
 
-use iltm::video::OperatorMemory;
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
-use iltm_runtime::pipeline::{Encoding, FullMemory, FullPipeline, RowBuffers};
+use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::firmware::{Effects, on_host, random_frame, random_table};
 use iltm_tests::made_up::MadeUp;
-
-fn device<const C: usize>(
-    table: &Table<'_>,
-    (tier, format): (u8, Format),
-    wanted: &[u8],
-) -> Vec<u8> {
-    let (cells, size) = (C * table.grid().cells(), format.size());
-    let area = table.area(size).expect("of the projector's aspect");
-    let pipeline = FullPipeline::<C>::within(table, size, area).expect("it fits");
-    let mut memory = FullMemory {
-        gains: &mut vec![[0; 2]; C * size.pixels()],
-        ambient: &mut vec![[0; 2]; C * size.pixels()],
-        sums: &mut vec![0; cells],
-        corrections: &mut vec![0; cells],
-        columns: &mut vec![0; 2 * C * size.width()],
-        row: RowBuffers {
-            line: &mut vec![0; pipeline.line_len()],
-            spread: &mut vec![0; area.size.width()],
-        },
-        values: &mut vec![0; area.size.width()],
-    };
-    pipeline.prepare(&mut memory).expect("sized");
-    let mut input = vec![[0; C]; size.pixels()];
-    let (encoding, mut operator) = (format.encoding(), OperatorMemory::new(table));
-    pipeline
-        .compensate(
-            tier,
-            encoding,
-            wanted.as_chunks().0,
-            &mut input,
-            &mut memory,
-            &mut operator.workspace(),
-        )
-        .expect("sized");
-    input.into_flattened()
-}
+use iltm_tests::neighbours::runtime_frame;
 
 #[test]
 fn a_device_makes_of_a_larger_frame_what_the_host_makes_of_it() {
@@ -65,10 +29,7 @@ fn a_device_makes_of_a_larger_frame_what_the_host_makes_of_it() {
                 for tier in 0..=table.top_tier() {
                     let wanted = random_frame(format, seed + u64::from(tier));
                     let (expected, _) = on_host(&table, tier, format, &wanted);
-                    let made = match channels {
-                        1 => device::<1>(&table, (tier, format), &wanted),
-                        _ => device::<3>(&table, (tier, format), &wanted),
-                    };
+                    let made = runtime_frame(&table, (tier, format), &wanted, None);
                     assert!(
                         made == expected,
                         "{grid} to {size}, {channels} channels, {encoding:?}, tier {tier}"
@@ -94,10 +55,7 @@ fn a_device_and_the_host_leave_the_same_border_black() {
             for tier in 0..=table.top_tier() {
                 let wanted = random_frame(format, seed + u64::from(tier));
                 let (expected, clipped) = on_host(&table, tier, format, &wanted);
-                let made = match channels {
-                    1 => device::<1>(&table, (tier, format), &wanted),
-                    _ => device::<3>(&table, (tier, format), &wanted),
-                };
+                let made = runtime_frame(&table, (tier, format), &wanted, None);
                 assert!(made == expected, "{size}, {channels} channels, tier {tier}");
                 assert!((clipped.total() as usize) < area.size.pixels() * channels);
                 let row = size.width() * channels;
@@ -133,7 +91,7 @@ fn ambient_light_that_falls_to_none_between_cells_leaves_no_pixel_dark() {
             let size = FrameSize::new(width, height).expect("not empty");
             let format = Format::new(size, 1, Encoding::Linear, 1_000).expect("a format");
             let wanted = vec![255; size.pixels()];
-            let made = device::<1>(&table, (0, format), &wanted);
+            let made = runtime_frame(&table, (0, format), &wanted, None);
             // Gain 1, and ambient light of at most one step of light.
             assert!(made.iter().all(|code| *code >= 254), "{grid} to {size}");
             let (expected, _) = on_host(&table, 0, format, &wanted);

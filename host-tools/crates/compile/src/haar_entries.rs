@@ -34,6 +34,13 @@ pub fn haar_entries(table: &Table<'_>, segments: &[Segment<'_>]) -> Vec<Vec<Haar
     (0..usize::from(table.channels())).map(of_channel).collect()
 }
 
+/// The entries of one segment, scales of the channels left out.
+pub(crate) fn entries_of(functions: &[Function], segment: &Segment<'_>) -> Vec<HaarEntry> {
+    let rows = segment.rows();
+    let entries = rows.flat_map(|row| of_row(functions, row, 1.0));
+    entries.collect()
+}
+
 /// The inverse of what [`quantise`](crate::quantise) does.
 fn of_row(functions: &[Function], row: Row<'_>, scale: f64) -> Vec<HaarEntry> {
     let norm = |index: usize| (functions[index].squared_norm() as f64).sqrt();

@@ -4,8 +4,9 @@ use super::ladder::Part;
 use super::quantise::Quantised;
 pub use super::quantise::StoredRow;
 use iltm_runtime::{
+    Grid,
     image::{
-        crc32,
+        Neighbours, crc32,
         layout::{ALIGNMENT, FORMAT_VERSION, MAGIC, SectionKind, entry, header, projector},
     },
     operator::layout as segment,
@@ -49,6 +50,13 @@ impl ImageWriter {
     pub(crate) fn replace(&mut self, kind: SectionKind, bytes: Option<Vec<u8>>) {
         self.sections.retain(|(own, _, _)| *own != kind);
         self.sections.extend(bytes.map(|bytes| (kind, 0, bytes)));
+    }
+
+    /// The bytes of the first section of a kind.
+    pub(crate) fn bytes(&self, kind: SectionKind) -> Option<&[u8]> {
+        let mut sections = self.sections.iter();
+        let (_, _, bytes) = sections.find(|(own, _, _)| *own == kind)?;
+        Some(bytes)
     }
 
     /// The image.
@@ -103,19 +111,28 @@ pub fn projector_section(pixels: ProjectorPixels) -> Vec<u8> {
     bytes
 }
 
+/// The bytes of a neighbours section: cells of those on the left and on the right, and their ambient
+/// light.
+#[must_use]
+pub fn neighbours_section(cells: Grid, around: [u8; 2], ambient: Vec<u16>) -> Vec<u8> {
+    let mut bytes = Neighbours::head(cells, around).to_vec();
+    bytes.extend(halfwords(ambient));
+    bytes
+}
+
 /// `u16`s as bytes.
 pub(super) fn halfwords(values: impl IntoIterator<Item = u16>) -> Vec<u8> {
     values.into_iter().flat_map(u16::to_le_bytes).collect()
 }
 
 /// The bytes of an operator section: rows, given in ascending order of their index,
-/// grouped by their number of pairs. `cells` are those of the grid: a single one, which
-/// lights no other, has no operator.
+/// grouped by their number of pairs. `inputs` are the input coefficients of a channel: a single one,
+/// which lights no other, has no operator.
 #[must_use]
-pub fn segment_bytes(cells: usize, rows: &[StoredRow]) -> Vec<u8> {
+pub fn segment_bytes(inputs: usize, rows: &[StoredRow]) -> Vec<u8> {
     let mut groups = vec![(0_u16, Vec::new()); segment::MAX_SHORT + 1];
     for row in rows {
-        let pairs = row.pairs(cells);
+        let pairs = row.pairs(inputs);
         let place = pairs.len().min(segment::MAX_SHORT + 1) - 1;
         let (count, words) = &mut groups[place];
         *count += 1;
@@ -150,14 +167,14 @@ pub fn segment_bytes(cells: usize, rows: &[StoredRow]) -> Vec<u8> {
 
 /// Operator sections of rows in the order of [`quantise`](super::quantise):
 /// selector and bytes of each.
-pub(super) fn operator_sections(cells: usize, quantised: &[Quantised]) -> Vec<(u16, Vec<u8>)> {
+pub(super) fn operator_sections(inputs: usize, quantised: &[Quantised]) -> Vec<(u16, Vec<u8>)> {
     let section = |segment: &Quantised| {
         let channel = match segment.part {
             Part::Shared => 0,
             Part::Channel(channel) => u16::from(channel) + 1,
         };
         let selector = u16::from(segment.tier) + 256 * channel;
-        (selector, segment_bytes(cells, &segment.rows))
+        (selector, segment_bytes(inputs, &segment.rows))
     };
     quantised.iter().map(section).collect()
 }

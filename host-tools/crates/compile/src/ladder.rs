@@ -120,7 +120,7 @@ fn queue(
     finest: f64,
     judge: &mut Judge<'_>,
 ) -> Vec<Entry> {
-    let mut ranked: Vec<Ranked> = Vec::new();
+    let mut entries: Vec<Entry> = Vec::new();
     let gains = inverse.channels.iter().flat_map(|channel| &channel.gain);
     let gain = gains.clone().sum::<f64>() / gains.count().max(1) as f64;
     let least = ASIDE * finest * gain * sigma.norm();
@@ -134,14 +134,11 @@ fn queue(
             judge.leave_out(part, found.iter().filter(|c| worth(c) < needed));
             found.retain(|coefficient| worth(coefficient) >= needed);
         }
-        ranked.extend(found.into_iter().map(|coefficient| Ranked {
-            worth: 0.0,
-            entry: Entry {
-                part,
-                row: coefficient.row,
-                col: coefficient.col,
-                value: coefficient.value,
-            },
+        entries.extend(found.into_iter().map(|coefficient| Entry {
+            part,
+            row: coefficient.row,
+            col: coefficient.col,
+            value: coefficient.value,
         }));
     };
     add(Part::Shared, &inverse.shared);
@@ -159,7 +156,17 @@ fn queue(
         };
         weight * (entry.value * sigma[entry.col as usize]).powi(2)
     };
-    let channels = inverse.channels.len() as u8;
+    most_useful_first(entries, worth, inverse.channels.len() as u8)
+}
+
+/// Entries by what they are worth per instruction of a table of `channels` channels, most first.
+pub(crate) fn most_useful_first(
+    entries: Vec<Entry>,
+    worth: impl Fn(&Entry) -> f64 + Copy + Sync + Send,
+    channels: u8,
+) -> Vec<Entry> {
+    let unranked = |entry| Ranked { worth: 0.0, entry };
+    let mut ranked: Vec<Ranked> = entries.into_iter().map(unranked).collect();
     let place = |ranked: &Ranked| (ranked.entry.part, ranked.entry.row, ranked.entry.col);
     let row = |ranked: &Ranked| (ranked.entry.part, ranked.entry.row);
     ranked.par_sort_unstable_by_key(place);

@@ -17,6 +17,7 @@
 //! | what a viewer would see of natural images | [`ViewerError`] |
 //! | what a frame takes on the board | [`cost`] |
 //! | the same table with other gains | [`refined_table()`] |
+//! | a table for each of several projectors | [`split_table`] |
 //! | the seal behind them | [`sign`] |
 //!
 //! The image is checked by the runtime's own reader before it is returned, so
@@ -37,6 +38,7 @@ mod refined_table;
 pub mod response;
 pub mod shader;
 pub mod sign;
+mod split;
 mod table;
 #[cfg(test)]
 mod test_scene;
@@ -47,5 +49,6 @@ pub use gain::FineGains;
 pub use ladder::Ladder;
 pub use provenance::{Photographs, PredictedError, Provenance, Refinement};
 pub use refined_table::{RefinedParts, refined_table};
+pub use split::{NEIGHBOURS_FACTOR, SplitError, SplitTable, SplitTableError, split_table};
 pub use table::{CompileError, CompileOptions, Compiled, compile};
 pub use viewer_error::ViewerError;

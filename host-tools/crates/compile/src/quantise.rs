@@ -8,7 +8,7 @@
 
 use super::ladder::{Entry, Part};
 use iltm_runtime::{
-    haar::{Basis, Function},
+    haar::Function,
     operator::{Bounds, Segment},
     units::{CORRECTION_GUARD_BITS, INPUT_COEFFICIENT_MAX},
 };
@@ -38,8 +38,8 @@ pub struct StoredRow {
 impl StoredRow {
     /// Its entries two by two where they are neighbours: index of the first, and
     /// the values of that and of the next.
-    pub(super) fn pairs(&self, cells: usize) -> Vec<(u16, [i16; 2])> {
-        let last = cells.saturating_sub(2) as u16;
+    pub(super) fn pairs(&self, inputs: usize) -> Vec<(u16, [i16; 2])> {
+        let last = inputs.saturating_sub(2) as u16;
         let mut pairs: Vec<(u16, [i16; 2])> = Vec::new();
         for &(index, value) in &self.entries {
             match pairs.last_mut() {
@@ -60,7 +60,7 @@ pub struct TooStrong {
     pub row: usize,
 }
 
-/// Quantises all entries of one tier. `scale(part)` is what an entry's value must be
+/// Quantises all entries of one tier. `functions` are those of the grid, and any inputs behind them. `scale(part)` is what an entry's value must be
 /// multiplied by to reach drive per reference light, before the channel's own scale.
 ///
 /// Entries that round to zero are left out.
@@ -68,12 +68,11 @@ pub struct TooStrong {
 /// # Errors
 /// [`TooStrong`] with the row whose values are too large for any shift.
 pub fn quantise(
-    basis: &Basis,
+    functions: &[Function],
     tier: u8,
     entries: &[Entry],
     scale: impl Fn(Part) -> f64,
 ) -> Result<Vec<Quantised>, TooStrong> {
-    let functions: Vec<Function> = basis.functions().collect();
     let norm = |function: &Function| (function.squared_norm() as f64).sqrt();
     let norms: Vec<f64> = functions.iter().map(norm).collect();
     let place = |entry: &Entry| {

@@ -329,16 +329,17 @@ impl StoredOperator {
                         .to_num::<f64>()
             }
         };
+        let functions: Vec<_> = basis.functions().collect();
         let mut quantised = Vec::new();
         for (tier, info) in (1..).zip(&ladder.tiers) {
             let entries = &ladder.entries[..info.entries];
-            let segments = quantise(basis, tier, entries, factor)
+            let segments = quantise(&functions, tier, entries, factor)
                 .map_err(|TooStrong { row }| CompileError::TooStrong { row })?;
             quantised.extend(segments);
         }
         let sections = operator_sections(basis.grid().cells(), &quantised);
         let (bounds, costs) = {
-            let operator = load(basis, &sections, scales)?;
+            let operator = load(basis, functions.len(), &sections, scales)?;
             let channels = inverse.channels.len() as u8;
             let tiers = 0..=ladder.tiers.len() as u8;
             let costs = tiers.map(|tier| operator.cost(tier, channels)).collect();
@@ -354,8 +355,9 @@ impl StoredOperator {
 }
 
 /// The stored operator as the runtime will see it, with its proof.
-fn load<'a>(
+pub(crate) fn load<'a>(
     basis: &Basis,
+    inputs: usize,
     sections: &'a [(u16, Vec<u8>)],
     scales: [U1F15; 3],
 ) -> Result<Operator<'a>, CompileError> {
@@ -368,7 +370,7 @@ fn load<'a>(
             .push(segment)
             .map_err(|_| CompileError::Operator(OperatorError::Segments))?;
     }
-    Operator::new(basis, segments, scales).map_err(CompileError::Operator)
+    Operator::new(basis, inputs, segments, scales).map_err(CompileError::Operator)
 }
 
 /// The tiers section.

@@ -1,9 +1,11 @@
 //! Sources of frames for a board: the test scene, a picture, or a video over and over.
 
 use iltm_picture::{Picture, Samples, png};
-use iltm_runtime::FrameSize;
+use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::Encoding;
+use iltm_runtime::{FrameSize, Grid};
 use iltm_video::{
-    Input, VideoError,
+    Input, OwnFrame, VideoError, WideFrames,
     test_scene::TestScene,
     y4m::{CodeRange, Reader, Y4mError, YuvFrame},
     yuv::{Conversion, Standard},
@@ -19,6 +21,8 @@ pub struct FrameFeed {
     size: FrameSize,
     channels: u8,
     rate: f64,
+    /// Where the device is one of several projectors'.
+    wide: Option<WideFrames>,
 }
 
 #[derive(Debug)]
@@ -46,6 +50,7 @@ impl FrameFeed {
             size,
             channels,
             rate,
+            wide: None,
         }
     }
 
@@ -64,6 +69,7 @@ impl FrameFeed {
                     channels: channels.unwrap_or(picture.channels() as u8),
                     rate: rate.unwrap_or(25.0),
                     kind: Kind::Still(picture),
+                    wide: None,
                 });
             }
             Input::Y4m(file) => Reader::new(file)?,
@@ -79,13 +85,39 @@ impl FrameFeed {
                 reader,
                 frame: YuvFrame::default(),
             },
+            wide: None,
         })
     }
 
-    /// Pixels of a frame.
+    /// The same for a device that has this table: its own part of them and its neighbours' light, if
+    /// it is one of several projectors'.
+    ///
+    /// # Errors
+    /// [`VideoError::NotWide`] if the frames are not those of all projectors side by side.
+    pub fn for_table(mut self, table: &Table<'_>) -> Result<Self, VideoError> {
+        let Some(neighbours) = table.neighbours() else {
+            return Ok(self);
+        };
+        let wide = WideFrames::new(table, self.size, Encoding::Display);
+        let [before, after] = neighbours.around();
+        let wide = wide.ok_or(VideoError::NotWide {
+            projectors: before + 1 + after,
+            size: self.size,
+        })?;
+        self.wide = Some(wide);
+        Ok(self)
+    }
+
+    /// Pixels of a frame of the device.
     #[must_use]
-    pub const fn size(&self) -> FrameSize {
-        self.size
+    pub fn size(&self) -> FrameSize {
+        self.wide.as_ref().map_or(self.size, WideFrames::own)
+    }
+
+    /// The neighbours' cells whose light comes with each.
+    #[must_use]
+    pub fn neighbours(&self) -> Option<Grid> {
+        self.wide.as_ref().map(WideFrames::cells)
     }
 
     /// Samples of a pixel.
@@ -100,11 +132,12 @@ impl FrameFeed {
         self.rate
     }
 
-    /// The next frame: 8-bit samples, the channels of a pixel side by side.
+    /// The next frame: 8-bit samples, the channels of a pixel side by side, and the neighbours' light;
+    /// none where there are no neighbours.
     ///
     /// # Errors
     /// [`VideoError`] if the file does not go on.
-    pub fn next_frame(&mut self) -> Result<Vec<u8>, VideoError> {
+    pub fn next_frame(&mut self) -> Result<OwnFrame, VideoError> {
         let picture = match &mut self.kind {
             Kind::Scene { scene, next } => {
                 *next += 1;
@@ -134,7 +167,14 @@ impl FrameFeed {
                 })?
             }
         };
-        Ok(samples(&picture, self.channels))
+        let pixels = samples(&picture, self.channels);
+        Ok(match &self.wide {
+            Some(wide) => wide.of_frame(&pixels),
+            None => OwnFrame {
+                pixels,
+                light: Vec::new(),
+            },
+        })
     }
 }
 
@@ -179,7 +219,7 @@ mod tests {
         assert_eq!((frames.size().width(), frames.channels()), (2, 1));
         assert!((frames.rate() - 29.97).abs() < 0.001);
         let got: Vec<_> = (0..5)
-            .map(|_| frames.next_frame().expect("a frame")[0])
+            .map(|_| frames.next_frame().expect("a frame").pixels[0])
             .collect();
         assert_eq!(got, [16, 235, 16, 235, 16]);
     }
@@ -197,7 +237,7 @@ mod tests {
         let scene = TestScene::new(size, 25.0);
         let mut frames = FrameFeed::scene(size, 3, 25.0);
         for number in 0..3 {
-            let got = frames.next_frame().expect("a frame");
+            let got = frames.next_frame().expect("a frame").pixels;
             assert_eq!(got, samples(&scene.frame(number), 3), "frame {number}");
         }
     }
@@ -219,7 +259,8 @@ mod tests {
         let size = FrameSize::new(16, 12).expect("small");
         let mut frames = FrameFeed::scene(size, 3, 25.0);
         let first = frames.next_frame().expect("a frame");
-        assert_eq!(first.len(), 16 * 12 * 3);
+        assert!(first.light.is_empty(), "no neighbours");
+        assert_eq!(first.pixels.len(), 16 * 12 * 3);
         let mut later = (1..100).map(|_| frames.next_frame().expect("a frame"));
         assert!(later.all(|frame| frame != first));
     }

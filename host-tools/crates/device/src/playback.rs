@@ -4,6 +4,7 @@
 
 use super::memory::{BoardMemory, FileWords};
 use iltm_runtime::frame_buffers::{Display, Format, Layout, RegionError, Shown, Source, psram};
+use iltm_runtime::units::Halfword;
 use std::io;
 use std::ops::Range;
 
@@ -63,17 +64,27 @@ impl<'m> Playback<'m> {
         self.display.is_some() || self.source.attached()
     }
 
-    /// Gives the board a frame, or lets it drop where the board has no buffer for
-    /// it, as a cable would.
+    /// Gives the board a frame without any light of its neighbours, or lets it drop where the board
+    /// has no buffer for it, as a cable would.
     ///
     /// # Errors
     /// [`PlaybackError::Memory`].
     pub fn give(&mut self, frame: &[u8]) -> Result<(), PlaybackError> {
+        self.give_with(frame, &[])
+    }
+
+    /// The same with the light of the neighbours' cells, if the format has that and it is there.
+    ///
+    /// # Errors
+    /// [`PlaybackError::Memory`].
+    pub fn give_with(&mut self, frame: &[u8], light: &[Halfword]) -> Result<(), PlaybackError> {
         match self.source.begin() {
             Some(filling) => {
                 let place = within_memory(&self.source.pixels(&filling));
                 self.memory.write(&place, frame)?;
-                self.source.finish(filling);
+                let place = within_memory(&self.source.light(&filling));
+                self.memory.write(&place, light.as_flattened())?;
+                self.source.finish(filling, !light.is_empty());
                 self.counts.given += 1;
             }
             None => self.counts.refused += 1,

@@ -10,6 +10,16 @@ use std::path::PathBuf;
 /// [`VideoError::next_step`] says what to do about it.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
+    /// Frames are not those of all projectors side by side.
+    #[error(
+        "the table is for one of {projectors} projectors, and frames of {size} are not so many of one size side by side"
+    )]
+    NotWide {
+        /// How many there are.
+        projectors: usize,
+        /// Size of the frames.
+        size: FrameSize,
+    },
     /// A file could not be opened or put in its place.
     #[error("{}: {source}", path.display())]
     File {
@@ -145,6 +155,9 @@ impl VideoError {
             Self::Aspect { .. } => {
                 "Say how it is to be shown: --fit letterbox (black bars), crop (edges cut off) or \
                  stretch; or make it in the projector's aspect."
+            }
+            Self::NotWide { .. } => {
+                "Give frames of all projectors side by side, from left to right."
             }
             Self::NothingToFit => "Leave --fit away.",
             Self::Elsewhere => "Start again with the new table.",

@@ -45,6 +45,7 @@ mod error;
 mod fit;
 mod input;
 pub mod live;
+mod neighbours;
 pub mod pipe;
 mod planar;
 mod stream;
@@ -58,6 +59,7 @@ pub use engine::OperatorMemory;
 pub use error::VideoError;
 pub use fit::{Fit, PlacedFrames};
 pub use input::{Input, sampled_frames};
+pub use neighbours::{OwnFrame, WideFrames, wide_size};
 
 #[cfg(test)]
 mod tests;

@@ -6,7 +6,7 @@
 
 use super::super::failure::Failure;
 use super::screen::{BoardScreen, PictureKind};
-use super::{format, playback_failure, scene_size};
+use super::{format, playback_failure, scene};
 use crate::device::frame_source::FrameFeed;
 use crate::device::memory::BoardMemory;
 use crate::device::playback::{Playback, PlaybackCounts};
@@ -80,7 +80,7 @@ impl<'m> Film<'m> {
     }
 
     /// What its frames are now.
-    pub(super) const fn kind(&self) -> PictureKind {
+    pub(super) fn kind(&self) -> PictureKind {
         PictureKind {
             size: self.frames.size(),
             channels: self.frames.channels(),
@@ -95,15 +95,16 @@ impl<'m> Film<'m> {
         if self.given.len() == REMEMBERED {
             self.given.pop_front();
         }
-        self.given.push_back(hash(&frame));
+        self.given.push_back(hash(&frame.pixels));
         let (given, unchanged) = (&self.given, &mut self.unchanged);
         let mut taken = Ok(());
-        let passed = self.playback.give(&frame).and_then(|()| {
+        let given_now = self.playback.give_with(&frame.pixels, &frame.light);
+        let passed = given_now.and_then(|()| {
             self.playback.show(|_, pixels| {
                 let same = given.contains(&hash(pixels));
                 *unchanged = if same { *unchanged + 1 } else { 0 };
                 if taken.is_ok() {
-                    taken = screen.take(kind, &frame, pixels);
+                    taken = screen.take(kind, &frame.pixels, pixels);
                 }
             })
         });
@@ -135,11 +136,11 @@ impl<'m> Film<'m> {
             let Ok(table) = table else {
                 continue;
             };
-            let (size, channels) = (scene_size(Some(&table)), table.channels());
-            if (size, channels) == (self.frames.size(), self.frames.channels()) {
+            let frames = scene(Some(&table), None, self.frames.rate())?;
+            let kind = |frames: &FrameFeed| (frames.size(), frames.channels(), frames.neighbours());
+            if kind(&frames) == kind(&self.frames) {
                 continue;
             }
-            let frames = FrameFeed::scene(size, channels, self.frames.rate());
             // Larger than the board's frame memory: it says so itself when it is asked.
             let Ok(playback) = Playback::new(self.memory, format(&frames)?) else {
                 continue;

@@ -21,6 +21,7 @@ use crate::device::memory::BoardMemory;
 use crate::device::playback::PlaybackError;
 use crate::user::Folders;
 use crate::user::emulated::register;
+use crate::video::wide_size;
 use film::Film;
 use iltm_runtime::{
     FrameSize,
@@ -38,6 +39,10 @@ use std::time::{Duration, Instant};
 
 /// Builds the firmware; the last line that it prints is the ELF file.
 const BUILD: &str = "runtime/firmware/build.sh";
+
+/// What names the stages that are built, and those of the firmware for one of several projectors.
+const STAGES: &str = "ILTM_FIRMWARE_STAGES";
+const OF_SEVERAL: &str = "stages,neighbours";
 
 /// Frames a second of the test scene.
 const RATE: f64 = 25.0;
@@ -58,7 +63,7 @@ pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     let frames = frames(arguments, table.as_ref())?;
     let firmware = match &arguments.firmware {
         Some(firmware) => firmware.clone(),
-        None => build(arguments.board, output)?,
+        None => build(arguments.board, table.as_ref(), output)?,
     };
     let follows = arguments.frames.is_none() && arguments.size.is_none();
     let mut film = Film::new(&memory, frames, follows)?;
@@ -152,12 +157,31 @@ fn put_table(
 fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameFeed, Failure> {
     let channels = table.map(Table::channels);
     if let Some(path) = &arguments.frames {
-        let frames = FrameFeed::file(path, channels, arguments.fps);
-        return Ok(frames?);
+        let frames = FrameFeed::file(path, channels, arguments.fps)?;
+        return Ok(match table {
+            Some(table) => frames.for_table(table)?,
+            None => frames,
+        });
     }
-    let size = arguments.size.unwrap_or_else(|| scene_size(table));
-    let rate = arguments.fps.unwrap_or(RATE);
-    Ok(FrameFeed::scene(size, channels.unwrap_or(3), rate))
+    scene(table, arguments.size, arguments.fps.unwrap_or(RATE))
+}
+
+/// The test scene for the device that has a table; of all projectors side by side, if it is one of
+/// several.
+fn scene(
+    table: Option<&Table<'_>>,
+    size: Option<FrameSize>,
+    rate: f64,
+) -> Result<FrameFeed, Failure> {
+    let own = size.unwrap_or_else(|| scene_size(table));
+    let neighbours = table.and_then(Table::neighbours);
+    let wide = neighbours.and_then(|neighbours| wide_size(neighbours, own));
+    let channels = table.map_or(3, Table::channels);
+    let frames = FrameFeed::scene(wide.unwrap_or(own), channels, rate);
+    Ok(match table {
+        Some(table) => frames.for_table(table)?,
+        None => frames,
+    })
 }
 
 /// A size that the emulated board can keep up with, in the aspect of the table's projector.
@@ -177,6 +201,7 @@ fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
 fn format(frames: &FrameFeed) -> Result<Format, Failure> {
     let period = (1e6 / frames.rate()).round().clamp(1.0, 1e8) as u32;
     let format = Format::new(frames.size(), frames.channels(), Encoding::Display, period);
+    let format = format.map(|format| format.with_neighbours(frames.neighbours()));
     format.ok_or_else(|| {
         let message = format!("a board cannot take frames of {}", frames.size());
         Failure::new(Kind::Frames, message, "Give other frames.")
@@ -185,7 +210,7 @@ fn format(frames: &FrameFeed) -> Result<Format, Failure> {
 
 /// Builds the firmware of the source folder that this is run in, or was built
 /// from; returns its ELF file.
-fn build(board: Board, output: &Output) -> Result<PathBuf, Failure> {
+fn build(board: Board, table: Option<&Table<'_>>, output: &Output) -> Result<PathBuf, Failure> {
     let here = std::env::current_dir().unwrap_or_default();
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     let script = here
@@ -203,7 +228,11 @@ fn build(board: Board, output: &Output) -> Result<PathBuf, Failure> {
     if output.terminal {
         let _ = writeln!(io::stderr(), "building the firmware for {board}");
     }
-    let built = Command::new("bash")
+    let mut command = Command::new("bash");
+    if table.and_then(Table::neighbours).is_some() {
+        command.env(STAGES, OF_SEVERAL);
+    }
+    let built = command
         .arg(&script)
         .arg(board.name())
         .stdin(Stdio::null())

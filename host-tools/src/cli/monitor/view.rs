@@ -188,6 +188,7 @@ impl View {
         let mode = style(words::mode(status, slots));
         let mode = match status.mode {
             Mode::Compensating => mode.green(),
+            Mode::Alone => mode.yellow(),
             Mode::PassThrough(_) => mode.red(),
         };
         let trial = match self.trial_s() {

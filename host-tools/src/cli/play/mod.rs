@@ -9,7 +9,7 @@ use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
 use super::mpv::{mpv, start};
 use super::output::Output;
-use super::tables::{check, chosen_tier, watch_table};
+use super::tables::{check_whole, chosen_tier, watch_table};
 use crate::compile::shader::user_shader;
 use crate::video::watch::FileWatch;
 use iltm_picture::Samples;
@@ -50,7 +50,7 @@ const WHITE: &str =
 
 pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
     let (image, watch) = watch_table(&arguments.table)?;
-    let table = check(&arguments.table, &image)?;
+    let table = check_whole(&arguments.table, &image)?;
     let tier = chosen_tier(&table, arguments.tier)?;
     let folder = TemporaryFolder::new().map_err(|error| cannot_write(Path::new("."), &error))?;
     let files = ShowFiles {
@@ -126,7 +126,7 @@ impl ShowFiles<'_> {
 
     /// Takes the place of the table before; `Err` says why it cannot.
     fn exchange(&self, bytes: &[u8], path: &Path, generation: u32) -> Result<(), String> {
-        let table = check(path, bytes).map_err(|failure| failure.message)?;
+        let table = check_whole(path, bytes).map_err(|failure| failure.message)?;
         if table.projector() != self.projector {
             return Err(format!(
                 "{}: the table is for another projector or border",

@@ -161,7 +161,7 @@ impl Orders {
         while *due <= now && play.left > 0 {
             // The pixels are there already: the test has written them.
             if let Some(filling) = play.source.begin() {
-                play.source.finish(filling);
+                play.source.finish(filling, false);
             }
             *due += play.period;
             play.left -= 1;

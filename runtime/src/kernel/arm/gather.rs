@@ -23,6 +23,8 @@ struct Context {
     /// Bytes from the inputs of a channel to those of the next.
     stride: usize,
     scales: [i32; 3],
+    /// Bytes from the sums of a channel to those of the next.
+    sums_stride: usize,
 }
 
 /// Runs the rows of one number of pairs (or of any) from `words` to `end`.
@@ -49,8 +51,8 @@ pub(crate) fn clear(values: &mut [i32]) -> bool {
 /// for all channels behind others.
 ///
 /// `fresh` says that the sums are zero. The rows are those of a segment that was checked
-/// against a grid of `sums.cells` cells, and inputs and sums have that many elements for
-/// each scale.
+/// against a grid of `sums.cells` cells and `sums.of_channel` inputs; sums and inputs have
+/// that many elements for each scale.
 pub(crate) fn gather<'a>(
     rows: impl Iterator<Item = GroupRows<'a>>,
     scales: &[I2F30],
@@ -66,8 +68,9 @@ pub(crate) fn gather<'a>(
     let mut context = Context {
         inputs: sums.inputs.as_ptr(),
         sums: sums.outputs.as_mut_ptr(),
-        stride: sums.cells * size_of::<i16>(),
+        stride: sums.of_channel * size_of::<i16>(),
         scales: [0; 3],
+        sums_stride: sums.cells * size_of::<i32>(),
     };
     for (slot, scale) in context.scales.iter_mut().zip(scales) {
         *slot = scale.to_bits();
@@ -80,8 +83,8 @@ pub(crate) fn gather<'a>(
         let words = rows.words.as_ptr_range();
         // SAFETY: the segment was checked, so `words` is aligned and holds whole rows as
         // the loop reads them, at least one, every row's index is below `sums.cells` and every pair's below
-        // `sums.cells - 1`; the caller made sure that `inputs` and `sums` have
-        // `sums.cells` elements for each scale. The table lies in flash that nobody
+        // `sums.of_channel - 1`; the caller made sure that `sums` and `inputs` have
+        // `sums.cells` and `sums.of_channel` elements for each scale. The table lies in flash that nobody
         // writes while a `Table` borrows it. Words of two inputs need no alignment.
         unsafe {
             run(words.start.cast(), &raw const context, words.end.cast());
@@ -344,8 +347,7 @@ global_asm!(
     \name:
         push {{r4-r11, lr}}
         sub sp, #28
-        ldmia r1, {{r3-r8}}
-        lsl r9, r5, #1
+        ldmia r1, {{r3-r9}}
         str r2, [sp, #20]
         stmia sp, {{r4, r6-r9}}
         mov r1, r3

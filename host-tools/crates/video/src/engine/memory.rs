@@ -3,9 +3,10 @@
 use super::super::bands::STRIP;
 use super::EngineJob;
 use iltm_runtime::{
+    haar::Basis,
     image::Table,
     pipeline::{RowBuffers, Workspace},
-    units::{Drive, InputCoefficient},
+    units::{Drive, Halfword, InputCoefficient},
 };
 use std::sync::{Mutex, PoisonError};
 
@@ -16,6 +17,8 @@ pub struct OperatorMemory {
     cells: Vec<i32>,
     inputs: Vec<InputCoefficient>,
     sums: Vec<i32>,
+    heard: Option<Vec<Halfword>>,
+    neighbours: Option<Basis>,
 }
 
 impl OperatorMemory {
@@ -23,13 +26,22 @@ impl OperatorMemory {
     #[must_use]
     pub fn new(table: &Table<'_>) -> Self {
         let values = table.grid().cells() * usize::from(table.channels());
-        let buffer = || vec![0; table.basis().scratch_len()];
+        let others = table.neighbours().map(|others| Basis::new(others.grid()));
+        let others = others.map_or(0, |basis| basis.scratch_len());
+        let buffer = || vec![0; table.basis().scratch_len().max(others)];
         Self {
             buffers: [buffer(), buffer()],
             cells: vec![0; table.grid().cells()],
-            inputs: vec![0; values],
+            inputs: vec![0; table.inputs() * usize::from(table.channels())],
             sums: vec![0; values],
+            heard: None,
+            neighbours: None,
         }
+    }
+
+    /// Light of the neighbours' cells for the frames to come ([`Workspace::heard`]).
+    pub fn hear(&mut self, light: Option<Vec<Halfword>>) {
+        self.heard = light;
     }
 
     /// The workspace of one frame.
@@ -40,6 +52,8 @@ impl OperatorMemory {
             cells: &mut self.cells,
             inputs: &mut self.inputs,
             sums: &mut self.sums,
+            heard: self.heard.as_deref(),
+            neighbours: &mut self.neighbours,
         }
     }
 }

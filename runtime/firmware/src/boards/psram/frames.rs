@@ -7,6 +7,7 @@ use iltm_runtime::frame_buffers::{
     psram,
 };
 use iltm_runtime::link::SourceFault;
+use iltm_runtime::units::Halfword;
 
 /// The frame memory's range in the PSRAM from a range in the frame memory.
 pub(super) fn in_psram(range: Range<usize>) -> Range<usize> {
@@ -72,6 +73,12 @@ impl FrameSource for PsramSource {
         frame.map_or(&[], |(receiver, claim)| {
             super::bytes(in_psram(receiver.pixels(claim)))
         })
+    }
+
+    fn heard(&self) -> Option<&[Halfword]> {
+        let (receiver, claim) = self.receiver.as_ref().zip(self.claim.as_ref())?;
+        let light = receiver.light(claim)?;
+        Some(super::bytes(in_psram(light)).as_chunks().0)
     }
 
     fn release(&mut self) -> Result<(), Broken> {

@@ -1,0 +1,675 @@
+//! Split of a table: one for each projector, from that of a wide frame of several.
+//!
+//! A device drives one projector. Its table has the cells of its own frame, and takes the light
+//! that is wanted of the other projectors, its neighbours, on a coarser grid
+//! ([`Neighbours`](iltm_runtime::image::Neighbours)). With `d` of a wide frame, `A` the restriction
+//! to the own cells and `U` from the coarse cells of the neighbours to fine ones, `K d` becomes
+//! `A K A^T d_own + A K U d_others`. Both bases are orthonormal, so each of the operator's entries
+//! is spread over the functions that its own two overlap; most overlap one.
+
+use crate::CompileError;
+use crate::haar_entries::{HaarEntry, entries_of};
+use crate::image::{ImageWriter, neighbours_section, operator_sections, projector_section};
+use crate::ladder::{Entry, Part, most_useful_first};
+use crate::quantise::{TooStrong, quantise};
+use crate::table::load;
+use fixed::types::U0F32;
+use iltm_runtime::haar::{Basis, Function};
+use iltm_runtime::image::layout::SectionKind;
+use iltm_runtime::image::layout::fine_gain;
+use iltm_runtime::image::layout::label::NAME_BYTES;
+use iltm_runtime::image::{Checked, Label, Meta, Table, TierInfo};
+use iltm_runtime::operator::{Channels, Operator, Segment};
+use iltm_runtime::placement::ProjectorPixels;
+use iltm_runtime::{FrameSize, Grid};
+use iltm_solve::{Haar, wanted_images};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::ops::Range;
+use thiserror::Error;
+
+/// Cells of a frame along each side of a cell that its neighbours take of it, if nothing else is
+/// asked for.
+pub const NEIGHBOURS_FACTOR: usize = 4;
+
+/// Most projectors of a wide frame.
+const MOST_PROJECTORS: usize = 8;
+
+/// What a tier may leave out for being split, as a part of its own error: it adds a twentieth.
+const LEFT_OUT: f64 = 0.3;
+
+/// The table of one projector.
+#[derive(Clone, Debug)]
+pub struct SplitTable {
+    /// The image, checked.
+    pub image: Vec<u8>,
+    /// Errors by tier.
+    pub tiers: Vec<SplitError>,
+}
+
+/// Errors of a tier on the surfaces of one projector, relative, root mean square over natural
+/// images: `|correction - that of the wide table's top tier| / gain` over `|light|`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SplitError {
+    /// Of the wide table's tier.
+    pub wide: f64,
+    /// With the light of the neighbours.
+    pub together: f64,
+    /// While they are silent.
+    pub alone: f64,
+}
+
+/// Why a table cannot be split.
+#[derive(Debug, Error)]
+pub enum SplitTableError {
+    /// Its columns are not those of so many frames.
+    #[error("{cols} columns of cells are not those of {projectors} projectors alike")]
+    Columns {
+        /// Columns of the table's grid.
+        cols: usize,
+        /// Projectors.
+        projectors: usize,
+    },
+    /// Its frames have a border, or a width that is not that of so many.
+    #[error(
+        "frames {width} pixels wide with a border of {border} are not those of {projectors} projectors alike"
+    )]
+    Frames {
+        /// Width of the wide frame.
+        width: usize,
+        /// Border of it.
+        border: u16,
+        /// Projectors.
+        projectors: usize,
+    },
+    /// It is for one of several projectors already.
+    #[error("the table is that of one projector of several already")]
+    Split,
+    /// The neighbours have too many cells.
+    #[error(
+        "the neighbours have {cells} cells, and a table takes at most as many as its own and {} with these",
+        Grid::MAX_CELLS
+    )]
+    NeighboursCells {
+        /// Their cells.
+        cells: usize,
+    },
+    /// A part cannot be stored.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+}
+
+/// Splits the table of `projectors` frames side by side, from left to right. Each takes one cell of
+/// its neighbours for `factor` of theirs along each side.
+///
+/// # Errors
+/// [`SplitTableError`] if the table is none of so many frames, or a part cannot be stored.
+pub fn split_table(
+    image: &[u8],
+    projectors: usize,
+    factor: usize,
+) -> Result<Vec<SplitTable>, SplitTableError> {
+    let own = Checked::new(image, &mut || {}).map_err(CompileError::Image)?;
+    let (meta, table) = (*own.meta(), own.table());
+    if table.neighbours().is_some() {
+        return Err(SplitTableError::Split);
+    }
+    let cols = meta.grid.cols();
+    if !(2..=MOST_PROJECTORS).contains(&projectors) || !cols.is_multiple_of(projectors) {
+        return Err(SplitTableError::Columns { cols, projectors });
+    }
+    let wide = Wide::new(&table, meta, projectors, factor)?;
+    (0..projectors).map(|own| wide.part(image, own)).collect()
+}
+
+/// The wide table and what all parts need of it.
+struct Wide<'t, 'a> {
+    table: &'t Table<'a>,
+    meta: Meta,
+    projectors: usize,
+    own: Grid,
+    others: Grid,
+    pixels: Option<ProjectorPixels>,
+    functions: Vec<Function>,
+    /// Natural images, and their coefficients.
+    images: DMatrix<f64>,
+    coefficients: DMatrix<f64>,
+}
+
+/// A function of the wide frame by those of another grid: index and product of the two.
+type Overlaps = Vec<Vec<(u32, f64)>>;
+
+/// Where the cells along a side go: the places of the other grid, and the share of a cell that
+/// lies in each.
+type Side = Vec<Vec<(usize, f64)>>;
+
+impl<'t, 'a> Wide<'t, 'a> {
+    fn new(
+        table: &'t Table<'a>,
+        meta: Meta,
+        projectors: usize,
+        factor: usize,
+    ) -> Result<Self, SplitTableError> {
+        let (rows, cols) = (meta.grid.rows(), meta.grid.cols() / projectors);
+        let coarse = |side: usize| side.div_ceil(factor.max(1)) as u16;
+        let others = (projectors - 1) as u16 * coarse(cols);
+        let grid = |rows, cols| Grid::new(rows, cols).map_err(|_| SplitTableError::Split);
+        let own = grid(rows as u16, cols as u16)?;
+        let others = grid(coarse(rows), others)?;
+        let cells = others.cells();
+        if cells > own.cells() || cells + own.cells() > Grid::MAX_CELLS {
+            return Err(SplitTableError::NeighboursCells { cells });
+        }
+        let images = wanted_images(meta.grid);
+        Ok(Self {
+            table,
+            meta,
+            projectors,
+            own,
+            others,
+            pixels: own_pixels(table, projectors)?,
+            functions: table.basis().functions().collect(),
+            coefficients: Haar::new(meta.grid).analyse_columns(&images),
+            images,
+        })
+    }
+
+    fn columns(&self, own: usize) -> Range<usize> {
+        own * self.own.cols()..(own + 1) * self.own.cols()
+    }
+
+    /// Where columns go: to those of the projector's own frame, and to the coarse ones of the
+    /// others.
+    fn sides(&self, own: usize) -> [[Side; 2]; 2] {
+        let columns = self.columns(own);
+        let (all, width) = (self.meta.grid.cols(), self.own.cols());
+        let rows = self.own.rows();
+        let coarse = self.others.cols() / (self.projectors - 1);
+        let of_own = (0..all).map(|col| {
+            let place = columns.contains(&col).then(|| (col - columns.start, 1.0));
+            place.into_iter().collect()
+        });
+        let side = spread(width, coarse);
+        let of_others = (0..all).map(|col| {
+            let projector = col / width;
+            if projector == own {
+                return Vec::new();
+            }
+            let first = (projector - usize::from(projector > own)) * coarse;
+            let places = side[col % width].iter();
+            places.map(|(at, share)| (first + at, *share)).collect()
+        });
+        [
+            [
+                (0..rows).map(|row| vec![(row, 1.0)]).collect(),
+                of_own.collect(),
+            ],
+            [spread(rows, self.others.rows()), of_others.collect()],
+        ]
+    }
+
+    /// The functions of the wide frame by those of a grid.
+    fn overlaps(&self, grid: Grid, [down, across]: &[Side; 2]) -> Overlaps {
+        const AT_ONCE: usize = 256;
+        let haar = Haar::new(grid);
+        let chunks = self.functions.par_chunks(AT_ONCE).map(|functions| {
+            let mut cells = DMatrix::zeros(grid.cells(), functions.len());
+            for (mut column, function) in cells.column_iter_mut().zip(functions) {
+                let norm = (function.squared_norm() as f64).sqrt();
+                let (height, width) = function.extent();
+                let (top, left) = (usize::from(function.row), usize::from(function.col));
+                for row in top..top + height {
+                    for col in left..left + width {
+                        let value = function.at(row, col) as f64 / norm;
+                        for (r, down) in &down[row] {
+                            for (c, across) in &across[col] {
+                                column[r * grid.cols() + c] += value * down * across;
+                            }
+                        }
+                    }
+                }
+            }
+            let found = haar.analyse_columns(&cells);
+            let of_function = |column: usize| {
+                let values = found.column(column);
+                let values = values.iter().enumerate();
+                let values = values.filter(|(_, value)| value.abs() > 1e-9);
+                values.map(|(at, value)| (at as u32, *value)).collect()
+            };
+            (0..functions.len()).map(of_function).collect::<Vec<_>>()
+        });
+        chunks.collect::<Vec<_>>().concat()
+    }
+
+    /// The table of one projector.
+    fn part(&self, image: &[u8], own: usize) -> Result<SplitTable, SplitTableError> {
+        let [to_own, to_others] = self.sides(own);
+        let outputs = self.overlaps(self.own, &to_own);
+        let mut inputs = outputs.clone();
+        let others = self.overlaps(self.others, &to_others);
+        let first = self.own.cells() as u32;
+        for (inputs, others) in inputs.iter_mut().zip(others) {
+            inputs.extend(others.iter().map(|(at, value)| (first + at, *value)));
+        }
+        let part = ProjectorPart {
+            wide: self,
+            own,
+            content: self.content(&[&to_own, &to_others]),
+            outputs,
+            inputs,
+        };
+        part.table(image)
+    }
+
+    /// Coefficients of the natural images on the own cells and those of the neighbours.
+    fn content(&self, sides: &[&[Side; 2]; 2]) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(self.own.cells() + self.others.cells(), self.images.ncols());
+        let mut start = 0;
+        for (grid, [down, across]) in [self.own, self.others].into_iter().zip(sides) {
+            let mut cells = DMatrix::zeros(grid.cells(), self.images.ncols());
+            let mut weights = vec![0.0; grid.cells()];
+            for (index, light) in self.images.row_iter().enumerate() {
+                let (row, col) = (index / self.meta.grid.cols(), index % self.meta.grid.cols());
+                for (r, by_row) in &down[row] {
+                    for (c, by_col) in &across[col] {
+                        let (at, weight) = (r * grid.cols() + c, by_row * by_col);
+                        weights[at] += weight;
+                        let mut mean = cells.row_mut(at);
+                        mean += light * weight;
+                    }
+                }
+            }
+            for (mut row, weight) in cells.row_iter_mut().zip(weights) {
+                row /= weight;
+            }
+            let coefficients = Haar::new(grid).analyse_columns(&cells);
+            let mut rows = all.rows_mut(start, grid.cells());
+            rows.copy_from(&coefficients);
+            start += grid.cells();
+        }
+        all
+    }
+}
+
+/// Where the cells along a side of `fine` go on one of `coarse`.
+fn spread(fine: usize, coarse: usize) -> Side {
+    let share = |at: usize, place: usize| {
+        // Both sides in units of `1 / (fine coarse)`.
+        let from = (at * coarse).max(place * fine);
+        let to = ((at + 1) * coarse).min((place + 1) * fine);
+        (to > from).then(|| (place, (to - from) as f64 / coarse as f64))
+    };
+    let of_cell = |at| (0..coarse).filter_map(|place| share(at, place)).collect();
+    (0..fine).map(of_cell).collect()
+}
+
+/// The pixels of one of the projectors whose frames make a wide one.
+fn own_pixels(
+    table: &Table<'_>,
+    projectors: usize,
+) -> Result<Option<ProjectorPixels>, SplitTableError> {
+    let Some(pixels) = table.projector() else {
+        return Ok(None);
+    };
+    let (width, border) = (pixels.size().width(), pixels.border());
+    let own = FrameSize::new((width / projectors) as u16, pixels.size().height() as u16);
+    let own = own.filter(|_| border == 0 && width.is_multiple_of(projectors));
+    let own = own.ok_or(SplitTableError::Frames {
+        width,
+        border,
+        projectors,
+    })?;
+    Ok(Some(ProjectorPixels::whole(own)))
+}
+
+/// One projector, and the wide frame's functions by its own.
+struct ProjectorPart<'w, 't, 'a> {
+    wide: &'w Wide<'t, 'a>,
+    own: usize,
+    /// Coefficients of the natural images, one row an input.
+    content: DMatrix<f64>,
+    outputs: Overlaps,
+    inputs: Overlaps,
+}
+
+impl ProjectorPart<'_, '_, '_> {
+    fn table(&self, image: &[u8]) -> Result<SplitTable, SplitTableError> {
+        let wide = self.wide;
+        let (table, meta) = (wide.table, wide.meta);
+        let basis = Basis::new(wide.own);
+        let others = Basis::new(wide.others);
+        let functions: Vec<Function> = basis.functions().chain(others.functions()).collect();
+        let mut quantised = Vec::new();
+        let mut errors = Vec::new();
+        for tier in 1..=table.top_tier() {
+            let entries = self.entries(tier);
+            errors.push(self.errors(tier, &entries));
+            let segments = quantise(&functions, tier, &entries, |_| 1.0)
+                .map_err(|TooStrong { row }| CompileError::TooStrong { row })?;
+            quantised.extend(segments);
+        }
+        let sections = operator_sections(functions.len(), &quantised);
+        let operator = load(&basis, functions.len(), &sections, meta.channel_scales)?;
+        let costs = (0..=table.top_tier()).map(|tier| operator.cost(tier, meta.channels));
+        let tiers = table.tiers().iter().zip(costs).enumerate();
+        let tiers = tiers.flat_map(|(tier, (info, (entries, multiplications)))| {
+            let more = tier
+                .checked_sub(1)
+                .map_or(0.0, |tier| errors[tier].together);
+            let less = tier.checked_sub(1).map_or(0.0, |tier| errors[tier].wide);
+            let more = (more.powi(2) - less.powi(2)).max(0.0);
+            let error = (info.predicted_error.to_num::<f64>().powi(2) + more).sqrt();
+            TierInfo {
+                predicted_error: U0F32::saturating_from_num(error),
+                entries,
+                multiplications,
+            }
+            .emit()
+        });
+        let tiers: Vec<u8> = tiers.collect();
+        let name = self.label();
+        let head = Meta {
+            grid: wide.own,
+            bounds: operator.bounds(),
+            label: name,
+            ..meta
+        };
+        let mut part = ImageWriter::of_image(image);
+        part.replace(SectionKind::Meta, Some(head.emit().to_vec()));
+        part.replace(SectionKind::Tiers, Some(tiers));
+        self.cut(&mut part, SectionKind::Gain, meta.grid.cols(), 0);
+        if let Some(fine) = table.fine_gain() {
+            self.cut(
+                &mut part,
+                SectionKind::FineGain,
+                fine.size().width(),
+                fine_gain::SIZE,
+            );
+        }
+        let ambient = self.ambient_of_others();
+        self.cut(&mut part, SectionKind::Ambient, meta.grid.cols(), 0);
+        let pixels = wide.pixels.map(projector_section);
+        part.replace(SectionKind::Projector, pixels);
+        part.replace(SectionKind::Operator, None);
+        for (selector, bytes) in &sections {
+            part.section(SectionKind::Operator, *selector, bytes.clone());
+        }
+        let around = [self.own as u8, (wide.projectors - 1 - self.own) as u8];
+        let section = neighbours_section(wide.others, around, ambient);
+        part.replace(SectionKind::Neighbours, Some(section));
+        let image = part.finish();
+        Table::check(&image).map_err(CompileError::Image)?;
+        Ok(SplitTable {
+            image,
+            tiers: errors,
+        })
+    }
+}
+
+impl ProjectorPart<'_, '_, '_> {
+    /// The operator of a tier by the own functions, without what is worth least.
+    fn entries(&self, tier: u8) -> Vec<Entry> {
+        let found = self.all_entries(tier);
+        let images = self.content.ncols() as f64;
+        let rows = self.content.row_iter();
+        let sigma: Vec<f64> = rows.map(|row| row.norm() / images.sqrt()).collect();
+        let channels = self.wide.meta.channels;
+        let scales = self.scales();
+        let squares: f64 = scales.iter().map(|scale| scale * scale).sum();
+        let worth = |entry: &Entry| {
+            let weight = match entry.part {
+                Part::Shared => squares,
+                Part::Channel(channel) => scales[usize::from(channel)].powi(2),
+            };
+            weight * (entry.value * sigma[entry.col as usize]).powi(2)
+        };
+        let mut entries = most_useful_first(found, worth, channels);
+        let error = self.wide.table.tiers()[usize::from(tier)].predicted_error;
+        let may = LEFT_OUT * error.to_num::<f64>() * self.light();
+        let mut left_out = 0.0;
+        while let Some(last) = entries.last() {
+            left_out += worth(last) / f64::from(channels);
+            if left_out > may * may {
+                break;
+            }
+            entries.pop();
+        }
+        entries
+    }
+
+    /// All of a tier, from whatever a device would read.
+    fn all_entries(&self, tier: u8) -> Vec<Entry> {
+        let segments = self
+            .wide
+            .table
+            .operator()
+            .map_or(&[][..], Operator::segments);
+        let of_tier = segments.iter().filter(|segment| segment.tier == tier);
+        let mut found = Vec::new();
+        for segment in of_tier {
+            let part = match segment.channels {
+                Channels::All => Part::Shared,
+                Channels::One(channel) => Part::Channel(channel),
+            };
+            let entry = |(row, col, value)| Entry {
+                part,
+                row,
+                col,
+                value,
+            };
+            let stored = entries_of(&self.wide.functions, segment);
+            found.extend(self.spread(&stored).into_iter().map(entry));
+        }
+        found
+    }
+
+    /// Entries between functions of the wide frame as entries between the own ones.
+    fn spread(&self, stored: &[HaarEntry]) -> Vec<(u32, u32, f64)> {
+        let count = self.content.nrows();
+        // By inputs first, a row of the wide frame's after the other.
+        let rows: Vec<&[HaarEntry]> = stored.chunk_by(|a, b| a.row == b.row).collect();
+        let by_inputs = rows.par_iter().map_init(
+            || vec![0.0; count],
+            |sums, row| {
+                if self.outputs[row[0].row].is_empty() {
+                    return Vec::new();
+                }
+                let terms = row.iter().flat_map(|entry| {
+                    let spread = self.inputs[entry.col].iter();
+                    spread.map(|(at, share)| (*at, share * entry.value))
+                });
+                sum_up(sums, terms)
+            },
+        );
+        let by_inputs: Vec<Vec<(u32, f64)>> = by_inputs.collect();
+        let mut of_output: Vec<Vec<(usize, f64)>> = vec![Vec::new(); self.wide.own.cells()];
+        for (index, row) in rows.iter().enumerate() {
+            for (at, share) in &self.outputs[row[0].row] {
+                of_output[*at as usize].push((index, *share));
+            }
+        }
+        let spread = of_output.par_iter().enumerate().map_init(
+            || vec![0.0; count],
+            |sums, (output, rows)| {
+                let terms = rows.iter().flat_map(|(index, share)| {
+                    let inputs = by_inputs[*index].iter();
+                    inputs.map(move |(at, value)| (*at, share * value))
+                });
+                let of_row = sum_up(sums, terms).into_iter();
+                let entry = |(at, value)| (output as u32, at, value);
+                of_row.map(entry).collect::<Vec<_>>()
+            },
+        );
+        spread.collect::<Vec<_>>().concat()
+    }
+
+    /// What multiplies the operator in each channel.
+    fn scales(&self) -> Vec<f64> {
+        let scales = self.wide.meta.channel_scales.iter();
+        let scales = scales.take(self.wide.meta.channels.into());
+        scales.map(|scale| scale.to_num()).collect()
+    }
+
+    /// The drive of the natural images by gain alone, root of the sum of squares of an image.
+    fn light(&self) -> f64 {
+        let own = self.content.rows(0, self.wide.own.cells());
+        self.gain() * own.norm() / (own.ncols() as f64).sqrt()
+    }
+
+    /// Mean gain of cells that the projector can light.
+    fn gain(&self) -> f64 {
+        let table = self.wide.table;
+        let unit = f64::from(table.gain_fraction()).exp2();
+        let columns = self.wide.columns(self.own);
+        let rows = (0..self.wide.own.rows()).flat_map(|row| {
+            let channels = 0..usize::from(table.channels());
+            channels.flat_map(move |channel| table.gain_row(row, channel).enumerate())
+        });
+        let gains = rows.filter(|(col, gain)| columns.contains(col) && *gain > 0);
+        let (sum, count) = gains.fold((0.0, 0), |(sum, count), (_, gain)| {
+            (sum + f64::from(gain) / unit, count + 1)
+        });
+        sum / f64::from(count.max(1))
+    }
+
+    /// Errors of these entries in the place of the wide table's.
+    fn errors(&self, tier: u8, entries: &[Entry]) -> SplitError {
+        let own = self.wide.own.cells() as u32;
+        let scales = self.scales();
+        let mut squares = [0.0; 3];
+        for (channel, scale) in scales.iter().enumerate() {
+            let counts = |part: Part| match part {
+                Part::Shared => true,
+                Part::Channel(one) => usize::from(one) == channel,
+            };
+            let right = self.wide_corrections(self.wide.table.top_tier(), channel);
+            let of_wide = self.wide_corrections(tier, channel);
+            let mut found = [(); 2].map(|()| DMatrix::zeros(own as usize, self.content.ncols()));
+            for entry in entries.iter().filter(|entry| counts(entry.part)) {
+                let light = self.content.row(entry.col as usize) * (scale * entry.value);
+                let [together, alone] = &mut found;
+                let mut row = together.row_mut(entry.row as usize);
+                row += &light;
+                if entry.col < own {
+                    let mut row = alone.row_mut(entry.row as usize);
+                    row += light;
+                }
+            }
+            let [together, alone] = found;
+            for (square, found) in squares.iter_mut().zip([of_wide, together, alone]) {
+                *square += (found - &right).norm_squared() / self.content.ncols() as f64;
+            }
+        }
+        let error = |square: f64| (square / scales.len() as f64).sqrt() / self.light();
+        let [wide, together, alone] = squares.map(error);
+        SplitError {
+            wide,
+            together,
+            alone,
+        }
+    }
+
+    /// Corrections of the natural images by the wide table at a tier, coefficients of the own
+    /// frame.
+    fn wide_corrections(&self, tier: u8, channel: usize) -> DMatrix<f64> {
+        let wide = self.wide;
+        let segments = wide.table.operator().map_or(&[][..], Operator::segments);
+        let scale = self.scales()[channel];
+        let mut corrections = DMatrix::zeros(wide.own.cells(), self.content.ncols());
+        let counts = |segment: &&Segment<'_>| {
+            segment.tier == tier
+                && match segment.channels {
+                    Channels::All => true,
+                    Channels::One(one) => usize::from(one) == channel,
+                }
+        };
+        for segment in segments.iter().filter(counts) {
+            for entry in entries_of(&wide.functions, segment) {
+                for (at, share) in &self.outputs[entry.row] {
+                    let light = wide.coefficients.row(entry.col) * (scale * entry.value * share);
+                    let mut row = corrections.row_mut(*at as usize);
+                    row += light;
+                }
+            }
+        }
+        corrections
+    }
+
+    /// Name of the wide table, and which of its projectors this is.
+    fn label(&self) -> Label {
+        let label = self.wide.meta.label;
+        let number = format!(" {}/{}", self.own + 1, self.wide.projectors);
+        let mut name = label.name().to_owned();
+        while name.len() + number.len() > NAME_BYTES {
+            name.pop();
+        }
+        Label::new(&(name + &number), label.date())
+    }
+
+    /// Cuts a section of values of a grid with `cols` columns, behind a head that says rows and
+    /// columns if it has `head` bytes, to the projector's own columns.
+    fn cut(&self, part: &mut ImageWriter, kind: SectionKind, cols: usize, head: usize) {
+        let Some(bytes) = part.bytes(kind) else {
+            return;
+        };
+        let value = size_of::<u16>() * usize::from(self.wide.meta.channels);
+        let width = cols / self.wide.projectors;
+        let (first, values) = bytes.split_at(head);
+        let mut cut = first.to_vec();
+        if let Some(stated) = cut.get_mut(fine_gain::COLS) {
+            stated.copy_from_slice(&(width as u16).to_le_bytes());
+        }
+        for row in values.chunks_exact(cols * value) {
+            cut.extend_from_slice(&row[self.own * width * value..][..width * value]);
+        }
+        part.replace(kind, Some(cut));
+    }
+
+    /// Ambient light of the neighbours' cells, the mean of what they cover; none in a dark room.
+    fn ambient_of_others(&self) -> Vec<u16> {
+        let wide = self.wide;
+        let channels = usize::from(wide.meta.channels);
+        let [_, [down, across]] = wide.sides(self.own);
+        let mut sums = vec![(0.0, 0.0); wide.others.cells() * channels];
+        for (row, places) in down.iter().enumerate() {
+            for channel in 0..channels {
+                let Some(ambient) = wide.table.ambient_row(row, channel) else {
+                    return Vec::new();
+                };
+                for (col, light) in ambient.enumerate() {
+                    for (r, by_row) in places {
+                        for (c, by_col) in &across[col] {
+                            let at = (r * wide.others.cols() + c) * channels + channel;
+                            let (sum, weight) = &mut sums[at];
+                            *sum += f64::from(light.to_bits()) * by_row * by_col;
+                            *weight += by_row * by_col;
+                        }
+                    }
+                }
+            }
+        }
+        let means = sums
+            .iter()
+            .map(|(sum, weight)| (sum / weight).round() as u16);
+        means.collect()
+    }
+}
+
+/// Adds up what terms say of places, and empties the memory again.
+fn sum_up(sums: &mut [f64], terms: impl Iterator<Item = (u32, f64)>) -> Vec<(u32, f64)> {
+    let mut touched = Vec::new();
+    for (at, value) in terms {
+        let sum = &mut sums[at as usize];
+        if *sum == 0.0 {
+            touched.push(at);
+        }
+        *sum += value;
+    }
+    touched.sort_unstable();
+    touched.dedup();
+    let taken = touched.into_iter().map(|at| {
+        let value = std::mem::take(&mut sums[at as usize]);
+        (at, value)
+    });
+    taken.filter(|(_, value)| *value != 0.0).collect()
+}
