@@ -1,7 +1,7 @@
 //! Split tables: what the devices of several projectors make of a wide frame, against the table of all.
 
 use iltm::compile::{SplitTableError, split_table};
-use iltm::video::WideFrames;
+use iltm::video::FrameSplitter;
 use iltm_runtime::FrameSize;
 use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
@@ -45,7 +45,7 @@ fn side_by_side(
         .iter()
         .map(|part| {
             let table = Table::check(&part.image).expect("split checked it");
-            let frames = WideFrames::new(&table, wide, Encoding::Linear).expect("wide frames");
+            let frames = FrameSplitter::new(&table, wide, Encoding::Linear).expect("wide frames");
             let own = frames.of_frame(frame);
             let light = (!silent).then_some(own.light.as_slice());
             let format = Format::new(frames.own(), channels as u8, Encoding::Linear, 1_000);
@@ -129,7 +129,7 @@ fn an_even_light_of_a_neighbour_is_its_light_in_every_cell() {
     let table = Table::check(&parts[1].image).expect("split checked it");
     // Neither rows nor columns of pixels are a multiple of the cells'.
     let wide = FrameSize::new(3 * 23, 31).expect("not empty");
-    let frames = WideFrames::new(&table, wide, Encoding::Linear).expect("wide frames");
+    let frames = FrameSplitter::new(&table, wide, Encoding::Linear).expect("wide frames");
     assert_eq!((frames.own().width(), frames.cells()), (23, grid(2, 4)));
     let colours = [[10, 20, 30], [0, 0, 0], [255, 128, 1]];
     let frame: Vec<u8> = (0..wide.pixels())

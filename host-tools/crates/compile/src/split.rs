@@ -118,12 +118,12 @@ pub fn split_table(
     if !(2..=MOST_PROJECTORS).contains(&projectors) || !cols.is_multiple_of(projectors) {
         return Err(SplitTableError::Columns { cols, projectors });
     }
-    let wide = Wide::new(&table, meta, projectors, factor)?;
+    let wide = WideTable::new(&table, meta, projectors, factor)?;
     (0..projectors).map(|own| wide.part(image, own)).collect()
 }
 
 /// The wide table and what all parts need of it.
-struct Wide<'t, 'a> {
+struct WideTable<'t, 'a> {
     table: &'t Table<'a>,
     meta: Meta,
     projectors: usize,
@@ -143,7 +143,7 @@ type Overlaps = Vec<Vec<(u32, f64)>>;
 /// lies in each.
 type Side = Vec<Vec<(usize, f64)>>;
 
-impl<'t, 'a> Wide<'t, 'a> {
+impl<'t, 'a> WideTable<'t, 'a> {
     fn new(
         table: &'t Table<'a>,
         meta: Meta,
@@ -251,7 +251,7 @@ impl<'t, 'a> Wide<'t, 'a> {
         for (inputs, others) in inputs.iter_mut().zip(others) {
             inputs.extend(others.iter().map(|(at, value)| (first + at, *value)));
         }
-        let part = ProjectorPart {
+        let part = SplitPart {
             wide: self,
             own,
             content: self.content(&[&to_own, &to_others]),
@@ -323,8 +323,8 @@ fn own_pixels(
 }
 
 /// One projector, and the wide frame's functions by its own.
-struct ProjectorPart<'w, 't, 'a> {
-    wide: &'w Wide<'t, 'a>,
+struct SplitPart<'w, 't, 'a> {
+    wide: &'w WideTable<'t, 'a>,
     own: usize,
     /// Coefficients of the natural images, one row an input.
     content: DMatrix<f64>,
@@ -332,7 +332,7 @@ struct ProjectorPart<'w, 't, 'a> {
     inputs: Overlaps,
 }
 
-impl ProjectorPart<'_, '_, '_> {
+impl SplitPart<'_, '_, '_> {
     fn table(&self, image: &[u8]) -> Result<SplitTable, SplitTableError> {
         let wide = self.wide;
         let (table, meta) = (wide.table, wide.meta);
@@ -406,7 +406,7 @@ impl ProjectorPart<'_, '_, '_> {
     }
 }
 
-impl ProjectorPart<'_, '_, '_> {
+impl SplitPart<'_, '_, '_> {
     /// The operator of a tier by the own functions, without what is worth least.
     fn entries(&self, tier: u8) -> Vec<Entry> {
         let found = self.all_entries(tier);

@@ -5,7 +5,7 @@ use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_video::{
-    Input, OwnFrame, VideoError, WideFrames,
+    FrameSplitter, Input, OwnFrame, VideoError,
     test_scene::TestScene,
     y4m::{CodeRange, Reader, Y4mError, YuvFrame},
     yuv::{Conversion, Standard},
@@ -22,7 +22,7 @@ pub struct FrameFeed {
     channels: u8,
     rate: f64,
     /// Where the device is one of several projectors'.
-    wide: Option<WideFrames>,
+    wide: Option<FrameSplitter>,
 }
 
 #[derive(Debug)]
@@ -98,7 +98,7 @@ impl FrameFeed {
         let Some(neighbours) = table.neighbours() else {
             return Ok(self);
         };
-        let wide = WideFrames::new(table, self.size, Encoding::Display);
+        let wide = FrameSplitter::new(table, self.size, Encoding::Display);
         let [before, after] = neighbours.around();
         let wide = wide.ok_or(VideoError::NotWide {
             projectors: before + 1 + after,
@@ -111,13 +111,13 @@ impl FrameFeed {
     /// Pixels of a frame of the device.
     #[must_use]
     pub fn size(&self) -> FrameSize {
-        self.wide.as_ref().map_or(self.size, WideFrames::own)
+        self.wide.as_ref().map_or(self.size, FrameSplitter::own)
     }
 
     /// The neighbours' cells whose light comes with each.
     #[must_use]
     pub fn neighbours(&self) -> Option<Grid> {
-        self.wide.as_ref().map(WideFrames::cells)
+        self.wide.as_ref().map(FrameSplitter::cells)
     }
 
     /// Samples of a pixel.

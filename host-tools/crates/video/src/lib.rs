@@ -59,7 +59,7 @@ pub use engine::OperatorMemory;
 pub use error::VideoError;
 pub use fit::{Fit, PlacedFrames};
 pub use input::{Input, sampled_frames};
-pub use neighbours::{OwnFrame, WideFrames, wide_size};
+pub use neighbours::{FrameSplitter, OwnFrame, wide_size};
 
 #[cfg(test)]
 mod tests;

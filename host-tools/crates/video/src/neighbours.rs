@@ -10,9 +10,9 @@ use iltm_runtime::resample::area::AreaAverage;
 use iltm_runtime::units::{Halfword, Light};
 use iltm_runtime::{FrameSize, Grid};
 
-/// Wide frames on their way to the device of one projector.
+/// Splits wide frames for the device of one projector.
 #[derive(Debug)]
-pub struct WideFrames {
+pub struct FrameSplitter {
     /// Frames on the left of the own one, and on its right.
     around: [usize; 2],
     own: FrameSize,
@@ -32,7 +32,7 @@ pub struct OwnFrame {
     pub light: Vec<Halfword>,
 }
 
-impl WideFrames {
+impl FrameSplitter {
     /// Frames whose codes mean this, for the device that has `table`; `None` if it is the table of a
     /// projector alone, or the frames are not as many of one size, side by side.
     #[must_use]
