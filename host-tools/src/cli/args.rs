@@ -802,8 +802,8 @@ pub(super) struct Split {
     pub(super) projectors: usize,
     /// Cells along each side of a frame that become one for its neighbours: more make less light to
     /// pass on and a coarser correction
-    #[arg(long, value_name = "CELLS", default_value_t = NEIGHBOURS_FACTOR)]
-    pub(super) neighbours: usize,
+    #[arg(long, value_name = "CELLS", default_value_t = NEIGHBOURS_FACTOR, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) neighbours: u16,
 }
 
 #[derive(Clone, Debug, Args)]

@@ -426,6 +426,10 @@ fn what_cannot_be_split_or_is_for_a_device_is_refused() {
         ("split t.iltm --projectors 1 -o e", "1 projectors alike"),
         ("split d/t-1.iltm --projectors 2 -o e", "already"),
         (
+            "split t.iltm --projectors 2 --neighbours 0 -o e",
+            "0 is not in 1..",
+        ),
+        (
             "split t.iltm --projectors 4 --neighbours 1 -o e",
             "the neighbours have 540 cells",
         ),

@@ -78,6 +78,8 @@ fn frame<const C: usize>(table: &Table<'_>) {
     let mut memory = OperatorMemory::new(table);
     for tier in 0..=table.top_tier() {
         for code in [0_u8, 255] {
+            let neighbours = table.neighbours();
+            memory.hear(neighbours.map(|others| vec![[code; 2]; others.samples()]));
             let mut workspace = memory.workspace();
             let (wanted, mut input) = (vec![[code; C]; cells], vec![[0; C]; cells]);
             let done =

@@ -197,7 +197,14 @@ fn tables() -> Vec<Vec<u8>> {
     let mut placed = MadeUp::of_all_kinds(Grid::new(2, 3).expect("small"), 1, 3, 1);
     let size = FrameSize::new(64, 40).expect("not empty");
     placed.projector = ProjectorPixels::new(size, 5);
-    let mut all = vec![wedge_table(3, 4, 3), wedge_table(4, 4, 1), placed.image()];
+    let others = Grid::new(1, 4).expect("small");
+    let one_of_three = placed.clone().with_neighbours(others, [1, 1], 2);
+    let mut all = vec![
+        wedge_table(3, 4, 3),
+        wedge_table(4, 4, 1),
+        placed.image(),
+        one_of_three.image(),
+    ];
     all.extend(
         [(1, 1), (2, 3)].map(|(rows, cols)| wedge_table_for(Response::Linear, rows, cols, 1)),
     );

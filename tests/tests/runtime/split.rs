@@ -83,7 +83,7 @@ fn devices_make_of_their_parts_what_the_table_of_all_makes_of_the_whole() {
         let (_, operator) = difference(&expected, &gains);
         let mut off = Vec::new();
         for factor in [block, 2 * block] {
-            let parts = split_table(&image, count, factor).expect("so many alike");
+            let parts = split_table(&image, count, factor as u16).expect("so many alike");
             assert_eq!(parts.len(), count);
             let made = side_by_side(&parts, (wide, channels), &frame, false);
             off.push(difference(&expected, &made));

@@ -30,7 +30,7 @@ use thiserror::Error;
 
 /// Cells of a frame along each side of a cell that its neighbours take of it, if nothing else is
 /// asked for.
-pub const NEIGHBOURS_FACTOR: usize = 4;
+pub const NEIGHBOURS_FACTOR: u16 = 4;
 
 /// Most projectors of a wide frame.
 const MOST_PROJECTORS: usize = 8;
@@ -107,7 +107,7 @@ pub enum SplitTableError {
 pub fn split_table(
     image: &[u8],
     projectors: usize,
-    factor: usize,
+    factor: u16,
 ) -> Result<Vec<SplitTable>, SplitTableError> {
     let own = Checked::new(image, &mut || {}).map_err(CompileError::Image)?;
     let (meta, table) = (*own.meta(), own.table());
@@ -148,10 +148,10 @@ impl<'t, 'a> WideTable<'t, 'a> {
         table: &'t Table<'a>,
         meta: Meta,
         projectors: usize,
-        factor: usize,
+        factor: u16,
     ) -> Result<Self, SplitTableError> {
         let (rows, cols) = (meta.grid.rows(), meta.grid.cols() / projectors);
-        let coarse = |side: usize| side.div_ceil(factor.max(1)) as u16;
+        let coarse = |side: usize| side.div_ceil(factor.max(1).into()) as u16;
         let others = (projectors - 1) as u16 * coarse(cols);
         let grid = |rows, cols| Grid::new(rows, cols).map_err(|_| SplitTableError::Split);
         let own = grid(rows as u16, cols as u16)?;
