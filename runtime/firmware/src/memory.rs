@@ -18,8 +18,8 @@ pub const MAX_CELLS: usize = Grid::MAX_CELLS;
 /// Most pixels of a frame larger than the grid.
 pub const MAX_PIXELS: usize = 320 * 240;
 
-/// Most pixels in a row of such a frame.
-pub const MAX_WIDTH: usize = 2_048;
+/// Most pixels in a row of such a frame: those of full HD.
+pub const MAX_WIDTH: usize = 1_920;
 
 const CHANNELS: usize = if Stage::Colour.is_built() { 3 } else { 1 };
 
