@@ -1,12 +1,12 @@
 //! `iltm split`
 
 use super::args::Split;
-use super::failure::{Failure, Kind};
+use super::failure::{Failure, cannot_write};
 use super::output::{Output, write_file};
 use super::tables::{check, read_table};
 use crate::compile::{SplitTable, split_table};
 use iltm_picture::numbers::{grouped, percent};
-use iltm_runtime::image::{Neighbours, Table, unseal};
+use iltm_runtime::image::{Table, unseal};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -17,17 +17,12 @@ pub(super) fn run(arguments: &Split, output: &Output) -> Result<(), Failure> {
     let _ = check(path, &file)?;
     let image = unseal(&file).map_or(&file[..], |(image, _)| image);
     let parts = split_table(image, arguments.projectors, arguments.neighbours)?;
-    std::fs::create_dir_all(&arguments.output).map_err(|error| {
-        Failure::new(
-            Kind::Read,
-            format!("{}: {error}", arguments.output.display()),
-            "Give a folder that can be made.",
-        )
-    })?;
+    let folder = &arguments.output;
+    std::fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
     let mut text = String::new();
     let mut data = Vec::new();
     for (number, part) in (1..).zip(&parts) {
-        let file = place(path, &arguments.output, number);
+        let file = place(path, folder, number);
         write_file(&file, &part.image)?;
         let (found, words) = said(part, number, &file)?;
         data.push(found);
@@ -52,13 +47,20 @@ fn place(table: &Path, folder: &Path, number: usize) -> PathBuf {
 fn said(part: &SplitTable, number: usize, file: &Path) -> Result<(Value, String), Failure> {
     let table = check(file, &part.image)?;
     let bytes = part.image.len() as u64;
-    let exchanged = table.neighbours().map_or(0, |others| others.bytes() as u64);
-    let others = table.neighbours().map(Neighbours::grid);
+    let others = table.neighbours();
+    let light = others.map_or_else(
+        || "none of its neighbours: gains alone take no light of theirs".to_owned(),
+        |others| {
+            let bytes = grouped(others.bytes() as u64);
+            format!(
+                "{} of its neighbours: {bytes} bytes of their light a frame",
+                others.grid()
+            )
+        },
+    );
     let mut text = format!(
-        "projector {number} {} cells of its own, {} of its neighbours: {} bytes of their light a frame\n",
-        table.grid(),
-        others.map_or_else(String::new, |grid| grid.to_string()),
-        grouped(exchanged),
+        "projector {number} {} cells of its own, {light}\n",
+        table.grid()
     );
     if let Some(top) = part.tiers.last() {
         let _ = writeln!(
@@ -83,10 +85,10 @@ fn said(part: &SplitTable, number: usize, file: &Path) -> Result<(Value, String)
         "table": file.display().to_string(),
         "bytes": bytes,
         "cells": size(&table),
-        "neighbours": others.map(|grid| json!({
-            "rows": grid.rows(),
-            "cols": grid.cols(),
-            "bytes": exchanged,
+        "neighbours": others.map(|others| json!({
+            "rows": others.grid().rows(),
+            "cols": others.grid().cols(),
+            "bytes": others.bytes(),
         })),
         "tiers": tiers.collect::<Vec<_>>(),
     });

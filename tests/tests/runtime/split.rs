@@ -166,11 +166,41 @@ fn tables_of_other_frames_are_refused() {
     let mut made = MadeUp::new(grid(4, 8), 1);
     let size = FrameSize::new(81, 40).expect("not empty");
     made.projector = Some(iltm_runtime::placement::ProjectorPixels::whole(size));
+    made.fine_gains = Some((8, 17, vec![1 << 13; 8 * 17]));
+    let odd = split_table(&made.image(), 2, 4).expect_err("17 columns of gains");
+    assert!(
+        matches!(odd, SplitTableError::Columns { cols: 17, .. }),
+        "{odd}"
+    );
+    made.fine_gains = None;
     let odd = split_table(&made.image(), 2, 4).expect_err("81 pixels");
     assert!(
         matches!(odd, SplitTableError::Frames { width: 81, .. }),
         "{odd}"
     );
+}
+
+#[test]
+fn gains_alone_are_cut_and_take_no_light_of_others() {
+    let effects = Effects {
+        operator: false,
+        deviation: false,
+        ..Effects::ALL
+    };
+    let image = random_table(grid(6, 20), 3, effects, 7);
+    let whole = Table::check(&image).expect("compile checked it");
+    for (own, part) in split_table(&image, 2, 4)
+        .expect("halves")
+        .iter()
+        .enumerate()
+    {
+        let table = Table::check(&part.image).expect("split checked it");
+        assert!(table.neighbours().is_none() && part.tiers.is_empty());
+        for row in 0..6 {
+            let of_whole = whole.gain_row(row, 1).skip(10 * own).take(10);
+            assert!(table.gain_row(row, 1).eq(of_whole), "{row}");
+        }
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@
 //! is spread over the functions that its own two overlap; most overlap one.
 
 use crate::CompileError;
-use crate::haar_entries::{HaarEntry, entries_of};
+use crate::haar_entries::{HaarEntry, entries_of, haar_entries};
 use crate::image::{ImageWriter, neighbours_section, operator_sections, projector_section};
 use crate::ladder::{Entry, Part, most_useful_first};
 use crate::quantise::{TooStrong, quantise};
@@ -63,9 +63,9 @@ pub struct SplitError {
 #[derive(Debug, Error)]
 pub enum SplitTableError {
     /// Its columns are not those of so many frames.
-    #[error("{cols} columns of cells are not those of {projectors} projectors alike")]
+    #[error("{cols} columns are not those of {projectors} projectors alike")]
     Columns {
-        /// Columns of the table's grid.
+        /// Columns of the table's cells, or of gains that are finer.
         cols: usize,
         /// Projectors.
         projectors: usize,
@@ -114,9 +114,11 @@ pub fn split_table(
     if table.neighbours().is_some() {
         return Err(SplitTableError::Split);
     }
-    let cols = meta.grid.cols();
-    if !(2..=MOST_PROJECTORS).contains(&projectors) || !cols.is_multiple_of(projectors) {
-        return Err(SplitTableError::Columns { cols, projectors });
+    let fine = table.fine_gain().map(|fine| fine.size().width());
+    for cols in [meta.grid.cols()].into_iter().chain(fine) {
+        if !(2..=MOST_PROJECTORS).contains(&projectors) || !cols.is_multiple_of(projectors) {
+            return Err(SplitTableError::Columns { cols, projectors });
+        }
     }
     let wide = WideTable::new(&table, meta, projectors, factor)?;
     (0..projectors).map(|own| wide.part(image, own)).collect()
@@ -152,14 +154,14 @@ impl<'t, 'a> WideTable<'t, 'a> {
     ) -> Result<Self, SplitTableError> {
         let (rows, cols) = (meta.grid.rows(), meta.grid.cols() / projectors);
         let coarse = |side: usize| side.div_ceil(factor.max(1).into()) as u16;
-        let others = (projectors - 1) as u16 * coarse(cols);
-        let grid = |rows, cols| Grid::new(rows, cols).map_err(|_| SplitTableError::Split);
-        let own = grid(rows as u16, cols as u16)?;
-        let others = grid(coarse(rows), others)?;
-        let cells = others.cells();
-        if cells > own.cells() || cells + own.cells() > Grid::MAX_CELLS {
-            return Err(SplitTableError::NeighboursCells { cells });
-        }
+        let of_others = [coarse(rows), (projectors - 1) as u16 * coarse(cols)];
+        let cells = of_others.map(usize::from).iter().product();
+        let too_many = SplitTableError::NeighboursCells { cells };
+        let grids = Grid::new(rows as u16, cols as u16)
+            .ok()
+            .zip(Grid::new(of_others[0], of_others[1]).ok())
+            .filter(|(own, _)| cells <= own.cells() && cells + own.cells() <= Grid::MAX_CELLS);
+        let (own, others) = grids.ok_or(too_many)?;
         let images = wanted_images(meta.grid);
         Ok(Self {
             table,
@@ -172,6 +174,12 @@ impl<'t, 'a> WideTable<'t, 'a> {
             coefficients: Haar::new(meta.grid).analyse_columns(&images),
             images,
         })
+    }
+
+    /// The operator of a tier.
+    fn segments(&self, tier: u8) -> impl Iterator<Item = &Segment<'a>> {
+        let segments = self.table.operator().map_or(&[][..], Operator::segments);
+        segments.iter().filter(move |segment| segment.tier == tier)
     }
 
     fn columns(&self, own: usize) -> Range<usize> {
@@ -257,6 +265,7 @@ impl<'t, 'a> WideTable<'t, 'a> {
             content: self.content(&[&to_own, &to_others]),
             outputs,
             inputs,
+            to_others,
         };
         part.table(image)
     }
@@ -330,6 +339,8 @@ struct SplitPart<'w, 't, 'a> {
     content: DMatrix<f64>,
     outputs: Overlaps,
     inputs: Overlaps,
+    /// Where rows and columns go on the neighbours' cells.
+    to_others: [Side; 2],
 }
 
 impl SplitPart<'_, '_, '_> {
@@ -341,9 +352,10 @@ impl SplitPart<'_, '_, '_> {
         let functions: Vec<Function> = basis.functions().chain(others.functions()).collect();
         let mut quantised = Vec::new();
         let mut errors = Vec::new();
+        let right = self.wide_corrections(table.top_tier());
         for tier in 1..=table.top_tier() {
             let entries = self.entries(tier);
-            errors.push(self.errors(tier, &entries));
+            errors.push(self.errors(tier, &entries, &right));
             let segments = quantise(&functions, tier, &entries, |_| 1.0)
                 .map_err(|TooStrong { row }| CompileError::TooStrong { row })?;
             quantised.extend(segments);
@@ -353,11 +365,10 @@ impl SplitPart<'_, '_, '_> {
         let costs = (0..=table.top_tier()).map(|tier| operator.cost(tier, meta.channels));
         let tiers = table.tiers().iter().zip(costs).enumerate();
         let tiers = tiers.flat_map(|(tier, (info, (entries, multiplications)))| {
-            let more = tier
-                .checked_sub(1)
-                .map_or(0.0, |tier| errors[tier].together);
-            let less = tier.checked_sub(1).map_or(0.0, |tier| errors[tier].wide);
-            let more = (more.powi(2) - less.powi(2)).max(0.0);
+            let more = tier.checked_sub(1).map_or(0.0, |above_gains| {
+                let SplitError { wide, together, .. } = errors[above_gains];
+                (together.powi(2) - wide.powi(2)).max(0.0)
+            });
             let error = (info.predicted_error.to_num::<f64>().powi(2) + more).sqrt();
             TierInfo {
                 predicted_error: U0F32::saturating_from_num(error),
@@ -367,11 +378,10 @@ impl SplitPart<'_, '_, '_> {
             .emit()
         });
         let tiers: Vec<u8> = tiers.collect();
-        let name = self.label();
         let head = Meta {
             grid: wide.own,
             bounds: operator.bounds(),
-            label: name,
+            label: self.label(),
             ..meta
         };
         let mut part = ImageWriter::of_image(image);
@@ -386,7 +396,6 @@ impl SplitPart<'_, '_, '_> {
                 fine_gain::SIZE,
             );
         }
-        let ambient = self.ambient_of_others();
         self.cut(&mut part, SectionKind::Ambient, meta.grid.cols(), 0);
         let pixels = wide.pixels.map(projector_section);
         part.replace(SectionKind::Projector, pixels);
@@ -394,9 +403,12 @@ impl SplitPart<'_, '_, '_> {
         for (selector, bytes) in &sections {
             part.section(SectionKind::Operator, *selector, bytes.clone());
         }
-        let around = [self.own as u8, (wide.projectors - 1 - self.own) as u8];
-        let section = neighbours_section(wide.others, around, ambient);
-        part.replace(SectionKind::Neighbours, Some(section));
+        // Gains alone take no light of others: a device need not wait for it.
+        if table.operator().is_some() {
+            let around = [self.own as u8, (wide.projectors - 1 - self.own) as u8];
+            let section = neighbours_section(wide.others, around, self.ambient_of_others());
+            part.replace(SectionKind::Neighbours, Some(section));
+        }
         let image = part.finish();
         Table::check(&image).map_err(CompileError::Image)?;
         Ok(SplitTable {
@@ -404,9 +416,7 @@ impl SplitPart<'_, '_, '_> {
             tiers: errors,
         })
     }
-}
 
-impl SplitPart<'_, '_, '_> {
     /// The operator of a tier by the own functions, without what is worth least.
     fn entries(&self, tier: u8) -> Vec<Entry> {
         let found = self.all_entries(tier);
@@ -439,14 +449,8 @@ impl SplitPart<'_, '_, '_> {
 
     /// All of a tier, from whatever a device would read.
     fn all_entries(&self, tier: u8) -> Vec<Entry> {
-        let segments = self
-            .wide
-            .table
-            .operator()
-            .map_or(&[][..], Operator::segments);
-        let of_tier = segments.iter().filter(|segment| segment.tier == tier);
         let mut found = Vec::new();
-        for segment in of_tier {
+        for segment in self.wide.segments(tier) {
             let part = match segment.channels {
                 Channels::All => Part::Shared,
                 Channels::One(channel) => Part::Channel(channel),
@@ -532,18 +536,18 @@ impl SplitPart<'_, '_, '_> {
         sum / f64::from(count.max(1))
     }
 
-    /// Errors of these entries in the place of the wide table's.
-    fn errors(&self, tier: u8, entries: &[Entry]) -> SplitError {
+    /// Errors of these entries in the place of the wide table's, by channel against the corrections that
+    /// are `right`.
+    fn errors(&self, tier: u8, entries: &[Entry], right: &[DMatrix<f64>]) -> SplitError {
         let own = self.wide.own.cells() as u32;
         let scales = self.scales();
         let mut squares = [0.0; 3];
-        for (channel, scale) in scales.iter().enumerate() {
+        let of_wide = self.wide_corrections(tier);
+        for (channel, (scale, of_wide)) in scales.iter().zip(of_wide).enumerate() {
             let counts = |part: Part| match part {
                 Part::Shared => true,
                 Part::Channel(one) => usize::from(one) == channel,
             };
-            let right = self.wide_corrections(self.wide.table.top_tier(), channel);
-            let of_wide = self.wide_corrections(tier, channel);
             let mut found = [(); 2].map(|()| DMatrix::zeros(own as usize, self.content.ncols()));
             for entry in entries.iter().filter(|entry| counts(entry.part)) {
                 let light = self.content.row(entry.col as usize) * (scale * entry.value);
@@ -557,7 +561,7 @@ impl SplitPart<'_, '_, '_> {
             }
             let [together, alone] = found;
             for (square, found) in squares.iter_mut().zip([of_wide, together, alone]) {
-                *square += (found - &right).norm_squared() / self.content.ncols() as f64;
+                *square += (found - &right[channel]).norm_squared() / self.content.ncols() as f64;
             }
         }
         let error = |square: f64| (square / scales.len() as f64).sqrt() / self.light();
@@ -570,29 +574,22 @@ impl SplitPart<'_, '_, '_> {
     }
 
     /// Corrections of the natural images by the wide table at a tier, coefficients of the own
-    /// frame.
-    fn wide_corrections(&self, tier: u8, channel: usize) -> DMatrix<f64> {
+    /// frame by channel.
+    fn wide_corrections(&self, tier: u8) -> Vec<DMatrix<f64>> {
         let wide = self.wide;
-        let segments = wide.table.operator().map_or(&[][..], Operator::segments);
-        let scale = self.scales()[channel];
-        let mut corrections = DMatrix::zeros(wide.own.cells(), self.content.ncols());
-        let counts = |segment: &&Segment<'_>| {
-            segment.tier == tier
-                && match segment.channels {
-                    Channels::All => true,
-                    Channels::One(one) => usize::from(one) == channel,
-                }
-        };
-        for segment in segments.iter().filter(counts) {
-            for entry in entries_of(&wide.functions, segment) {
+        let segments: Vec<Segment<'_>> = wide.segments(tier).copied().collect();
+        let of_channel = |entries: Vec<HaarEntry>| {
+            let mut corrections = DMatrix::zeros(wide.own.cells(), self.content.ncols());
+            for entry in entries {
                 for (at, share) in &self.outputs[entry.row] {
-                    let light = wide.coefficients.row(entry.col) * (scale * entry.value * share);
                     let mut row = corrections.row_mut(*at as usize);
-                    row += light;
+                    row += wide.coefficients.row(entry.col) * (entry.value * share);
                 }
             }
-        }
-        corrections
+            corrections
+        };
+        let entries = haar_entries(wide.table, &segments).into_iter();
+        entries.map(of_channel).collect()
     }
 
     /// Name of the wide table, and which of its projectors this is.
@@ -629,7 +626,7 @@ impl SplitPart<'_, '_, '_> {
     fn ambient_of_others(&self) -> Vec<u16> {
         let wide = self.wide;
         let channels = usize::from(wide.meta.channels);
-        let [_, [down, across]] = wide.sides(self.own);
+        let [down, across] = &self.to_others;
         let mut sums = vec![(0.0, 0.0); wide.others.cells() * channels];
         for (row, places) in down.iter().enumerate() {
             for channel in 0..channels {
