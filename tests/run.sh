@@ -36,6 +36,8 @@ command -v git >/dev/null || missing+=(git)
 command -v qemu-system-arm >/dev/null || missing+=(qemu-system-arm)
 # A desktop without a screen, and what a window on it needs.
 command -v Xvfb >/dev/null || missing+=(xvfb libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 libxrandr2)
+# A desktop of several displays.
+command -v Xvnc >/dev/null || missing+=(tigervnc-standalone-server)
 # Players, and Vulkan and OpenGL in software, for tables on a PC.
 command -v ffmpeg >/dev/null || missing+=(ffmpeg)
 command -v mpv >/dev/null || missing+=(mpv)
@@ -44,7 +46,7 @@ ls /usr/share/glvnd/egl_vendor.d/*mesa.json >/dev/null 2>&1 || missing+=(libegl-
 ls /usr/lib/*/dri/swrast_dri.so >/dev/null 2>&1 || missing+=(libgl1-mesa-dri)
 if [ ${#missing[@]} -gt 0 ]; then
     command -v apt-get >/dev/null || {
-        echo "error: this needs Rust $wanted or newer, a C linker, git, qemu-system-arm, Xvfb, ffmpeg, mpv and Mesa's Vulkan; missing: ${missing[*]}. Install them and run this again" >&2
+        echo "error: this needs Rust $wanted or newer, a C linker, git, qemu-system-arm, Xvfb, Xvnc, ffmpeg, mpv and Mesa's Vulkan; missing: ${missing[*]}. Install them and run this again" >&2
         exit 1
     }
     install_packages "${missing[@]}"

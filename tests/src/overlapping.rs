@@ -4,11 +4,12 @@
 //! Where a place of the screen lies in frames and photographs comes from the scene's geometry, not
 //! from the photographs that a table was learned from.
 
+use crate::neighbours::runtime_frame;
 use crate::simulated::simulation;
 use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
 use iltm::capture::{CameraSettings, CaptureOptions, camera_places, read_several};
-use iltm::compile::Provenance;
 use iltm::compile::reference_white::WhiteRequest;
+use iltm::compile::{NEIGHBOURS_FACTOR, Provenance, split_table};
 use iltm::picture::{ContactSheet, Picture, Response, Samples, Tile};
 use iltm::progress::Silent;
 use iltm::scene::description::{Projector, Scene};
@@ -17,8 +18,10 @@ use iltm::scene::{Forced, Photograph, Pinhole, ProjectedFrame, SimulationError, 
 use iltm::session::{self, Layout, OrderOptions};
 use iltm::solve::{SolveOptions, natural_images};
 use iltm::verify::{self, Readings, Slides, TableVerdict};
-use iltm::video::{CompensateOptions, Compensator};
+use iltm::video::{CompensateOptions, Compensator, FrameSplitter};
+use iltm_runtime::frame_buffers::Format;
 use iltm_runtime::image::Table;
+use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::{FrameSize, Grid};
 use nalgebra::{DMatrix, Vector3};
 use std::path::{Path, PathBuf};
@@ -289,6 +292,39 @@ impl<'s> Screen<'s> {
         })
     }
 
+    /// The same where a device drives each projector, with frames of 8 bits and its part of the table
+    /// of all; `heard` says whether it gets the light of its neighbours.
+    pub fn seen_of_devices(&self, built: &BuiltTable, heard: bool) -> SeenOnScreen {
+        let count = self.scene.projectors.len();
+        let parts = split_table(&built.compiled.image, count, NEIGHBOURS_FACTOR);
+        let parts = parts.expect("projectors alike");
+        self.seen_of(&|frame| {
+            let wide = frame.size();
+            let Samples::Sixteen(codes) = frame.samples() else {
+                unreachable!("frames of 16 bits");
+            };
+            let codes: Vec<u8> = codes.iter().map(|code| of_eight_bits(*code)).collect();
+            let mut shown = vec![0; codes.len()];
+            for (number, part) in parts.iter().enumerate() {
+                let table = Table::check(&part.image).expect("split checked it");
+                let splitter = FrameSplitter::new(&table, wide, Encoding::Display);
+                let splitter = splitter.expect("a wide frame");
+                let own = splitter.of_frame(&codes);
+                let format =
+                    Format::new(splitter.own(), table.channels(), Encoding::Display, 40_000);
+                let format = format.expect("a frame");
+                let light = heard.then_some(&*own.light);
+                let made = runtime_frame(&table, (table.top_tier(), format), &own.pixels, light);
+                let row = made.len() / wide.height();
+                let rows = shown.chunks_exact_mut(row * count);
+                for (wide, own) in rows.zip(made.chunks_exact(row)) {
+                    wide[number * row..][..row].copy_from_slice(own);
+                }
+            }
+            Picture::new(wide, Samples::Eight(shown)).expect("a code a sample")
+        })
+    }
+
     /// What a camera without noise sees of an even white and of a picture: wanted, without a table,
     /// and with the table of all projectors.
     ///
@@ -464,12 +500,15 @@ fn is_lit(view: &Pinhole, grid: Grid, place: &Vector3<f64>) -> bool {
         .is_some_and(|at| within(at.across, grid.cols()) && within(at.down, grid.rows()))
 }
 
+const fn of_eight_bits(code: u16) -> u8 {
+    ((code as u32 + 128) / 257) as u8
+}
+
 /// A picture as projectors show it, with 8 bits.
 fn projected(picture: &Picture) -> ProjectedFrame {
-    let code = |code: u16| ((u32::from(code) + 128) / 257) as u8;
     let codes: Vec<u8> = match picture.samples() {
         Samples::Eight(codes) => codes.clone(),
-        Samples::Sixteen(codes) => codes.iter().map(|value| code(*value)).collect(),
+        Samples::Sixteen(codes) => codes.iter().map(|code| of_eight_bits(*code)).collect(),
     };
     let channels = picture.channels();
     let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % channels]);

@@ -14,7 +14,7 @@ use clap::{ArgGroup, Args, Parser, Subcommand};
 use iltm_runtime::FrameSize;
 use std::ffi::OsString;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
-use std::path::PathBuf;
+use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 use strum::{VariantArray, VariantNames};
 
@@ -252,9 +252,11 @@ pub(super) struct Patterns {
     /// Seed of the Bernoulli patterns
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(super) seed: u64,
-    /// The projector's own resolution
-    #[arg(long, value_name = "WxH", value_parser = frame_size, default_value = "1920x1080")]
-    pub(super) projector: FrameSize,
+    /// The projector's own resolution. Of several projectors one each, with a name that its folder in
+    /// CAPTURE gets: --projector left=1920x1080 --projector right=1280x1080. Columns are the first
+    /// one's; cells of the others have as many pixels
+    #[arg(long, value_name = "[NAME=]WxH", value_parser = named_size, default_value = "1920x1080")]
+    pub(super) projector: Vec<NamedSize>,
     /// Pixels to leave black on every side
     #[arg(long, value_name = "PIXELS", default_value_t = 0)]
     pub(super) border: u16,
@@ -305,11 +307,18 @@ the same command goes on with what is missing.";
 #[derive(Debug, Args)]
 #[allow(clippy::struct_field_names, reason = "it is what stands there")]
 pub(super) struct Capture {
-    /// Folder that `iltm patterns` made
-    pub(super) capture: PathBuf,
-    /// Display to show slides on, the first is 0; of one that is not there, all are listed
-    #[arg(long, value_name = "N", group = "screen", required_unless_present_any = ["show", "list"])]
-    pub(super) display: Option<u16>,
+    /// Folder that `iltm patterns` or `iltm verify` made; of several projectors one each, which
+    /// are photographed one after the other
+    #[arg(required = true, value_name = "CAPTURE")]
+    pub(super) captures: Vec<PathBuf>,
+    /// Display to show slides on, the first is 0; of one that is not there, all are listed. Of
+    /// several folders one display each, black while another shows; of one folder with wide
+    /// slides all that show them, from left to right: 1,2
+    #[arg(long, value_name = "N", value_delimiter = ',', group = "screen", required_unless_present_any = ["show", "list"])]
+    pub(super) display: Vec<u16>,
+    /// Keep other displays black meanwhile: 3, or 0,3
+    #[arg(long, value_name = "N", value_delimiter = ',', requires = "display")]
+    pub(super) dark: Vec<u16>,
     /// Show slides by a command instead, which returns when the slide is shown
     #[arg(long, value_name = "CMD", group = "screen")]
     pub(super) show: Option<String>,
@@ -333,7 +342,7 @@ pub(super) struct Capture {
     #[arg(long, value_name = "INDEX", num_args = 1.., value_delimiter = ',', value_parser = indices)]
     pub(super) again: Vec<RangeInclusive<u32>>,
     /// Say what is missing, and take nothing
-    #[arg(long, conflicts_with_all = ["screen", "taker", "again", "latency", "timeout", "retries"])]
+    #[arg(long, conflicts_with_all = ["screen", "dark", "taker", "again", "latency", "timeout", "retries"])]
     pub(super) list: bool,
 }
 
@@ -921,6 +930,31 @@ fn milliseconds(text: &str) -> Result<Duration, String> {
 fn error_bound(text: &str) -> Result<f64, String> {
     let range = (Bound::Excluded(0.0), Bound::Included(1.0));
     number(text, range, "an error is a number above 0, at most 1")
+}
+
+/// A projector's pixels, and its name among several.
+#[derive(Clone, Debug)]
+pub(super) struct NamedSize {
+    pub(super) name: Option<String>,
+    pub(super) size: FrameSize,
+}
+
+fn named_size(text: &str) -> Result<NamedSize, String> {
+    let (name, size) = match text.rsplit_once('=') {
+        Some((name, size)) => (Some(name), size),
+        None => (None, text),
+    };
+    let mut parts = name.map(|name| Path::new(name).components());
+    let is_folder = parts.as_mut().is_none_or(|parts| {
+        matches!(parts.next(), Some(Component::Normal(_))) && parts.next().is_none()
+    });
+    if !is_folder {
+        return Err("the name is that of a folder, without slashes".to_owned());
+    }
+    Ok(NamedSize {
+        name: name.map(str::to_owned),
+        size: frame_size(size)?,
+    })
 }
 
 fn frame_size(text: &str) -> Result<FrameSize, String> {

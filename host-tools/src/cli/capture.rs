@@ -7,14 +7,14 @@ use super::output::Output;
 use super::progress::progress;
 use crate::capture::{MANIFEST_FILE, PhotoStats, Role};
 use crate::session::{
-    CameraDriver, CaptureSession, CommandCamera, CommandScreen, Screen, SessionError,
-    SessionOptions, ShootEvent, State, Summary, WatchedFolder, ranges, with_window,
+    CameraDriver, CaptureSession, CommandCamera, CommandScreen, DisplaySpan, Displays, Screen,
+    SessionError, SessionOptions, ShootEvent, State, Summary, WatchedFolder, ranges, with_windows,
 };
 use iltm_picture::{foreign_file, png, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Most numbers that `--again` may stand for.
@@ -26,10 +26,14 @@ const TOO_DARK: f64 = 0.4;
 
 pub(super) fn run(arguments: &Capture, output: &Output) -> Result<(), Failure> {
     let bars = progress(output);
-    let mut session = CaptureSession::open(&arguments.capture, bars.as_ref())?;
+    let folders = &arguments.captures;
+    let open = |folder: &PathBuf| CaptureSession::open(folder, bars.as_ref());
+    let mut sessions: Vec<CaptureSession> = folders.iter().map(open).collect::<Result<_, _>>()?;
     if arguments.list {
-        let (data, text) = listed(&session, arguments);
-        output.result(&data, &text);
+        for (at, (folder, session)) in folders.iter().zip(&sessions).enumerate() {
+            let (data, text) = listed(session, folder);
+            output.part_of_result(at + 1 == sessions.len(), &data, &text);
+        }
         return Ok(());
     }
     if let Some(command) = &arguments.camera
@@ -41,6 +45,8 @@ pub(super) fn run(arguments: &Capture, output: &Output) -> Result<(), Failure> {
             "Put {photo} where the camera command takes the name of the file to write.",
         ));
     }
+    let sizes: Vec<(u32, u32)> = sessions.iter().map(slide_size).collect();
+    let displays = displays(arguments, &sizes)?;
     let numbers = arguments.again.iter().cloned().flatten();
     let options = SessionOptions {
         again: numbers.take(MOST_AGAIN).collect(),
@@ -48,74 +54,101 @@ pub(super) fn run(arguments: &Capture, output: &Output) -> Result<(), Failure> {
         retries: arguments.retries,
     };
     interrupt::catch();
-    let size = slide_size(&session);
     let mut teller = Teller {
         output,
         bars: bars.as_ref(),
         by_hand: arguments.watch.is_some(),
-        left: session.list().count(),
+        left: 0,
     };
-    let done = match (&arguments.show, arguments.display) {
-        (Some(command), _) => {
-            let stop = interrupt::stopped;
-            let mut screen = CommandScreen::new(command, &stop);
-            photograph(
-                &mut session,
-                arguments,
-                &options,
-                &mut screen,
-                &stop,
-                &mut teller,
-            )
-        }
-        (None, display) => with_window(display.unwrap_or(0).into(), size, |screen, closed| {
+    let mut photograph =
+        |at: usize, screen: &mut dyn Screen, stop: &dyn Fn() -> bool| -> Result<(), SessionError> {
+            let mut camera = camera(arguments, stop);
+            let session = &mut sessions[at];
+            let tell = &mut |event: &ShootEvent<'_>| teller.tell(event);
+            let summary = session.run(&options, screen, camera.as_mut(), stop, tell)?;
+            bars.end();
+            let (data, text) = finished(summary, folders, at);
+            output.part_of_result(at + 1 == folders.len(), &data, &text);
+            Ok(())
+        };
+    let done = if let Some(command) = &arguments.show {
+        let stop = interrupt::stopped;
+        photograph(0, &mut CommandScreen::new(command, &stop), &stop)
+    } else {
+        with_windows(&displays, |windows, closed| {
             let stop = || interrupt::stopped() || closed();
-            photograph(
-                &mut session,
-                arguments,
-                &options,
-                screen,
-                &stop,
-                &mut teller,
-            )
-        }),
+            (0..folders.len()).try_for_each(|at| photograph(at, &mut windows.screen(at), &stop))
+        })
     };
     bars.end();
-    let left = teller.left;
     match done {
-        Ok(summary) => {
-            let (data, text) = finished(summary, arguments);
-            output.result(&data, &text);
-            Ok(())
+        Err(SessionError::Stopped) => {
+            let all = sessions.iter().flat_map(CaptureSession::list);
+            let left = all.filter(|(_, state)| !matches!(state, State::Whole(_)));
+            Err(Failure::new(
+                Kind::Interrupted,
+                format!("stopped; {} photographs are missing", left.count()),
+                SessionError::Stopped.next_step(),
+            ))
         }
-        Err(SessionError::Stopped) => Err(Failure::new(
-            Kind::Interrupted,
-            format!("stopped; {left} photographs are missing"),
-            SessionError::Stopped.next_step(),
-        )),
-        Err(error) => Err(error.into()),
+        done => Ok(done?),
     }
 }
 
-fn photograph(
-    session: &mut CaptureSession,
-    arguments: &Capture,
-    options: &SessionOptions,
-    screen: &mut dyn Screen,
-    stop: &dyn Fn() -> bool,
-    teller: &mut Teller<'_>,
-) -> Result<Summary, SessionError> {
+/// What the displays are for, with the slides' width and height in each folder.
+fn displays(arguments: &Capture, sizes: &[(u32, u32)]) -> Result<Displays, Failure> {
+    let refuse = |message: String, next_step| Err(Failure::new(Kind::Usage, message, next_step));
+    let (folders, shown) = (sizes.len(), arguments.display.len());
+    if folders > 1 && !arguments.again.is_empty() {
+        return refuse(
+            "--again does not say of which folder".to_owned(),
+            "Give that folder alone, with its display, and the others' with --dark.",
+        );
+    }
+    if arguments.show.is_some() {
+        if folders > 1 {
+            return refuse(
+                format!("--show shows the slides of one folder, {folders} are given"),
+                "Photograph one after the other, while the other projectors are black.",
+            );
+        }
+        return Ok(Displays::default());
+    }
+    let numbers = || arguments.display.iter().chain(&arguments.dark);
+    if let Some(twice) = numbers().find(|number| numbers().filter(|n| n == number).count() > 1) {
+        return refuse(
+            format!("display {twice} is named twice"),
+            "Name each display once.",
+        );
+    }
+    if folders > 1 && folders != shown {
+        return refuse(
+            format!("{folders} folders and {shown} displays"),
+            "Give --display one display for each folder, in their order: --display 1,2.",
+        );
+    }
+    let displays: Vec<usize> = arguments.display.iter().map(|n| usize::from(*n)).collect();
+    // Wide slides of one folder lie over all displays.
+    let spans = displays.chunks(if folders > 1 { 1 } else { shown.max(1) });
+    let screens = spans.zip(sizes).map(|(displays, size)| DisplaySpan {
+        displays: displays.to_vec(),
+        size: *size,
+    });
+    Ok(Displays {
+        screens: screens.collect(),
+        dark: arguments.dark.iter().map(|n| usize::from(*n)).collect(),
+    })
+}
+
+fn camera<'s>(arguments: &Capture, stop: &'s dyn Fn() -> bool) -> Box<dyn CameraDriver + 's> {
     let patience = Duration::from_secs(arguments.timeout.into());
-    let mut camera: Box<dyn CameraDriver> = match (&arguments.watch, &arguments.camera) {
+    match (&arguments.watch, &arguments.camera) {
         (Some(folder), _) => Box::new(WatchedFolder::new(folder, patience, stop)),
         (None, command) => {
             let command = command.as_deref().unwrap_or_default();
             Box::new(CommandCamera::new(command, patience, stop))
         }
-    };
-    session.run(options, screen, camera.as_mut(), stop, &mut |event| {
-        teller.tell(event);
-    })
+    }
 }
 
 /// Width and height of the slides: those of the first that can be read.
@@ -135,7 +168,7 @@ fn slide_size(session: &CaptureSession) -> (u32, u32) {
 }
 
 /// What there is and what is missing.
-fn listed(session: &CaptureSession, arguments: &Capture) -> (Value, String) {
+fn listed(session: &CaptureSession, folder: &Path) -> (Value, String) {
     let mut photographs = Vec::new();
     let mut missing = Vec::new();
     let mut bad = Vec::new();
@@ -162,7 +195,7 @@ fn listed(session: &CaptureSession, arguments: &Capture) -> (Value, String) {
     let whole = all - missing.len() - bad.len();
     let mut text = format!(
         "capture     {}: {whole} of {all} photographs are there\n",
-        arguments.capture.display()
+        folder.display()
     );
     if !missing.is_empty() {
         let _ = writeln!(text, "missing     {}", ranges(&missing));
@@ -171,7 +204,7 @@ fn listed(session: &CaptureSession, arguments: &Capture) -> (Value, String) {
         let _ = writeln!(text, "bad         {index}: {why}");
     }
     let data = json!({
-        "capture": arguments.capture.display().to_string(),
+        "capture": folder.display().to_string(),
         "all": all,
         "whole": whole,
         "missing": missing,
@@ -181,8 +214,8 @@ fn listed(session: &CaptureSession, arguments: &Capture) -> (Value, String) {
     (data, text)
 }
 
-fn finished(summary: Summary, arguments: &Capture) -> (Value, String) {
-    let capture = arguments.capture.display();
+fn finished(summary: Summary, folders: &[PathBuf], at: usize) -> (Value, String) {
+    let capture = folders[at].display();
     let data = json!({
         "event": "done",
         "capture": capture.to_string(),
@@ -196,8 +229,16 @@ fn finished(summary: Summary, arguments: &Capture) -> (Value, String) {
         summary.taken, summary.all
     );
     // A folder to verify a table with is none to solve.
-    if arguments.capture.join(MANIFEST_FILE).exists() {
-        let _ = writeln!(text, "next        `iltm check {capture}`");
+    let to_solve = folders
+        .iter()
+        .all(|folder| folder.join(MANIFEST_FILE).exists());
+    if at + 1 == folders.len() && to_solve {
+        let names = folders.iter().map(|folder| folder.display().to_string());
+        let _ = writeln!(
+            text,
+            "next        `iltm check {}`",
+            names.collect::<Vec<_>>().join(" ")
+        );
     }
     (data, text)
 }

@@ -67,6 +67,16 @@ impl Output {
         }
     }
 
+    /// The result of a command on one of several things: the last ends what programs read.
+    pub(super) fn part_of_result(&self, is_last: bool, data: &Value, text: &str) {
+        if is_last {
+            self.result(data, text);
+        } else {
+            self.event(data);
+            self.findings(text);
+        }
+    }
+
     /// The result of a command that fails by what it has found, for people; programs get it with
     /// the failure.
     pub(super) fn findings(&self, text: &str) {

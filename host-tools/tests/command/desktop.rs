@@ -2,12 +2,14 @@
 
 use super::user::User;
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::Shutdown;
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
 
-/// An X server without a screen, its picture in a file.
+/// An X server without a screen. Of one display, it has the picture in a file.
 pub(crate) struct Desktop {
     server: Child,
     pub(crate) display: String,
@@ -17,14 +19,34 @@ pub(crate) struct Desktop {
 impl Desktop {
     pub(crate) fn start(size: &str) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", size])
-            .arg("-fbdir")
-            .arg(folder.path())
+        let mut server = Command::new("Xvfb");
+        server.args(["-screen", "0", size]);
+        server.arg("-fbdir").arg(folder.path());
+        Self::of(server, folder)
+    }
+
+    /// A desktop of several displays beside each other, of these widths and one height.
+    pub(crate) fn with_displays(widths: &[u16], height: u16) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let socket = folder.path().join("socket");
+        let width: u16 = widths.iter().sum();
+        let mut server = Command::new("Xvnc");
+        server.args(["-geometry", &format!("{width}x{height}"), "-depth", "24"]);
+        server.args(["-SecurityTypes", "None", "-rfbport", "-1"]);
+        server.arg("-rfbunixpath").arg(&socket);
+        let desktop = Self::of(server, folder);
+        divide(&socket, widths, height).expect("a server that listens");
+        desktop
+    }
+
+    fn of(mut server: Command, folder: TempDir) -> Self {
+        let name = server.get_program().to_string_lossy().into_owned();
+        let mut server = server
+            .args(["-displayfd", "1", "-nolisten", "tcp"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
-            .expect("Xvfb is installed: `sudo apt-get install xvfb`");
+            .unwrap_or_else(|error| panic!("{name}: {error}; `tests/run.sh` installs it"));
         let mut number = String::new();
         let mut said = BufReader::new(server.stdout.take().expect("piped"));
         said.read_line(&mut number).expect("a display number");
@@ -48,6 +70,35 @@ impl Drop for Desktop {
         let _ = self.server.kill();
         let _ = self.server.wait();
     }
+}
+
+/// Asks a VNC server on a socket to divide its desktop into displays: the message `SetDesktopSize`
+/// of the Remote Framebuffer Protocol (RFC 6143; the message is of its registered extension 251).
+fn divide(socket: &Path, widths: &[u16], height: u16) -> io::Result<()> {
+    let mut server = UnixStream::connect(socket)?;
+    // Its version, and ways to log in, the only one of which is none.
+    server.read_exact(&mut [0; 12])?;
+    server.write_all(b"RFB 003.008\n")?;
+    server.read_exact(&mut [0; 2])?;
+    // None; beside other clients.
+    server.write_all(&[1, 1])?;
+    let words = |words: &[u16]| words.iter().flat_map(|word| word.to_be_bytes()).collect();
+    // A list of one: this client understands desktops of several displays, by the number -308.
+    let mut sent: Vec<u8> = words(&[0x0200, 1, 0xffff, 0xfecc]);
+    let mut left = 0;
+    let mut displays = Vec::new();
+    for (number, width) in (0..).zip(widths) {
+        displays.extend([0, number, left, 0, *width, height, 0, 0]);
+        left += width;
+    }
+    let count = u8::try_from(widths.len()).expect("a few displays");
+    sent.extend([251, 0]);
+    sent.extend::<Vec<u8>>(words(&[left, height, u16::from_be_bytes([count, 0])]));
+    sent.extend::<Vec<u8>>(words(&displays));
+    server.write_all(&sent)?;
+    // The server hangs up once it has done everything.
+    server.shutdown(Shutdown::Write)?;
+    server.read_to_end(&mut Vec::new()).map(|_| ())
 }
 
 /// What an X server shows, `0RGB` a pixel, from its file in the format of `xwd`

@@ -188,6 +188,76 @@ fn slides_fill_a_display_pixel_by_pixel() {
     }
 }
 
+/// Has what all displays of a desktop show together as a photograph.
+fn camera_of(desktop: &Desktop) -> String {
+    let grab = "ffmpeg -loglevel error -f x11grab -draw_mouse 0";
+    let rest = "-frames:v 1 -pix_fmt rgb24 {photo}";
+    format!("--camera '{grab} -i {} {rest}'", desktop.display)
+}
+
+/// The slides of a folder are on the wall from this column on, and all others are black.
+fn shown_from(user: &User, folder: &str, left: u32) {
+    let names = user.names(&format!("{folder}/slides"));
+    assert!(names.len() > 20, "{names:?}");
+    for name in names {
+        let slide = user.picture(&format!("{folder}/slides/{name}")).to_rgb8();
+        let photo = user.picture(&format!("{folder}/photos/{name}")).to_rgb8();
+        for (x, y, pixel) in photo.enumerate_pixels() {
+            let inside = x.checked_sub(left).filter(|x| *x < slide.width());
+            let wanted = inside.map_or(image::Rgb([0; 3]), |x| *slide.get_pixel(x, y));
+            assert_eq!(*pixel, wanted, "{folder}: {name} at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn each_of_several_projectors_shows_its_slides_while_the_others_are_black() {
+    let desktop = Desktop::with_displays(&[64, 80, 32], 48);
+    let user = User::new();
+    user.says("patterns -o left --rows 3 --cols 4 --photos 10 --projector 64x48 --ramp 2");
+    user.says("patterns -o right --rows 3 --cols 5 --photos 10 --projector 80x48 --ramp 2");
+    let camera = camera_of(&desktop);
+    let line = format!("capture left right --display 0,1 --dark 2 --latency 100 {camera}");
+    let ended = Ended::of(desktop.spawn(&user, &line));
+    insta::assert_snapshot!(ended.with_code());
+    shown_from(&user, "left", 0);
+    shown_from(&user, "right", 64);
+    // What is missing is taken, and nothing else.
+    user.remove("right/photos/003.png");
+    let events = Ended::of(desktop.spawn(&user, &format!("{line} --json"))).events();
+    let done = events.iter().filter(|event| event["event"] == "done");
+    let taken: Vec<_> = done.map(|event| &event["taken"]).collect();
+    assert_eq!(taken, [0, 1]);
+    shown_from(&user, "right", 64);
+}
+
+#[test]
+fn wide_slides_lie_over_all_displays_that_show_them() {
+    // The left half of the slides on the display that stands at the right.
+    let desktop = Desktop::with_displays(&[64, 80], 48);
+    let user = User::new();
+    user.says("patterns -o c --rows 3 --cols 9 --photos 10 --projector 144x48 --ramp 2");
+    let camera = camera_of(&desktop);
+    let line = format!("capture c --display 0,1 --latency 100 {camera}");
+    let ended = Ended::of(desktop.spawn(&user, &line));
+    assert_eq!(ended.code, 0, "{}", ended.said);
+    shown_from(&user, "c", 0);
+    let mut text = String::new();
+    for line in [
+        "c --display 0",
+        "c --display 1,1",
+        "c --display 0 --dark 0",
+        "c --display 0,1 --dark 2",
+        "c c --display 0",
+        "c c --display 0,1 --again 3",
+        "c c --show true",
+    ] {
+        let ended = Ended::of(desktop.spawn(&user, &format!("capture {line} {camera}")));
+        text += &ended.with_code();
+    }
+    insta::assert_snapshot!(text);
+}
+
 #[test]
 fn a_display_that_is_not_there_or_of_another_size_is_refused_with_what_there_is() {
     let desktop = Desktop::start("80x48x24");

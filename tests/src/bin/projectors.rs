@@ -75,6 +75,16 @@ fn by_pixels() {
         let screen = Screen::new(&scene);
         row(name, "each alone", screen.seen_of_each(&alone));
         row(name, "together", screen.seen(&together));
+        row(
+            name,
+            "together, by a device each",
+            screen.seen_of_devices(&together, true),
+        );
+        row(
+            name,
+            "the same, neighbours silent",
+            screen.seen_of_devices(&together, false),
+        );
     }
 }
 

@@ -274,14 +274,16 @@ fn pixel_shares(own: &[Measurements]) -> Vec<Vec<f32>> {
         })
         .collect();
     let apart = |index: usize| {
-        let alone = (0..pixels).map(|pixel| {
-            let others = lit
-                .iter()
-                .enumerate()
-                .any(|(at, lit)| at != index && lit[pixel]);
+        let others_alone = (0..pixels).map(|pixel| {
+            let mut others = lit.iter().enumerate();
+            let others = others.any(|(at, lit)| at != index && lit[pixel]);
             others && !lit[index][pixel]
         });
-        let mut apart = distances(&alone.collect::<Vec<_>>(), width);
+        // Where edges of pictures run beside each other, one reaches a little farther: no border
+        // either.
+        let half_a_cell = own[index].registration.cell_side() as f32 / 2.0;
+        let others_alone = opened(&others_alone.collect::<Vec<_>>(), width, half_a_cell);
+        let mut apart = distances(&others_alone, width);
         for (distance, lit) in apart.iter_mut().zip(&lit[index]) {
             // Finite, so that projectors which cover the same have equal shares.
             *distance = if *lit {
@@ -311,6 +313,13 @@ fn closed(region: &[bool], width: usize, reach: f32) -> Vec<bool> {
     let away = distances(&outside, width);
     let within = away.iter().zip(region);
     within.map(|(away, own)| *own || *away > reach).collect()
+}
+
+/// A region without its parts that are thinner than twice `reach` pixels.
+fn opened(region: &[bool], width: usize, reach: f32) -> Vec<bool> {
+    let rest: Vec<bool> = region.iter().map(|within| !within).collect();
+    let closed = closed(&rest, width, reach);
+    closed.iter().map(|rest| !rest).collect()
 }
 
 /// Distance of each pixel to the nearest of a region, in pixels along the eight directions;
@@ -372,5 +381,26 @@ mod tests {
         }
         assert_eq!(closed(&holed, width, 3.0), whole);
         assert_eq!(closed(&whole, width, 3.0), whole);
+    }
+
+    #[test]
+    fn what_is_thinner_than_twice_the_reach_is_no_part_of_an_opened_region() {
+        let (width, height) = (40, 30);
+        let part = |from: [usize; 2], to: [usize; 2]| -> Vec<bool> {
+            let within = |pixel: usize| {
+                (from[0]..to[0]).contains(&(pixel % width))
+                    && (from[1]..to[1]).contains(&(pixel / width))
+            };
+            (0..width * height).map(within).collect()
+        };
+        let wide = part([4, 6], [16, 22]);
+        let sliver = part([16, 20], [36, 22]);
+        let both: Vec<bool> = wide.iter().zip(&sliver).map(|(a, b)| a | b).collect();
+        let found = opened(&both, width, 2.0);
+        // The beginning of the sliver, where the wide part ends, may count as that.
+        let differs = (0..width * height).filter(|pixel| found[*pixel] != wide[*pixel]);
+        assert!(differs.into_iter().all(|pixel| pixel % width < 18));
+        assert_eq!(opened(&sliver, width, 2.0), vec![false; width * height]);
+        assert_eq!(opened(&sliver, width, 0.5), sliver);
     }
 }

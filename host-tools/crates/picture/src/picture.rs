@@ -127,10 +127,23 @@ impl Picture {
         let border = usize::from(border);
         let left = |side: usize| u16::try_from(side.checked_sub(2 * border)?).ok();
         let size = FrameSize::new(left(self.size.width())?, left(self.size.height())?)?;
+        self.part([border; 2], size)
+    }
+
+    /// The part of this size with its upper left pixel at `x` and `y`; `None` if the picture does
+    /// not have all of it.
+    #[must_use]
+    pub fn part(&self, [x, y]: [usize; 2], size: FrameSize) -> Option<Self> {
+        let fits = |from: usize, part: usize, whole: usize| {
+            from.checked_add(part).is_some_and(|to| to <= whole)
+        };
+        if !fits(x, size.width(), self.size.width()) || !fits(y, size.height(), self.size.height())
+        {
+            return None;
+        }
         let (line, channels) = (self.size.width() * self.channels, self.channels);
-        let lines = border..border + size.height();
-        let parts = lines.map(|y| {
-            let begin = y * line + border * channels;
+        let parts = (y..y + size.height()).map(|y| {
+            let begin = y * line + x * channels;
             begin..begin + size.width() * channels
         });
         let samples = match &self.samples {

@@ -142,14 +142,12 @@ pub enum SessionError {
         /// What there is, each in words.
         found: Vec<String>,
     },
-    /// A display has not the pixels that slides are drawn for.
-    #[error("display {display} has {} x {} pixels, the slides have {} x {}", found.0, found.1, slides.0, slides.1)]
+    /// Displays have not the pixels that slides are drawn for.
+    #[error("{}, the slides have {} x {}", sizes(found), slides.0, slides.1)]
     DisplaySize {
-        /// Which.
-        display: usize,
-        /// Its width and height.
-        found: (u32, u32),
-        /// Theirs.
+        /// Width and height of each display, from left to right.
+        found: Vec<(usize, (u32, u32))>,
+        /// Width and height of the slides.
         slides: (u32, u32),
     },
     /// The camera gave no photograph, or none that can be used.
@@ -188,6 +186,13 @@ fn displays(found: &[String]) -> String {
     }
 }
 
+fn sizes(displays: &[(usize, (u32, u32))]) -> String {
+    let words = displays
+        .iter()
+        .map(|(number, (width, height))| format!("display {number} has {width} x {height} pixels"));
+    words.collect::<Vec<_>>().join(", ")
+}
+
 impl SessionError {
     /// What to do about it, one sentence.
     #[must_use]
@@ -210,6 +215,10 @@ impl SessionError {
             Self::NoDisplay { .. } => {
                 "Choose one of these, switch the projector on and extend the desktop to it, or show \
                  slides by a command of your own with --show."
+            }
+            Self::DisplaySize { found, .. } if found.len() > 1 => {
+                "Set all displays to one height and widths that add up to the slides', without \
+                 scaling, or make the folder with `iltm patterns --projector WxH`."
             }
             Self::DisplaySize { .. } => {
                 "Set the display to the projector's own resolution, without scaling, or make the \

@@ -107,6 +107,17 @@ impl Layout {
         self.inner
     }
 
+    /// Columns of cells of as many pixels as these on another projector; `None` if there is no whole
+    /// number of them, or its rows would be others.
+    #[must_use]
+    pub fn cols_of(&self, other: FrameSize) -> Option<u16> {
+        let (own, cols) = (self.projector, self.grid.cols());
+        let is_whole = own.width().is_multiple_of(cols);
+        let width = own.width() / cols;
+        let fits = is_whole && self.border == 0 && other.height() == own.height();
+        (fits && other.width().is_multiple_of(width)).then_some((other.width() / width) as u16)
+    }
+
     /// A picture of [`inner`](Self::inner) with its black border, of the projector's size;
     /// `None` if it has another size or depth.
     #[must_use]

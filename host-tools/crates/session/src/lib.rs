@@ -43,6 +43,6 @@ pub use layout::Layout;
 pub(crate) use order::fine_stripes;
 pub use order::{OrderOptions, Purpose, Slide, order};
 pub use plan::{Planned, State, planned, ranges, states};
-pub use screen::{CommandScreen, Screen, with_window};
+pub use screen::{CommandScreen, DisplaySpan, Displays, Screen, Windows, with_windows};
 pub use shoot::{CaptureSession, SessionOptions, ShootEvent, Summary};
 pub use stills::stills;

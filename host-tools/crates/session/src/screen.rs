@@ -1,4 +1,4 @@
-//! Screens: slides shown by a command, or in a window that fills a display, pixel by pixel
+//! Screens: slides shown by a command, or in windows that fill displays, pixel by pixel
 //! and nothing else.
 //!
 //! The system wants its windows served by the thread that the process began with,
@@ -8,6 +8,7 @@ use super::SessionError;
 use super::plan::Planned;
 use super::shell::{self, Ran};
 use iltm_picture::{Picture, Samples, foreign_file, png};
+use iltm_runtime::FrameSize;
 use std::io::BufReader;
 use std::num::NonZeroU32;
 use std::rc::Rc;
@@ -82,29 +83,45 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// show meanwhile.
 const SETTLING: Duration = Duration::from_secs(1);
 
-/// What the session's thread asks of the window's.
+/// What the displays of a session are for; none is named twice.
+#[derive(Clone, Debug, Default)]
+pub struct Displays {
+    /// Screens that slides are shown on, each while all others are black.
+    pub screens: Vec<DisplaySpan>,
+    /// Displays that stay black.
+    pub dark: Vec<usize>,
+}
+
+/// Displays beside each other that show one slide; the first display of a desktop is 0.
+#[derive(Clone, Debug)]
+pub struct DisplaySpan {
+    /// From left to right in the slide.
+    pub displays: Vec<usize>,
+    /// Width and height of the slides, in pixels.
+    pub size: (u32, u32),
+}
+
+/// What the session's thread asks of the windows'.
 enum Order {
-    /// Show this picture.
-    Show(Picture),
+    /// Show this picture on a screen, and black on all others.
+    Show(usize, Picture),
     /// The session is over.
     Close,
 }
 
-/// What the window's thread answers.
+/// What the windows' thread answers.
 type Answer = Result<(), SessionError>;
 
-/// Runs `session` with a window on display `display`, the first being 0, for slides
-/// of `size` pixels (width, height). The session's `stop` is true once the user closes
-/// the window or presses Escape. Call it from the thread that the process began with.
+/// Runs `session` with a window on each display. The session's `stop` is true once the user closes
+/// a window or presses Escape. Call it from the thread that the process began with.
 ///
 /// # Errors
 /// [`SessionError::Display`], [`SessionError::NoDisplay`] or
-/// [`SessionError::DisplaySize`] if there is no such window, or what `session`
+/// [`SessionError::DisplaySize`] if there are no such windows, or what `session`
 /// returns.
-pub fn with_window<T: Send>(
-    display: usize,
-    size: (u32, u32),
-    session: impl FnOnce(&mut dyn Screen, &(dyn Fn() -> bool + Sync)) -> Result<T, SessionError> + Send,
+pub fn with_windows<T: Send>(
+    displays: &Displays,
+    session: impl FnOnce(&mut Windows, &(dyn Fn() -> bool + Sync)) -> Result<T, SessionError> + Send,
 ) -> Result<T, SessionError> {
     let refuse = |error: EventLoopError| {
         let text = error.to_string();
@@ -122,25 +139,22 @@ pub fn with_window<T: Send>(
     let (answer, answers) = channel();
     let closed = AtomicBool::new(false);
     let mut wall = Wall {
-        display,
-        size,
+        displays,
         answer,
         closed: &closed,
-        surface: None,
-        picture: None,
-        waiting: false,
+        windows: Vec::new(),
     };
     thread::scope(|scope| {
         let closed = &closed;
         let running = scope.spawn(move || {
-            let mut screen = WindowScreen { proxy, answers };
-            // The first answer: there is a window.
-            let result = screen.answer().and_then(|()| {
+            let mut windows = Windows { proxy, answers };
+            // The first answer: there are windows.
+            let result = windows.answer().and_then(|()| {
                 thread::sleep(SETTLING);
-                session(&mut screen, &|| closed.load(Ordering::SeqCst))
+                session(&mut windows, &|| closed.load(Ordering::SeqCst))
             });
             // Without an event loop nobody has to be told.
-            let _ = screen.proxy.send_event(Order::Close);
+            let _ = windows.proxy.send_event(Order::Close);
             result
         });
         let ran = events.run_app(&mut wall).map_err(refuse);
@@ -156,13 +170,22 @@ pub fn with_window<T: Send>(
     })
 }
 
-/// The session's side of the window.
-struct WindowScreen {
+/// The session's side of the windows.
+#[derive(Debug)]
+pub struct Windows {
     proxy: EventLoopProxy<Order>,
     answers: Receiver<Answer>,
 }
 
-impl WindowScreen {
+impl Windows {
+    /// The screen of this place in [`Displays::screens`].
+    pub fn screen(&mut self, number: usize) -> impl Screen {
+        WindowScreen {
+            windows: self,
+            number,
+        }
+    }
+
     fn answer(&self) -> Answer {
         self.answers
             .recv_timeout(PATIENCE)
@@ -175,7 +198,12 @@ impl WindowScreen {
     }
 }
 
-impl Screen for WindowScreen {
+struct WindowScreen<'w> {
+    windows: &'w mut Windows,
+    number: usize,
+}
+
+impl Screen for WindowScreen<'_> {
     fn show(&mut self, planned: &Planned) -> Result<(), SessionError> {
         let refuse = |reason: String| SessionError::Display {
             reason: format!("{}: {reason}", planned.slide.display()),
@@ -185,37 +213,51 @@ impl Screen for WindowScreen {
         if !matches!(picture.samples(), Samples::Eight(_)) {
             return Err(refuse("a display shows 8 bits, it has 16".to_owned()));
         }
-        if self.proxy.send_event(Order::Show(picture)).is_err() {
+        let order = Order::Show(self.number, picture);
+        if self.windows.proxy.send_event(order).is_err() {
             return Err(SessionError::Stopped);
         }
-        self.answer()
+        self.windows.answer()
     }
 }
 
-/// The window's side.
+/// The windows' side.
 struct Wall<'a> {
-    display: usize,
-    size: (u32, u32),
+    displays: &'a Displays,
     answer: Sender<Answer>,
     closed: &'a AtomicBool,
-    surface: Option<Surface>,
+    windows: Vec<DisplayWindow>,
+}
+
+type Surface = softbuffer::Surface<Rc<Window>, Rc<Window>>;
+
+/// A window that fills a display.
+struct DisplayWindow {
+    surface: Surface,
+    /// Its screen, if it is not one that stays black, and the part of the slides that is shown here;
+    /// `None` for all of them.
+    shows: Option<(usize, Option<SlidePart>)>,
+    /// Black if left out.
     picture: Option<Picture>,
     /// Whether the session waits for the picture to be drawn.
     waiting: bool,
 }
 
-type Surface = softbuffer::Surface<Rc<Window>, Rc<Window>>;
+/// Corner and size, in pixels.
+type SlidePart = ([usize; 2], FrameSize);
 
 impl ApplicationHandler<Order> for Wall<'_> {
     fn resumed(&mut self, events: &ActiveEventLoop) {
-        if self.surface.is_some() {
+        if !self.windows.is_empty() {
             return;
         }
-        let opened = self.open(events);
+        let opened = self.open_all(events);
         let failed = opened.is_err();
-        let answer = opened.map(|surface| {
-            surface.window().request_redraw();
-            self.surface = Some(surface);
+        let answer = opened.map(|windows| {
+            for window in &windows {
+                window.surface.window().request_redraw();
+            }
+            self.windows = windows;
         });
         let _ = self.answer.send(answer);
         if failed {
@@ -225,25 +267,18 @@ impl ApplicationHandler<Order> for Wall<'_> {
 
     fn user_event(&mut self, events: &ActiveEventLoop, order: Order) {
         match order {
-            Order::Show(picture) => {
-                self.picture = Some(picture);
-                self.waiting = true;
-                if let Some(surface) = &self.surface {
-                    surface.window().request_redraw();
+            Order::Show(screen, picture) => {
+                if let Err(error) = self.show(screen, &picture) {
+                    let _ = self.answer.send(Err(error));
                 }
             }
             Order::Close => events.exit(),
         }
     }
 
-    fn window_event(&mut self, _events: &ActiveEventLoop, _window: WindowId, event: WindowEvent) {
+    fn window_event(&mut self, _events: &ActiveEventLoop, window: WindowId, event: WindowEvent) {
         match event {
-            WindowEvent::RedrawRequested => {
-                let drawn = self.draw();
-                if std::mem::take(&mut self.waiting) {
-                    let _ = self.answer.send(drawn);
-                }
-            }
+            WindowEvent::RedrawRequested => self.draw(window),
             WindowEvent::CloseRequested => self.closed.store(true, Ordering::SeqCst),
             WindowEvent::KeyboardInput { event, .. }
                 if event.state == ElementState::Pressed
@@ -257,45 +292,128 @@ impl ApplicationHandler<Order> for Wall<'_> {
 }
 
 impl Wall<'_> {
-    /// Opens the window.
-    fn open(&self, events: &ActiveEventLoop) -> Result<Surface, SessionError> {
+    /// Opens all windows, once every display is known to be there and of the slides' size.
+    fn open_all(&self, events: &ActiveEventLoop) -> Result<Vec<DisplayWindow>, SessionError> {
         let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
-        let Some(chosen) = monitors.get(self.display) else {
-            return Err(SessionError::NoDisplay {
-                asked: self.display,
+        let chosen = |number: &usize| {
+            let missing = || SessionError::NoDisplay {
+                asked: *number,
                 found: (0..).zip(&monitors).map(|(n, m)| described(n, m)).collect(),
-            });
+            };
+            monitors.get(*number).ok_or_else(missing)
         };
-        let found = (chosen.size().width, chosen.size().height);
-        if found != self.size {
-            return Err(SessionError::DisplaySize {
-                display: self.display,
-                found,
-                slides: self.size,
-            });
+        let mut places = Vec::new();
+        for (screen, span) in self.displays.screens.iter().enumerate() {
+            let shown: Vec<&MonitorHandle> =
+                span.displays.iter().map(chosen).collect::<Result<_, _>>()?;
+            let sizes = shown.iter().map(|monitor| monitor.size());
+            let sizes: Vec<_> = sizes.map(|size| (size.width, size.height)).collect();
+            let parts = parts(&sizes, span.size).ok_or_else(|| SessionError::DisplaySize {
+                found: span.displays.iter().copied().zip(sizes).collect(),
+                slides: span.size,
+            })?;
+            let shows = parts.into_iter().map(|part| Some((screen, part)));
+            places.extend(shown.into_iter().zip(shows));
         }
-        let refuse = |reason: String| SessionError::Display { reason };
-        let attributes = Window::default_attributes()
-            .with_title("iltm")
-            // For a desktop without a window manager, which full screen is a wish to.
-            .with_position(chosen.position())
-            .with_inner_size(chosen.size())
-            .with_decorations(false)
-            .with_fullscreen(Some(Fullscreen::Borderless(Some(chosen.clone()))));
-        let window = events.create_window(attributes);
-        let window = Rc::new(window.map_err(|error| refuse(error.to_string()))?);
-        window.set_cursor_visible(false);
-        let context = softbuffer::Context::new(Rc::clone(&window));
-        let context = context.map_err(|error| refuse(error.to_string()))?;
-        softbuffer::Surface::new(&context, window).map_err(|error| refuse(error.to_string()))
+        for number in &self.displays.dark {
+            places.push((chosen(number)?, None));
+        }
+        let windows = places.into_iter().map(|(monitor, shows)| {
+            Ok(DisplayWindow {
+                surface: open(events, monitor)?,
+                shows,
+                picture: None,
+                waiting: false,
+            })
+        });
+        windows.collect()
     }
 
+    /// Has the picture drawn on a screen and black on the others.
+    fn show(&mut self, screen: usize, picture: &Picture) -> Result<(), SessionError> {
+        for window in &mut self.windows {
+            let part = match window.shows {
+                Some((shows, None)) if shows == screen => Some(picture.clone()),
+                Some((shows, Some((corner, size)))) if shows == screen => {
+                    let part = picture.part(corner, size);
+                    Some(part.ok_or_else(|| SessionError::Display {
+                        reason: format!("it has {} pixels, other slides have more", picture.size()),
+                    })?)
+                }
+                _ => None,
+            };
+            // What is black already is not drawn again.
+            window.waiting = part.is_some() || window.picture.is_some();
+            window.picture = part;
+            if window.waiting {
+                window.surface.window().request_redraw();
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws a window, and tells the session once it waits for none any more.
+    fn draw(&mut self, id: WindowId) {
+        let waits = |windows: &[DisplayWindow]| windows.iter().any(|window| window.waiting);
+        let waited = waits(&self.windows);
+        let mut all = self.windows.iter_mut();
+        let Some(window) = all.find(|window| window.surface.window().id() == id) else {
+            return;
+        };
+        window.waiting = false;
+        let drawn = window.draw();
+        if drawn.is_err() {
+            for window in &mut self.windows {
+                window.waiting = false;
+            }
+        }
+        if waited && !waits(&self.windows) {
+            let _ = self.answer.send(drawn);
+        }
+    }
+}
+
+/// Opens a window that fills a display.
+fn open(events: &ActiveEventLoop, monitor: &MonitorHandle) -> Result<Surface, SessionError> {
+    let refuse = |reason: String| SessionError::Display { reason };
+    let attributes = Window::default_attributes()
+        .with_title("iltm")
+        // For a desktop without a window manager, which full screen is a wish to.
+        .with_position(monitor.position())
+        .with_inner_size(monitor.size())
+        .with_decorations(false)
+        .with_fullscreen(Some(Fullscreen::Borderless(Some(monitor.clone()))));
+    let window = events.create_window(attributes);
+    let window = Rc::new(window.map_err(|error| refuse(error.to_string()))?);
+    window.set_cursor_visible(false);
+    let context = softbuffer::Context::new(Rc::clone(&window));
+    let context = context.map_err(|error| refuse(error.to_string()))?;
+    softbuffer::Surface::new(&context, window).map_err(|error| refuse(error.to_string()))
+}
+
+/// The part of slides of this width and height that each display shows, given theirs; `None` for one
+/// that shows whole slides. `None` if the displays do not have the slides' pixels.
+fn parts(displays: &[(u32, u32)], slides: (u32, u32)) -> Option<Vec<Option<SlidePart>>> {
+    let width: u32 = displays.iter().map(|(width, _)| width).sum();
+    let fit = displays.iter().all(|(_, height)| *height == slides.1) && width == slides.0;
+    if !fit || displays.len() == 1 {
+        return fit.then(|| vec![None]);
+    }
+    let mut left = 0;
+    let parts = displays.iter().map(|(width, height)| {
+        let size = FrameSize::new(u16::try_from(*width).ok()?, u16::try_from(*height).ok()?)?;
+        let part = ([left, 0], size);
+        left += size.width();
+        Some(Some(part))
+    });
+    parts.collect()
+}
+
+impl DisplayWindow {
     /// Draws the picture in the middle of the window, black around it and before the
     /// first one.
     fn draw(&mut self) -> Result<(), SessionError> {
-        let Some(surface) = &mut self.surface else {
-            return Ok(());
-        };
+        let surface = &mut self.surface;
         let refuse = |error: softbuffer::SoftBufferError| SessionError::Display {
             reason: error.to_string(),
         };
@@ -358,7 +476,24 @@ fn paint(picture: &Picture, window: &mut [u32], width: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use iltm_runtime::FrameSize;
+
+    #[test]
+    fn displays_beside_each_other_have_the_pixels_of_the_slides() {
+        let part = |left, width, height| Some(([left, 0], FrameSize::new(width, height).unwrap()));
+        assert_eq!(parts(&[(64, 48)], (64, 48)), Some(vec![None]));
+        assert_eq!(
+            parts(&[(64, 48), (80, 48)], (144, 48)),
+            Some(vec![part(0, 64, 48), part(64, 80, 48)])
+        );
+        for (displays, slides) in [
+            (&[(64, 48)][..], (144, 48)),
+            (&[(64, 48), (80, 48)], (143, 48)),
+            (&[(64, 48), (80, 49)], (144, 48)),
+            (&[], (64, 48)),
+        ] {
+            assert_eq!(parts(displays, slides), None, "{displays:?} {slides:?}");
+        }
+    }
 
     #[test]
     fn a_picture_lies_in_the_middle_of_its_window() {

@@ -60,12 +60,11 @@ impl Obstacles {
         };
         let mut first: Option<Hit> = None;
         self.near(&stretch, |facet| {
-            if let Some(along) = meets(&self.facets[facet], origin, direction) {
-                // Of surfaces met together, the first in the list.
-                let nearer = first.is_none_or(|f| (along, facet) < (f.along, f.facet));
-                if along > least && nearer {
-                    first = Some(Hit { facet, along });
-                }
+            // Of surfaces met together, the first in the list.
+            let nearer = |along| first.is_none_or(|f| (along, facet) < (f.along, f.facet));
+            let wanted = |along| along > least && nearer(along);
+            if let Some(along) = meets(&self.facets[facet], origin, direction, wanted) {
+                first = Some(Hit { facet, along });
             }
             false
         });
@@ -83,8 +82,8 @@ impl Obstacles {
             lengths: 1.0,
         };
         self.near(&stretch, |facet| {
-            meets(&self.facets[facet], from, &direction)
-                .is_some_and(|along| along > ENDS && along < 1.0 - ENDS)
+            let between = |along| along > ENDS && along < 1.0 - ENDS;
+            meets(&self.facets[facet], from, &direction, between).is_some()
         })
     }
 
@@ -97,15 +96,21 @@ impl Obstacles {
     }
 }
 
-/// How far along the ray it meets the polygon.
-fn meets(polygon: &Polygon, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+/// How far along the ray it meets the polygon, if that is `wanted`: it is known before the longer
+/// question whether the place lies inside.
+fn meets(
+    polygon: &Polygon,
+    origin: &Vector3<f64>,
+    direction: &Vector3<f64>,
+    wanted: impl Fn(f64) -> bool,
+) -> Option<f64> {
     let slope = polygon.normal().dot(direction);
     if slope == 0.0 {
         return None;
     }
     let along = -polygon.plane().distance(origin) / slope;
-    let inside = along.is_finite() && polygon.contains(&(origin + direction * along));
-    inside.then_some(along)
+    let inside = || polygon.contains(&(origin + direction * along));
+    (along.is_finite() && wanted(along) && inside()).then_some(along)
 }
 
 /// Part of a surface's size that its box is wider: a flat box has no inside to hit.
