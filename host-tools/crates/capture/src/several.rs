@@ -216,6 +216,8 @@ impl WideFrame {
             let brighter = black_shift::brighter(&black, &own);
             gates.push((other, movement));
             gates.push((other, between::black(&pair(0, other), brighter)));
+            let responses = [0, other].map(|at| &self.own[at].devices.projector);
+            gates.push((other, between::response(&pair(0, other), responses)));
         }
         for (other, shares) in self.pixel_shares.iter().enumerate() {
             let same = (0..other).filter_map(|first| {

@@ -1,9 +1,11 @@
 //! Gates between captures of several projectors: one camera that stood still, one light in the
-//! room, and each projector once.
+//! room, one response, and each projector once.
 
 use super::movement;
+use super::response::{MOST_STEPS, WARN_STEPS};
 use crate::gate::{Gate, GateName, Verdict};
 use crate::registration::black_shift::BlackShift;
+use iltm_picture::ProjectorResponse;
 
 /// Part of the light under black that one has less, from which it is worth a word.
 const DARKER: f64 = 0.1;
@@ -94,6 +96,35 @@ pub(crate) fn black(pair: &Pair<'_>, brighter: Option<f64>) -> Gate {
     }
 }
 
+/// Judges whether two projectors show the same light for a code: a table has one response for all.
+pub(crate) fn response(pair: &Pair<'_>, of: [&ProjectorResponse; 2]) -> Gate {
+    let Pair { first, other } = pair;
+    let [one, two] = of;
+    let channels = one.channels().len().max(two.channels().len());
+    let steps = (0..channels).map(|channel| one.channel(channel).steps_from(two.channel(channel)));
+    let steps = steps.fold(0.0, f64::max);
+    let verdict = Verdict::of(steps, WARN_STEPS, MOST_STEPS);
+    let what = match verdict {
+        Verdict::Pass => format!("{first} and {other} have one response of the projector"),
+        _ => format!(
+            "the projector of {other} has another response than that of {first}: {steps:.1} steps of \
+             255 (its gamma)"
+        ),
+    };
+    Gate {
+        number: steps,
+        limit: MOST_STEPS,
+        unit: "steps",
+        what,
+        ..Gate::of_share(
+            GateName::Response,
+            verdict,
+            (0.0, 0.0),
+            "Set all projectors to one picture mode and gamma, and take that capture again.",
+        )
+    }
+}
+
 /// Judges whether two captures are of two projectors. `same` is the part of the pixels that both
 /// know which see the same place in both pictures.
 pub(crate) fn same_projector(pair: &Pair<'_>, same: f64) -> Option<Gate> {
@@ -130,6 +161,7 @@ pub(crate) fn shared(name: &str, shared: f64) -> Option<Gate> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use iltm_picture::Response;
 
     const PAIR: Pair<'_> = Pair {
         first: "left",
@@ -160,6 +192,24 @@ mod tests {
         assert!(unknown.what.contains("left and right is not known"));
         assert_eq!(unknown.verdict, Warn);
         assert_eq!(black(&PAIR, None).verdict, Verdict::NotJudged);
+    }
+
+    #[test]
+    fn a_projector_with_another_gamma_is_named() {
+        let verdict = |gamma| {
+            let responses = [2.2, gamma].map(|gamma| Response::Gamma(gamma).into());
+            let gate = response(&PAIR, [&responses[0], &responses[1]]);
+            assert_eq!(
+                gate.what.contains("another response"),
+                gate.verdict != Verdict::Pass
+            );
+            gate.verdict
+        };
+        assert_eq!(verdict(2.2), Verdict::Pass);
+        assert_eq!(verdict(2.22), Verdict::Pass);
+        assert_eq!(verdict(2.3), Verdict::Warn);
+        assert_eq!(verdict(2.6), Verdict::Fail);
+        assert_eq!(verdict(1.9), Verdict::Fail);
     }
 
     #[test]

@@ -10,9 +10,10 @@ use crate::gate::{Evidence, Gate, GateName, Verdict};
 const WARN: f64 = 0.004;
 const MOST: f64 = 0.006;
 
-/// Steps of 255 that the projector's measured response may be off the declared one.
-const WARN_STEPS: f64 = 2.5;
-const MOST_STEPS: f64 = 8.0;
+/// Steps of 255 that the projector's measured response may be off the declared one, or another
+/// projector's.
+pub(super) const WARN_STEPS: f64 = 2.5;
+pub(super) const MOST_STEPS: f64 = 8.0;
 
 /// Judges what was measured of the devices; `cause` is why light does not add up.
 pub(super) fn judge(devices: &Devices, cause: Option<Nonlinearity>) -> Gate {
