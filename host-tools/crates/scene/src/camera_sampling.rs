@@ -259,7 +259,7 @@ impl<'e> PixelSampler<'e> {
     fn look(&self, point: &SurfacePoint<'_>, part: f64, pixel: &mut PixelSamples) {
         let view = &self.facets.projector().view;
         let described = self.facets.described(point.facet);
-        let albedo = point.panel.albedo.at(described.texture_place(&point.world));
+        let albedo = point.panel.albedo.at(described, &point.world);
         let at = |patches: &Patches| patches.at(view, point.facet, point.back, &point.world);
         if let Some(patch) = self.patches.and_then(at) {
             pixel

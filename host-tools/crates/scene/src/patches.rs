@@ -50,7 +50,31 @@ pub(crate) struct Patches {
     /// Patch of a facet in a cell.
     in_frame: HashMap<(usize, usize), usize>,
     /// Other patches by facet and side.
-    beside: HashMap<(usize, bool), Vec<usize>>,
+    beside: HashMap<(usize, bool), Vec<BesidePatch>>,
+}
+
+/// A patch that no cell of the projector lights, and a sphere around it.
+#[derive(Clone, Copy, Debug)]
+struct BesidePatch {
+    index: usize,
+    centre: Vector3<f64>,
+    /// A little more than its radius, squared.
+    reach: f64,
+}
+
+impl BesidePatch {
+    fn new(index: usize, polygon: &Polygon) -> Self {
+        let centre = polygon.centroid();
+        let distances = polygon
+            .corners()
+            .iter()
+            .map(|corner| (corner - centre).norm_squared());
+        Self {
+            index,
+            centre,
+            reach: 1.01 * distances.fold(0.0, f64::max),
+        }
+    }
 }
 
 impl Patches {
@@ -88,7 +112,8 @@ impl Patches {
             chop(part, side, &mut pieces);
             for piece in pieces {
                 let index = patches.push(facets, piece, facet, back, None);
-                patches.beside.entry((facet, back)).or_default().push(index);
+                let patch = BesidePatch::new(index, &patches.all[index].polygon);
+                patches.beside.entry((facet, back)).or_default().push(patch);
             }
         }
         patches
@@ -111,16 +136,18 @@ impl Patches {
             return Some(patch);
         }
         let candidates = self.beside.get(&(facet, back))?;
-        let inside = |patch: &&usize| self.all[**patch].polygon.contains(world);
-        let nearest = |patch: &&usize| (self.all[**patch].polygon.centroid() - world).norm();
+        let distance = |patch: &BesidePatch| (patch.centre - world).norm_squared();
+        let inside = |patch: &&BesidePatch| {
+            distance(patch) <= patch.reach && self.all[patch.index].polygon.contains(world)
+        };
         let found = candidates.iter().find(inside);
         // Rounding leaves points on the borders between pieces to neither.
         let found = found.or_else(|| {
             candidates
                 .iter()
-                .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
         });
-        found.copied()
+        found.map(|patch| patch.index)
     }
 
     fn in_cell(&self, view: &Pinhole, facet: usize, world: &Vector3<f64>) -> Option<usize> {
@@ -273,7 +300,7 @@ fn mean_albedo(facets: &Facets<'_>, facet: usize, polygon: &Polygon) -> [f64; 3]
     let described = facets.described(facet);
     let (mut sum, mut weight) = ([0.0; 3], 0.0);
     for (place, share) in samples(polygon, ALBEDO_SAMPLES) {
-        let channels = albedo.at(described.texture_place(&place));
+        let channels = albedo.at(described, &place);
         for (sum, value) in sum.iter_mut().zip(channels) {
             *sum += share * value;
         }

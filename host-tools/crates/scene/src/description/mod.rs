@@ -225,12 +225,12 @@ impl Facet {
 }
 
 impl Albedo {
-    /// Albedo at a place of the texture.
+    /// Albedo at a point of a facet.
     #[must_use]
-    pub fn at(&self, place: Vector2<f64>) -> [f64; 3] {
+    pub fn at(&self, facet: &Facet, world: &Vector3<f64>) -> [f64; 3] {
         match self {
             Self::Uniform(channels) => *channels,
-            Self::Texture(texture) => texture.at(place),
+            Self::Texture(texture) => texture.at(facet.texture_place(world)),
         }
     }
 

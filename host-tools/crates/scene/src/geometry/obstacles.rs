@@ -53,11 +53,7 @@ impl Obstacles {
         direction: &Vector3<f64>,
         least: f64,
     ) -> Option<Hit> {
-        let stretch = Stretch {
-            origin: *origin,
-            direction: *direction,
-            lengths: f64::INFINITY,
-        };
+        let stretch = Stretch::new(origin, direction, f64::INFINITY);
         let mut first: Option<Hit> = None;
         self.near(&stretch, |facet| {
             // Of surfaces met together, the first in the list.
@@ -76,11 +72,7 @@ impl Obstacles {
     #[must_use]
     pub fn blocked(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let direction = to - from;
-        let stretch = Stretch {
-            origin: *from,
-            direction,
-            lengths: 1.0,
-        };
+        let stretch = Stretch::new(from, &direction, 1.0);
         self.near(&stretch, |facet| {
             let between = |along| along > ENDS && along < 1.0 - ENDS;
             meets(&self.facets[facet], from, &direction, between).is_some()
@@ -177,26 +169,37 @@ impl BoundingBoxes {
     }
 }
 
-/// Part of a line, from `origin` to that many lengths of `direction` away.
+/// Part of a line, from a place to that many lengths of a direction away.
 struct Stretch {
     origin: Vector3<f64>,
-    direction: Vector3<f64>,
+    /// One over the direction along each axis: boxes are met often, and divisions take long.
+    inverse: Vector3<f64>,
     lengths: f64,
+}
+
+impl Stretch {
+    fn new(origin: &Vector3<f64>, direction: &Vector3<f64>, lengths: f64) -> Self {
+        Self {
+            origin: *origin,
+            inverse: direction.map(f64::recip),
+            lengths,
+        }
+    }
 }
 
 impl IntersectsAabb<f64, 3> for Stretch {
     fn intersects_aabb(&self, aabb: &Aabb<f64, 3>) -> bool {
         let (mut enters, mut leaves) = (0.0_f64, self.lengths);
         for axis in 0..3 {
-            let (start, slope) = (self.origin[axis], self.direction[axis]);
+            let (start, inverse) = (self.origin[axis], self.inverse[axis]);
             let (least, most) = (aabb.min[axis], aabb.max[axis]);
-            if slope == 0.0 {
+            if inverse.is_infinite() {
                 if start < least || start > most {
                     return false;
                 }
                 continue;
             }
-            let (a, b) = ((least - start) / slope, (most - start) / slope);
+            let (a, b) = ((least - start) * inverse, (most - start) * inverse);
             enters = enters.max(a.min(b));
             leaves = leaves.min(a.max(b));
         }
