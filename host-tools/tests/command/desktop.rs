@@ -72,8 +72,9 @@ impl Drop for Desktop {
     }
 }
 
-/// Asks a VNC server on a socket to divide its desktop into displays: the message `SetDesktopSize`
-/// of the Remote Framebuffer Protocol (RFC 6143; the message is of its registered extension 251).
+/// Asks a VNC server on a socket to divide its desktop into displays, by the message `SetDesktopSize`
+/// (251) that the community's extension `ExtendedDesktopSize` (-308) adds to the Remote Framebuffer
+/// Protocol (RFC 6143).
 fn divide(socket: &Path, widths: &[u16], height: u16) -> io::Result<()> {
     let mut server = UnixStream::connect(socket)?;
     // Its version, and ways to log in, the only one of which is none.

@@ -106,7 +106,8 @@ fn every_scene_that_comes_with_the_tools_is_explained() {
         .filter_map(|name| name.strip_suffix(".toml"))
         .collect();
     assert!(scenes.len() > 10, "{scenes:?}");
-    for name in scenes {
+    // Its four projectors before a mesh take a minute with any number of cells.
+    for name in scenes.into_iter().filter(|name| *name != "dome-of-four") {
         // As few cells take a fraction of the time.
         let path = format!("scenes/{name}.toml");
         let fewer = |line: &str| match line.split_once(" = ") {

@@ -222,7 +222,8 @@ impl SessionError {
             }
             Self::DisplaySize { .. } => {
                 "Set the display to the projector's own resolution, without scaling, or make the \
-                 folder with `iltm patterns --projector WxH`."
+                 folder with `iltm patterns --projector WxH`. Wide slides need all their displays: \
+                 --display 1,2."
             }
             Self::Camera { .. } => {
                 "Try the command by itself, look at the camera's battery, card and cable, and run \
