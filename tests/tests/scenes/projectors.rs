@@ -2,7 +2,7 @@
 
 use iltm::capture::{CaptureOptions, GateName, Verdict, listed, read_several};
 use iltm::compile::Provenance;
-use iltm::picture::{Picture, Samples, png};
+use iltm::picture::{Picture, Response, Samples, png};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::{FillCaptureError, UnfilledCapture};
@@ -328,7 +328,7 @@ fn captures_between_which_something_changed_are_refused_or_said_by_name() {
     let said = |right: &PathBuf| {
         let several = read(right, &[]).unwrap();
         let gates = several.all.diagnostics.gates;
-        let between = gates[gates.len() - 2..].iter();
+        let between = gates[gates.len() - 3..].iter();
         let what = between.map(|gate| (gate.name, gate.verdict, gate.what.clone()));
         what.collect::<Vec<_>>()
     };
@@ -364,6 +364,16 @@ fn captures_between_which_something_changed_are_refused_or_said_by_name() {
     assert!(dark[0].0 == GateName::Movement && dark[0].1 == Verdict::Warn);
     assert!(dark[0].2.contains("is not known"), "{dark:?}");
     assert!(dark[1].1 == Verdict::Warn, "{dark:?}");
+
+    // The ramps tell it.
+    let mut mode = scene.clone();
+    for projector in &mut mode.projectors {
+        projector.response = Response::Gamma(2.8);
+    }
+    let error = read(&right("mode", &mode), &[]).unwrap_err();
+    println!("{error}");
+    assert!(error.to_string().contains("another response"), "{error}");
+    assert!(error.next_step().contains("gamma"));
 
     // The cables were not changed, or both displays show the left one's slides.
     let mut mirrored = scene.clone();
