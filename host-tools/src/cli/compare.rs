@@ -74,7 +74,7 @@ fn of_light(
     };
     let light = light.map_err(dark)?;
     let (photographed, inverted) = benchmark::every(
-        (&light.truth, &light.rig),
+        (&light.truth, &light.rig, &light.columns),
         arguments.photos,
         arguments.seed,
         meter,
@@ -127,7 +127,7 @@ fn of_paper(
         .filter(|condition| condition.noisy)
     {
         if let Some((truth, rig)) = condition.world(arguments.seed) {
-            let light = (&truth, &rig);
+            let light = (&truth, &rig, &[][..]);
             let (photographed, inverted) =
                 benchmark::every(light, arguments.photos, arguments.seed, meter, progress);
             contests.push((condition.name(), photographed, inverted));
@@ -200,6 +200,11 @@ fn dark(error: BenchmarkSceneError) -> Failure {
             Kind::Solve,
             error,
             "Look at `iltm solve`: it says which cells cannot be solved for.",
+        ),
+        BenchmarkSceneError::Overlap => Failure::new(
+            Kind::Usage,
+            error,
+            "Compare on a scene without overlap; docs/several-projectors.md has figures of both.",
         ),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::user::{User, contains};
 use std::fs;
+use std::path::Path;
 
 #[test]
 fn a_capture_is_compared_on_with_every_method_and_a_source_for_each() {
@@ -34,6 +35,41 @@ fn a_capture_is_compared_on_with_every_method_and_a_source_for_each() {
     for text in [page, table] {
         contains(&text, &["one light at a time", "exact inverse"]);
     }
+}
+
+/// A scene that comes with the tools, of few cells and pixels.
+fn coarse(scene: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let text = fs::read_to_string(folder.join(scene)).expect("a scene");
+    let fewer = |line: &str| match line.split_once(" = ") {
+        Some(("rows", _)) => "rows = 4\n".to_owned(),
+        Some(("cols", _)) => "cols = 6\n".to_owned(),
+        Some(("width", _)) => "width = 160\n".to_owned(),
+        Some(("height", _)) => "height = 100\n".to_owned(),
+        _ => format!("{line}\n"),
+    };
+    text.lines().map(fewer).collect()
+}
+
+#[test]
+fn projectors_that_light_each_others_walls_are_compared_together_and_each_alone() {
+    let user = User::new();
+    user.write("walls.toml", coarse("two-walls.toml"));
+    let data = user.json("compare walls.toml -o out --photos 30");
+    let rows = data["inverted"].as_array().expect("a list");
+    let error = |name: &str| {
+        let row = rows.iter().find(|row| row["method"] == name);
+        row.expect("a row")["compensation_error"]
+            .as_f64()
+            .expect("a number")
+    };
+    let alone = error("exact inverse of each projector alone");
+    assert!(error("exact inverse") < 1e-6 && alone > 0.02, "{alone}");
+    let page = user.text("out/index.html");
+    contains(&page, &["exact inverse of each projector alone"]);
+    user.write("screen.toml", coarse("folded-screen.toml"));
+    let said = user.fails(2, "compare screen.toml -o none");
+    contains(&said, &["overlap", "docs/several-projectors.md"]);
 }
 
 #[test]

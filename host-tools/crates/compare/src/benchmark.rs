@@ -4,6 +4,7 @@ use super::acquisition::{self, Acquisition};
 use super::inversion::{self, Inversion, Inverted, KnownTransport};
 use super::{Answer, Description, Errors, GroundTruth, Rig, Unfit};
 use iltm_picture::progress::Progress;
+use std::ops::Range;
 use std::time::Instant;
 
 /// What one method did.
@@ -96,15 +97,15 @@ fn row(
 }
 
 /// All ways to photograph (with `photographs` where one likes) and all ways to invert,
-/// in that order.
+/// in that order. `columns` are the columns of cells of each projector.
 pub fn every(
-    (truth, rig): (&GroundTruth, &Rig),
+    (truth, rig, columns): (&GroundTruth, &Rig, &[Range<usize>]),
     photographs: usize,
     seed: u64,
     meter: Option<Meter>,
     progress: &dyn Progress,
 ) -> (Vec<BenchmarkRow>, Vec<BenchmarkRow>) {
-    let (acquisitions, inversions) = (acquisition::all(photographs, seed), inversion::all());
+    let (acquisitions, inversions) = (acquisition::all(photographs, seed), inversion::all(columns));
     let total = acquisitions.len() + inversions.len();
     progress.begin("methods, one after the other", total as u64);
     let photographed = acquisitions.iter().map(|method| {

@@ -21,6 +21,7 @@ use iltm_scene::{
 };
 use iltm_solve::{SolveError, SolveOptions, solve};
 use nalgebra::DMatrix;
+use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
 
@@ -45,6 +46,8 @@ pub struct BenchmarkScene {
     pub truth: GroundTruth,
     /// What photographs are taken with; its noise is the camera's.
     pub rig: Rig,
+    /// Columns of cells of each of several projectors; empty for one.
+    pub columns: Vec<Range<usize>>,
 }
 
 /// Why there is no light to compare on.
@@ -80,6 +83,11 @@ pub enum BenchmarkSceneError {
     /// The transport has no inverse.
     #[error("the scene's transport has no inverse, by which answers could be judged")]
     Singular,
+    /// Projectors light one place together.
+    #[error(
+        "pictures of its projectors overlap: methods are compared where one projector lights a place"
+    )]
+    Overlap,
 }
 
 impl BenchmarkScene {
@@ -109,6 +117,7 @@ impl BenchmarkScene {
                          to methods that look for the same";
             (light.ok_or(BenchmarkSceneError::Singular)?, known)
         };
+        let transport = (transport, Vec::new());
         Self::new(&measurements, inverse.live, transport, known, seed)
     }
 
@@ -132,14 +141,18 @@ impl BenchmarkScene {
         let measurements = iltm_capture::read(&folder, &CaptureOptions::default(), progress)?;
         let transport = simulated(&simulation, &measurements, progress)?;
         let live = measurements.live.clone();
+        let columns = scene.columns();
+        if overlap(&transport, measurements.grid, &columns) {
+            return Err(BenchmarkSceneError::Overlap);
+        }
         let known = "simulated without noise, one cell lit at a time";
-        Self::new(&measurements, live, transport, known, seed)
+        Self::new(&measurements, live, (transport, columns), known, seed)
     }
 
     fn new(
         measurements: &Measurements,
         live: Vec<bool>,
-        mut transport: DMatrix<f64>,
+        (mut transport, columns): (DMatrix<f64>, Vec<Range<usize>>),
         known: &'static str,
         seed: u64,
     ) -> Result<Self, BenchmarkSceneError> {
@@ -153,8 +166,31 @@ impl BenchmarkScene {
             colour: measurements.channels.len() > 1,
             truth,
             rig,
+            columns,
         })
     }
+}
+
+/// Part of a cell's own light from which another projector's cell lights it directly: bounces from a
+/// single cell are far less.
+const DIRECT: f64 = 0.1;
+
+/// Whether cells of one projector light another's directly.
+fn overlap(transport: &DMatrix<f64>, grid: Grid, columns: &[Range<usize>]) -> bool {
+    let projector = |cell: usize| {
+        columns
+            .iter()
+            .position(|own| own.contains(&(cell % grid.cols())))
+    };
+    (0..grid.cells()).any(|cell| {
+        let own = transport[(cell, cell)];
+        let lit = transport.row(cell);
+        let mut others = lit
+            .iter()
+            .enumerate()
+            .filter(|(from, _)| projector(*from) != projector(cell));
+        own > 0.0 && others.any(|(_, light)| *light > DIRECT * own)
+    })
 }
 
 fn check_size(grid: Grid) -> Result<(), BenchmarkSceneError> {

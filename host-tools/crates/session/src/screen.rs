@@ -331,17 +331,19 @@ impl Wall<'_> {
 
     /// Has the picture drawn on a screen and black on the others.
     fn show(&mut self, screen: usize, picture: &Picture) -> Result<(), SessionError> {
-        for window in &mut self.windows {
-            let part = match window.shows {
-                Some((shows, None)) if shows == screen => Some(picture.clone()),
-                Some((shows, Some((corner, size)))) if shows == screen => {
-                    let part = picture.part(corner, size);
-                    Some(part.ok_or_else(|| SessionError::Display {
-                        reason: format!("it has {} pixels, other slides have more", picture.size()),
-                    })?)
-                }
-                _ => None,
-            };
+        let parts = self.windows.iter().map(|window| match window.shows {
+            Some((shows, None)) if shows == screen => Ok(Some(picture.clone())),
+            Some((shows, Some((corner, size)))) if shows == screen => {
+                let part = picture.part(corner, size);
+                let missing = || SessionError::Display {
+                    reason: format!("it has {} pixels, other slides have more", picture.size()),
+                };
+                part.map(Some).ok_or_else(missing)
+            }
+            _ => Ok(None),
+        });
+        let parts: Vec<Option<Picture>> = parts.collect::<Result<_, _>>()?;
+        for (window, part) in self.windows.iter_mut().zip(parts) {
             // What is black already is not drawn again.
             window.waiting = part.is_some() || window.picture.is_some();
             window.picture = part;

@@ -6,6 +6,7 @@
 mod albedo;
 mod bounded;
 mod clustered;
+mod each_alone;
 mod exact;
 mod gain_only;
 mod haar_input;
@@ -25,6 +26,7 @@ use super::{Answer, Description, Rig, Unfit};
 pub use albedo::{Albedo, AlbedoAlone, albedo};
 pub use bounded::Bounded;
 pub use clustered::Clustered;
+pub use each_alone::EachAlone;
 pub use exact::{Cancellation, Exact};
 pub use gain_only::{FloodGain, Uncompensated};
 pub use haar_input::{LargestInputs, StoredElements};
@@ -35,6 +37,7 @@ pub use neumann::{Neumann, Stratified};
 pub use out_of_focus::OutOfFocus;
 pub use probing::Probing;
 pub use pseudo_inverse::{Fewer, PseudoInverse};
+use std::ops::Range;
 pub use sweeps::{SweepOrder, Sweeps};
 pub use tikhonov::Tikhonov;
 pub use wavelet_inverse::WaveletInverse;
@@ -97,10 +100,14 @@ pub trait Inversion {
 /// more light than its own input does.
 const BLUR: f64 = 0.7;
 
-/// Every way, those with a parameter more than once.
+/// Every way, those with a parameter more than once. `columns` are those of each projector.
 #[must_use]
-pub fn all() -> Vec<Box<dyn Inversion>> {
+pub fn all(columns: &[Range<usize>]) -> Vec<Box<dyn Inversion>> {
     let mut all = vec![boxed(Exact)];
+    if columns.len() > 1 {
+        let columns = columns.to_vec();
+        all.push(boxed(EachAlone { columns }));
+    }
     // Series and sweeps.
     all.extend([1, 3, 8].map(|order| boxed(Neumann { order })));
     for order in [SweepOrder::Jacobi, SweepOrder::GaussSeidel] {
