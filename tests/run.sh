@@ -109,7 +109,7 @@ if [ $has_target ]; then
 fi
 
 say "documentation"
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet "${features[@]}"
 if [ $has_target ]; then
     (cd "$firmware" && RUSTDOCFLAGS="-D warnings" cargo doc --lib --no-deps --locked --quiet)
 fi
