@@ -9,7 +9,7 @@ use crate::simulated::simulation;
 use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
 use iltm::capture::{CameraSettings, CaptureOptions, camera_places, read_several};
 use iltm::compile::reference_white::WhiteRequest;
-use iltm::compile::{NEIGHBOURS_FACTOR, Provenance, split_table};
+use iltm::compile::{Provenance, split_table};
 use iltm::picture::{ContactSheet, Picture, Response, Samples, Tile};
 use iltm::progress::Silent;
 use iltm::scene::description::{Projector, Scene};
@@ -293,10 +293,11 @@ impl<'s> Screen<'s> {
     }
 
     /// The same where a device drives each projector, with frames of 8 bits and its part of the table
-    /// of all; `heard` says whether it gets the light of its neighbours.
-    pub fn seen_of_devices(&self, built: &BuiltTable, heard: bool) -> SeenOnScreen {
+    /// of all, with one cell for `factor` of its neighbours' along each side; `heard` says whether it gets
+    /// their light.
+    pub fn seen_of_devices(&self, built: &BuiltTable, factor: u16, heard: bool) -> SeenOnScreen {
         let count = self.scene.projectors.len();
-        let parts = split_table(&built.compiled.image, count, NEIGHBOURS_FACTOR);
+        let parts = split_table(&built.compiled.image, count, factor);
         let parts = parts.expect("projectors alike");
         self.seen_of(&|frame| {
             let wide = frame.size();

@@ -5,6 +5,7 @@
 //! `docs/several-projectors.md`; with `-- verdicts` that of verifications, and with `-- FOLDER` it draws
 //! the pictures there, and nothing else.
 
+use iltm::compile::NEIGHBOURS_FACTOR;
 use iltm::picture::png;
 use iltm::verify::{Cause, TableVerdict};
 use iltm_tests::overlapping::{
@@ -75,16 +76,11 @@ fn by_pixels() {
         let screen = Screen::new(&scene);
         row(name, "each alone", screen.seen_of_each(&alone));
         row(name, "together", screen.seen(&together));
-        row(
-            name,
-            "together, by a device each",
-            screen.seen_of_devices(&together, true),
-        );
-        row(
-            name,
-            "the same, neighbours silent",
-            screen.seen_of_devices(&together, false),
-        );
+        let devices = |factor, heard| screen.seen_of_devices(&together, factor, heard);
+        let usual = NEIGHBOURS_FACTOR;
+        row(name, "together, by a device each", devices(usual, true));
+        row(name, "the same, --neighbours 2", devices(2, true));
+        row(name, "the same, neighbours silent", devices(usual, false));
     }
 }
 
