@@ -1,6 +1,6 @@
 //! `iltm compare`, also the wrong ways.
 
-use super::user::{User, contains};
+use super::user::{User, contains, with_values};
 use std::fs;
 use std::path::Path;
 
@@ -41,14 +41,8 @@ fn a_capture_is_compared_on_with_every_method_and_a_source_for_each() {
 fn coarse(scene: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let text = fs::read_to_string(folder.join(scene)).expect("a scene");
-    let fewer = |line: &str| match line.split_once(" = ") {
-        Some(("rows", _)) => "rows = 4\n".to_owned(),
-        Some(("cols", _)) => "cols = 6\n".to_owned(),
-        Some(("width", _)) => "width = 160\n".to_owned(),
-        Some(("height", _)) => "height = 100\n".to_owned(),
-        _ => format!("{line}\n"),
-    };
-    text.lines().map(fewer).collect()
+    let few = [("rows", 4), ("cols", 6), ("width", 160), ("height", 100)];
+    with_values(&text, &few)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `iltm simulate` as a user meets it, the wrong ways in particular.
 
-use super::user::{User, contains};
+use super::user::{User, contains, with_values};
 use std::fs;
 use std::path::Path;
 
@@ -110,11 +110,7 @@ fn every_scene_that_comes_with_the_tools_is_explained() {
     for name in scenes.into_iter().filter(|name| *name != "dome-of-four") {
         // As few cells take a fraction of the time.
         let path = format!("scenes/{name}.toml");
-        let fewer = |line: &str| match line.split_once(" = ") {
-            Some((key @ ("rows" | "cols"), _)) => format!("{key} = 6\n"),
-            _ => format!("{line}\n"),
-        };
-        let coarse: String = user.text(&path).lines().map(fewer).collect();
+        let coarse = with_values(&user.text(&path), &[("rows", 6), ("cols", 6)]);
         user.write(&path, coarse);
         user.says(&format!("simulate {path} --explain"));
     }

@@ -212,6 +212,18 @@ impl Ended {
     }
 }
 
+/// A scene with other values of these keys, wherever they stand.
+pub(crate) fn with_values(scene: &str, values: &[(&str, u16)]) -> String {
+    let line = |line: &str| {
+        let key = line.split_once(" = ").map(|(key, _)| key);
+        match values.iter().find(|(changed, _)| key == Some(changed)) {
+            Some((key, value)) => format!("{key} = {value}\n"),
+            None => format!("{line}\n"),
+        }
+    };
+    scene.lines().map(line).collect()
+}
+
 /// What ctrl-C does.
 pub(crate) fn interrupt(child: &Child) {
     let id = child.id().to_string();

@@ -216,7 +216,7 @@ impl WideFrame {
             let brighter = black_shift::brighter(&black, &own);
             gates.push((other, movement));
             gates.push((other, between::black(&pair(0, other), brighter)));
-            let responses = [0, other].map(|at| &self.own[at].devices.projector);
+            let responses = [0, other].map(|at| self.own[at].devices.known_projector());
             gates.push((other, between::response(&pair(0, other), responses)));
         }
         for (other, shares) in self.pixel_shares.iter().enumerate() {

@@ -6,6 +6,7 @@
 //! together tell.
 
 use super::{GroundTruth, Rig};
+use crate::inversion::projector_of;
 use crate::rig::clear_dead;
 use iltm_capture::{
     CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, pattern_set,
@@ -177,11 +178,7 @@ const DIRECT: f64 = 0.1;
 
 /// Whether cells of one projector light another's directly.
 fn overlap(transport: &DMatrix<f64>, grid: Grid, columns: &[Range<usize>]) -> bool {
-    let projector = |cell: usize| {
-        columns
-            .iter()
-            .position(|own| own.contains(&(cell % grid.cols())))
-    };
+    let projector = |cell: usize| projector_of(cell, grid, columns);
     (0..grid.cells()).any(|cell| {
         let own = transport[(cell, cell)];
         let lit = transport.row(cell);

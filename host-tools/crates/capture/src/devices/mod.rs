@@ -96,6 +96,18 @@ impl Devices {
         steps.reduce(f64::max)
     }
 
+    /// The projector's response, if it was declared or measured: nothing else tells it from the
+    /// default.
+    pub(crate) fn known_projector(&self) -> Option<&ProjectorResponse> {
+        let measured = self
+            .ramp
+            .as_ref()
+            .is_some_and(|ramp| ramp.response.is_some());
+        let known =
+            measured || self.by_images.is_some() || self.declared_projector.known().is_some();
+        known.then_some(&self.projector)
+    }
+
     /// The mixing of the projector's channels in the camera's.
     #[must_use]
     pub fn mixing(&self) -> Option<&ColourMixingMatrix> {

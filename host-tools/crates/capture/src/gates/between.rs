@@ -97,9 +97,13 @@ pub(crate) fn black(pair: &Pair<'_>, brighter: Option<f64>) -> Gate {
 }
 
 /// Judges whether two projectors show the same light for a code: a table has one response for all.
-pub(crate) fn response(pair: &Pair<'_>, of: [&ProjectorResponse; 2]) -> Gate {
+/// Responses are those that are known.
+pub(crate) fn response(pair: &Pair<'_>, of: [Option<&ProjectorResponse>; 2]) -> Gate {
     let Pair { first, other } = pair;
-    let [one, two] = of;
+    let [Some(one), Some(two)] = of else {
+        let why = format!("{first} or {other} does not tell the projector's response");
+        return Gate::not_judged(GateName::Response, why);
+    };
     let channels = one.channels().len().max(two.channels().len());
     let steps = (0..channels).map(|channel| one.channel(channel).steps_from(two.channel(channel)));
     let steps = steps.fold(0.0, f64::max);
@@ -198,7 +202,7 @@ mod tests {
     fn a_projector_with_another_gamma_is_named() {
         let verdict = |gamma| {
             let responses = [2.2, gamma].map(|gamma| Response::Gamma(gamma).into());
-            let gate = response(&PAIR, [&responses[0], &responses[1]]);
+            let gate = response(&PAIR, [Some(&responses[0]), Some(&responses[1])]);
             assert_eq!(
                 gate.what.contains("another response"),
                 gate.verdict != Verdict::Pass
@@ -210,6 +214,10 @@ mod tests {
         assert_eq!(verdict(2.3), Verdict::Warn);
         assert_eq!(verdict(2.6), Verdict::Fail);
         assert_eq!(verdict(1.9), Verdict::Fail);
+        let known = Response::Srgb.into();
+        for of in [[None, None], [Some(&known), None], [None, Some(&known)]] {
+            assert_eq!(response(&PAIR, of).verdict, Verdict::NotJudged);
+        }
     }
 
     #[test]

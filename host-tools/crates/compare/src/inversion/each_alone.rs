@@ -3,6 +3,7 @@
 use super::{Inversion, Inverted, KnownTransport};
 use crate::rig::live_cells;
 use crate::{Citation, Description, Unfit};
+use iltm_runtime::Grid;
 use iltm_solve::inverted;
 use std::ops::Range;
 
@@ -13,10 +14,10 @@ pub struct EachAlone {
     pub columns: Vec<Range<usize>>,
 }
 
-impl EachAlone {
-    fn projector(&self, col: usize) -> Option<usize> {
-        self.columns.iter().position(|own| own.contains(&col))
-    }
+/// The projector that a cell of a grid with these columns is of.
+pub(crate) fn projector_of(cell: usize, grid: Grid, columns: &[Range<usize>]) -> Option<usize> {
+    let col = cell % grid.cols();
+    columns.iter().position(|own| own.contains(&col))
 }
 
 impl Inversion for EachAlone {
@@ -30,8 +31,7 @@ impl Inversion for EachAlone {
     }
 
     fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
-        let cols = known.grid.cols();
-        let of_cell = |cell: usize| self.projector(cell % cols);
+        let of_cell = |cell: usize| projector_of(cell, known.grid, &self.columns);
         let mut own = known.transport.clone();
         for col in 0..own.ncols() {
             for row in (0..own.nrows()).filter(|row| of_cell(*row) != of_cell(col)) {
@@ -40,8 +40,10 @@ impl Inversion for EachAlone {
         }
         let inverse = inverted(&own, known.live).ok_or(Unfit::Singular)?;
         let live = live_cells(known.live);
-        let multiplications = self.columns.iter().map(|columns| {
-            let cells = live.iter().filter(|cell| columns.contains(&(*cell % cols)));
+        let multiplications = (0..self.columns.len()).map(|projector| {
+            let cells = live
+                .iter()
+                .filter(|cell| of_cell(**cell) == Some(projector));
             (cells.count() as f64).powi(2)
         });
         Ok(Inverted::matrix(

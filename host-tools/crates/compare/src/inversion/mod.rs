@@ -27,6 +27,7 @@ pub use albedo::{Albedo, AlbedoAlone, albedo};
 pub use bounded::Bounded;
 pub use clustered::Clustered;
 pub use each_alone::EachAlone;
+pub(crate) use each_alone::projector_of;
 pub use exact::{Cancellation, Exact};
 pub use gain_only::{FloodGain, Uncompensated};
 pub use haar_input::{LargestInputs, StoredElements};
