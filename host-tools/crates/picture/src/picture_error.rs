@@ -129,10 +129,7 @@ impl PictureError {
         let pairs = || shown_codes.iter().zip(&wanted_codes);
         let mean_square = pairs().map(squared_codes).sum::<f64>() / count / channels as f64;
         let windows = windows(judged, size.width());
-        let similar = |(a, b): (&Vec<f64>, &Vec<f64>)| -> f64 {
-            let ssim = |at: &usize| similarity(a, b, size.width(), *at);
-            windows.iter().map(ssim).sum()
-        };
+        let similar = |(a, b): (&Vec<f64>, &Vec<f64>)| similarity(a, b, size.width(), &windows);
         let ssim = pairs().map(similar).sum::<f64>() / windows.len() as f64 / channels as f64;
         let lab = |picture: &LightPicture, at: usize, scale: f64| -> Lab<D65, f64> {
             let light =
@@ -186,28 +183,51 @@ fn windows(judged: &[bool], width: usize) -> Vec<usize> {
     (0..judged.len()).filter(whole).collect()
 }
 
-/// SSIM of one window.
-fn similarity(a: &[f64], b: &[f64], width: usize, at: usize) -> f64 {
+/// Sum of the SSIM of all windows with these middles.
+fn similarity(a: &[f64], b: &[f64], width: usize, windows: &[usize]) -> f64 {
+    if windows.is_empty() {
+        return 0.0;
+    }
+    let products = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| a * b).collect()
+    };
+    let means = |values: &[f64]| weighted(&weighted(values, 1), width);
+    let (x, y) = (means(a), means(b));
+    let (xx, yy, xy) = (
+        means(&products(a, a)),
+        means(&products(b, b)),
+        means(&products(a, b)),
+    );
+    let of = |&at: &usize| {
+        let (x, y) = (x[at], y[at]);
+        let (squares, product) = (x * x + y * y, x * y);
+        let (variances, covariance) = (xx[at] + yy[at] - squares, xy[at] - product);
+        let means = (2.0 * product + SSIM_MEAN) / (squares + SSIM_MEAN);
+        means * (2.0 * covariance + SSIM_VARIANCE) / (variances + SSIM_VARIANCE)
+    };
+    windows.iter().map(of).sum()
+}
+
+/// Mean around each value, of those `stride` apart, by the weights of SSIM's window. Where a window
+/// does not fit, it means nothing.
+fn weighted(values: &[f64], stride: usize) -> Vec<f64> {
     let weight = |offset: usize| {
         let apart = offset as f64 - SSIM_REACH as f64;
         (-apart * apart / (2.0 * SSIM_DEVIATION * SSIM_DEVIATION)).exp()
     };
-    let mut sums = [0.0; 6];
-    for down in 0..=2 * SSIM_REACH {
-        let first = at + down * width - SSIM_REACH * (width + 1);
-        for across in 0..=2 * SSIM_REACH {
-            let (x, y) = (a[first + across], b[first + across]);
-            let share = weight(down) * weight(across);
-            let terms = [1.0, x, y, x * x, y * y, x * y];
-            sums.iter_mut()
-                .zip(terms)
-                .for_each(|(sum, term)| *sum += share * term);
+    let total: f64 = (0..=2 * SSIM_REACH).map(weight).sum();
+    let reach = SSIM_REACH * stride;
+    let mut means = vec![0.0; values.len()];
+    for offset in 0..=2 * SSIM_REACH {
+        let share = weight(offset) / total;
+        let whole = values.len() - 2 * reach;
+        let terms = &values[offset * stride..][..whole];
+        for (mean, term) in means[reach..][..whole].iter_mut().zip(terms) {
+            *mean += share * term;
         }
     }
-    let [x, y, xx, yy, xy] = [1, 2, 3, 4, 5].map(|k: usize| sums[k] / sums[0]);
-    let (variances, covariance) = (xx - x * x + yy - y * y, xy - x * y);
-    let means = (2.0 * x * y + SSIM_MEAN) / (x * x + y * y + SSIM_MEAN);
-    means * (2.0 * covariance + SSIM_VARIANCE) / (variances + SSIM_VARIANCE)
+    means
 }
 
 #[cfg(test)]
