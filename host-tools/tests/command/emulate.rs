@@ -101,7 +101,7 @@ fn a_board_without_a_table_gets_frames_for_any_table_that_is_flashed_to_it() {
     let tables = [
         wedge_table(4, 6, 1),
         wedge_table(5, 4, 3),
-        wedge_table(100, 2, 1),
+        wedge_table(100, 1, 1),
     ];
     let board = Emulated::start(&user, "");
     let status = || user.json(&format!("status --port {}", board.port));

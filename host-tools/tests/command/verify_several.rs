@@ -5,19 +5,28 @@ use super::user::{User, contains};
 use std::fs;
 use std::sync::OnceLock;
 
-const SCENE: &str = "SCENES/folded-screen.toml";
+/// The folded screen before a camera of fewer pixels, which takes half the time.
+fn scene() -> String {
+    let scene = include_str!("../../scenes/folded-screen.toml");
+    let fewer = scene
+        .replace("width = 640", "width = 480")
+        .replace("height = 400", "height = 300");
+    assert_ne!(scene, fewer);
+    fewer
+}
 
 /// With a table of two projectors, and a folder `v` to verify it with, not yet photographed.
 fn prepared() -> &'static User {
     static USER: OnceLock<User> = OnceLock::new();
     USER.get_or_init(|| {
         let user = User::new();
+        user.write("scene.toml", scene());
         for name in ["left", "right"] {
             user.says(&format!(
                 "patterns -o {name} --rows 15 --cols 24 --photos 60 --projector 480x300"
             ));
             user.says(&format!(
-                "simulate {SCENE} --photograph {name} --projector {name}"
+                "simulate scene.toml --photograph {name} --projector {name}"
             ));
         }
         let data = user.json("solve left right -o t.iltm --report report");
@@ -26,15 +35,13 @@ fn prepared() -> &'static User {
             &user.says("verify t.iltm -o v --captures left right"),
             &["5 test images", "stripes of the projectors' own pixels"],
         );
-        let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/folded-screen.toml");
-        fs::copy(scene, user.path("scene.toml")).unwrap();
         user
     })
 }
 
 /// The scene with `from` replaced in the table that is called `name`.
 fn changed(name: &str, (from, to): (&str, &str)) -> String {
-    let scene = prepared().text("scene.toml");
+    let scene = scene();
     let start = scene.find(&format!("name = \"{name}\"")).unwrap();
     let (before, after) = scene.split_at(start);
     assert!(after.contains(from), "{from}");
@@ -56,7 +63,7 @@ fn photographed(scene: &str) -> User {
 /// A copy of the folder with photographs of the scene as it was, in a place of its own.
 fn photographed_unchanged() -> User {
     static USER: OnceLock<User> = OnceLock::new();
-    let photographs = USER.get_or_init(|| photographed(&prepared().text("scene.toml")));
+    let photographs = USER.get_or_init(|| photographed(&scene()));
     let user = User::new();
     for part in ["", "v", "v/patterns", "v/photos", "v/slides", "v/wanted"] {
         user.copy(&photographs.path(part), part);
@@ -208,7 +215,7 @@ fn a_report_of_two_projectors_draws_both_and_says_who_lights_whom_as_a_check_doe
 #[test]
 fn a_good_table_passes_from_where_the_camera_stood_and_from_elsewhere() {
     let elsewhere = ("position = [0.0, 1.0, 4.6]", "position = [0.5, 1.3, 4.4]");
-    let scene = prepared().text("scene.toml");
+    let scene = scene();
     // The camera has no name.
     let changed = scene.replacen(elsewhere.0, elsewhere.1, 1);
     assert_ne!(scene, changed);
@@ -285,7 +292,7 @@ fn an_overlap_that_the_camera_does_not_see_is_not_known() {
 
 #[test]
 fn exchanged_cables_are_named() {
-    let scene = prepared().text("scene.toml");
+    let scene = scene();
     let (left, right) = ("name = \"left\"", "name = \"right\"");
     let exchanged = scene
         .replacen(left, "name = \"other\"", 1)

@@ -81,7 +81,7 @@ fn random_scene(seed: u64) -> Scene {
 #[test]
 fn an_effect_that_was_left_out_would_have_changed_less_than_the_threshold() {
     let (mut left_out, mut worst) = (0, 0.0_f64);
-    for seed in 0..24 {
+    for seed in 0..12 {
         let scene = random_scene(seed);
         let options = SimulationOptions::default();
         let simulation = simulation(&scene, Forced::default());
@@ -101,13 +101,23 @@ fn an_effect_that_was_left_out_would_have_changed_less_than_the_threshold() {
         "{left_out} effects left out; the worst would have changed {worst:.2} of the threshold"
     );
     // The scenes are drawn such that about half of the effects are too weak.
-    assert!(left_out > 50, "{left_out}");
+    assert!(left_out > 25, "{left_out}");
 }
 
 #[test]
 fn an_effect_that_is_on_shows() {
-    for name in ["m-panels", "painted-corner"] {
-        let scene = scene(name, &[]);
+    // Of half as many cells across and down, which exchange light in a tenth of the time.
+    for (name, cells) in [
+        (
+            "m-panels",
+            [("rows = 13", "rows = 7"), ("cols = 21", "cols = 11")],
+        ),
+        (
+            "painted-corner",
+            [("rows = 18", "rows = 9"), ("cols = 24", "cols = 12")],
+        ),
+    ] {
+        let scene = scene(name, &cells);
         let ablated = ablate(&scene, &SimulationOptions::default(), &Silent).unwrap();
         for effect in [
             Effect::Interreflection,
