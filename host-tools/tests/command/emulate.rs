@@ -97,7 +97,7 @@ fn a_board_with_a_key_from_its_factory_takes_only_tables_that_are_signed_with_it
 #[test]
 fn a_board_without_a_table_gets_frames_for_any_table_that_is_flashed_to_it() {
     let user = User::new();
-    // Grey; colour; more rows and columns than the film that the board begins with has.
+    // Grey; colour; more rows than the film that the board begins with has.
     let tables = [
         wedge_table(4, 6, 1),
         wedge_table(5, 4, 3),

@@ -1,18 +1,14 @@
 //! `iltm check` and `iltm verify` where pictures of two projectors overlap: good photographs from anywhere,
 //! what has changed since, and what is not as it must be.
 
-use super::user::{User, contains};
+use super::user::{User, contains, with_values};
 use std::fs;
 use std::sync::OnceLock;
 
 /// The folded screen before a camera of fewer pixels, which takes half the time.
 fn scene() -> String {
     let scene = include_str!("../../scenes/folded-screen.toml");
-    let fewer = scene
-        .replace("width = 640", "width = 480")
-        .replace("height = 400", "height = 300");
-    assert_ne!(scene, fewer);
-    fewer
+    with_values(scene, &[("width", 480), ("height", 300)])
 }
 
 /// With a table of two projectors, and a folder `v` to verify it with, not yet photographed.

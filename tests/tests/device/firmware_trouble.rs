@@ -142,7 +142,7 @@ fn no_frame_waits_for_the_gains_of_a_new_tables_pixels() {
     let (old, new) = (short_table(1), short_table(2));
     let memory = memory_with(&old);
     // The gains and ambient light of all pixels take 15 million instructions, a frame at
-    // the top tier 7: of a nanosecond each, as everything here.
+    // the top tier 6: of a nanosecond each, as everything here.
     let format = format(320, 240, 12_000);
     let frame = random_frame(format, 4);
     play(&memory, u32::MAX, format, &frame);

@@ -81,7 +81,7 @@ fn random_scene(seed: u64) -> Scene {
 #[test]
 fn an_effect_that_was_left_out_would_have_changed_less_than_the_threshold() {
     let (mut left_out, mut worst) = (0, 0.0_f64);
-    for seed in 0..12 {
+    for seed in 0..24 {
         let scene = random_scene(seed);
         let options = SimulationOptions::default();
         let simulation = simulation(&scene, Forced::default());
@@ -101,7 +101,7 @@ fn an_effect_that_was_left_out_would_have_changed_less_than_the_threshold() {
         "{left_out} effects left out; the worst would have changed {worst:.2} of the threshold"
     );
     // The scenes are drawn such that about half of the effects are too weak.
-    assert!(left_out > 25, "{left_out}");
+    assert!(left_out > 50, "{left_out}");
 }
 
 #[test]
