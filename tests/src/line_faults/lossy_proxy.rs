@@ -8,7 +8,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Longest that one direction waits for the other: what the proxy adds to the time of a
 /// frame, once in each direction.
@@ -17,6 +17,13 @@ const ROUND: Duration = Duration::from_millis(1);
 /// Bytes that wait for a client that does not read. More are lost, as on a line
 /// without flow control.
 const MOST_WAITING: usize = 1 << 16;
+
+/// Least time between the last frame and the end of the pseudo-terminal: the kernel
+/// hands bytes over a little after they were written.
+const HANDED_OVER: Duration = Duration::from_millis(50);
+
+/// Longest that a client may take to read what came before the line was unplugged.
+const LONGEST_TO_READ: Duration = Duration::from_secs(2);
 
 /// A pseudo-terminal that stands before a real port and does to frames what
 /// [`Faults`] say, for any client program:
@@ -75,10 +82,10 @@ impl LossyProxy {
             .spawn({
                 let shared = Arc::clone(&shared);
                 move || {
-                    // Kept open, or ours would end whenever a client closes it.
-                    let _theirs = theirs;
-                    // However it ends, the client will find its port gone.
-                    let _ = carry(ours, LossyLine::new(line, faults), &shared);
+                    // `theirs` stays open, or ours would end whenever a client closes it.
+                    // However this ends, the client will find its port gone.
+                    let _ = carry(&mut ours, LossyLine::new(line, faults), &shared);
+                    wait_for_reader(&theirs, &shared);
                     shared.is_over.store(true, Ordering::Relaxed);
                 }
             });
@@ -126,7 +133,7 @@ impl Drop for LossyProxy {
 }
 
 /// Carries bytes in both directions until one end has gone.
-fn carry(mut client: TTYPort, mut line: LossyLine<impl Line>, shared: &Shared) -> io::Result<()> {
+fn carry(client: &mut TTYPort, mut line: LossyLine<impl Line>, shared: &Shared) -> io::Result<()> {
     let mut bytes = [0; 4_096];
     let mut waiting = Vec::new();
     while !shared.is_over.load(Ordering::Relaxed) {
@@ -146,6 +153,18 @@ fn carry(mut client: TTYPort, mut line: LossyLine<impl Line>, shared: &Shared) -
         *counts = (line.to_device(), line.to_host());
     }
     Ok(())
+}
+
+/// Gives the client time to read what has come: a pseudo-terminal that ends takes the
+/// bytes along that nobody has read yet.
+fn wait_for_reader(theirs: &TTYPort, shared: &Shared) {
+    let since = Instant::now();
+    let is_unread = || theirs.bytes_to_read().is_ok_and(|count| count > 0);
+    while !shared.is_over.load(Ordering::Relaxed)
+        && (since.elapsed() < HANDED_OVER || (is_unread() && since.elapsed() < LONGEST_TO_READ))
+    {
+        thread::sleep(ROUND);
+    }
 }
 
 /// Nothing to read or no room to write is no reason to end.
