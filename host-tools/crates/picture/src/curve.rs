@@ -6,17 +6,21 @@ use std::fmt;
 /// A rising curve through measured points, value and light both from 0 to 1.
 ///
 /// Between the points it is a monotone cubic (Fritsch and Carlson, *Monotone
-/// piecewise cubic interpolation*, SIAM J. Numer. Anal. 1980) of the light's
-/// `gamma`-th root, `gamma` being the power that is nearest to the points: that
-/// root is almost a straight line, so that few points do.
+/// piecewise cubic interpolation*, SIAM J. Numer. Anal. 1980) of the values that
+/// the nearest formula gives the light: sRGB or a power. That is almost a straight
+/// line, so that few points do, and what is darker than the darkest point follows
+/// the formula.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Curve {
+    /// The formula that is nearest to the points.
+    nearest: Response,
+    /// The power that is.
     gamma: f64,
     /// Values, ascending from 0 to 1.
     values: Vec<f64>,
-    /// Root of the light at each of them, not falling.
-    roots: Vec<f64>,
-    /// Slope of the root at each of them.
+    /// The formula's value for the light at each of them, not falling.
+    straight: Vec<f64>,
+    /// Slope of these at each of them.
     slopes: Vec<f64>,
 }
 
@@ -47,12 +51,23 @@ impl Curve {
         let values: Vec<f64> = values.iter().map(|v| (v - low) / (high - low)).collect();
         let light: Vec<f64> = light.iter().map(|l| (l - dark) / (bright - dark)).collect();
         let gamma = nearest_gamma(&values, &light);
-        let roots: Vec<f64> = light.iter().map(|l| l.powf(1.0 / gamma)).collect();
-        let slopes = slopes(&values, &roots);
+        let off = |formula: Response| -> f64 {
+            let points = values.iter().zip(&light);
+            points.map(|(v, l)| (formula.light(*v) - l).powi(2)).sum()
+        };
+        let power = Response::Gamma(gamma);
+        let nearest = if off(Response::Srgb) < off(power) {
+            Response::Srgb
+        } else {
+            power
+        };
+        let straight: Vec<f64> = light.iter().map(|l| nearest.value(*l)).collect();
+        let slopes = slopes(&values, &straight);
         Some(Self {
+            nearest,
             gamma,
             values,
-            roots,
+            straight,
             slopes,
         })
     }
@@ -64,16 +79,16 @@ impl Curve {
         let after = self.values.partition_point(|&v| v <= value);
         let right = after.clamp(1, self.values.len() - 1);
         let (x0, x1) = (self.values[right - 1], self.values[right]);
-        let (y0, y1) = (self.roots[right - 1], self.roots[right]);
+        let (y0, y1) = (self.straight[right - 1], self.straight[right]);
         let (m0, m1) = (self.slopes[right - 1], self.slopes[right]);
         let width = x1 - x0;
         let t = (value - x0) / width;
         let (t2, t3) = (t * t, t * t * t);
-        let root = (2.0 * t3 - 3.0 * t2 + 1.0) * y0
+        let straight = (2.0 * t3 - 3.0 * t2 + 1.0) * y0
             + (t3 - 2.0 * t2 + t) * width * m0
             + (3.0 * t2 - 2.0 * t3) * y1
             + (t3 - t2) * width * m1;
-        root.clamp(0.0, 1.0).powf(self.gamma)
+        self.nearest.light(straight)
     }
 
     /// The lowest value that makes this light, the inverse of [`Curve::light`].
@@ -152,6 +167,9 @@ impl fmt::Display for DeviceResponse {
         match self {
             Self::Known(Response::Gamma(gamma)) => write!(f, "gamma {gamma:.2}"),
             Self::Known(response) => response.fmt(f),
+            Self::Measured(curve) if curve.nearest == Response::Srgb => {
+                f.write_str("measured, about sRGB")
+            }
             Self::Measured(curve) => write!(f, "measured, about gamma {:.2}", curve.gamma),
         }
     }
@@ -234,9 +252,9 @@ fn nearest_gamma(values: &[f64], light: &[f64]) -> f64 {
 }
 
 /// Slopes that keep a cubic between rising points rising.
-fn slopes(values: &[f64], roots: &[f64]) -> Vec<f64> {
+fn slopes(values: &[f64], straight: &[f64]) -> Vec<f64> {
     let last = values.len() - 1;
-    let secant = |k: usize| (roots[k + 1] - roots[k]) / (values[k + 1] - values[k]);
+    let secant = |k: usize| (straight[k + 1] - straight[k]) / (values[k + 1] - values[k]);
     let slope = |k: usize| {
         if k == 0 {
             return secant(0);
@@ -274,6 +292,25 @@ mod tests {
             let curve = Curve::new(&sampled(response, 17)).unwrap();
             let steps = DeviceResponse::from(response).steps_from(&DeviceResponse::Measured(curve));
             assert!(steps < 0.5, "{response}: {steps}");
+        }
+    }
+
+    /// Light of the darkest codes, which no ramp measures, decides how dark scenes look.
+    #[test]
+    fn codes_darker_than_the_darkest_of_nine_points_follow_the_nearest_formula() {
+        for response in [Response::Srgb, Response::Gamma(2.2), Response::Gamma(1.8)] {
+            for noise in [0.0, 0.001] {
+                let mut points = sampled(response, 9);
+                for (k, point) in points.iter_mut().enumerate().skip(1) {
+                    point.1 *= 1.0 + if k % 2 == 0 { noise } else { -noise };
+                }
+                let curve = Curve::new(&points).unwrap();
+                for code in 0..32 {
+                    let light = response.light(f64::from(code) / 255.0);
+                    let off = 255.0 * curve.value(light) - f64::from(code);
+                    assert!(off.abs() < 0.5, "{response}: {off:.2} at {code}");
+                }
+            }
         }
     }
 
