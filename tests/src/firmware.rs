@@ -391,7 +391,7 @@ impl Effects {
 }
 
 /// A table with these effects for a wedge whose texture and ambient light are
-/// random.
+/// random. With an even seed, black is raised to the brightest ambient light.
 pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) -> Vec<u8> {
     let mut random = fastrand::Rng::with_seed(seed);
     let cells = grid.cells();
@@ -431,6 +431,7 @@ pub fn random_table(grid: Grid, channels: usize, effects: Effects, seed: u64) ->
         } else {
             Response::Linear.into()
         },
+        match_black: seed.is_multiple_of(2),
         inverse_error: 0.01,
         provenance: format!("seed = {seed}\n"),
         ..CompileOptions::default()

@@ -13,7 +13,9 @@ use iltm_runtime::haar::Basis;
 use iltm_runtime::image::layout::SectionKind;
 use iltm_runtime::image::{Label, Meta, TierInfo};
 use iltm_runtime::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use iltm_runtime::pipeline::raised_curves;
 use iltm_runtime::placement::ProjectorPixels;
+use iltm_runtime::units::Light;
 use std::collections::BTreeSet;
 
 /// What a table is to hold.
@@ -27,8 +29,10 @@ pub struct MadeUp {
     pub gain_fraction: u8,
     /// Gains of every cell, channels of a cell side by side.
     pub gains: Vec<u16>,
-    /// Ambient light in the same way, bits of [`Light`](iltm_runtime::units::Light).
+    /// Ambient light in the same way, bits of [`Light`].
     pub ambient: Option<Vec<u16>>,
+    /// Light that black is raised to, bits of [`Light`]; none if zero.
+    pub black: u16,
     /// Whether codes follow a projector's response (sRGB).
     pub response: bool,
     /// Whether each channel then has another response.
@@ -58,6 +62,7 @@ impl MadeUp {
             gain_fraction: 13,
             gains: vec![1 << 13; grid.cells() * channels],
             ambient: None,
+            black: 0,
             response: false,
             of_channels: false,
             fine_gains: None,
@@ -144,6 +149,7 @@ impl MadeUp {
             made.tiers.insert(0, half);
         }
         made.response = true;
+        made.black = if seed.is_multiple_of(2) { 500 } else { 0 };
         let (rows, cols) = (4 * grid.rows(), 4 * grid.cols());
         let mut random = Rng::with_seed(!seed);
         let gains = (0..rows * cols * channels).map(|_| random.u16(3_000..9_000));
@@ -193,6 +199,14 @@ impl MadeUp {
         image.section(SectionKind::Gain, 0, halfwords(self.gains.iter().copied()));
         if let Some(ambient) = &self.ambient {
             image.section(SectionKind::Ambient, 0, halfwords(ambient.iter().copied()));
+        }
+        if self.black > 0 {
+            let curves = raised_curves(Light::from_bits(self.black));
+            image.section(
+                SectionKind::Light,
+                0,
+                curves.as_flattened().as_flattened().to_vec(),
+            );
         }
         if self.response {
             let knots = if self.of_channels {

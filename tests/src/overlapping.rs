@@ -100,18 +100,30 @@ fn pixels(grid: Grid) -> FrameSize {
     FrameSize::new(side(grid.cols()), side(grid.rows())).expect("a frame")
 }
 
+/// Light that the table makes of black.
+fn black(image: &[u8]) -> f64 {
+    Table::check(image).expect("a table").black().to_num()
+}
+
 /// The table of all projectors.
 pub fn learned_together(captures: &[PathBuf]) -> BuiltTable {
+    learned_with(captures, &TableOptions::default())
+}
+
+/// The table of all projectors that makes black even.
+pub fn learned_with_even_black(captures: &[PathBuf]) -> BuiltTable {
+    let options = TableOptions {
+        match_black: true,
+        ..TableOptions::default()
+    };
+    learned_with(captures, &options)
+}
+
+fn learned_with(captures: &[PathBuf], table: &TableOptions<'_>) -> BuiltTable {
     let options = CaptureOptions::default();
     let several = read_several(captures, &options, &Silent).expect("good captures");
-    build_table_from(
-        several.into(),
-        &captures[0],
-        &SolveOptions::default(),
-        &TableOptions::default(),
-        &Silent,
-    )
-    .expect("a table")
+    let (first, solve) = (&captures[0], SolveOptions::default());
+    build_table_from(several.into(), first, &solve, table, &Silent).expect("a table")
 }
 
 /// A table for each projector, learned from its own photographs alone, for this light of white.
@@ -164,6 +176,8 @@ pub struct SeenOnScreen {
     pub overlap: Option<f64>,
     /// The largest step of an even white across a border of the overlap, of its light.
     pub step: Option<f64>,
+    /// The same of black.
+    pub step_of_black: Option<f64>,
 }
 
 /// The screen as a camera and the projectors see it.
@@ -257,13 +271,15 @@ impl<'s> Screen<'s> {
 
     /// What a camera without noise sees of pictures that the table of all projectors compensates.
     pub fn seen(&self, built: &BuiltTable) -> SeenOnScreen {
-        self.seen_of(&|frame| compensated(built, frame))
+        self.seen_of(black(&built.compiled.image), &|frame| {
+            compensated(built, frame)
+        })
     }
 
     /// The same where each projector has a table of its own, learned from its own photographs and
     /// for the same light of white.
     pub fn seen_of_each(&self, tables: &[BuiltTable]) -> SeenOnScreen {
-        self.seen_of(&|frame| {
+        self.seen_of(0.0, &|frame| {
             let (width, height) = (frame.size().width(), frame.size().height());
             let Samples::Sixteen(wanted) = frame.samples() else {
                 unreachable!("frames of 16 bits");
@@ -299,7 +315,7 @@ impl<'s> Screen<'s> {
         let count = self.scene.projectors.len();
         let parts = split_table(&built.compiled.image, count, factor);
         let parts = parts.expect("projectors alike");
-        self.seen_of(&|frame| {
+        self.seen_of(black(&built.compiled.image), &|frame| {
             let wide = frame.size();
             let Samples::Sixteen(codes) = frame.samples() else {
                 unreachable!("frames of 16 bits");
@@ -373,12 +389,13 @@ impl<'s> Screen<'s> {
         sheet.compose().expect("tiles")
     }
 
-    /// The same of frames that are compensated somehow.
-    fn seen_of(&self, compensate: &dyn Fn(Picture) -> Picture) -> SeenOnScreen {
+    /// The same of frames that are compensated somehow, where black is raised to this.
+    fn seen_of(&self, black: f64, compensate: &dyn Fn(Picture) -> Picture) -> SeenOnScreen {
         let (rows, cols) = DETAILS;
         let pictures = natural_images(Grid::new(rows, cols).expect("a grid"));
-        let white = |_: Vector3<f64>| 1.0;
-        let mut lights: Vec<Box<dyn Fn(Vector3<f64>) -> f64 + '_>> = vec![Box::new(white)];
+        // White, black, and the pictures.
+        let mut lights: Vec<Box<dyn Fn(Vector3<f64>) -> f64 + '_>> =
+            vec![Box::new(|_| 1.0), Box::new(|_| 0.0)];
         for number in 0..pictures.ncols() {
             let pictures = &pictures;
             lights.push(Box::new(move |place| self.wanted(pictures, number, place)));
@@ -391,10 +408,10 @@ impl<'s> Screen<'s> {
         let photographs = self.photographs(&frames);
         let looks = self.looks();
         let (mut whole, mut overlap) = (0.0, 0.0);
-        for (light, seen) in lights.iter().zip(&photographs).skip(1) {
+        for (light, seen) in lights.iter().zip(&photographs).skip(2) {
             let pairs = looks.iter().zip(seen).filter_map(|(look, seen)| {
                 let (place, lit) = (*look)?;
-                Some((*seen, light(place), lit))
+                Some((*seen, black + (1.0 - black) * light(place), lit))
             });
             let pairs: Vec<(f64, f64, usize)> = pairs.collect();
             let sum = |of: &dyn Fn(&(f64, f64, usize)) -> f64| pairs.iter().map(of).sum::<f64>();
@@ -412,6 +429,7 @@ impl<'s> Screen<'s> {
             whole,
             overlap: overlaps.then_some(overlap),
             step: self.step(&looks, &photographs[0]),
+            step_of_black: self.step(&looks, &photographs[1]),
         }
     }
 

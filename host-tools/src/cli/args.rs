@@ -387,6 +387,10 @@ pub(super) struct Solve {
     /// in the show than in the photographs; by default it counts as a part of the picture
     #[arg(long)]
     pub(super) keep_ambient: bool,
+    /// Raise black to that of the brightest part, so that it is even: where projectors overlap,
+    /// their black adds up, which dark pictures show
+    #[arg(long, conflicts_with = "keep_ambient")]
+    pub(super) match_black: bool,
     /// Picture or video (PNG, Y4M) that is going to be shown: reference white is the
     /// brightest that cuts no more of it than --clip-share; may be repeated
     #[arg(long, value_name = "FILE")]

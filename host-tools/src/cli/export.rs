@@ -12,6 +12,7 @@ use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_runtime::pipeline::Encoding;
 use iltm_runtime::placement::ProjectorPixels;
+use iltm_runtime::units::Light;
 use serde_json::json;
 
 /// A file's name and bytes.
@@ -109,7 +110,12 @@ fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<Named>, Failure> {
     let light = samples_of(&even(gain.recip(), Encoding::Linear, 0)?);
     let left = 1.0 - f64::from(light.into_iter().fold(0.0, f32::max));
     let brightest = ((1.0 + left) / gain).min(1.0);
-    let black = brightest_ambient(table);
+    // A table that raises black asks for its light with code 0.
+    let black = if table.black() > Light::ZERO {
+        0.0
+    } else {
+        brightest_ambient(table)
+    };
     let size = (frame.width(), frame.height());
     let mut files = Vec::new();
     let mut add = |name: &str, codes: &[f32], light: &[f32]| {

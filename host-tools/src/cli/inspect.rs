@@ -16,6 +16,7 @@ use iltm_runtime::{
     image::{Seal, Table},
     operator::{Bounds, Operator},
     trust::Rejected,
+    units::Light,
 };
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -126,6 +127,7 @@ fn effects(table: &Table<'_>) -> Vec<&'static str> {
         (true, "per-cell gain"),
         (table.fine_gain().is_some(), "fine gain"),
         (table.ambient_row(0, 0).is_some(), "ambient light"),
+        (table.black() > Light::ZERO, "raised black"),
         (table.operator().is_some(), "interreflection"),
         (table.has_response(), "projector response"),
         (table.neighbours().is_some(), "light of other projectors"),

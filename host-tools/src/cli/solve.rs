@@ -58,6 +58,7 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
         None => Some(WhiteRequest::Content {
             frames: &frames,
             share: arguments.clip_share,
+            match_black: arguments.match_black,
         }),
     };
     let built = build_table_from(
@@ -68,6 +69,7 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
             white,
             gain_resolution: arguments.gain_resolution,
             keep_ambient: arguments.keep_ambient,
+            match_black: arguments.match_black,
         },
         bars.as_ref(),
     );

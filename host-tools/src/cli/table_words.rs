@@ -5,6 +5,7 @@ use crate::report::tier_costs;
 use crate::solve::Compensation;
 use iltm_picture::numbers::{grouped, percent};
 use iltm_runtime::image::Table;
+use iltm_runtime::units::Light;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -63,6 +64,7 @@ pub(super) fn data(table: &Table<'_>) -> Value {
     json!({
         "grade": grade,
         "brightness": Provenance::read(table.provenance()).brightness,
+        "black": table.black().to_num::<f64>(),
         "projector": table.projector().map(|projector| json!({
             "width": projector.size().width(),
             "height": projector.size().height(),
@@ -117,27 +119,14 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
     if let Some(brightness) = provenance.brightness {
         let _ = writeln!(text, "brightness  {}", brightness.words());
     }
-    let colour = if table.channels() == 1 {
-        "grey"
-    } else {
-        "colour"
-    };
-    let projector = table.projector().map_or_else(String::new, |projector| {
-        let (width, height) = (projector.size().width(), projector.size().height());
-        let border = match projector.border() {
-            0 => String::new(),
-            border => format!(" with a border of {border}"),
-        };
-        format!(" on {width} x {height} pixels{border}")
-    });
-    let _ = writeln!(
-        text,
-        "table       {}, {:08x}: {} cells{projector}, {colour}, {} bytes",
-        table.label(),
-        table.id(),
-        table.grid(),
-        table.bytes()
-    );
+    if table.black() > Light::ZERO {
+        let _ = writeln!(
+            text,
+            "black       raised to {} of white everywhere, as it is where black is brightest",
+            percent(table.black().to_num()),
+        );
+    }
+    let _ = writeln!(text, "{}", sizes(table));
     if let Some(neighbours) = table.neighbours() {
         let [before, after] = neighbours.around();
         let plural = if before == 1 { "" } else { "s" };
@@ -171,6 +160,30 @@ pub(super) fn lines(path: &Path, table: &Table<'_>) -> String {
         let _ = writeln!(text, "next        {next}");
     }
     text
+}
+
+/// The line of what the table is for, and how long it is.
+fn sizes(table: &Table<'_>) -> String {
+    let colour = if table.channels() == 1 {
+        "grey"
+    } else {
+        "colour"
+    };
+    let projector = table.projector().map_or_else(String::new, |projector| {
+        let (width, height) = (projector.size().width(), projector.size().height());
+        let border = match projector.border() {
+            0 => String::new(),
+            border => format!(" with a border of {border}"),
+        };
+        format!(" on {width} x {height} pixels{border}")
+    });
+    format!(
+        "table       {}, {:08x}: {} cells{projector}, {colour}, {} bytes",
+        table.label(),
+        table.id(),
+        table.grid(),
+        table.bytes()
+    )
 }
 
 #[cfg(test)]

@@ -9,9 +9,10 @@ use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::layout::MAX_SEGMENTS;
 use crate::operator::{Bounds, Channels, Operator, OperatorError, Segment};
+use crate::pipeline::{LightCurve, plain, raised};
 use crate::placement::ProjectorPixels;
 use crate::response::{CODES, RESPONSE_KNOTS, code_of_index};
-use crate::units::Light;
+use crate::units::{Halfword, Light};
 use crate::yield_budget::{YieldBudget, cost};
 use crate::{FrameSize, Grid};
 use heapless::Vec;
@@ -32,6 +33,7 @@ pub struct Checked<'a> {
     provenance: &'a [u8],
     projector: Option<ProjectorPixels>,
     neighbours: Option<Neighbours<'a>>,
+    light: Option<[&'a LightCurve; 2]>,
 }
 
 impl<'a> Checked<'a> {
@@ -78,6 +80,9 @@ impl<'a> Checked<'a> {
             response,
             fine_gain,
             neighbours,
+            light: of_stage(Stage::Ambient, &whole, SectionKind::Light)
+                .map(|section| light_curves(section, budget))
+                .transpose()?,
             provenance: whole
                 .optional(SectionKind::Provenance)
                 .map_or(Ok(&[][..]), |section| provenance(section, budget))?,
@@ -128,6 +133,7 @@ impl<'a> Checked<'a> {
             provenance: self.provenance,
             projector: self.projector,
             neighbours: self.neighbours,
+            light: self.light,
             bytes: self.whole.image.len(),
             id: self.id(),
             label: self.meta.label,
@@ -174,6 +180,33 @@ fn ambient<'a>(
     match words.run(0, count).position(too_much) {
         None => Ok(words),
         Some(index) => Err(section.field_error("ambient light", 2 * index)),
+    }
+}
+
+/// The light of codes, which must be that of a black that is raised.
+fn light_curves<'a>(
+    section: Section<'a>,
+    budget: &mut YieldBudget<'_, impl FnMut() + ?Sized>,
+) -> Result<[&'a LightCurve; 2], ImageError> {
+    let words = Halfwords::new(section.bytes).map_or(&[][..], Halfwords::words);
+    let (curves, rest) = words.as_chunks();
+    let ([display, linear], []) = (curves, rest) else {
+        return Err(section.length_error());
+    };
+    let black = words.first().map_or(0, |black| u16::from_le_bytes(*black));
+    if Light::from_bits(black) > Light::ONE {
+        return Err(section.field_error("light of black", 0));
+    }
+    let mut pairs = words.iter().zip(plain().into_iter().flatten());
+    let differs = |(stored, plain): (&Halfword, &Halfword)| {
+        budget.spend(1, cost::VALUE);
+        let [stored, plain] =
+            [stored, plain].map(|light| Light::from_bits(u16::from_le_bytes(*light)));
+        stored != raised(plain, Light::from_bits(black))
+    };
+    match pairs.position(differs) {
+        None => Ok([display, linear]),
+        Some(index) => Err(section.field_error("light", 2 * index)),
     }
 }
 
@@ -274,7 +307,7 @@ fn check_stages(whole: &Whole<'_>, meta: &Meta) -> Result<(), ImageError> {
     for stage in Stage::ALL {
         let sections: &[SectionKind] = match stage {
             Stage::Operator => &[SectionKind::Operator],
-            Stage::Ambient => &[SectionKind::Ambient],
+            Stage::Ambient => &[SectionKind::Ambient, SectionKind::Light],
             Stage::Response => &[SectionKind::Response, SectionKind::Codes],
             Stage::Colour => &[],
             Stage::FullResolution => &[SectionKind::FineGain],
@@ -415,6 +448,7 @@ fn provenance<'a>(
 mod tests {
     use super::super::made_up::{flat, image};
     use super::*;
+    use crate::pipeline::raised_curves;
     use std::vec::Vec;
 
     fn with_projector(fields: &[u16]) -> Result<Option<ProjectorPixels>, ImageError> {
@@ -425,6 +459,44 @@ mod tests {
         let mut sections = flat(2, 3);
         sections.push((SectionKind::Projector, bytes));
         Table::check(&image(&sections)).map(|table| table.projector())
+    }
+
+    /// A table of 4 x 6 cells with this light section: its black.
+    fn with_light(bytes: Vec<u8>) -> Result<Light, ImageError> {
+        let mut sections = flat(4, 6);
+        sections.push((SectionKind::Light, bytes));
+        Ok(Table::check(&image(&sections))?.black())
+    }
+
+    #[test]
+    fn the_light_of_codes_is_that_of_a_raised_black_or_refused() {
+        let curves = |black| {
+            let curves = raised_curves(Light::from_bits(black));
+            curves.as_flattened().as_flattened().to_vec()
+        };
+        for black in [0, 1, 131, 32_768] {
+            assert_eq!(with_light(curves(black)), Ok(Light::from_bits(black)));
+        }
+        let section = SectionKind::Light;
+        let refused = |bytes, error| assert_eq!(with_light(bytes), Err(error));
+        let of = |field, offset| ImageError::Field {
+            section,
+            field,
+            offset,
+        };
+        for length in [0, 1, 512, 1_022, 1_023, 1_026, 2_048] {
+            let mut bytes = curves(131);
+            bytes.resize(length, 0);
+            let problem = SectionProblem::Length;
+            refused(bytes, ImageError::Section { section, problem });
+        }
+        // More than white, and one step off in the first curve and in the last value of all.
+        refused([1, 128].repeat(512), of("light of black", 0));
+        for at in [2, 511, 512, 1_022] {
+            let mut bytes = curves(131);
+            bytes[at] ^= 1;
+            refused(bytes, of("light", at / 2 * 2));
+        }
     }
 
     #[test]

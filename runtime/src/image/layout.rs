@@ -106,6 +106,10 @@ pub enum SectionKind {
     Projector = 10,
     /// Cells of the other projectors' frames; see [`neighbours`].
     Neighbours = 11,
+    /// Light that 8-bit codes ask for where black is raised, `u16`
+    /// [`Light`](crate::units::Light): of 256 sRGB codes, then of 256 in proportion to light.
+    /// See [`raised`](crate::pipeline::raised).
+    Light = 12,
 }
 
 impl SectionKind {
@@ -124,6 +128,7 @@ impl SectionKind {
             9 => Self::Provenance,
             10 => Self::Projector,
             11 => Self::Neighbours,
+            12 => Self::Light,
             _ => return None,
         })
     }
@@ -143,6 +148,7 @@ impl SectionKind {
             Self::Provenance => "provenance",
             Self::Projector => "projector",
             Self::Neighbours => "neighbours",
+            Self::Light => "light",
         }
     }
 }

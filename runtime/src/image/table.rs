@@ -6,6 +6,7 @@ use super::{Checked, ImageError, Label, Neighbours, TierInfo};
 use crate::features::Stage;
 use crate::haar::Basis;
 use crate::operator::Operator;
+use crate::pipeline::LightCurve;
 use crate::placement::{PixelArea, ProjectorPixels};
 use crate::response::{CODES, RESPONSE_KNOTS, ResponseCurve};
 use crate::units::Light;
@@ -34,6 +35,7 @@ pub struct Table<'a> {
     pub(super) provenance: &'a [u8],
     pub(super) projector: Option<ProjectorPixels>,
     pub(super) neighbours: Option<Neighbours<'a>>,
+    pub(super) light: Option<[&'a LightCurve; 2]>,
     pub(super) bytes: usize,
     pub(super) id: u32,
     pub(super) label: Label,
@@ -202,6 +204,27 @@ impl<'a> Table<'a> {
         let ambient = self.lit()?;
         let row = channel_row(ambient, self.grid().cols(), self.channels, row, channel);
         Some(row.map(Light::from_bits))
+    }
+
+    /// Light of the codes of frames where black is raised: of sRGB codes, and of codes in
+    /// proportion to light.
+    #[inline]
+    pub(crate) const fn light_curves(&self) -> Option<[&'a LightCurve; 2]> {
+        if Stage::Ambient.is_built() {
+            self.light
+        } else {
+            None
+        }
+    }
+
+    /// Light that is wanted where a frame is black; zero, unless the table raises black to what
+    /// projectors leave where they overlap.
+    #[must_use]
+    pub fn black(&self) -> Light {
+        let first = self.light_curves().and_then(|[display, _]| display.first());
+        first.map_or(Light::ZERO, |light| {
+            Light::from_bits(u16::from_le_bytes(*light))
+        })
     }
 
     /// The projector's response in a channel; [`has_response`](Self::has_response)

@@ -96,7 +96,7 @@ pub(crate) mod pixels {
     #[inline]
     pub(crate) const fn merge<const C: usize>(
         _plane: &Plane<'_, u8, C>,
-        _light: &[u16; 256],
+        _light: &[Halfword; 256],
         _block: Block,
         _shift: u32,
         _sums: &mut [i32],
@@ -112,7 +112,7 @@ pub(crate) mod pixels {
     #[inline]
     pub(crate) const fn finish<const C: usize>(
         _wanted: &Plane<'_, u8, C>,
-        _light: &[u16; 256],
+        _light: &[Halfword; 256],
         _codes: Option<&[u8; CODES]>,
         _gain_fraction: u32,
         _gains: &[[Halfword; C]],
@@ -128,7 +128,7 @@ pub(crate) mod pixels {
     #[inline]
     pub(crate) const fn add_light<const C: usize>(
         _plane: &Plane<'_, u8, C>,
-        _light: &[u16; 256],
+        _light: &[Halfword; 256],
         _weight: u32,
         _columns: &mut [u32],
     ) -> bool {

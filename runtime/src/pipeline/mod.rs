@@ -22,6 +22,7 @@ mod dispatch;
 mod full;
 mod full_frames;
 mod grid;
+mod light_curve;
 mod pixels;
 mod sample;
 pub mod srgb;
@@ -31,6 +32,8 @@ pub use dispatch::{FrameJob, compensate_cells, compensate_pixels, prepare_pixels
 pub use full::{FullPipeline, RowBuffers};
 pub use full_frames::FullMemory;
 pub use grid::GridPipeline;
+pub(crate) use light_curve::plain;
+pub use light_curve::{LightCurve, raised, raised_curves};
 pub use pixels::Pixels;
 pub use sample::{Encoding, Sample};
 pub use stages::Workspace;

@@ -1,5 +1,6 @@
 //! Samples of a frame: from codes to light, and from drive to codes.
 
+use super::light_curve::{LightCurve, plain, raised};
 use super::pixels::Pixels;
 use super::srgb;
 use super::stages::{clip, drive};
@@ -102,7 +103,7 @@ fn finish_plainly<S: Sample, const C: usize>(
 /// Curves of 8-bit samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Curves<'a> {
-    light: &'a [u16; 256],
+    light: &'a LightCurve,
     /// `None` if codes are in proportion to drives.
     codes: Option<&'a [u8; CODES]>,
 }
@@ -111,13 +112,14 @@ impl Sample for u8 {
     type Curves<'a> = Curves<'a>;
 
     fn curves<'a>(table: &'a Table<'_>, encoding: Encoding, channel: usize) -> Curves<'a> {
+        let [display, linear] = table.light_curves().unwrap_or(plain());
         match encoding {
             Encoding::Display => Curves {
-                light: &srgb::DECODED,
+                light: display,
                 codes: table.codes(channel),
             },
             Encoding::Linear => Curves {
-                light: &LINEAR_LIGHT,
+                light: linear,
                 codes: None,
             },
         }
@@ -127,7 +129,7 @@ impl Sample for u8 {
     fn light(self, curves: Curves<'_>) -> Light {
         // A `u8` indexes 256 elements: the compiler sees that it cannot fail.
         #[allow(clippy::indexing_slicing)]
-        Light::from_bits(curves.light[usize::from(self)])
+        Light::from_bits(u16::from_le_bytes(curves.light[usize::from(self)]))
     }
 
     #[inline]
@@ -193,6 +195,8 @@ impl Sample for u8 {
 #[derive(Clone, Copy, Debug)]
 pub struct WideCurves<'a> {
     encoding: Encoding,
+    /// Light that code 0 asks for.
+    black: Light,
     response: ResponseCurve<'a>,
 }
 
@@ -202,13 +206,14 @@ impl Sample for u16 {
     fn curves<'a>(table: &'a Table<'_>, encoding: Encoding, channel: usize) -> WideCurves<'a> {
         WideCurves {
             encoding,
+            black: table.black(),
             response: table.response(channel),
         }
     }
 
     #[inline]
     fn light(self, curves: WideCurves<'_>) -> Light {
-        match curves.encoding {
+        let light = match curves.encoding {
             Encoding::Linear => {
                 Light::from_bits(((u32::from(self) * 32_768 + 32_767) / 65_535) as Self)
             }
@@ -218,7 +223,8 @@ impl Sample for u16 {
                 let upper = u32::from(srgb::decode(below.saturating_add(1)).to_bits());
                 Light::from_bits((lower + ((upper - lower) * rest + 128) / 257) as Self)
             }
-        }
+        };
+        raised(light, curves.black)
     }
 
     #[inline]
@@ -230,32 +236,10 @@ impl Sample for u16 {
     }
 }
 
-/// Light of every 8-bit code that is in proportion to it, to nearest.
-static LINEAR_LIGHT: [u16; 256] = {
-    let mut light = [0; 256];
-    let mut code = 0;
-    while code < 256 {
-        #[allow(clippy::indexing_slicing, reason = "evaluated when compiled")]
-        {
-            light[code] = ((code as u32 * 32_768 + 127) / 255) as u16;
-        }
-        code += 1;
-    }
-    light
-};
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::response::code_of_index;
-
-    #[test]
-    fn linear_codes_round_to_the_nearest_light() {
-        for (code, light) in LINEAR_LIGHT.iter().enumerate() {
-            let exact = code as f64 / 255.0;
-            assert!((f64::from(*light) / 32_768.0 - exact).abs() <= 0.5 / 32_768.0);
-        }
-    }
 
     #[test]
     fn what_is_clipped_is_what_lies_outside() {
@@ -263,7 +247,7 @@ mod tests {
             core::array::from_fn(|index| code_of_index(index, ResponseCurve::new(&[])));
         for codes in [None, Some(&of_response)] {
             let curves = Curves {
-                light: &LINEAR_LIGHT,
+                light: plain()[1],
                 codes,
             };
             for (wanted, code, black, white) in [

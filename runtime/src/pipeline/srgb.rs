@@ -3,7 +3,10 @@
 use crate::units::Light;
 
 /// Light of every 8-bit code, in units of 2^-15, to nearest.
-pub(super) static DECODED: [u16; 256] = [
+static DECODED: [u16; 256] = LIGHT;
+
+/// What [`DECODED`] holds, for other tables that are worked out when compiled.
+pub(super) const LIGHT: [u16; 256] = [
     0, 10, 20, 30, 40, 50, 60, 70, 80, 90, 99, 110, 120, 132, 144, 157, 170, 184, 198, 213, 229,
     246, 263, 281, 299, 319, 338, 359, 381, 403, 425, 449, 473, 498, 524, 551, 578, 606, 635, 665,
     695, 727, 759, 792, 825, 860, 895, 931, 969, 1006, 1045, 1085, 1125, 1167, 1209, 1252, 1296,

@@ -9,8 +9,8 @@ use iltm::compile::NEIGHBOURS_FACTOR;
 use iltm::picture::png;
 use iltm::verify::{Cause, TableVerdict};
 use iltm_tests::overlapping::{
-    Screen, SeenOnScreen, learned_alone, learned_together, photograph_each, photograph_together,
-    refined, verified,
+    Screen, SeenOnScreen, learned_alone, learned_together, learned_with_even_black,
+    photograph_each, photograph_together, refined, verified,
 };
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, overlaps, photograph, scene, showable,
@@ -58,8 +58,8 @@ fn side_by_side() {
 
 /// By pixels of a camera without noise.
 fn by_pixels() {
-    println!("| scene | tables | whole screen | overlap | largest step |");
-    println!("|---|---|---|---|---|");
+    println!("| scene | tables | whole screen | overlap | largest step | of black |");
+    println!("|---|---|---|---|---|---|");
     let place = tempfile::tempdir().expect("a folder");
     for name in ["two-walls", "cube-room", "folded-screen", "dome-of-four"] {
         let scene = scene(name, &[]);
@@ -76,6 +76,10 @@ fn by_pixels() {
         let screen = Screen::new(&scene);
         row(name, "each alone", screen.seen_of_each(&alone));
         row(name, "together", screen.seen(&together));
+        if overlaps(name) {
+            let even = learned_with_even_black(&captures);
+            row(name, "together, --match-black", screen.seen(&even));
+        }
         let devices = |factor, heard| screen.seen_of_devices(&together, factor, heard);
         let usual = NEIGHBOURS_FACTOR;
         row(name, "together, by a device each", devices(usual, true));
@@ -167,8 +171,11 @@ fn row(scene: &str, tables: &str, seen: SeenOnScreen) {
         whole,
         overlap,
         step,
+        step_of_black,
     } = seen;
     let overlap = overlap.map_or_else(String::new, |error| format!("{error:.4}"));
-    let step = step.map_or_else(String::new, |step| format!("{:.1} %", 100.0 * step));
-    println!("| {scene} | {tables} | {whole:.4} | {overlap} | {step} |");
+    let percent =
+        |step: Option<f64>| step.map_or_else(String::new, |step| format!("{:.1} %", 100.0 * step));
+    let (step, black) = (percent(step), percent(step_of_black));
+    println!("| {scene} | {tables} | {whole:.4} | {overlap} | {step} | {black} |");
 }

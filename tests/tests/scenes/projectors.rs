@@ -9,7 +9,9 @@ use iltm::scene::fill_capture::{FillCaptureError, UnfilledCapture};
 use iltm::scene::{Effect, Forced, Pinhole, VirtualCamera};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
-use iltm_tests::overlapping::{Screen, learned_alone, learned_together, photograph_each};
+use iltm_tests::overlapping::{
+    Screen, learned_alone, learned_together, learned_with_even_black, photograph_each,
+};
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, photograph, scene, showable,
     simulation,
@@ -273,6 +275,12 @@ fn projectors_that_overlap_share_the_light_and_cancel_what_crosses() {
     let alone = screen.seen_of_each(&alone);
     assert!(within(alone.overlap, 0.5, 1.0), "{alone:?}");
     assert!(within(alone.step, 0.2, 1.0), "{alone:?}");
+    // The black of both projectors lies over the overlap, unless black is raised to it elsewhere.
+    assert!(within(seen.step_of_black, 0.2, 0.6), "{seen:?}");
+    let even = screen.seen(&learned_with_even_black(&captures));
+    assert!(within(even.step_of_black, 0.0, 0.15), "{even:?}");
+    assert!(within(even.step, 0.0, 0.02), "{even:?}");
+    assert!(within(even.overlap, 0.0, 0.016), "{even:?}");
 }
 
 #[test]

@@ -60,6 +60,9 @@ pub struct TableOptions<'c> {
     /// Leaves light that is there without the projector as it is, instead of counting it as a
     /// part of the picture.
     pub keep_ambient: bool,
+    /// Raises black to that of the brightest cells, so that it is even: where projectors overlap,
+    /// their black adds up.
+    pub match_black: bool,
 }
 
 /// Why a capture did not become a table.
@@ -233,6 +236,7 @@ pub fn build_table_from(
         projector: measurements.devices.projector.clone(),
         pixels: measurements.settings.projector.pixels(),
         reference_white: Some(white.light),
+        match_black: table.match_black,
         inverse_error: predicted.of(report.compensation),
         provenance: provenance.to_text(),
         targets: None,

@@ -20,8 +20,8 @@ pub struct Cut {
     pub allowed: f64,
     /// Share of the samples that are.
     pub bright: f64,
-    /// Share of the samples that are cut at its black, whatever the reference white: more
-    /// light arrives from elsewhere than is wanted.
+    /// Share of the samples that are cut at its black: more light arrives from elsewhere than
+    /// is wanted.
     pub dark: f64,
     /// Frames looked at.
     pub frames: usize,
@@ -34,7 +34,10 @@ pub struct ClipThresholds {
     size: FrameSize,
     lattice: Lattice,
     channels: Vec<Channel>,
-    /// Of every frame given so far.
+    /// Light that is wanted where frames are black, camera units.
+    black: f64,
+    /// Of every frame given so far. A negative one says from which white on the sample is cut
+    /// at black.
     thresholds: Vec<Vec<f32>>,
 }
 
@@ -44,17 +47,19 @@ struct Channel {
     operator: Interreflection,
     /// `t` of every sample.
     offset: Vec<f64>,
+    /// `s` of every sample of an even white.
+    even: Vec<f64>,
 }
 
 /// Threshold of a sample that is cut at black for any reference white.
-const DARK: f32 = -1.0;
+const DARK: f32 = -f32::MIN_POSITIVE;
 
 /// Threshold of a sample that nothing cuts.
 const NEVER: f32 = f32::INFINITY;
 
 impl ClipThresholds {
-    /// For frames on `inverse`'s scene, light relative to white, of any size; `None` if the
-    /// fine gains are not of its grid.
+    /// For frames on `inverse`'s scene, light relative to white, of any size, with black raised to
+    /// the light `black`, camera units; `None` if the fine gains are not of its grid.
     ///
     /// # Errors
     /// [`CompileError::GreyContent`].
@@ -62,8 +67,9 @@ impl ClipThresholds {
         inverse: &InverseTransport,
         fine: Option<&FineGains>,
         frames: &[LightPicture],
+        black: f64,
     ) -> Result<Option<Self>, CompileError> {
-        let Some(mut thresholds) = Self::new(inverse, fine) else {
+        let Some(mut thresholds) = Self::new(inverse, fine, black) else {
             return Ok(None);
         };
         if !frames.iter().all(|frame| thresholds.add(frame)) {
@@ -72,7 +78,7 @@ impl ClipThresholds {
         Ok(Some(thresholds))
     }
 
-    fn new(inverse: &InverseTransport, fine: Option<&FineGains>) -> Option<Self> {
+    fn new(inverse: &InverseTransport, fine: Option<&FineGains>, black: f64) -> Option<Self> {
         let size = fine.map_or(FrameSize::of_grid(inverse.grid), |fine| fine.size);
         let lattice = Lattice::new(inverse.grid, size)?;
         let channel = |index: usize| {
@@ -82,7 +88,13 @@ impl ClipThresholds {
             let ambient = DVector::from_column_slice(&own.ambient);
             let driven = DVector::from_column_slice(&own.gain).component_mul(&ambient);
             let offset = lattice.expand((driven - &operator * &ambient).as_slice());
+            let received = &operator * &DVector::from_element(ambient.len(), 1.0);
+            let received = lattice.expand(received.as_slice()).into_iter();
+            let even = gain.iter().zip(received);
             Channel {
+                even: even
+                    .map(|(gain, received)| gain - f64::from(received))
+                    .collect(),
                 offset: offset.into_iter().map(f64::from).collect(),
                 gain,
                 operator,
@@ -92,6 +104,7 @@ impl ClipThresholds {
             size,
             channels: (0..inverse.channels.len()).map(channel).collect(),
             lattice,
+            black,
             thresholds: Vec::new(),
         })
     }
@@ -123,26 +136,25 @@ impl ClipThresholds {
         let cells = self.lattice.average(light);
         let received = &channel.operator * &DVector::from_column_slice(&cells);
         let received = self.lattice.expand(received.as_slice());
-        let samples = channel
-            .gain
-            .iter()
-            .zip(light)
-            .zip(&received)
-            .zip(&channel.offset);
-        let threshold = |(((gain, light), received), offset): (((&f64, &f32), &f32), &f64)| {
+        let samples = channel.gain.iter().zip(&channel.even);
+        let samples = samples
+            .zip(&channel.offset)
+            .zip(light.iter().zip(&received));
+        let threshold = |(((gain, even), offset), (light, received)): (((&f64, &f64), &f64), _)| {
+            let (light, received): (&f32, &f32) = (light, received);
             // Where no cell was measured, nothing is projected.
             if *gain <= 0.0 {
                 return NEVER;
             }
             let slope = gain * f64::from(*light) - f64::from(*received);
-            if slope <= 0.0 {
-                return if *light > 0.0 || *received > 0.0 {
-                    DARK
-                } else {
-                    NEVER
-                };
+            let offset = offset - self.black * (even - slope);
+            if slope > 0.0 {
+                ((1.0 + offset) / slope) as f32
+            } else if *light <= 0.0 && *received <= 0.0 {
+                NEVER
+            } else {
+                ((offset / -slope) as f32).min(DARK)
             }
-            ((1.0 + offset) / slope) as f32
         };
         samples.map(threshold).collect()
     }
@@ -153,27 +165,21 @@ impl ClipThresholds {
     #[must_use]
     pub fn choose(&self, share: f64) -> Option<(f64, Cut)> {
         let mut bright: Vec<f32> = Vec::new();
-        let (mut dark, mut total) = (0_usize, 0_usize);
-        for threshold in self.thresholds.iter().flatten() {
-            total += 1;
-            if *threshold < 0.0 {
-                dark += 1;
-            } else if threshold.is_finite() {
-                bright.push(*threshold);
-            }
-        }
+        let total = self.thresholds.iter().map(Vec::len).sum::<usize>();
+        let all = self.thresholds.iter().flatten();
+        bright.extend(all.filter(|threshold| threshold.is_finite() && **threshold >= 0.0));
         // As many as may be cut, and the next one is the first that may not.
         let allowed = ((share * total as f64) as usize).min(bright.len().checked_sub(1)?);
         let (_, light, _) = bright.select_nth_unstable_by(allowed, f32::total_cmp);
-        let light = *light;
-        let below = bright.iter().filter(|threshold| **threshold < light);
+        let light = f64::from(*light);
+        let (bright, dark) = self.cut(light);
         let cut = Cut {
             allowed: share,
-            bright: below.count() as f64 / total as f64,
-            dark: dark as f64 / total as f64,
+            bright,
+            dark,
             frames: self.thresholds.len(),
         };
-        Some((f64::from(light), cut))
+        Some((light, cut))
     }
 
     /// Share of all frames' samples that are cut at a reference white: at the projector's
@@ -181,12 +187,11 @@ impl ClipThresholds {
     #[must_use]
     pub fn cut(&self, white: f64) -> (f64, f64) {
         let total = self.thresholds.iter().map(Vec::len).sum::<usize>().max(1) as f64;
-        let count = |of: &dyn Fn(f32) -> bool| {
+        let count = |of: fn(f32, f64) -> bool| {
             let all = self.thresholds.iter().flatten();
-            all.filter(|threshold| of(**threshold)).count() as f64 / total
+            all.filter(|threshold| of(**threshold, white)).count() as f64 / total
         };
-        let bright = count(&|threshold| threshold >= 0.0 && f64::from(threshold) < white);
-        (bright, count(&|threshold| threshold < 0.0))
+        (count(is_bright), count(is_dark))
     }
 
     /// For each place of [`size`](Self::size), the share of frames `from` to `to` in which
@@ -201,15 +206,25 @@ impl ClipThresholds {
             let [bright, dark] = &mut maps;
             for (at, (bright, dark)) in bright.iter_mut().zip(dark).enumerate() {
                 let colours = || frame.iter().skip(at).step_by(pixels);
-                if colours().any(|t| *t >= 0.0 && f64::from(*t) < white) {
+                if colours().any(|t| is_bright(*t, white)) {
                     *bright += part;
-                } else if colours().any(|t| *t < 0.0) {
+                } else if colours().any(|t| is_dark(*t, white)) {
                     *dark += part;
                 }
             }
         }
         maps
     }
+}
+
+/// Whether a sample with this threshold is cut at the projector's white.
+fn is_bright(threshold: f32, white: f64) -> bool {
+    threshold >= 0.0 && f64::from(threshold) < white
+}
+
+/// Whether it is cut at its black.
+fn is_dark(threshold: f32, white: f64) -> bool {
+    threshold < 0.0 && f64::from(-threshold) < white
 }
 
 /// Means over the pixels of each place, or the pixel there.
@@ -247,7 +262,7 @@ mod tests {
     #[test]
     fn for_even_white_with_nothing_cut_it_is_the_uniform_reference_white() {
         let inverse = scene(1);
-        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        let mut thresholds = ClipThresholds::new(&inverse, None, 0.0).unwrap();
         assert!(thresholds.add(&grey(&inverse, |_| 1.0)));
         let (light, cut) = thresholds.choose(0.0).unwrap();
         let uniform = uniform_white(&inverse).unwrap();
@@ -259,7 +274,7 @@ mod tests {
     fn content_of_half_the_light_gets_twice_the_white_but_for_ambient_light() {
         let mut inverse = scene(1);
         inverse.channels[0].ambient.fill(0.0);
-        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        let mut thresholds = ClipThresholds::new(&inverse, None, 0.0).unwrap();
         thresholds.add(&grey(&inverse, |_| 0.5));
         let uniform = uniform_white(&inverse).unwrap();
         let chosen = thresholds.choose(0.0).unwrap().0;
@@ -269,7 +284,7 @@ mod tests {
     #[test]
     fn no_more_than_the_share_is_cut_and_a_little_more_white_cuts_more() {
         let inverse = scene(1);
-        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        let mut thresholds = ClipThresholds::new(&inverse, None, 0.0).unwrap();
         for frame in 0..8_usize {
             thresholds.add(&grey(&inverse, |cell| {
                 0.3 + 0.7 * ((cell * 7 + frame * 13) % 40) as f32 / 40.0
@@ -291,7 +306,7 @@ mod tests {
     #[test]
     fn what_bounces_onto_wanted_black_is_cut_at_any_white() {
         let inverse = scene(1);
-        let mut thresholds = ClipThresholds::new(&inverse, None).unwrap();
+        let mut thresholds = ClipThresholds::new(&inverse, None, 0.0).unwrap();
         thresholds.add(&grey(&inverse, |cell| f32::from(cell != 11)));
         let (light, cut) = thresholds.choose(0.0).unwrap();
         assert!((cut.dark - 1.0 / 40.0).abs() < 1e-9, "{cut:?}");
@@ -301,5 +316,40 @@ mod tests {
                 .enumerate()
                 .all(|(cell, cut)| (*cut > 0.5) == (cell == 11))
         );
+    }
+
+    /// By the formula itself, for every cell of a picture with black beside white.
+    #[test]
+    fn where_black_is_raised_less_is_cut_at_black_as_the_light_says() {
+        let inverse = scene(1);
+        let channel = &inverse.channels[0];
+        let operator = inverse.channel(0).operator;
+        let frame = grey(&inverse, |cell| if cell % 3 == 0 { 0.0 } else { 0.9 });
+        let light = frame.planes()[0].iter().map(|light| f64::from(*light));
+        let light: Vec<f64> = light.collect();
+        let white = uniform_white(&inverse).unwrap();
+        let mut shares = Vec::new();
+        for black in [0.0, 0.1 * white, 0.8 * white] {
+            let mut thresholds = ClipThresholds::new(&inverse, None, black).unwrap();
+            assert!(thresholds.add(&frame));
+            for white in [0.7 * white, white, 1.5 * white] {
+                let wanted = light.iter().zip(&channel.ambient);
+                let wanted = wanted.map(|(d, ambient)| black + (white - black) * d - ambient);
+                let wanted = DVector::from_iterator(light.len(), wanted);
+                let own = DVector::from_column_slice(&channel.gain).component_mul(&wanted);
+                let drive = own - &operator * &wanted;
+                let count = |of: &dyn Fn(f64) -> bool| {
+                    drive.iter().filter(|drive| of(**drive)).count() as f64 / light.len() as f64
+                };
+                let (bright, dark) = thresholds.cut(white);
+                assert!((bright - count(&|drive| drive > 1.0)).abs() < 1e-9);
+                assert!(
+                    (dark - count(&|drive| drive < 0.0)).abs() < 1e-9,
+                    "{black} {white}"
+                );
+            }
+            shares.push(thresholds.cut(white).1);
+        }
+        assert!(shares[0] > 0.3 && shares[2] < shares[0], "{shares:?}");
     }
 }

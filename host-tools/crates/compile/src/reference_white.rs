@@ -2,7 +2,7 @@
 
 use super::clip_thresholds::{ClipThresholds, Cut};
 use super::{CompileError, FineGains};
-use iltm_picture::LightPicture;
+use iltm_picture::{LightPicture, statistics::quantile};
 use iltm_solve::InverseTransport;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,8 @@ pub enum WhiteRequest<'c> {
         frames: &'c [LightPicture],
         /// Share of the samples that may be cut at the projector's white.
         share: f64,
+        /// Whether black is raised to that of the brightest cells.
+        match_black: bool,
     },
 }
 
@@ -81,8 +83,17 @@ impl ReferenceWhite {
                 }
                 (own.light, own.chosen) = (light, Chosen::Given);
             }
-            Some(WhiteRequest::Content { frames, share }) => {
-                let thresholds = ClipThresholds::of(inverse, fine, frames)?;
+            Some(WhiteRequest::Content {
+                frames,
+                share,
+                match_black,
+            }) => {
+                let black = if match_black {
+                    brightest_black(inverse)
+                } else {
+                    0.0
+                };
+                let thresholds = ClipThresholds::of(inverse, fine, frames, black)?;
                 if let Some((light, cut)) = thresholds.and_then(|found| found.choose(share)) {
                     (own.light, own.chosen) = (light, Chosen::Content);
                     own.content = Some(cut);
@@ -113,6 +124,21 @@ impl ReferenceWhite {
             }
         }
     }
+}
+
+/// Share of the live cells whose black is not brighter than the one that all get: the brightest
+/// cells of all are those with the most noise.
+const BLACK_REACHED: f64 = 0.99;
+
+/// The black that nearly all live cells can show, camera units.
+pub(crate) fn brightest_black(inverse: &InverseTransport) -> f64 {
+    let live = (0..inverse.live.len()).filter(|cell| inverse.live[*cell]);
+    let most = |cell: usize| {
+        let channels = inverse.channels.iter().map(|channel| channel.ambient[cell]);
+        channels.fold(0.0, f64::max)
+    };
+    let mut light: Vec<f64> = live.map(most).collect();
+    quantile(&mut light, BLACK_REACHED).unwrap_or(0.0)
 }
 
 /// Light of the brightest uniform grey, the same in all channels, that every live cell

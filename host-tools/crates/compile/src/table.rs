@@ -4,7 +4,7 @@ use super::gain::FineGains;
 use super::image::{ImageWriter, halfwords, operator_sections, projector_section};
 use super::ladder::{self, Ladder, Part};
 use super::quantise::{TooStrong, quantise};
-use super::reference_white::uniform_white;
+use super::reference_white::{brightest_black, uniform_white};
 use super::response;
 use fixed::types::{U0F32, U1F15, U8F24};
 use iltm_picture::ProjectorResponse;
@@ -16,6 +16,7 @@ use iltm_runtime::{
         layout::{MAX_PROVENANCE, SectionKind},
     },
     operator::{Bounds, Channels, Operator, OperatorError, Segment},
+    pipeline::raised_curves,
     placement::ProjectorPixels,
     units::Light,
 };
@@ -33,6 +34,8 @@ pub struct CompileOptions {
     /// Light of reference white in camera units; by default the brightest uniform
     /// grey that every live cell reaches.
     pub reference_white: Option<f64>,
+    /// Raises black to the brightest that is left of the room's light and the projectors' black.
+    pub match_black: bool,
     /// Predicted closed-loop error of the inverse.
     pub inverse_error: f64,
     /// Errors that the tiers above 0 aim for, descending; by default
@@ -216,6 +219,12 @@ pub fn compile(
     image.section(SectionKind::Tiers, 0, tiers(&ladder, &operator));
     image.section(SectionKind::Gain, 0, halfwords(gains.cells.iter().copied()));
     if let Some(ambient) = ambient(inverse, &gains, white) {
+        if options.match_black {
+            let black = Light::saturating_from_num(brightest_black(inverse) / white);
+            let curves = raised_curves(black.min(Light::ONE));
+            let bytes = curves.as_flattened().as_flattened().to_vec();
+            image.section(SectionKind::Light, 0, bytes);
+        }
         image.section(SectionKind::Ambient, 0, halfwords(ambient));
     }
     if let Some(knots) = response::knots(&options.projector, inverse.channels.len()) {

@@ -94,6 +94,13 @@ impl LightPicture {
         self.with_planes(|_, plane| plane.iter().map(|light| light * factor as f32).collect())
     }
 
+    /// What is shown where black is raised to `black` and white stays: `black + (1 - black) light`.
+    #[must_use]
+    pub fn raised(&self, black: f64) -> Self {
+        let raised = |light: &f32| (black + (1.0 - black) * f64::from(*light)) as f32;
+        self.with_planes(|_, plane| plane.iter().map(raised).collect())
+    }
+
     /// The light that this share (0 to 1) of all pixels and channels stays below.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {

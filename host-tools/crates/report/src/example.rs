@@ -94,6 +94,7 @@ impl Example {
         wanted: Wanted,
     ) -> Result<Self, VideoError> {
         let light = LightPicture::decode(&wanted.picture, Response::Srgb);
+        let light = light.raised(table.black().to_num());
         let mut shown = Vec::new();
         for treatment in Treatment::ALL {
             let mut input = wanted.picture.clone();

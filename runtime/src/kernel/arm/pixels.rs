@@ -106,7 +106,7 @@ fn ambient<const C: usize>(pixels: &Plane<'_, u8, C>, count: usize) -> Option<*c
 /// Sums and details of a block, as `portable.rs` says.
 pub(crate) fn merge<const C: usize>(
     pixels: &Plane<'_, u8, C>,
-    light: &[u16; 256],
+    light: &[Halfword; 256],
     block: Block,
     shift: u32,
     sums: &mut [i32],
@@ -128,7 +128,7 @@ pub(crate) fn merge<const C: usize>(
     };
     let merge = MergePixels {
         top,
-        light: light.as_ptr(),
+        light: light.as_ptr().cast(),
         sums: sums.as_mut_ptr(),
         details: details.as_mut_ptr().cast(),
         nodes: block.nodes,
@@ -156,7 +156,7 @@ pub(crate) fn merge<const C: usize>(
 /// Codes of pixels, as `portable.rs` says.
 pub(crate) fn finish<const C: usize>(
     wanted: &Plane<'_, u8, C>,
-    light: &[u16; 256],
+    light: &[Halfword; 256],
     codes: Option<&[u8; CODES]>,
     gain_fraction: u32,
     gains: &[[Halfword; C]],
@@ -172,7 +172,7 @@ pub(crate) fn finish<const C: usize>(
         wanted: samples(wanted.codes, channel, count)?,
         gain: samples(gains, channel, count)?.cast(),
         input: samples(input, channel, count)?.cast_mut(),
-        light: light.as_ptr(),
+        light: light.as_ptr().cast(),
         codes: codes.map_or(without_provenance(PROPORTIONAL), |codes| codes.as_ptr()),
         gain_fraction,
         half: 1_u32.wrapping_shl(gain_fraction) >> 1,
@@ -206,7 +206,7 @@ pub(crate) fn finish<const C: usize>(
 /// Light added to columns, as `portable.rs` says.
 pub(crate) fn add_light<const C: usize>(
     pixels: &Plane<'_, u8, C>,
-    light: &[u16; 256],
+    light: &[Halfword; 256],
     weight: u32,
     columns: &mut [u32],
 ) -> bool {
@@ -218,7 +218,7 @@ pub(crate) fn add_light<const C: usize>(
     let add = AddLight {
         pixels: first,
         columns: columns.as_mut_ptr(),
-        light: light.as_ptr(),
+        light: light.as_ptr().cast(),
         weight,
         count,
         ambient,

@@ -1,9 +1,9 @@
-// Light of an sRGB code. Films have codes beyond black and white beside hard edges.
+// Light of an sRGB code; that of black is raised by tables that make black even. Films have codes beyond black and white beside hard edges.
 vec3 light_of(vec3 code) {
     code = clamp(code, 0.0, 1.0);
     vec3 low = code / 12.92;
     vec3 high = pow((code + 0.055) / 1.055, vec3(2.4));
-    return mix(high, low, vec3(lessThanEqual(code, vec3(0.04045))));
+    return BLACK + (1.0 - BLACK) * mix(high, low, vec3(lessThanEqual(code, vec3(0.04045))));
 }
 
 // The pixels that cells cover: left, top, width, height. As `placement` of the runtime.

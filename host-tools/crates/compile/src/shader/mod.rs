@@ -114,6 +114,7 @@ impl<'t, 'a> Shader<'t, 'a> {
     /// What every pass begins with.
     fn constants(&self) -> String {
         let grid = self.table.grid();
+        let black = self.table.black();
         let (projector, border) = self.table.projector().map_or_else(
             || (FrameSize::of_grid(grid), 0),
             |projector| (projector.size(), projector.border()),
@@ -122,6 +123,7 @@ impl<'t, 'a> Shader<'t, 'a> {
             "const ivec2 CELLS = ivec2({}, {});\n\
              const vec2 PROJECTOR = vec2({}, {});\n\
              const float BORDER = float({border});\n\
+             const float BLACK = float({black});\n\
              const int LINE = {LINE};\n{COMMON}\n",
             grid.cols(),
             grid.rows(),

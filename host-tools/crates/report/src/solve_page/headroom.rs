@@ -27,7 +27,7 @@ pub(super) fn section(
     files: &mut Vec<PictureFile>,
 ) -> Markup {
     let white = &learned.white;
-    let previews = previews(learned, content, files);
+    let previews = previews(learned, table, content, files);
     html! { section {
         h2 { "How bright white is" }
         p {
@@ -80,13 +80,16 @@ struct Preview<'c> {
 
 fn previews<'c>(
     learned: &BuiltTable,
+    table: &Table<'_>,
     content: &'c [Content],
     files: &mut Vec<PictureFile>,
 ) -> Vec<Preview<'c>> {
     let mut previews = Vec::new();
     for (index, content) in content.iter().take(SHOWN).enumerate() {
         let light = content.light();
-        let found = ClipThresholds::of(&learned.inverse, learned.fine.as_ref(), &light);
+        let black = table.black().to_num::<f64>() * learned.white.light;
+        let (inverse, fine) = (&learned.inverse, learned.fine.as_ref());
+        let found = ClipThresholds::of(inverse, fine, &light, black);
         let Ok(Some(thresholds)) = found else {
             continue;
         };

@@ -114,13 +114,9 @@ pub(super) fn of_capture(
 impl Base<'_> {
     fn options(&self) -> CompileOptions {
         CompileOptions {
-            label: iltm_runtime::image::Label::default(),
             projector: self.learned.measurements.devices.projector.clone(),
-            pixels: None,
-            reference_white: None,
             inverse_error: self.learned.predicted_error(),
-            targets: None,
-            provenance: String::new(),
+            ..CompileOptions::default()
         }
     }
 

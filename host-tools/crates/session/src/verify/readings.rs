@@ -261,7 +261,7 @@ fn wanted_pictures(
         let mut made = wanted.clone();
         compensator.picture(&mut made)?;
         Ok(Pictures {
-            wanted: light(&LightPicture::decode(&wanted, Response::Srgb)),
+            wanted: light(&wanted_light(&wanted, table)),
             // Who does not compensate sends the codes as they are.
             input: [&wanted, &made].map(|picture| input(picture, &curves)),
         })
@@ -340,11 +340,16 @@ fn pictures(
             }
         }
         Ok(Pictures {
-            wanted: light(&LightPicture::decode(&wanted, Response::Srgb)),
+            wanted: light(&wanted_light(&wanted, table)),
             input: given.map(|picture| input(&picture, &curves)),
         })
     };
     pairs.iter().map(of_pair).collect()
+}
+
+/// The light of a picture, with black as bright as the table makes it.
+fn wanted_light(wanted: &Picture, table: &Table<'_>) -> LightPicture {
+    LightPicture::decode(wanted, Response::Srgb).raised(table.black().to_num())
 }
 
 /// The same of test images of the projector's own pixels.
@@ -378,7 +383,7 @@ pub(super) fn fine_pictures(
         }
         Ok(FineShown {
             image: *image,
-            wanted: LightPicture::decode(&wanted, Response::Srgb),
+            wanted: wanted_light(&wanted, table),
             compensated: made,
             clipped: summary.clipped as f64 / summary.samples.max(1) as f64,
         })

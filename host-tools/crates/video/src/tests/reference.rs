@@ -112,7 +112,9 @@ fn reference(table: &MadeUp, channel: usize, frame: FrameSize, light: &[f64]) ->
         }
         None => resample(&own(&table.gains, gain_unit), &up_rows, &up_cols),
     };
-    let mut light = light.to_vec();
+    let black = f64::from(table.black) / UNIT;
+    let raised = |light: &f64| ((black + (1.0 - black) * light) * UNIT).round() / UNIT;
+    let mut light: Vec<f64> = light.iter().map(raised).collect();
     if let Some(ambient) = &table.ambient {
         let driven = own(&table.gains, gain_unit).into_iter();
         let driven = driven.zip(own(ambient, UNIT)).map(|(gain, a)| gain * a);
