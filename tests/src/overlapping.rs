@@ -176,7 +176,7 @@ pub struct SeenOnScreen {
     pub overlap: Option<f64>,
     /// The largest step of an even white across a border of the overlap, of its light.
     pub step: Option<f64>,
-    /// The same of black.
+    /// The same of black; `None` where it is dark.
     pub step_of_black: Option<f64>,
 }
 
@@ -456,7 +456,7 @@ impl<'s> Screen<'s> {
                 for (left, right) in [(1, 2), (2, 1)] {
                     // The pixels between belong to either.
                     let beside = mean(x, y, left).zip(mean(x + 2 * BESIDE, y, right));
-                    if let Some((a, b)) = beside {
+                    if let Some((a, b)) = beside.filter(|(a, b)| a.max(*b) > 0.0) {
                         let step = (a - b).abs() / a.max(b);
                         largest = Some(largest.map_or(step, |largest| largest.max(step)));
                     }

@@ -75,8 +75,9 @@ fn by_pixels() {
         let alone = learned_alone(&captures, together.white.light);
         let screen = Screen::new(&scene);
         row(name, "each alone", screen.seen_of_each(&alone));
-        row(name, "together", screen.seen(&together));
-        if overlaps(name) {
+        let seen = screen.seen(&together);
+        row(name, "together", seen);
+        if seen.step_of_black.is_some() {
             let even = learned_with_even_black(&captures);
             row(name, "together, --match-black", screen.seen(&even));
         }

@@ -143,8 +143,8 @@ impl DeviceResponse {
     }
 
     /// Largest difference to `other` in the values for one light, in steps of an
-    /// 8-bit value. Light below a hundredth of full light, where curves differ most
-    /// and nobody sees it, does not count.
+    /// 8-bit value. Light below a hundredth of full light, where ramps are dark
+    /// and curves differ most, does not count.
     #[must_use]
     pub fn steps_from(&self, other: &Self) -> f64 {
         const SEEN: f64 = 0.01;
