@@ -15,7 +15,7 @@ use crate::solve::{Method, Processes, SolveOptions};
 use crate::solve_page::{self, Content};
 use crate::video::{Fit, PlacedFrames, VideoError, sampled_frames};
 use iltm_picture::{LightPicture, Picture, progress::Progress, whole_file};
-use iltm_runtime::FrameSize;
+use iltm_runtime::{FrameSize, units::Light};
 use serde_json::json;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,6 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
         None => Some(WhiteRequest::Content {
             frames: &frames,
             share: arguments.clip_share,
-            match_black: arguments.match_black,
         }),
     };
     let built = build_table_from(
@@ -98,6 +97,9 @@ pub(super) fn run(arguments: &Solve, processes: Processes, output: &Output) -> R
     }
     let mut text = table_words::lines(&arguments.output, &table);
     text += &remarks(&built);
+    if arguments.match_black && table.black() == Light::ZERO {
+        text += "note        black is not raised: the photographs of black are dark\n";
+    }
     if processes.count() > 1 && built.report.method != Method::Links {
         let _ = writeln!(
             text,

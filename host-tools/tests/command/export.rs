@@ -230,7 +230,11 @@ fn touch_designer(user: &User, folder: &str) -> String {
 
 #[test]
 fn shaders_make_what_the_runtime_makes_at_every_tier() {
-    for (sample, width, height) in [("m-panels", 336, 208), ("m-panels-colour", 384, 256)] {
+    for (sample, width, height) in [
+        ("m-panels", 336, 208),
+        ("m-panels-colour", 384, 256),
+        ("m-panels --match-black", 336, 208),
+    ] {
         let user = User::new();
         let sample = format!("{}/samples/{sample}", env!("CARGO_MANIFEST_DIR"));
         user.says(&format!("solve {sample} -o t.iltm"));
@@ -245,6 +249,11 @@ fn shaders_make_what_the_runtime_makes_at_every_tier() {
             .unwrap()
             .len();
         assert!(tiers > 3);
+        let raises = user.json("inspect t.iltm --json")["black"]
+            .as_f64()
+            .unwrap()
+            > 0.0;
+        assert_eq!(raises, sample.ends_with("--match-black"));
         for tier in 0..tiers {
             user.says(&format!(
                 "compensate t.iltm in.png --tier {tier} -o expected.png"
@@ -301,7 +310,7 @@ fn mean_apart(a: &ImageBuffer<Rgb<u16>, Vec<u16>>, b: &ImageBuffer<Rgb<u16>, Vec
 
 #[test]
 fn maps_make_even_pictures_what_the_runtime_makes_of_them() {
-    for sample in ["m-panels", "m-panels-colour"] {
+    for sample in ["m-panels", "m-panels-colour", "m-panels --match-black"] {
         let user = User::new();
         let sample = format!("{}/samples/{sample}", env!("CARGO_MANIFEST_DIR"));
         user.says(&format!("solve {sample} -o t.iltm"));

@@ -1,7 +1,7 @@
 //! What a table is said to be, and where its frames go: the words and the pixels that a
 //! technician gets.
 
-use super::user::{Ended, User, contains};
+use super::user::{Ended, User, contains, with_values};
 use image::{GrayImage, Luma};
 use std::fs;
 use std::process::Command;
@@ -104,6 +104,34 @@ fn ambient_light_is_left_as_it_is_when_asked() {
     };
     assert_eq!(effects("b.iltm"), (true, None));
     assert_eq!(effects("kept.iltm"), (false, Some(true)));
+}
+
+#[test]
+fn black_is_raised_where_asked_or_it_is_said_why_not() {
+    let user = bordered();
+    let said = user.says("solve c -o even.iltm --match-black");
+    contains(&said, &["black       raised to 0.", " of white everywhere"]);
+    let black = |table: &str| {
+        let inspected = user.json(&format!("inspect {table}"));
+        let raised = inspected["effects"].to_string().contains("raised black");
+        (raised, inspected["black"].as_f64().expect("a number") > 0.0)
+    };
+    assert_eq!(black("even.iltm"), (true, true));
+    assert_eq!(black("b.iltm"), (false, false));
+    let said = user.fails(2, "solve c -o never.iltm --match-black --keep-ambient");
+    contains(&said, &["cannot be used with"]);
+    // A scene without a room's light.
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/m-panels.toml");
+    let scene = fs::read_to_string(scene).expect("part of the repository");
+    user.write("dark.toml", with_values(&scene, &[("ambient", 0)]));
+    let cells = "--rows 13 --cols 21 --photos 20 --projector 160x100";
+    user.says(&format!(
+        "patterns -o dark {cells} --camera linear --no-calibration"
+    ));
+    user.says("simulate dark.toml --photograph dark --without noise");
+    let said = user.says("solve dark -o dark.iltm --match-black");
+    contains(&said, &["black is not raised"]);
+    assert_eq!(black("dark.iltm"), (false, false));
 }
 
 #[test]

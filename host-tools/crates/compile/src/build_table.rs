@@ -225,7 +225,7 @@ pub fn build_table_from(
     if let Some(several) = several {
         inverse.share(&several.shares_of_cells());
     }
-    let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white)?;
+    let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white, table.match_black)?;
     let provenance = Provenance {
         ambient_kept,
         overlapping: several.is_some_and(SeveralCaptures::is_overlapping),

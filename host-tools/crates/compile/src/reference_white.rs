@@ -19,8 +19,6 @@ pub enum WhiteRequest<'c> {
         frames: &'c [LightPicture],
         /// Share of the samples that may be cut at the projector's white.
         share: f64,
-        /// Whether black is raised to that of the brightest cells.
-        match_black: bool,
     },
 }
 
@@ -56,7 +54,8 @@ pub enum Chosen {
 }
 
 impl ReferenceWhite {
-    /// Chooses as asked. Content that nothing could cut, black all over, leaves it to the
+    /// Chooses as asked, for content with black raised to that of the brightest cells if
+    /// `match_black`. Content that nothing could cut, black all over, leaves it to the
     /// even grey.
     ///
     /// # Errors
@@ -67,6 +66,7 @@ impl ReferenceWhite {
         inverse: &InverseTransport,
         fine: Option<&FineGains>,
         request: Option<WhiteRequest<'_>>,
+        match_black: bool,
     ) -> Result<Self, CompileError> {
         let uniform = uniform_white(inverse).ok_or(CompileError::Dark)?;
         let mut own = Self {
@@ -83,11 +83,7 @@ impl ReferenceWhite {
                 }
                 (own.light, own.chosen) = (light, Chosen::Given);
             }
-            Some(WhiteRequest::Content {
-                frames,
-                share,
-                match_black,
-            }) => {
+            Some(WhiteRequest::Content { frames, share }) => {
                 let black = if match_black {
                     brightest_black(inverse)
                 } else {

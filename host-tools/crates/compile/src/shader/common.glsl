@@ -1,4 +1,5 @@
-// Light of an sRGB code; that of black is raised by tables that make black even. Films have codes beyond black and white beside hard edges.
+// Light of an sRGB code, with black as bright as the table makes it. Films have codes beyond
+// black and white beside hard edges.
 vec3 light_of(vec3 code) {
     code = clamp(code, 0.0, 1.0);
     vec3 low = code / 12.92;
