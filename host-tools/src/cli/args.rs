@@ -680,9 +680,10 @@ pub(super) struct Play {
     /// from standard input
     #[arg(required = true, value_name = "FILM")]
     pub(super) films: Vec<OsString>,
-    /// Screen to fill, from 0; it must have as many pixels as the table's projector
-    #[arg(long, value_name = "N")]
-    pub(super) display: Option<u32>,
+    /// Display to fill, the first is 0, as in `iltm capture`; it must have as many pixels as the
+    /// table's projector. Of a wide frame all displays that show it, from left to right: 1,2
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    pub(super) display: Vec<u16>,
     /// Tier of the table's accuracy ladder; the most accurate if left out
     #[arg(long, value_name = "TIER")]
     pub(super) tier: Option<u8>,

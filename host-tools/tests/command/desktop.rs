@@ -35,8 +35,14 @@ impl Desktop {
         server.args(["-SecurityTypes", "None", "-rfbport", "-1"]);
         server.arg("-rfbunixpath").arg(&socket);
         let desktop = Self::of(server, folder);
-        divide(&socket, widths, height).expect("a server that listens");
+        desktop.divide(widths, height);
         desktop
+    }
+
+    /// Has other displays from now on.
+    pub(crate) fn divide(&self, widths: &[u16], height: u16) {
+        let socket = self.folder.path().join("socket");
+        divide(&socket, widths, height).expect("a server that listens");
     }
 
     fn of(mut server: Command, folder: TempDir) -> Self {

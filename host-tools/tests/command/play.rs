@@ -4,7 +4,7 @@
 use super::desktop::Desktop;
 use super::schema;
 use super::user::{Ended, User, contains, interrupt};
-use image::{DynamicImage, RgbImage};
+use image::{DynamicImage, RgbImage, imageops};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -13,6 +13,11 @@ use std::os::unix::net::UnixStream;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
+use x11rb::connection::Connection;
+use x11rb::protocol::randr::ConnectionExt as _;
+use x11rb::protocol::xproto::{self, ConnectionExt as _, InputFocus};
+use x11rb::protocol::xtest::ConnectionExt as _;
+use x11rb::rust_connection::RustConnection;
 
 /// The projector of [`user`]: 336 x 208 pixels in a border of 8.
 const SIZE: &str = "352x224";
@@ -165,7 +170,7 @@ fn compensated(user: &User, picture: &RgbImage, tier: &str) -> RgbImage {
 
 /// Pixels inside the border.
 fn inside(picture: &RgbImage) -> RgbImage {
-    image::imageops::crop_imm(picture, 8, 8, 336, 208).to_image()
+    imageops::crop_imm(picture, 8, 8, 336, 208).to_image()
 }
 
 #[test]
@@ -384,6 +389,195 @@ fn late_frames_are_counted_where_the_rate_of_the_display_is_known() {
     assert_eq!((words[2], words[4]), ("dropped,", "late"), "{said}");
     let told: i64 = words[3].parse().expect("a count");
     assert!(told > 0 && Some(told) >= counted, "{said}: {counted:?}");
+}
+
+/// A user of the desktop beside `iltm`.
+struct Beside {
+    connection: RustConnection,
+    root: xproto::Window,
+}
+
+impl Beside {
+    fn of(desktop: &Desktop) -> Self {
+        let (connection, screen) = x11rb::connect(Some(&desktop.display)).expect("it runs");
+        let root = connection.setup().roots[screen].root;
+        Self { connection, root }
+    }
+
+    /// What all displays show together.
+    fn sees(&self) -> RgbImage {
+        let whole = self.connection.get_geometry(self.root).unwrap();
+        let whole = whole.reply().unwrap();
+        let format = xproto::ImageFormat::Z_PIXMAP;
+        let (width, height) = (whole.width, whole.height);
+        let image = self
+            .connection
+            .get_image(format, self.root, 0, 0, width, height, !0);
+        let data = image.unwrap().reply().unwrap().data;
+        RgbImage::from_fn(width.into(), height.into(), |x, y| {
+            let at = 4 * (x + u32::from(width) * y) as usize;
+            image::Rgb([data[at + 2], data[at + 1], data[at]])
+        })
+    }
+
+    /// Width and height of the window that has the keys.
+    fn keys(&self) -> (u16, u16) {
+        let focus = self.connection.get_input_focus().unwrap();
+        let window = focus.reply().unwrap().focus;
+        // None, and whatever the pointer is on, are no windows.
+        if window <= 1 {
+            return (0, 0);
+        }
+        let geometry = self.connection.get_geometry(window).unwrap();
+        geometry.reply().map_or((0, 0), |of| (of.width, of.height))
+    }
+
+    fn takes_the_keys(&self) {
+        let focus = self
+            .connection
+            .set_input_focus(InputFocus::NONE, self.root, 0_u32);
+        focus.unwrap().check().unwrap();
+    }
+
+    fn clicks(&self, x: i16, y: i16) {
+        for (kind, button) in [
+            (xproto::MOTION_NOTIFY_EVENT, 0),
+            (xproto::BUTTON_PRESS_EVENT, 1),
+            (xproto::BUTTON_RELEASE_EVENT, 1),
+        ] {
+            let faked = self
+                .connection
+                .xtest_fake_input(kind, button, 0, self.root, x, y, 0);
+            faked.unwrap().check().unwrap();
+        }
+    }
+
+    /// Makes the display at this place the primary one, which the server lists first.
+    fn prefers(&self, place: usize) {
+        let resources = self
+            .connection
+            .randr_get_screen_resources_current(self.root);
+        let output = resources.unwrap().reply().unwrap().outputs[place];
+        let set = self.connection.randr_set_output_primary(self.root, output);
+        set.unwrap().check().unwrap();
+    }
+}
+
+/// The table's projector as two, of 176 columns each, and a display of 40 columns for the technician.
+#[test]
+fn a_wide_frame_lies_over_the_displays_that_are_named() {
+    let desktop = Desktop::with_displays(&[40, 176, 176], 224);
+    let user = user();
+    let beside = Beside::of(&desktop);
+    film(&user, "wide.mkv", 25, "bgr0");
+    for (name, left) in [("left", 0), ("right", 176)] {
+        user.ffmpeg(&format!(
+            "-i wide.mkv -vf crop=176:224:{left}:0 -c:v ffv1 {name}.mkv"
+        ));
+    }
+    let two = "--external-file=right.mkv --lavfi-complex=[vid1][vid2]hstack[vo]";
+    for (film, option) in [("wide.mkv", ""), ("left.mkv", two)] {
+        let line = format!("{film} --display 1,2");
+        let mut show = Playing::with(&desktop, &user, &line, option);
+        show.hold("1.0");
+        let found = show.shown("found.png");
+        let sees = beside.sees();
+        let operator = imageops::crop_imm(&sees, 0, 0, 40, 224).to_image();
+        assert!(operator.iter().all(|code| *code == 0), "{film}");
+        let walls = imageops::crop_imm(&sees, 40, 0, 352, 224).to_image();
+        assert!(
+            apart(&walls, &found).1 < 0.01,
+            "{film}: not pixel for pixel"
+        );
+        show.key("c");
+        let wanted = show.shown("raw.png");
+        let (most, mean) = apart(&compensated(&user, &wanted, ""), &walls);
+        assert!(most < ROUNDED && mean < 0.3, "{film}: {most}, mean {mean}");
+        assert!(apart(&wanted, &walls).0 > 0.1, "{film}: nothing was done");
+        assert_eq!(beside.keys(), (352, 224));
+        // Another window takes the keys, until somebody clicks on the show.
+        beside.takes_the_keys();
+        beside.clicks(20, 100);
+        thread::sleep(Duration::from_millis(500));
+        assert_ne!(beside.keys(), (352, 224));
+        beside.clicks(300, 100);
+        within(10, || (beside.keys() == (352, 224)).then_some(()));
+        let ended = show.end();
+        assert_eq!(ended.code, 0, "{}", ended.said);
+        assert!(!ended.said.contains("problem"), "{}", ended.said);
+    }
+}
+
+#[test]
+fn a_display_that_goes_in_mid_show_is_said_and_ends_a_strict_one() {
+    let user = user();
+    user.ffmpeg(&format!(
+        "-f lavfi -i testsrc2=size={SIZE} -frames:v 1 wide.png"
+    ));
+    for (strict, code) in [("", 0), ("--strict", 38)] {
+        let desktop = Desktop::with_displays(&[176, 176, 40], 224);
+        let line = format!("wide.png --display 0,1 {strict}");
+        let mut show = Playing::start(&desktop, &user, &line);
+        // One that shows none of it.
+        desktop.divide(&[176, 176, 80], 224);
+        thread::sleep(Duration::from_secs(1));
+        assert!(show.get("time-pos").as_f64().is_some());
+        desktop.divide(&[176, 144, 80], 224);
+        let ended = if code == 0 {
+            thread::sleep(Duration::from_secs(1));
+            show.end()
+        } else {
+            Ended::of(show.child)
+        };
+        assert_eq!(ended.code, code, "{}", ended.said);
+        contains(
+            &ended.said,
+            &["display 1 is gone, or its mode or place changed"],
+        );
+    }
+}
+
+#[test]
+fn displays_that_cannot_show_a_wide_frame_are_refused_with_what_there_is() {
+    let desktop = Desktop::with_displays(&[176, 176, 352], 224);
+    let user = user();
+    user.ffmpeg(&format!(
+        "-f lavfi -i testsrc2=size={SIZE} -frames:v 1 wide.png"
+    ));
+    let mut text = String::new();
+    for display in ["7", "1,0", "0,0", "0", "0,1,2"] {
+        let line = format!("play t.iltm wide.png --display {display} -- {MPV}");
+        let refused = Ended::of(desktop.spawn(&user, &line));
+        text += &refused.with_code();
+    }
+    // Numbers are those of `iltm capture`, whatever display is the primary one.
+    Beside::of(&desktop).prefers(1);
+    user.says("patterns -o c --rows 3 --cols 4 --photos 10 --no-calibration --no-dense");
+    for line in [
+        "play t.iltm wide.png",
+        "capture c --camera 'cp now {photo}'",
+    ] {
+        let listed = Ended::of(desktop.spawn(&user, &format!("{line} --display 7")));
+        contains(&listed.said, &["0 is VNC-1, 176 x 224 pixels at 176, 0"]);
+    }
+    Beside::of(&desktop).prefers(0);
+    let mut other = user.iltm("play t.iltm wide.png --display 0,1");
+    let other = Ended::of(
+        other
+            .env("WAYLAND_DISPLAY", "wayland-0")
+            .spawn()
+            .expect("a binary"),
+    );
+    text += &other.with_code();
+    insta::assert_snapshot!(text);
+    // One display of a desktop of three.
+    let mut show = Playing::start(&desktop, &user, "wide.png --display 2");
+    show.shown("found.png");
+    let found = user.picture("found.png").to_rgb8();
+    let sees = Beside::of(&desktop).sees();
+    let third = imageops::crop_imm(&sees, 352, 0, 352, 224).to_image();
+    assert!(apart(&third, &found).1 < 0.01, "not pixel for pixel");
+    assert_eq!(show.end().code, 0);
 }
 
 #[test]

@@ -4,6 +4,8 @@
 //! `iltm export`. The script `play.lua` runs within mpv: it has the keys, counts frames that were
 //! dropped or late, and says what happens as JSON lines on standard output.
 
+mod spanning;
+
 use super::args::Play;
 use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
@@ -19,6 +21,7 @@ use iltm_runtime::FrameSize;
 use iltm_runtime::image::Table;
 use iltm_runtime::placement::ProjectorPixels;
 use serde_json::{Value, json};
+use spanning::SpanningWindow;
 use std::ffi::OsString;
 use std::fs;
 use std::io::{self, BufRead, BufReader};
@@ -65,12 +68,15 @@ pub(super) fn run(arguments: &Play, output: &Output) -> Result<(), Failure> {
     }
     interrupt::catch();
     let start = Instant::now();
-    let mut player = files.start(arguments)?;
+    let window = files.window(&arguments.display)?;
+    let mut player = files.start(arguments, window.as_ref())?;
     let events = read(player.stdout.take().expect("it is piped"));
     let mut show = FilmShow {
         arguments,
         output,
         files: &files,
+        window,
+        struck: false,
         generation: 0,
         used: 0,
         before: None,
@@ -143,12 +149,35 @@ impl ShowFiles<'_> {
         fs::rename(part, self.folder.join("newest")).map_err(|error| error.to_string())
     }
 
-    fn start(&self, arguments: &Play) -> Result<Child, Failure> {
+    /// What mpv is given to draw in, where displays are named and it does not take one by itself.
+    fn window(&self, numbers: &[u16]) -> Result<Option<SpanningWindow>, Failure> {
+        if numbers.is_empty() {
+            return Ok(None);
+        }
+        if spanning::on_x11() {
+            let size = self.projector.map(|projector| {
+                let size = projector.size();
+                (size.width() as u32, size.height() as u32)
+            });
+            return SpanningWindow::open(numbers, size).map(Some);
+        }
+        if numbers.len() > 1 {
+            return Err(Failure::new(
+                Kind::Display,
+                "several displays need a desktop of X11, this is none",
+                "Log in to a session of X11 (Xorg), or have the graphics driver present the displays \
+                 as one.",
+            ));
+        }
+        Ok(None)
+    }
+
+    fn start(&self, arguments: &Play, window: Option<&SpanningWindow>) -> Result<Child, Failure> {
         let mut command = mpv();
         command
             .env("ILTM_PLAY", self.folder)
             .stdout(Stdio::piped())
-            .args(["--fullscreen", "--keepaspect=no"])
+            .arg("--keepaspect=no")
             .args(["--force-window=immediate", "--cursor-autohide=always"])
             .args(["--input-default-bindings=no", "--osd-bar=no"])
             .args(["--quiet", "--msg-level=all=error"])
@@ -166,9 +195,20 @@ impl ShowFiles<'_> {
         if let Some(projector) = self.projector {
             command.arg(format!("--vf=lavfi=[{}]", filled(projector)));
         }
-        if let Some(display) = arguments.display {
-            command.arg(format!("--screen={display}"));
-            command.arg(format!("--fs-screen={display}"));
+        match (window, &arguments.display[..]) {
+            // Clicks are the window's, which asks for the keys then.
+            (Some(window), _) => {
+                command.arg(format!("--wid={}", window.id()));
+                command.arg("--input-cursor=no");
+            }
+            (None, [display]) => {
+                command.arg("--fullscreen");
+                command.arg(format!("--screen={display}"));
+                command.arg(format!("--fs-screen={display}"));
+            }
+            (None, _) => {
+                command.arg("--fullscreen");
+            }
         }
         if !arguments.once {
             command.arg("--loop-playlist=inf");
@@ -246,6 +286,9 @@ struct FilmShow<'s> {
     arguments: &'s Play,
     output: &'s Output,
     files: &'s ShowFiles<'s>,
+    window: Option<SpanningWindow>,
+    /// Whether a problem of the displays ends it, as was asked for.
+    struck: bool,
     /// The number of the newest table that was looked at, of the one in use, and of the one
     /// before that.
     generation: u32,
@@ -274,7 +317,11 @@ impl FilmShow<'_> {
             if let Some(bytes) = watch.newer() {
                 self.exchange(&bytes);
             }
-            if interrupt::stopped() {
+            if let Some(problem) = self.window.as_mut().and_then(SpanningWindow::look) {
+                self.problem(&problem);
+                self.struck |= self.arguments.strict;
+            }
+            if interrupt::stopped() || self.struck {
                 if asked.is_none() {
                     self.files.write(STOP, "")?;
                 }
@@ -370,7 +417,7 @@ impl FilmShow<'_> {
                     "Set the display to the projector's own mode, or choose another with --display.",
                 );
             }
-            Some(STRICT) => {
+            code if self.struck || code == Some(STRICT) => {
                 return failed(
                     Kind::Player,
                     "the show was ended",
