@@ -58,7 +58,7 @@ pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
     let simulation = simulation(scene, Forced::default());
     let patterns = pattern_set(simulation.grid(), bernoulli, seed);
     let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
-    folder::write(&camera, &patterns, capture, &Silent).expect("written");
+    folder::write(&camera, None, &patterns, capture, &Silent).expect("written");
 }
 
 /// What is learned from a capture with the usual options.

@@ -6,7 +6,7 @@ use super::output::{Output, make_folder, write_files};
 use super::progress::progress;
 use crate::compare::benchmark::{self, BenchmarkRow};
 use crate::compare::benchmark_scene::{BenchmarkScene, BenchmarkSceneError};
-use crate::compare::page::BenchmarkPage;
+use crate::compare::page::{self, BenchmarkPage};
 use crate::compare::paper::{self, Condition, File};
 use crate::compare::{Meter, table};
 use crate::demo;
@@ -74,9 +74,8 @@ fn of_light(
     };
     let light = light.map_err(dark)?;
     let (photographed, inverted) = benchmark::every(
-        (&light.truth, &light.rig, &light.columns),
-        arguments.photos,
-        arguments.seed,
+        (&light.truth, &light.rig),
+        light.methods(arguments.photos, arguments.seed),
         meter,
         progress,
     );
@@ -95,13 +94,16 @@ fn of_light(
         File::new("compare.csv", table::csv(&groups)),
     ];
     let truth = &light.truth;
+    let photographs = match &photographed[..] {
+        [] => format!("{}\n", page::OVERLAP.to_lowercase()),
+        rows => format!("\nways to photograph\n{}", table::text(rows)),
+    };
     let text = format!(
-        "{} cells, {} lit and seen{}; the transport is {}\nerrors are of the mean light of cells; `iltm verify` measures what a viewer sees at pixels\n\nways to photograph\n{}\nways to invert, given the transport\n{}\n",
+        "{} cells, {} lit and seen{}; the transport is {}\nerrors are of the mean light of cells; `iltm verify` measures what a viewer sees at pixels\n{photographs}\nways to invert, given the transport\n{}\n",
         truth.grid,
         truth.live_cells(),
         if light.colour { ", green channel" } else { "" },
         light.known,
-        table::text(&photographed),
         table::text(&inverted),
     );
     let data = json!({
@@ -127,9 +129,9 @@ fn of_paper(
         .filter(|condition| condition.noisy)
     {
         if let Some((truth, rig)) = condition.world(arguments.seed) {
-            let light = (&truth, &rig, &[][..]);
+            let methods = benchmark::all(arguments.photos, arguments.seed);
             let (photographed, inverted) =
-                benchmark::every(light, arguments.photos, arguments.seed, meter, progress);
+                benchmark::every((&truth, &rig), methods, meter, progress);
             contests.push((condition.name(), photographed, inverted));
         }
     }
@@ -200,11 +202,6 @@ fn dark(error: BenchmarkSceneError) -> Failure {
             Kind::Solve,
             error,
             "Look at `iltm solve`: it says which cells cannot be solved for.",
-        ),
-        BenchmarkSceneError::Overlap => Failure::new(
-            Kind::Usage,
-            error,
-            "Compare on a scene without overlap; docs/several-projectors.md has figures of both.",
         ),
     }
 }

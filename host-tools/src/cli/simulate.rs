@@ -184,7 +184,7 @@ fn shoot<'a>(
         return Ok(Shot::Nothing);
     };
     let patterns = pattern_set(simulation.grid(), arguments.photos, arguments.seed);
-    let written = folder::write(&camera()?, &patterns, out, progress)?;
+    let written = folder::write(&camera()?, None, &patterns, out, progress)?;
     Ok(Shot::Capture(out, written))
 }
 

@@ -160,7 +160,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     let capture = place.path().join("capture");
     let patterns = pattern_set(simulation.grid(), 60, 1);
     let camera = VirtualCamera::new(&scene, &simulation, 1).unwrap();
-    let written = folder::write(&camera, &patterns, &capture, &Silent).unwrap();
+    let written = folder::write(&camera, None, &patterns, &capture, &Silent).unwrap();
     assert_eq!(written.photographs, patterns.len());
     let learned = learned(&capture);
     let prediction = learned.report.prediction;
@@ -178,7 +178,7 @@ fn a_simulated_capture_is_solved_as_well_as_a_photographed_one() {
     );
     // The same seed gives the same bytes.
     let again = place.path().join("again");
-    folder::write(&camera, &patterns, &again, &Silent).unwrap();
+    folder::write(&camera, None, &patterns, &again, &Silent).unwrap();
     for name in ["photos/000.png", "photos/050.png", "capture.csv"] {
         let read = |folder: &Path| std::fs::read(folder.join(name)).unwrap();
         assert_eq!(read(&capture), read(&again), "{name}");

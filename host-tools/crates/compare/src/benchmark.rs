@@ -4,7 +4,6 @@ use super::acquisition::{self, Acquisition};
 use super::inversion::{self, Inversion, Inverted, KnownTransport};
 use super::{Answer, Description, Errors, GroundTruth, Rig, Unfit};
 use iltm_picture::progress::Progress;
-use std::ops::Range;
 use std::time::Instant;
 
 /// What one method did.
@@ -96,16 +95,22 @@ fn row(
     BenchmarkRow { method, result }
 }
 
-/// All ways to photograph (with `photographs` where one likes) and all ways to invert,
-/// in that order. `columns` are the columns of cells of each projector.
+/// Ways to photograph, and ways to invert.
+pub type Methods = (Vec<Box<dyn Acquisition>>, Vec<Box<dyn Inversion>>);
+
+/// All ways to photograph (with `photographs` where one likes) and all ways to invert one projector.
+#[must_use]
+pub fn all(photographs: usize, seed: u64) -> Methods {
+    (acquisition::all(photographs, seed), inversion::all(&[]))
+}
+
+/// What each of the methods does, in their order.
 pub fn every(
-    (truth, rig, columns): (&GroundTruth, &Rig, &[Range<usize>]),
-    photographs: usize,
-    seed: u64,
+    (truth, rig): (&GroundTruth, &Rig),
+    (acquisitions, inversions): Methods,
     meter: Option<Meter>,
     progress: &dyn Progress,
 ) -> (Vec<BenchmarkRow>, Vec<BenchmarkRow>) {
-    let (acquisitions, inversions) = (acquisition::all(photographs, seed), inversion::all(columns));
     let total = acquisitions.len() + inversions.len();
     progress.begin("methods, one after the other", total as u64);
     let photographed = acquisitions.iter().map(|method| {

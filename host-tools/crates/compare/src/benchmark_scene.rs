@@ -6,11 +6,13 @@
 //! together tell.
 
 use super::{GroundTruth, Rig};
-use crate::inversion::projector_of;
+use crate::acquisition;
+use crate::benchmark::Methods;
+use crate::inversion::{self, Together, projector_of};
 use crate::rig::clear_dead;
 use iltm_capture::{
-    CaptureError, CaptureOptions, Measurements, NoiseModel, ReferenceError, pattern_set,
-    read_reference,
+    CaptureError, CaptureOptions, Measurements, NO_CELL, NoiseModel, ReferenceError,
+    SeveralCaptures, pattern_set, read_reference, read_several,
 };
 use iltm_picture::progress::Progress;
 use iltm_picture::unfinished::TemporaryFolder;
@@ -20,8 +22,8 @@ use iltm_scene::{
     description::{Scene, SceneError},
     folder::{self, CaptureFolderError},
 };
-use iltm_solve::{SolveError, SolveOptions, solve};
-use nalgebra::DMatrix;
+use iltm_solve::{SolveError, SolveOptions, solve, wanted_images};
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
@@ -36,6 +38,14 @@ const TOGETHER: usize = 64;
 /// Bernoulli photographs by which a described scene's camera is registered.
 const REGISTRATION: usize = 60;
 
+/// Details of a wanted image along a side of the camera's picture, at most.
+const MOST_DETAILS: u16 = 128;
+
+/// Side of a detail of wanted images where projectors overlap, in cells. Cells of two projectors do not
+/// lie on each other, so smaller details would be judged by where cells lie. Films have them in their
+/// pixels, which are shared out one by one.
+const DETAIL: f64 = 2.0;
+
 /// A scene's light, cell by cell.
 #[derive(Debug)]
 pub struct BenchmarkScene {
@@ -48,7 +58,9 @@ pub struct BenchmarkScene {
     /// What photographs are taken with; its noise is the camera's.
     pub rig: Rig,
     /// Columns of cells of each of several projectors; empty for one.
-    pub columns: Vec<Range<usize>>,
+    columns: Vec<Range<usize>>,
+    /// How several projectors that overlap share the light.
+    together: Option<Together>,
 }
 
 /// Why there is no light to compare on.
@@ -84,11 +96,6 @@ pub enum BenchmarkSceneError {
     /// The transport has no inverse.
     #[error("the scene's transport has no inverse, by which answers could be judged")]
     Singular,
-    /// Projectors light one place together.
-    #[error(
-        "pictures of its projectors overlap: methods are compared where one projector lights a place"
-    )]
-    Overlap,
 }
 
 impl BenchmarkScene {
@@ -118,7 +125,6 @@ impl BenchmarkScene {
                          to methods that look for the same";
             (light.ok_or(BenchmarkSceneError::Singular)?, known)
         };
-        let transport = (transport, Vec::new());
         Self::new(&measurements, inverse.live, transport, known, seed)
     }
 
@@ -135,41 +141,118 @@ impl BenchmarkScene {
         check_size(scene.grid())?;
         let simulation = Simulation::new(&scene, &SimulationOptions::default(), progress)?;
         let room = TemporaryFolder::new()?;
-        let folder = room.path().join("capture");
-        let patterns = pattern_set(simulation.grid(), REGISTRATION, seed);
-        let camera = VirtualCamera::new(&scene, &simulation, seed)?;
-        folder::write(&camera, &patterns, &folder, progress)?;
-        let measurements = iltm_capture::read(&folder, &CaptureOptions::default(), progress)?;
-        let transport = simulated(&simulation, &measurements, progress)?;
-        let live = measurements.live.clone();
-        let columns = scene.columns();
-        if overlap(&transport, measurements.grid, &columns) {
-            return Err(BenchmarkSceneError::Overlap);
+        let mut folders = Vec::new();
+        for (index, projector) in scene.projectors.iter().enumerate() {
+            let folder = room.path().join(index.to_string());
+            let patterns = pattern_set(projector.grid, REGISTRATION, seed);
+            let camera = VirtualCamera::new(&scene, &simulation, seed + index as u64)?;
+            folder::write(&camera, Some(index), &patterns, &folder, progress)?;
+            folders.push(folder);
         }
+        let several = read_several(&folders, &CaptureOptions::default(), progress)?;
+        let transport = simulated(&simulation, &several, progress)?;
         let known = "simulated without noise, one cell lit at a time";
-        Self::new(&measurements, live, (transport, columns), known, seed)
+        let (all, live) = (&several.all, several.all.live.clone());
+        let columns = scene.columns();
+        if !overlap(&transport, all.grid, &columns) {
+            let scene = Self::new(all, live, transport, known, seed)?;
+            return Ok(Self { columns, ..scene });
+        }
+        let together = Together {
+            overlaps: several.overlaps.clone(),
+            shares: Some(several.shares_of_cells()),
+        };
+        let inverse = together.matrix(&transport, &live);
+        let inverse = inverse.ok_or(BenchmarkSceneError::Singular)?;
+        let images = images_seen(all);
+        let truth =
+            GroundTruth::of_overlapping((all.grid, transport.clone(), live), inverse, images);
+        Ok(Self {
+            known,
+            colour: all.channels.len() > 1,
+            rig: rig(all, transport, seed),
+            truth: truth.ok_or(BenchmarkSceneError::Singular)?,
+            columns,
+            together: Some(together),
+        })
+    }
+
+    /// The methods that fit it: all, with `photographs` where one likes, or those for projectors that
+    /// overlap.
+    #[must_use]
+    pub fn methods(&self, photographs: usize, seed: u64) -> Methods {
+        match &self.together {
+            Some(together) => (
+                Vec::new(),
+                inversion::of_overlapping(&self.columns, together),
+            ),
+            None => (
+                acquisition::all(photographs, seed),
+                inversion::all(&self.columns),
+            ),
+        }
     }
 
     fn new(
         measurements: &Measurements,
         live: Vec<bool>,
-        (mut transport, columns): (DMatrix<f64>, Vec<Range<usize>>),
+        mut transport: DMatrix<f64>,
         known: &'static str,
         seed: u64,
     ) -> Result<Self, BenchmarkSceneError> {
         clear_dead(&mut transport, &live);
-        let noise = cell_noise(measurements, &live);
         let grid = measurements.grid;
-        let rig = Rig::new(grid, transport.clone(), live.clone(), noise, seed);
+        let rig = rig(measurements, transport.clone(), seed);
         let truth = GroundTruth::new(grid, transport, live).ok_or(BenchmarkSceneError::Singular)?;
         Ok(Self {
             known,
             colour: measurements.channels.len() > 1,
             truth,
             rig,
-            columns,
+            columns: Vec::new(),
+            together: None,
         })
     }
+}
+
+fn rig(measurements: &Measurements, transport: DMatrix<f64>, seed: u64) -> Rig {
+    let live = measurements.live.clone();
+    let noise = cell_noise(measurements, &live);
+    Rig::new(measurements.grid, transport, live, noise, seed)
+}
+
+/// Wanted images that lie on the camera's picture, `N x n`: cells that overlap want the same light.
+fn images_seen(measurements: &Measurements) -> DMatrix<f64> {
+    let centres = &measurements.registration.centre;
+    let detail = DETAIL * measurements.registration.cell_side();
+    // Least and most of a coordinate, and how many details lie between them.
+    let extent = |side: usize| {
+        let seen = centres.iter().flatten().map(|at| at[side]);
+        let (least, most) = seen.fold((f64::INFINITY, 0.0_f64), |(least, most), at| {
+            (least.min(at), most.max(at))
+        });
+        (
+            least,
+            (((most - least) / detail) as u16).min(MOST_DETAILS) + 2,
+        )
+    };
+    let ((left, cols), (top, rows)) = (extent(0), extent(1));
+    let grid = Grid::new(rows, cols).expect("there are details, and few");
+    let drawn = wanted_images(grid);
+    DMatrix::from_fn(centres.len(), drawn.ncols(), |place, image| {
+        let Some([x, y]) = centres[place] else {
+            return 0.0;
+        };
+        let (x, y) = ((x - left) / detail, (y - top) / detail);
+        let (col, row) = (
+            x.min(f64::from(cols - 2)) as usize,
+            y.min(f64::from(rows - 2)) as usize,
+        );
+        let (right, lower) = (x.fract(), y.fract());
+        let at = |row: usize, col: usize| drawn[(row * grid.cols() + col, image)];
+        let of_row = |row| (1.0 - right) * at(row, col) + right * at(row, col + 1);
+        (1.0 - lower) * of_row(row) + lower * of_row(row + 1)
+    })
 }
 
 /// Part of a cell's own light from which another projector's cell lights it directly: bounces from a
@@ -216,19 +299,30 @@ fn cell_noise(measurements: &Measurements, live: &[bool]) -> NoiseModel {
 /// other is lit, in the units of the measurements.
 fn simulated(
     simulation: &Simulation<'_>,
-    measurements: &Measurements,
+    several: &SeveralCaptures,
     progress: &dyn Progress,
 ) -> Result<DMatrix<f64>, BenchmarkSceneError> {
-    let cells = simulation.grid().cells();
-    let channel = simulation.channels() / 2;
-    let labels = &measurements.registration.cell_of_pixel;
+    let grid = simulation.grid();
+    let (cells, channel) = (grid.cells(), simulation.channels() / 2);
+    // Pixels of every projector's cells: where pictures overlap, a pixel is of several.
+    let mut labels = Vec::new();
+    for projector in &several.projectors {
+        let (own, first) = (&projector.own, projector.columns.start);
+        let seen = own.registration.cell_of_pixel.iter().enumerate();
+        labels.extend(
+            seen.filter(|(_, cell)| **cell != NO_CELL)
+                .map(|(pixel, cell)| {
+                    let (cell, cols) = (*cell as usize, own.grid.cols());
+                    (pixel, cell / cols * grid.cols() + first + cell % cols)
+                }),
+        );
+    }
     let means = |photograph: &[f32]| {
         let mut sums = vec![(0.0, 0_u32); cells];
-        for (light, label) in photograph.iter().zip(labels) {
-            if let Some((sum, count)) = sums.get_mut(*label as usize) {
-                *sum += f64::from(*light);
-                *count += 1;
-            }
+        for (pixel, cell) in &labels {
+            let (sum, count) = &mut sums[*cell];
+            *sum += f64::from(photograph[*pixel]);
+            *count += 1;
         }
         sums.into_iter()
             .map(|(sum, count)| sum / f64::from(count.max(1)))
@@ -254,10 +348,13 @@ fn simulated(
     }
     progress.end();
     // The camera's exposure: the same flood light, as measured and as simulated.
-    let white = measurements.channels[measurements.channels.len() / 2]
-        .observations
-        .column(Measurements::WHITE)
-        .into_owned();
+    let channels = &several.all.channels;
+    let measured = &channels[channels.len() / 2].observations;
+    let whites = several.projectors.iter().map(|projector| {
+        let white = projector.views.start + Measurements::WHITE;
+        measured.column(white).into_owned()
+    });
+    let white: DVector<f64> = whites.sum();
     let flood = transport.column_sum();
     let exposure = white.dot(&flood) / flood.norm_squared();
     if !exposure.is_finite() {

@@ -14,8 +14,11 @@ pub struct GroundTruth {
     pub live: Vec<bool>,
     /// `T`, `N x N`, camera units; zero rows and columns of cells that are not live.
     pub transport: DMatrix<f64>,
-    /// `T^-1` between live cells, zero elsewhere.
+    /// `T^-1` between live cells, zero elsewhere. Where projectors overlap there is no one inverse, and it
+    /// is that which shares the light.
     pub inverse: DMatrix<f64>,
+    /// Whether projectors overlap, so that answers are judged by what they show alone.
+    pub overlap: bool,
     /// Brightest even grey that every live cell reaches, camera units.
     pub white: f64,
     /// Wanted images, `N x n`, camera units.
@@ -41,29 +44,53 @@ impl GroundTruth {
     #[must_use]
     pub fn new(grid: Grid, transport: DMatrix<f64>, live: Vec<bool>) -> Option<Self> {
         let inverse = inverted(&transport, &live)?;
+        let images = wanted_images(grid);
+        let mut truth = Self::with((grid, transport, live), inverse, images)?;
+        truth.second_bounce = truth.second_bounce_by(&truth.inverse, &truth.flood());
+        Some(truth)
+    }
+
+    /// The same of projectors that overlap, with an `inverse` that shares the light and wanted images of
+    /// which overlapping cells have the same, `N x n`, 0 to 1.
+    #[must_use]
+    pub fn of_overlapping(
+        (grid, transport, live): (Grid, DMatrix<f64>, Vec<bool>),
+        inverse: DMatrix<f64>,
+        images: DMatrix<f64>,
+    ) -> Option<Self> {
+        let truth = Self::with((grid, transport, live), inverse, images)?;
+        Some(Self {
+            overlap: true,
+            ..truth
+        })
+    }
+
+    fn with(
+        (grid, transport, live): (Grid, DMatrix<f64>, Vec<bool>),
+        inverse: DMatrix<f64>,
+        mut images: DMatrix<f64>,
+    ) -> Option<Self> {
         let drive = inverse.column_sum().max();
         if !(drive.is_finite() && drive > 0.0) {
             return None;
         }
         let white = drive.recip();
-        let mut images = wanted_images(grid);
         images *= white;
         for (mut row, live) in images.row_iter_mut().zip(&live) {
             if !live {
                 row.fill(0.0);
             }
         }
-        let mut truth = Self {
+        Some(Self {
             grid,
             live,
             transport,
             inverse,
+            overlap: false,
             white,
             images,
             second_bounce: DVector::zeros(grid.cells()),
-        };
-        truth.second_bounce = truth.second_bounce_by(&truth.inverse, &truth.flood());
-        Some(truth)
+        })
     }
 
     /// How many cells are lit and seen.
@@ -107,7 +134,7 @@ impl GroundTruth {
         let images = self.images.column_iter();
         let sum: f64 = images.map(|image| error(image.into_owned())).sum();
         let matrix = match answer {
-            Answer::Inverse(matrix) => Some(matrix),
+            Answer::Inverse(matrix) => Some(matrix).filter(|_| !self.overlap),
             Answer::Frames(_) => None,
         };
         Errors {

@@ -18,6 +18,10 @@ const ACROSS: usize = 4;
 /// powers of ten below it.
 const WORST: (f64, i32) = (0.3, 3);
 
+/// What is said where projectors overlap.
+pub const OVERLAP: &str = "Pictures of its projectors overlap, so methods for one projector are left out; the wanted images \
+     lie on the camera\u{2019}s picture";
+
 /// Two groups of rows and the light they were made with.
 #[derive(Debug)]
 pub struct BenchmarkPage<'c> {
@@ -46,10 +50,13 @@ impl BenchmarkPage<'_> {
                         " of them lit and seen. The transport is " (self.light.known)
                         "; every method gets the same light, with this camera\u{2019}s noise, and is judged by the same images."
                         @if self.light.colour { " Of the three channels it is the green one." }
+                        @if truth.overlap { " " (OVERLAP) "." }
                     }
                     p { "All of them know cells only, so errors are those of the mean light of a cell. What a viewer sees at pixels is more; " code { "iltm solve" } " predicts it, and " code { "iltm verify" } " measures it." }
                 }
-                (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))
+                @if !self.photographed.is_empty() {
+                    (self.group("Ways to photograph", "Each takes as many photographs as it wants; the transport that some of them find is inverted exactly.", self.photographed))
+                }
                 (self.group("Ways to invert, or to do without an inverse", "Each is given the transport itself.", self.inverted))
                 (self.sources())
             }

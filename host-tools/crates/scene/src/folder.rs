@@ -34,12 +34,17 @@ pub struct SimulatedCapture {
 }
 
 /// Photographs `patterns` and writes the folder `out`: beside its place first, then
-/// renamed, so that it is whole or not there.
+/// renamed, so that it is whole or not there. They are patterns of the scene's projector with
+/// this index, while all others show black; or, without it, of all side by side.
 ///
 /// # Errors
 /// [`CaptureFolderError`] if something is in its place or it cannot be written.
+///
+/// # Panics
+/// If there is no such projector.
 pub fn write(
     camera: &VirtualCamera<'_>,
+    projector: Option<usize>,
     patterns: &[(Role, Pattern)],
     out: &Path,
     progress: &dyn Progress,
@@ -55,7 +60,11 @@ pub fn write(
         folder.file(numbered("patterns", index as u32), picture)?;
     }
     progress.begin("taking photographs", patterns.len() as u64);
-    let frame = |(_, pattern): &(Role, Pattern)| ProjectedFrame::of_pattern(camera.grid(), pattern);
+    let all = 0..camera.grid().cols();
+    let columns = projector.map_or(all, |index| camera.scene.columns()[index].clone());
+    let frame = |(_, pattern): &(Role, Pattern)| {
+        ProjectedFrame::of_pattern(camera.grid(), &columns, pattern)
+    };
     let frames: Vec<ProjectedFrame> = patterns.iter().map(frame).collect();
     let all: Vec<usize> = (0..frames.len()).collect();
     let taken = AtomicUsize::new(0);
@@ -71,7 +80,8 @@ pub fn write(
     let roles = (0..).zip(patterns.iter().map(|(role, _)| *role));
     let manifest = Manifest::numbered("patterns", roles);
     folder.file(MANIFEST_FILE, manifest.to_csv())?;
-    folder.file(SETTINGS_FILE, settings(camera.scene, camera.simulation))?;
+    let settings = settings(camera.scene, projector.unwrap_or(0), camera.simulation);
+    folder.file(SETTINGS_FILE, settings)?;
     folder.finish()?;
     progress.end();
     Ok(SimulatedCapture {
@@ -80,17 +90,18 @@ pub fn write(
     })
 }
 
-fn settings(scene: &Scene, simulation: &Simulation<'_>) -> String {
+fn settings(scene: &Scene, projector: usize, simulation: &Simulation<'_>) -> String {
+    let projector = &scene.projectors[projector];
     let settings = Settings {
         camera: CameraSettings {
             response: scene.camera.response.into(),
             ..CameraSettings::default()
         },
         projector: ProjectorSettings {
-            response: scene.projectors[0].response.into(),
+            response: projector.response.into(),
             // Known exactly here, as whoever focused the projector might know it.
             blur: Some(if simulation.blurred() {
-                scene.projectors[0].blur
+                projector.blur
             } else {
                 0.0
             }),

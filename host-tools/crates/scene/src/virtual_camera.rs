@@ -13,6 +13,7 @@ use nalgebra::DMatrix;
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use rayon::prelude::*;
 use std::io;
+use std::ops::Range;
 
 /// Photographs that are exposed together: their light is held in memory.
 const TOGETHER: usize = 64;
@@ -29,12 +30,19 @@ pub struct ProjectedFrame {
 }
 
 impl ProjectedFrame {
-    /// Lit cells white, the others black.
-    pub(super) fn of_pattern(grid: Grid, pattern: &Pattern) -> Self {
+    /// Lit cells white, the others black; the pattern has these columns of the grid.
+    pub(super) fn of_pattern(grid: Grid, columns: &Range<usize>, pattern: &Pattern) -> Self {
         let code = |lit: &bool| [255 * u8::from(*lit); 3];
+        let mut codes = vec![[0; 3]; grid.cells()];
+        let rows = codes.chunks_exact_mut(grid.cols());
+        for (row, own) in rows.zip(pattern.lit.chunks_exact(columns.len())) {
+            for (code_of, lit) in row[columns.clone()].iter_mut().zip(own) {
+                *code_of = code(lit);
+            }
+        }
         Self {
             size: FrameSize::of_grid(grid),
-            codes: pattern.lit.iter().map(code).collect(),
+            codes,
             exposure: 1.0,
         }
     }

@@ -20,6 +20,7 @@ mod sweeps;
 #[cfg(test)]
 mod tests;
 mod tikhonov;
+mod together;
 mod wavelet_inverse;
 
 use super::{Answer, Description, Rig, Unfit};
@@ -41,6 +42,7 @@ pub use pseudo_inverse::{Fewer, PseudoInverse};
 use std::ops::Range;
 pub use sweeps::{SweepOrder, Sweeps};
 pub use tikhonov::Tikhonov;
+pub use together::Together;
 pub use wavelet_inverse::WaveletInverse;
 
 /// What a way to invert may look at.
@@ -147,6 +149,20 @@ pub fn all(columns: &[Range<usize>]) -> Vec<Box<dyn Inversion>> {
     all.extend([boxed(AlbedoAlone), boxed(FloodGain), boxed(Uncompensated)]);
     all.push(boxed(Bounded));
     all
+}
+
+/// Ways for projectors that overlap: others need one cell a place. `columns` are those of each projector.
+#[must_use]
+pub fn of_overlapping(columns: &[Range<usize>], together: &Together) -> Vec<Box<dyn Inversion>> {
+    let (overlaps, columns) = (together.overlaps.clone(), columns.to_vec());
+    let shares = None;
+    vec![
+        boxed(together.clone()),
+        boxed(Together { overlaps, shares }),
+        boxed(EachAlone { columns }),
+        boxed(FloodGain),
+        boxed(Uncompensated),
+    ]
 }
 
 fn boxed(method: impl Inversion + 'static) -> Box<dyn Inversion> {

@@ -234,7 +234,7 @@ fn direct_light_is_what_the_camera_sees_without_interreflection() {
     let place = tempfile::tempdir().unwrap();
     let capture = place.path().join("capture");
     let camera = VirtualCamera::new(&scene, &simulation, 3).unwrap();
-    simulated::write(&camera, &patterns, &capture, &Silent).unwrap();
+    simulated::write(&camera, None, &patterns, &capture, &Silent).unwrap();
     let light = DMatrix::from_fn(simulation.grid().cells(), patterns.len(), |cell, k| {
         f64::from(u8::from(patterns[k].1.lit[cell]))
     });
