@@ -52,14 +52,26 @@ const SHAPES: [Shape; 33] = [
     (45, 80, 3, false, 4, 160, 90),
 ];
 
+/// The same without a size, and rows and columns of the neighbours' cells.
+type SplitShape = (u16, u16, usize, bool, usize, u16, u16);
+
+/// Tables of one of several projectors. The light of the neighbours' cells is bytes of the frame, of which
+/// there are enough.
+const SPLIT: [SplitShape; 7] = [
+    (8, 8, 1, false, 2, 4, 4),
+    (16, 24, 1, true, 5, 8, 12),
+    (16, 24, 3, false, 5, 8, 24),
+    (13, 21, 3, true, 3, 7, 18),
+    (24, 40, 1, false, 6, 9, 42),
+    (32, 32, 3, true, 4, 16, 32),
+    (48, 64, 3, true, 2, 12, 32),
+];
+
 /// The cases of the list.
 pub fn cases() -> Vec<Case> {
     let case = |&(rows, cols, channels, ambient, pairs, width, height): &Shape| {
-        let grid = crate::grid(rows, cols);
-        let mut table = MadeUp::nearly_plain(grid, channels, ambient);
-        table.response = true;
-        table.tiers = vec![self::rows(grid, pairs)];
-        let size = FrameSize::new(width, height).unwrap_or(FrameSize::of_grid(grid));
+        let table = made(rows, cols, channels, ambient, pairs);
+        let size = FrameSize::new(width, height).unwrap_or(FrameSize::of_grid(table.grid));
         let (colour, light) = (
             if channels == 3 { "colour" } else { "grey" },
             if ambient { "ambient" } else { "dark" },
@@ -70,7 +82,26 @@ pub fn cases() -> Vec<Case> {
             size,
         }
     };
-    SHAPES.iter().map(case).collect()
+    let split = |&(rows, cols, channels, ambient, pairs, down, across): &SplitShape| {
+        let others = crate::grid(down, across);
+        let case = case(&(rows, cols, channels, ambient, pairs, 0, 0));
+        let table = made(rows, cols, channels, ambient, pairs);
+        Case {
+            name: format!("{} and {down}x{across} of neighbours", case.name),
+            image: table.with_neighbours(others, [1, 1], 5).image(),
+            ..case
+        }
+    };
+    let all = SHAPES.iter().map(case);
+    all.chain(SPLIT.iter().map(split)).collect()
+}
+
+fn made(rows: u16, cols: u16, channels: usize, ambient: bool, pairs: usize) -> MadeUp {
+    let grid = crate::grid(rows, cols);
+    let mut table = MadeUp::nearly_plain(grid, channels, ambient);
+    table.response = true;
+    table.tiers = vec![self::rows(grid, pairs)];
+    table
 }
 
 /// Three of four rows, each with so many pairs at places of their own, two more or two

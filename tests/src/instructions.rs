@@ -4,7 +4,8 @@
 //! frame give the same count every time. `docs/firmware.md` shows the result,
 //! `docs/instructions.csv` holds it, and a test compares the two.
 
-use crate::firmware::{counted, elf, memory_with, order};
+use crate::firmware::{counted, elf, elf_of, memory_with, order};
+use crate::neighbours::OF_SEVERAL;
 use crate::simulated::{host_tools, learned, photograph, scene};
 use iltm::compile::{CompileOptions, compile};
 use iltm::device::emulator::Board;
@@ -201,7 +202,12 @@ pub fn count(case: &Case) -> Vec<Count> {
             clipped,
         }
     };
-    let lines = bench(&elf(Board::An500, "bench"), &case.image, case.size, None);
+    let bench_elf = if table.neighbours().is_some() {
+        elf_of(Board::An500, OF_SEVERAL, "bench")
+    } else {
+        elf(Board::An500, "bench")
+    };
+    let lines = bench(&bench_elf, &case.image, case.size, None);
     lines.into_iter().map(read).collect()
 }
 

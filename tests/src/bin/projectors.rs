@@ -2,8 +2,8 @@
 //! alone, and with gains alone; and by pixels on all scenes of several projectors.
 //!
 //! `cargo run --release -p iltm-tests --bin projectors` prints the tables of
-//! `docs/several-projectors.md`; with `-- verdicts` that of verifications, and with `-- FOLDER` it draws
-//! the pictures there, and nothing else.
+//! `docs/several-projectors.md`; with `-- verdicts` that of verifications, with `-- photographs` that of
+//! fewer photographs, and with `-- FOLDER` it draws the pictures there, and nothing else.
 
 use iltm::compile::NEIGHBOURS_FACTOR;
 use iltm::picture::png;
@@ -17,6 +17,9 @@ use iltm_tests::simulated::{
 };
 use std::path::Path;
 
+/// All scenes of several projectors.
+const SCENES: [&str; 4] = ["two-walls", "cube-room", "folded-screen", "dome-of-four"];
+
 /// Scenes whose photographs are drawn, and the heading.
 const DRAWN: [(&str, &str); 2] = [
     ("dome-of-four", "A dome with four projectors"),
@@ -26,6 +29,7 @@ const DRAWN: [(&str, &str); 2] = [
 fn main() {
     match std::env::args_os().nth(1) {
         Some(word) if word == "verdicts" => return verdicts(),
+        Some(word) if word == "photographs" => return photographs(),
         Some(folder) => return draw(Path::new(&folder)),
         None => {}
     }
@@ -61,7 +65,7 @@ fn by_pixels() {
     println!("| scene | tables | whole screen | overlap | largest step | of black |");
     println!("|---|---|---|---|---|---|");
     let place = tempfile::tempdir().expect("a folder");
-    for name in ["two-walls", "cube-room", "folded-screen", "dome-of-four"] {
+    for name in SCENES {
         let scene = scene(name, &[]);
         let captures = photograph_each(&scene, 60, &place.path().join(name));
         let together = if overlaps(name) {
@@ -86,6 +90,29 @@ fn by_pixels() {
         row(name, "together, by a device each", devices(usual, true));
         row(name, "the same, --neighbours 2", devices(2, true));
         row(name, "the same, neighbours silent", devices(usual, false));
+    }
+}
+
+/// Errors by pixels after fewer Bernoulli patterns: shown by each projector while the others are dark,
+/// and by all at once.
+fn photographs() {
+    println!("| scene | patterns | whole screen | overlap | largest step | of black |");
+    println!("|---|---|---|---|---|---|");
+    let place = tempfile::tempdir().expect("a folder");
+    for name in SCENES {
+        let scene = scene(name, &[]);
+        let screen = Screen::new(&scene);
+        for bernoulli in [15, 30, 60] {
+            let place = place.path().join(format!("{name}-{bernoulli}"));
+            let alone = learned_together(&photograph_each(&scene, bernoulli, &place));
+            row(name, &format!("{bernoulli} each"), screen.seen(&alone));
+            if !overlaps(name) {
+                let capture = place.join("wide");
+                photograph_together(&scene, bernoulli, &capture);
+                let all = learned(&capture);
+                row(name, &format!("{bernoulli} at once"), screen.seen(&all));
+            }
+        }
     }
 }
 

@@ -6,12 +6,12 @@
 //! | stage | works on |
 //! |---|---|
 //! | first | pixels of each channel, nodes of the Haar levels |
-//! | operator | rows and pairs of entries of the tier's segments |
+//! | operator | rows and pairs of entries of the tier's segments, cells of neighbours |
 //! | last | nodes of the levels, pixels of each channel |
 //!
 //! Rows, pairs, sums to clear, and what turns of a loop save have the numbers of instructions of
 //! the kernel's loops, read off `runtime/src/kernel/arm`. All other numbers were fitted by least squares
-//! to the 33 kinds of frames of `docs/costs.csv` (`cargo run --release -p iltm-tests
+//! to the 40 kinds of frames of `docs/costs.csv` (`cargo run --release -p iltm-tests
 //! --bin counts -- costs`) and to `docs/instructions.csv`: no frame there is off by more than
 //! 2 %. Those of `docs/stages.csv`, to which nothing was fitted, are off by up to
 //! 1.9 %. `tests/tests/runtime/costs.rs` holds the model to 2 % of every one. Clipped
@@ -24,7 +24,7 @@
 use crate::ladder::Part;
 use iltm_runtime::{
     FrameSize, Grid,
-    image::Table,
+    image::{Neighbours, Table},
     operator::{Channels, Segment},
 };
 
@@ -51,6 +51,8 @@ pub struct Shape {
     pub linear: bool,
     /// Size of the frame.
     pub size: FrameSize,
+    /// Cells of other projectors whose light comes with each frame.
+    pub neighbours: Option<Grid>,
 }
 
 /// Instructions of a frame's stages.
@@ -83,6 +85,7 @@ impl Shape {
             ambient: table.ambient_row(0, 0).is_some(),
             linear: table.codes(0).is_none(),
             size,
+            neighbours: table.neighbours().map(Neighbours::grid),
         }
     }
 
@@ -106,7 +109,7 @@ impl Shape {
         }
         let levels = levels(self.grid);
         let synthesis = channels * self.synthesis(&levels);
-        let operator = self.operator(segments);
+        let operator = self.operator(segments) + channels * self.of_neighbours();
         if of_grid {
             return Stages {
                 first: channels * self.analysis(&levels),
@@ -126,7 +129,7 @@ impl Shape {
         let channels = f64::from(self.channels);
         let sample = if self.channels == 1 { 13.99 } else { 12.99 };
         let sample = sample + if self.ambient { 2.01 } else { 0.0 } + self.turns();
-        118.0 + channels * (146.0 + sample * self.grid.cells() as f64)
+        200.0 + channels * (146.0 + sample * self.grid.cells() as f64)
     }
 
     /// More a sample of what a linear projector shows: its loop takes two a turn, not four.
@@ -190,7 +193,23 @@ impl Shape {
             258.5 + 61.8 * groups + rows.sum::<f64>()
         };
         let sums = 0.375 * f64::from(self.channels) * self.grid.cells() as f64;
-        223.2 + sums + segments.iter().map(of_segment).sum::<f64>()
+        340.0 + sums + segments.iter().map(of_segment).sum::<f64>()
+    }
+
+    /// From the light of the neighbours' cells to input coefficients, one channel.
+    fn of_neighbours(&self) -> f64 {
+        let Some(grid) = self.neighbours else {
+            return 0.0;
+        };
+        let level = |level: &LevelCost| {
+            193.0
+                + 44.9 * level.halves
+                + 288.3 * level.weighted
+                + 64.9 * level.calls
+                + 171.2 * level.rows
+        };
+        let cell = if self.ambient { 25.76 } else { 21.66 };
+        60.0 + cell * grid.cells() as f64 + levels(grid).iter().map(level).sum::<f64>()
     }
 
     /// Means of the cells of a larger frame, one channel. A row of pixels that a border

@@ -83,6 +83,10 @@ fn grid<const C: usize>(
         .neighbours()
         .and_then(|others| wanted.as_flattened().as_chunks().0.get(..others.samples()));
     let mut workspace = memory.workspace(heard);
+    if heard.is_some() && pipeline.operates(tier) {
+        // The basis of their cells is worked out with the first frame.
+        pipeline.operate(tier, &mut workspace)?;
+    }
     let mut laps = Laps::new(clock);
     if pipeline.operates(tier) {
         pipeline.analyse(ENCODING, wanted, &mut workspace)?;
