@@ -145,6 +145,11 @@ fn iltm(words: &[&str]) -> Result<(), Unknown> {
                 continue;
             }
         };
+        if word == "--" {
+            // What follows is for another program.
+            let others = command.get_arguments().any(clap::Arg::is_last_set);
+            return if others { Ok(()) } else { Err(unknown()) };
+        }
         if (long, short) == (None, None) {
             // `-` is standard input or output.
             continue;
@@ -262,6 +267,7 @@ fn names_that_do_not_exist_are_noticed() {
         "cargo run --release -- demos",
         "time iltm simulates host-tools/scenes/stage.toml",
         "cat film.y4m | iltm compensate --tiers 3 scene.iltm - -o -",
+        "iltm compensate scene.iltm -- --profile=low-latency",
         "bash tests/runs.sh",
     ] {
         assert!(look_up(line).is_err(), "{line}");
