@@ -129,7 +129,7 @@ fn of_paper(
         .filter(|condition| condition.noisy)
     {
         if let Some((truth, rig)) = condition.world(arguments.seed) {
-            let methods = benchmark::all(arguments.photos, arguments.seed);
+            let methods = benchmark::all(&[], arguments.photos, arguments.seed);
             let (photographed, inverted) =
                 benchmark::every((&truth, &rig), methods, meter, progress);
             contests.push((condition.name(), photographed, inverted));

@@ -6,8 +6,7 @@
 //! together tell.
 
 use super::{GroundTruth, Rig};
-use crate::acquisition;
-use crate::benchmark::Methods;
+use crate::benchmark::{self, Methods};
 use crate::inversion::{self, Together, projector_of};
 use crate::rig::clear_dead;
 use iltm_capture::{
@@ -150,7 +149,7 @@ impl BenchmarkScene {
             folders.push(folder);
         }
         let several = read_several(&folders, &CaptureOptions::default(), progress)?;
-        let transport = simulated(&simulation, &several, progress)?;
+        let mut transport = simulated(&simulation, &several, progress)?;
         let known = "simulated without noise, one cell lit at a time";
         let (all, live) = (&several.all, several.all.live.clone());
         let columns = scene.columns();
@@ -158,6 +157,7 @@ impl BenchmarkScene {
             let scene = Self::new(all, live, transport, known, seed)?;
             return Ok(Self { columns, ..scene });
         }
+        clear_dead(&mut transport, &live);
         let together = Together {
             overlaps: several.overlaps.clone(),
             shares: Some(several.shares_of_cells()),
@@ -165,12 +165,12 @@ impl BenchmarkScene {
         let inverse = together.matrix(&transport, &live);
         let inverse = inverse.ok_or(BenchmarkSceneError::Singular)?;
         let images = images_seen(all);
-        let truth =
-            GroundTruth::of_overlapping((all.grid, transport.clone(), live), inverse, images);
+        let rig = rig(all, transport.clone(), &live, seed);
+        let truth = GroundTruth::of_overlapping((all.grid, transport, live), inverse, images);
         Ok(Self {
             known,
             colour: all.channels.len() > 1,
-            rig: rig(all, transport, seed),
+            rig,
             truth: truth.ok_or(BenchmarkSceneError::Singular)?,
             columns,
             together: Some(together),
@@ -186,10 +186,7 @@ impl BenchmarkScene {
                 Vec::new(),
                 inversion::of_overlapping(&self.columns, together),
             ),
-            None => (
-                acquisition::all(photographs, seed),
-                inversion::all(&self.columns),
-            ),
+            None => benchmark::all(&self.columns, photographs, seed),
         }
     }
 
@@ -202,7 +199,7 @@ impl BenchmarkScene {
     ) -> Result<Self, BenchmarkSceneError> {
         clear_dead(&mut transport, &live);
         let grid = measurements.grid;
-        let rig = rig(measurements, transport.clone(), seed);
+        let rig = rig(measurements, transport.clone(), &live, seed);
         let truth = GroundTruth::new(grid, transport, live).ok_or(BenchmarkSceneError::Singular)?;
         Ok(Self {
             known,
@@ -215,10 +212,9 @@ impl BenchmarkScene {
     }
 }
 
-fn rig(measurements: &Measurements, transport: DMatrix<f64>, seed: u64) -> Rig {
-    let live = measurements.live.clone();
-    let noise = cell_noise(measurements, &live);
-    Rig::new(measurements.grid, transport, live, noise, seed)
+fn rig(measurements: &Measurements, transport: DMatrix<f64>, live: &[bool], seed: u64) -> Rig {
+    let noise = cell_noise(measurements, live);
+    Rig::new(measurements.grid, transport, live.to_vec(), noise, seed)
 }
 
 /// Wanted images that lie on the camera's picture, `N x n`: cells that overlap want the same light.
@@ -259,7 +255,8 @@ fn images_seen(measurements: &Measurements) -> DMatrix<f64> {
 /// single cell are far less.
 const DIRECT: f64 = 0.1;
 
-/// Whether cells of one projector light another's directly.
+/// Whether cells of one projector light another's directly. The transport is known, so it says more than
+/// the photographs: a coarse camera's pixels mix cells at a corner.
 fn overlap(transport: &DMatrix<f64>, grid: Grid, columns: &[Range<usize>]) -> bool {
     let projector = |cell: usize| projector_of(cell, grid, columns);
     (0..grid.cells()).any(|cell| {

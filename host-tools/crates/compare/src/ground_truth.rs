@@ -1,6 +1,7 @@
 //! Ground truth: the scene itself, which answers are judged by.
 
 use super::Answer;
+use crate::rig::clear_dead;
 use iltm_runtime::Grid;
 use iltm_solve::{inverted, wanted_images};
 use nalgebra::{DMatrix, DVector};
@@ -66,10 +67,11 @@ impl GroundTruth {
     }
 
     fn with(
-        (grid, transport, live): (Grid, DMatrix<f64>, Vec<bool>),
+        (grid, mut transport, live): (Grid, DMatrix<f64>, Vec<bool>),
         inverse: DMatrix<f64>,
         mut images: DMatrix<f64>,
     ) -> Option<Self> {
+        clear_dead(&mut transport, &live);
         let drive = inverse.column_sum().max();
         if !(drive.is_finite() && drive > 0.0) {
             return None;
@@ -175,6 +177,20 @@ mod tests {
         assert_eq!(errors.inverse, Some(0.0));
         assert_eq!(errors.second_bounce, Some(0.0));
         assert!(errors.compensation < 0.02, "{errors:?}");
+    }
+
+    #[test]
+    fn light_on_cells_that_are_not_live_is_nobodys_error() {
+        let whole = truth();
+        let mut live = whole.live.clone();
+        live[3] = false;
+        let inverse = inverted(&whole.transport, &live).unwrap();
+        let (grid, transport, images) = (whole.grid, whole.transport, wanted_images(whole.grid));
+        let light = (grid, transport, live);
+        let truth = GroundTruth::of_overlapping(light, inverse.clone(), images).unwrap();
+        let errors = truth.judge(&Answer::Inverse(inverse));
+        assert!(errors.compensation < 0.02, "{errors:?}");
+        assert_eq!((errors.inverse, errors.second_bounce), (None, None));
     }
 
     /// `T = (I - R F)^-1 R E`: the second bounce under white is `R F R E 1`.

@@ -155,10 +155,7 @@ impl ShowFiles<'_> {
             return Ok(None);
         }
         if spanning::on_x11() {
-            let size = self.projector.map(|projector| {
-                let size = projector.size();
-                (size.width() as u32, size.height() as u32)
-            });
+            let size = self.projector.map(ProjectorPixels::size);
             return SpanningWindow::open(numbers, size).map(Some);
         }
         if numbers.len() > 1 {

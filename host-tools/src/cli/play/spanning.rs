@@ -5,6 +5,7 @@
 //! keys itself, and again at a click.
 
 use super::super::failure::{Failure, Kind};
+use iltm_runtime::FrameSize;
 use std::env;
 use std::fmt;
 use x11rb::connection::Connection;
@@ -58,15 +59,16 @@ pub(super) fn on_x11() -> bool {
 impl SpanningWindow {
     /// Covers the displays of these numbers with black. Together they must have `size` pixels, if
     /// that is known.
-    pub(super) fn open(numbers: &[u16], size: Option<(u32, u32)>) -> Result<Self, Failure> {
+    pub(super) fn open(numbers: &[u16], size: Option<FrameSize>) -> Result<Self, Failure> {
         let (connection, screen) =
             x11rb::connect(None).map_err(|error: ConnectError| lost(&error))?;
         let root = connection.setup().roots[screen].root;
         let all = displays(&connection, root).map_err(|error| lost(&error))?;
         let displays = beside(numbers, &all)?;
-        if let Some((width, height)) = size {
-            let found = (width_of(&displays), u32::from(displays[0].1.height));
-            if found != (width, height) {
+        if let Some(size) = size {
+            let found = [width_of(&displays), displays[0].1.height.into()];
+            let wanted = [size.width(), size.height()];
+            if found != wanted {
                 let (which, have) = if displays.len() > 1 {
                     ("displays", "have together")
                 } else {
@@ -75,8 +77,8 @@ impl SpanningWindow {
                 return Err(Failure::new(
                     Kind::Display,
                     format!(
-                        "the {which} {have} {} x {} pixels, the table's projector {width} x {height}",
-                        found.0, found.1
+                        "the {which} {have} {} x {} pixels, the table's projector {} x {}",
+                        found[0], found[1], wanted[0], wanted[1]
                     ),
                     "Set displays to the projectors' own modes, and name all that show a wide frame: \
                      --display 1,2.",
@@ -247,8 +249,8 @@ fn beside(numbers: &[u16], all: &[DesktopDisplay]) -> Result<Vec<(u16, DesktopDi
     Ok(chosen)
 }
 
-fn width_of(displays: &[(u16, DesktopDisplay)]) -> u32 {
-    displays.iter().map(|(_, one)| u32::from(one.width)).sum()
+fn width_of(displays: &[(u16, DesktopDisplay)]) -> usize {
+    displays.iter().map(|(_, one)| usize::from(one.width)).sum()
 }
 
 #[cfg(test)]
