@@ -7,7 +7,9 @@
 use crate::neighbours::runtime_frame;
 use crate::simulated::simulation;
 use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
-use iltm::capture::{CameraSettings, CaptureOptions, camera_places, read_several};
+use iltm::capture::{
+    CameraSettings, CaptureOptions, PosePhotographs, camera_places, join_poses, read_several,
+};
 use iltm::compile::reference_white::WhiteRequest;
 use iltm::compile::{Provenance, split_table};
 use iltm::picture::{ContactSheet, Picture, Response, Samples, Tile};
@@ -48,11 +50,20 @@ const BESIDE: usize = 4;
 pub fn photograph_each(scene: &Scene, bernoulli: usize, place: &Path) -> Vec<PathBuf> {
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 1).expect("light");
+    each_by(&camera, scene, bernoulli, place)
+}
+
+fn each_by(
+    camera: &VirtualCamera<'_>,
+    scene: &Scene,
+    bernoulli: usize,
+    place: &Path,
+) -> Vec<PathBuf> {
     std::fs::create_dir_all(place).expect("a folder");
     let of_projector = |(index, projector): (usize, &Projector)| {
         let folder = place.join(index.to_string());
         photograph_session(
-            &camera,
+            camera,
             scene,
             (Some(index), projector.grid),
             bernoulli,
@@ -66,6 +77,45 @@ pub fn photograph_each(scene: &Scene, bernoulli: usize, place: &Path) -> Vec<Pat
         .enumerate()
         .map(of_projector)
         .collect()
+}
+
+/// Takes the photographs of a session for each projector from each of the scene's further places of the
+/// camera, with one exposure, in a folder of each place.
+pub fn photograph_from_poses(
+    scene: &Scene,
+    bernoulli: usize,
+    place: &Path,
+) -> Vec<PosePhotographs> {
+    let at_first = simulation(scene, Forced::default());
+    let exposed = VirtualCamera::new(scene, &at_first, 1).expect("light");
+    let of_pose = |(index, name): (usize, String)| {
+        let scene = scene.from_pose(index);
+        let simulation = simulation(&scene, Forced::default());
+        let camera = VirtualCamera::new(&scene, &simulation, 2 + index as u64).expect("light");
+        let camera = camera.exposed_as(&exposed);
+        let place = place.join(&name);
+        PosePhotographs {
+            captures: each_by(&camera, &scene, bernoulli, &place),
+            name,
+        }
+    };
+    scene
+        .pose_names()
+        .into_iter()
+        .enumerate()
+        .map(of_pose)
+        .collect()
+}
+
+/// One capture of each projector of the photographs from all poses.
+pub fn joined(poses: &[PosePhotographs], place: &Path) -> Vec<PathBuf> {
+    std::fs::create_dir_all(place).expect("a folder");
+    let projectors = 0..poses[0].captures.len();
+    let out: Vec<PathBuf> = projectors
+        .map(|index| place.join(index.to_string()))
+        .collect();
+    join_poses(poses, &[], &out, &Silent).expect("poses that belong together");
+    out
 }
 
 /// Takes the photographs of one session of wide frames.

@@ -63,6 +63,8 @@ pub(super) enum Command {
     /// Show a folder's slides and photograph each, with a camera on a cable or a person
     #[command(after_help = CAMERAS)]
     Capture(Capture),
+    /// Put photographs from several places of the camera together as one capture
+    Join(Join),
     /// Learn a scene from its photographs and write its table
     Solve(Solve),
     /// Say what is in a table
@@ -144,13 +146,18 @@ pub(super) struct Simulate {
     )]
     pub(super) output: Option<PathBuf>,
     /// Take the photographs that this folder calls for and does not have: one that
-    /// `iltm patterns` or `iltm verify` made
+    /// `iltm patterns` or `iltm verify` made, or one with the captures of all projectors, named as
+    /// they are
     #[arg(long, value_name = "FOLDER")]
     pub(super) photograph: Option<PathBuf>,
     /// The folder's slides are those of this one of the scene's projectors, named or counted
     /// from 1; all others show black
     #[arg(long, value_name = "NAME", requires = "photograph")]
     pub(super) projector: Option<String>,
+    /// Photograph from this one of the scene's further places of the camera, named or counted
+    /// from 1, with the exposure of [camera]
+    #[arg(long, value_name = "NAME")]
+    pub(super) pose: Option<String>,
     /// Take only the photograph with this index, and write it to --output
     #[arg(
         long,
@@ -802,6 +809,20 @@ pub(super) struct Refine {
     pub(super) key: Option<PathBuf>,
     #[command(flatten)]
     pub(super) seal: SealTerms,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Join {
+    /// Folder that was photographed from each place: a capture, or a folder with the captures of all
+    /// projectors
+    #[arg(required = true, num_args = 2.., value_name = "POSE")]
+    pub(super) poses: Vec<PathBuf>,
+    /// Folder for the joined capture, or for those of all projectors
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(super) output: PathBuf,
+    /// Go on although this gate fails; may be repeated
+    #[arg(long, value_name = "GATE", value_parser = gate(), hide_possible_values = true)]
+    pub(super) ignore: Vec<GateName>,
 }
 
 #[derive(Debug, Args)]

@@ -311,7 +311,7 @@ fn cells(examined: &Examined) -> Value {
 }
 
 /// The gates for people, one or two lines each.
-fn text(gates: &[Gate]) -> String {
+pub(super) fn text(gates: &[Gate]) -> String {
     let mut text = String::new();
     for gate in gates {
         let mark = match gate.verdict {
@@ -336,7 +336,7 @@ fn text(gates: &[Gate]) -> String {
 const INDENT: usize = 19;
 
 /// The text as it is printed: in a terminal in its width, with colours where it has some.
-fn dressed(text: &str) -> String {
+pub(super) fn dressed(text: &str) -> String {
     let text = printable(text);
     let terminal = Term::stdout();
     if terminal.is_term() {

@@ -4,7 +4,7 @@ use super::active::Active;
 use super::output::printable;
 use super::summary::gates;
 use crate::build_table::BuildError;
-use crate::capture::CaptureError;
+use crate::capture::{CaptureError, PoseError};
 use crate::compile::sign::KeyError;
 use crate::compile::{CompileError, SplitTableError};
 use crate::demo::DemoError;
@@ -467,6 +467,15 @@ impl From<CaptureFolderError> for Failure {
         match error {
             CaptureFolderError::Simulation(error) => error.into(),
             CaptureFolderError::Folder(error) => error.into(),
+        }
+    }
+}
+
+impl From<PoseError> for Failure {
+    fn from(error: PoseError) -> Self {
+        match error {
+            PoseError::Capture(error) => error.into(),
+            PoseError::Folder(error) => error.into(),
         }
     }
 }

@@ -21,6 +21,7 @@ mod fit;
 mod flash;
 mod inspect;
 mod interrupt;
+mod join;
 mod key;
 mod man;
 mod monitor;
@@ -93,6 +94,7 @@ fn run_alone(meter: Option<Meter>, processes: Processes) -> ExitCode {
         Command::Check(check) => check::run(check, &output),
         Command::Patterns(patterns) => patterns::run(patterns, &output),
         Command::Capture(capture) => capture::run(capture, &output),
+        Command::Join(join) => join::run(join, &output),
         Command::Solve(solve) => solve::run(solve, processes, &output),
         Command::Inspect(inspect) => inspect::run(inspect, &output),
         Command::Compare(compare) => compare::run(compare, meter, &output),

@@ -1,7 +1,7 @@
 //! `iltm patterns`
 
 use super::args::{NamedSize, Patterns};
-use super::failure::{Failure, Kind};
+use super::failure::{Failure, Kind, cannot_write};
 use super::output::Output;
 use super::progress::progress;
 use crate::capture::MIN_BERNOULLI;
@@ -9,6 +9,7 @@ use crate::session::{self, Layout, Made, OrderOptions, PatternsError};
 use iltm_runtime::Grid;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use std::fs;
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> {
@@ -26,6 +27,14 @@ pub(super) fn run(arguments: &Patterns, output: &Output) -> Result<(), Failure> 
     let given = usize::from(arguments.photos) + images[0].len();
     if given < MIN_BERNOULLI {
         return Err(PatternsError::TooFew { given }.into());
+    }
+    if arguments
+        .projector
+        .iter()
+        .any(|projector| projector.name.is_some())
+    {
+        let folder = &arguments.output;
+        fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
     }
     let bars = progress(output);
     for (at, ((layout, out), images)) in layouts.iter().zip(&folders).zip(images).enumerate() {

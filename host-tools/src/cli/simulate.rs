@@ -6,57 +6,72 @@ use super::output::Output;
 use super::progress::progress;
 use super::simulate_chain::ChainedSlides;
 use super::tables::read_table;
-use crate::capture::pattern_set;
+use crate::capture::{MANIFEST_FILE, pattern_set};
 use crate::scene::ablation::{Ablated, ablate};
 use crate::scene::description::Scene;
 use crate::scene::fill_capture::{FillCaptureError, UnfilledCapture};
 use crate::scene::folder::{self, SimulatedCapture};
-use crate::scene::{Decision, Forced, Simulation, SimulationOptions, VirtualCamera};
+use crate::scene::{
+    Decision, Forced, Simulation, SimulationError, SimulationOptions, VirtualCamera,
+};
 use iltm_picture::{numbers::percent, progress::Progress};
 use serde_json::{Value, json};
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub(super) fn run(arguments: &Simulate, output: &Output) -> Result<(), Failure> {
     let start = Instant::now();
-    let scene = Scene::read(&arguments.scene)?;
+    let described = Scene::read(&arguments.scene)?;
+    let pose = pose(arguments, &described)?;
+    let posed = pose.map(|index| described.from_pose(index));
+    let scene = posed.as_ref().unwrap_or(&described);
     // A folder that is in the way is known before the work, not after it.
     if let (Some(out), None) = (&arguments.output, &arguments.photograph) {
         iltm_picture::check_free(out)?;
     }
     check_used(arguments)?;
-    let session = match &arguments.photograph {
-        Some(folder) => {
-            let lit = lit(arguments, &scene)?;
-            let read = UnfilledCapture::read(folder, &scene, lit);
-            Some((folder.as_path(), read.map_err(not_taken)?))
-        }
-        None => None,
-    };
+    let sessions = sessions(arguments, scene, pose)?;
     let only_these = arguments.shot.is_none() && !arguments.explain && !arguments.ablate;
-    if let Some((folder, session)) = session.as_ref().filter(|_| only_these)
-        && session.missing().map_err(not_taken)?.is_empty()
-    {
-        // Nothing has to be simulated for that.
-        let data = json!({ "folder": folder.display().to_string(), "photographs": 0 });
-        let text = format!(
-            "session     {}: every photograph is there\n",
-            folder.display()
-        );
-        output.result(&data, &text);
-        return Ok(());
+    if let (Some(folder), true) = (&arguments.photograph, only_these) {
+        let missing = sessions.iter().map(|(_, session)| session.missing());
+        let missing: Vec<_> = missing.collect::<Result<_, _>>().map_err(not_taken)?;
+        if missing.iter().all(Vec::is_empty) {
+            // Nothing has to be simulated for that.
+            let data = json!({ "folder": folder.display().to_string(), "photographs": 0 });
+            let text = format!(
+                "session     {}: every photograph is there\n",
+                folder.display()
+            );
+            output.result(&data, &text);
+            return Ok(());
+        }
     }
     let options = SimulationOptions {
         forced: forced(arguments),
         threshold: arguments.threshold,
     };
     let bars = progress(output);
-    let simulation = Simulation::new(&scene, &options, bars.as_ref())?;
+    let simulation = Simulation::new(scene, &options, bars.as_ref())?;
+    let takes_photographs = !sessions.is_empty() || arguments.output.is_some();
+    let first_place = match pose {
+        Some(_) if takes_photographs => Some(Simulation::new(&described, &options, bars.as_ref())?),
+        _ => None,
+    };
     let ready = start.elapsed().as_secs_f64();
-    let done = shoot(arguments, &scene, session, &simulation, bars.as_ref())?;
+    let camera = || {
+        let camera = VirtualCamera::new(scene, &simulation, arguments.seed)?;
+        let camera = match &first_place {
+            Some(first) => {
+                camera.exposed_as(&VirtualCamera::new(&described, first, arguments.seed)?)
+            }
+            None => camera,
+        };
+        Ok(camera.with_faults(&arguments.fault))
+    };
+    let done = shoot(arguments, scene, sessions, &camera, bars.as_ref())?;
     let ablated = if arguments.ablate {
-        ablate(&scene, &options, bars.as_ref())?
+        ablate(scene, &options, bars.as_ref())?
     } else {
         Vec::new()
     };
@@ -129,6 +144,44 @@ fn check_used(arguments: &Simulate) -> Result<(), Failure> {
     ))
 }
 
+/// The folders that wait for photographs: the one that is given, or those in it that are called as the
+/// scene's projectors.
+fn sessions(
+    arguments: &Simulate,
+    scene: &Scene,
+    pose: Option<usize>,
+) -> Result<Vec<(PathBuf, UnfilledCapture)>, Failure> {
+    let Some(folder) = &arguments.photograph else {
+        return Ok(Vec::new());
+    };
+    let names = scene.projector_names();
+    let inner: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    let is_capture = |folder: &PathBuf| folder.join(MANIFEST_FILE).exists();
+    let all = arguments.projector.is_none()
+        && arguments.shot.is_none()
+        && arguments.chain.is_none()
+        && !is_capture(folder)
+        && inner.iter().all(is_capture);
+    let folders = if all {
+        inner
+            .into_iter()
+            .enumerate()
+            .map(|(index, folder)| (folder, Some(index)))
+            .collect()
+    } else {
+        vec![(folder.clone(), lit(arguments, scene)?)]
+    };
+    let read = |(folder, lit): (PathBuf, Option<usize>)| {
+        let session = UnfilledCapture::read(&folder, scene, lit).map_err(not_taken)?;
+        let session = match pose {
+            Some(pose) => session.from_pose(pose),
+            None => session,
+        };
+        Ok((folder, session))
+    };
+    folders.into_iter().map(read).collect()
+}
+
 /// The index of the projector that the slides are for; `None` for all side by side.
 fn lit(arguments: &Simulate, scene: &Scene) -> Result<Option<usize>, Failure> {
     let Some(name) = &arguments.projector else {
@@ -146,6 +199,36 @@ fn lit(arguments: &Simulate, scene: &Scene) -> Result<Option<usize>, Failure> {
         )
     })?;
     Ok(Some(lit))
+}
+
+/// The index of the further place of the camera that is asked for; `None` for `[camera]`'s own.
+fn pose(arguments: &Simulate, scene: &Scene) -> Result<Option<usize>, Failure> {
+    let Some(name) = &arguments.pose else {
+        return Ok(None);
+    };
+    let pose = scene.pose_called(name).ok_or_else(|| {
+        let names = scene.pose_names();
+        let (there, next) = if names.is_empty() {
+            (
+                "the scene has no [[pose]]".to_owned(),
+                "Describe one in the scene file (docs/scenes.md), or leave --pose away.",
+            )
+        } else {
+            (
+                format!("there is `{}`", names.join("`, `")),
+                "Name one of these after --pose, or count them from 1.",
+            )
+        };
+        Failure::new(
+            Kind::Usage,
+            format!(
+                "{}: there is no pose `{name}`; {there}",
+                arguments.scene.display()
+            ),
+            next,
+        )
+    })?;
+    Ok(Some(pose))
 }
 
 /// The effects that the command line turns on and off.
@@ -167,24 +250,27 @@ enum Shot<'a> {
     Missing(&'a Path, usize),
 }
 
-fn shoot<'a>(
+fn shoot<'a, 's>(
     arguments: &'a Simulate,
     scene: &Scene,
-    session: Option<(&'a Path, UnfilledCapture)>,
-    simulation: &Simulation<'_>,
+    sessions: Vec<(PathBuf, UnfilledCapture)>,
+    camera: &dyn Fn() -> Result<VirtualCamera<'s>, SimulationError>,
     progress: &dyn Progress,
 ) -> Result<Shot<'a>, Failure> {
-    let camera = || VirtualCamera::new(scene, simulation, arguments.seed);
-    let camera = || camera().map(|camera| camera.with_faults(&arguments.fault));
-    if let Some((folder, session)) = session {
-        let taken = photograph(arguments, folder, session, (scene, &camera()?), progress)?;
+    if let Some(folder) = &arguments.photograph {
+        let camera = camera()?;
+        let mut taken = 0;
+        for (folder, session) in sessions {
+            taken += photograph(arguments, &folder, session, (scene, &camera), progress)?;
+        }
         return Ok(Shot::Missing(folder, taken));
     }
     let Some(out) = &arguments.output else {
         return Ok(Shot::Nothing);
     };
-    let patterns = pattern_set(simulation.grid(), arguments.photos, arguments.seed);
-    let written = folder::write(&camera()?, None, &patterns, out, progress)?;
+    let camera = camera()?;
+    let patterns = pattern_set(camera.grid(), arguments.photos, arguments.seed);
+    let written = folder::write(&camera, None, &patterns, out, progress)?;
     Ok(Shot::Capture(out, written))
 }
 

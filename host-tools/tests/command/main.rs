@@ -13,6 +13,7 @@ mod flash;
 mod images;
 #[cfg(target_os = "linux")]
 mod interruption;
+mod join;
 mod live;
 mod play;
 mod schema;

@@ -105,6 +105,7 @@ pages! {
     the_page_of_several_projectors, "docs/several-projectors.md", |clone| {
         there(clone, &["proof/verdict/verdict.html", "wide.png"]);
         there(clone, &["screen-proof/verdict/verdict.html", "better.iltm", "screen-report/report.html"]);
+        there(clone, &["whole/right/capture.csv", "proof-1/verdict/verdict.html"]);
     };
     the_page_of_scenes, "docs/scenes.md", |_| ();
     the_page_of_figures, "docs/measured.md", |_| ();

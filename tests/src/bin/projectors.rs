@@ -9,8 +9,8 @@ use iltm::compile::NEIGHBOURS_FACTOR;
 use iltm::picture::png;
 use iltm::verify::{Cause, TableVerdict};
 use iltm_tests::overlapping::{
-    Screen, SeenOnScreen, learned_alone, learned_together, learned_with_even_black,
-    photograph_each, photograph_together, refined, verified,
+    Screen, SeenOnScreen, joined, learned_alone, learned_together, learned_with_even_black,
+    photograph_each, photograph_from_poses, photograph_together, refined, verified,
 };
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, overlaps, photograph, scene, showable,
@@ -78,6 +78,13 @@ fn by_pixels() {
         };
         let alone = learned_alone(&captures, together.white.light);
         let screen = Screen::new(&scene);
+        if !scene.poses.is_empty() {
+            let place = place.path().join(format!("{name}-poses"));
+            let poses = photograph_from_poses(&scene, 60, &place);
+            let captures = joined(&poses, &place.join("joined"));
+            let of_poses = screen.seen(&learned_together(&captures));
+            row(name, "together, from two places", of_poses);
+        }
         row(name, "each alone", screen.seen_of_each(&alone));
         let seen = screen.seen(&together);
         row(name, "together", seen);

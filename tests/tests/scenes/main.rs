@@ -10,6 +10,7 @@ mod installation;
 mod paper;
 mod path_tracer;
 mod placed_simulated;
+mod poses;
 mod projectors;
 mod reference;
 mod simulator;

@@ -20,6 +20,7 @@
 #[cfg(test)]
 extern crate self as iltm_capture;
 
+mod blending;
 mod camera_places;
 mod cells;
 mod crossing_light;
@@ -32,6 +33,7 @@ mod gate_tests;
 mod gates;
 mod linear_photograph;
 mod photographs;
+mod poses;
 #[cfg(test)]
 mod refusal_tests;
 mod registration;
@@ -81,6 +83,7 @@ pub use gate::{Evidence, Gate, GateName, Verdict};
 pub use linear_photograph::LinearPhotograph;
 pub use photographs::grey_view::grey_view;
 pub use photographs::photo_stats::PhotoStats;
+pub use poses::{JoinedPoses, PoseError, PosePhotographs, join_poses};
 pub use registration::cell_map::{NO_CELL, Registration};
 pub use registration::correspondence::{Correspondence, PictureShift};
 pub use registration::map_file::{MapFormat, exr};

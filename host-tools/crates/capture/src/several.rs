@@ -240,7 +240,9 @@ impl WideFrame {
             let mut found = Vec::new();
             for (projector, other) in self.own.iter().enumerate().filter(|(at, _)| *at != own) {
                 let seen = &other.registration.seen_cell;
-                let labels = pixels.iter().map(|pixel| seen[*pixel as usize]);
+                let shares = &self.pixel_shares[projector];
+                let reached = pixels.iter().filter(|pixel| shares[**pixel as usize] > 0.0);
+                let labels = reached.map(|pixel| seen[*pixel as usize]);
                 let mut labels: Vec<u32> = labels.filter(|cell| *cell != NO_CELL).collect();
                 if (labels.len() as f64) < LEAST_OVERLAP * pixels.len() as f64 {
                     continue;
@@ -406,9 +408,8 @@ impl SeveralCaptures {
     /// many samples along a cell's width and height, row by row: the mean over the camera pixels
     /// that see the sample.
     ///
-    /// It is 1 where no other one reaches. Where projectors overlap it goes with the distance to
-    /// where others light alone, against the sum of all distances: the shares of a place add up to
-    /// one (Raskar and others, *Multi-projector displays using camera-based registration*, 1999).
+    /// It is 1 where no other one reaches, and the shares of a place add up to one
+    /// (`blending.rs` says how).
     #[must_use]
     pub fn shares(&self, factor: [usize; 2]) -> Vec<f64> {
         let [wide, tall] = factor;

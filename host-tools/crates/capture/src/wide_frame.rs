@@ -1,12 +1,14 @@
 //! Wide frame: the frames of several projectors side by side, from left to right, as one grid of cells,
 //! one registration and one map.
 
+use crate::blending::pixel_shares;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::Measurements;
 use crate::cells::pixel_views::PixelViews;
 use crate::format::error::CaptureError;
+use crate::registration::PLACED;
 use crate::registration::cell_map::{NO_CELL, Registration};
-use crate::registration::projector_map::{MapError, ProjectorMap};
+use crate::registration::projector_map::{MapError, MapSource, ProjectorMap};
 use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid};
 use std::ops::Range;
@@ -244,165 +246,22 @@ pub(crate) fn wide_size(maps: &[&ProjectorMap]) -> Option<FrameSize> {
 }
 
 /// Where a camera pixel lies in a projector's picture, in cells from the left and upper edge of the
-/// first; `None` where the projector does not reach.
+/// first; `None` where the projector does not reach. Where fine stripes are known, what does not show
+/// them has its light from other walls.
 pub(crate) fn place(own: &Measurements, pixel: usize) -> Option<[f32; 2]> {
     let grid = own.grid;
     if let Some(Ok(map)) = &own.map {
         let place = map.position[pixel];
-        if place.iter().all(|side| side.is_finite()) {
+        let known = map.uncertainty[pixel] < PLACED || map.source == MapSource::Cells;
+        if known && place.iter().all(|side| side.is_finite()) {
             return Some(map.in_cells(place, grid));
+        }
+        if map.source == MapSource::Waves {
+            return None;
         }
     }
     let cell = own.registration.seen_cell[pixel];
     let cell = (cell != NO_CELL).then_some(cell as usize)?;
     let centre = |at: usize| at as f32 + 0.5;
     Some([centre(cell % grid.cols()), centre(cell / grid.cols())])
-}
-
-/// Share of each projector at each camera pixel, by projector and pixel; 0 where it does not reach.
-fn pixel_shares(own: &[Measurements]) -> Vec<Vec<f32>> {
-    let (width, height) = own[0].registration.camera;
-    let pixels = width * height;
-    let lit: Vec<Vec<bool>> = own
-        .iter()
-        .map(|own| {
-            let lit: Vec<bool> = (0..pixels)
-                .map(|pixel| place(own, pixel).is_some())
-                .collect();
-            // Single pixels that tell no place are no border.
-            closed(&lit, width, own.registration.cell_side() as f32)
-        })
-        .collect();
-    let apart = |index: usize| {
-        let others_alone = (0..pixels).map(|pixel| {
-            let mut others = lit.iter().enumerate();
-            let others = others.any(|(at, lit)| at != index && lit[pixel]);
-            others && !lit[index][pixel]
-        });
-        // Where edges of pictures run beside each other, one reaches a little farther: no border
-        // either.
-        let half_a_cell = own[index].registration.cell_side() as f32 / 2.0;
-        let others_alone = opened(&others_alone.collect::<Vec<_>>(), width, half_a_cell);
-        let mut apart = distances(&others_alone, width);
-        for (distance, lit) in apart.iter_mut().zip(&lit[index]) {
-            // Finite, so that projectors which cover the same have equal shares.
-            *distance = if *lit {
-                distance.min(pixels as f32)
-            } else {
-                0.0
-            };
-        }
-        apart
-    };
-    let mut shares: Vec<Vec<f32>> = (0..own.len()).map(apart).collect();
-    for pixel in 0..pixels {
-        let sum: f32 = shares.iter().map(|shares| shares[pixel]).sum();
-        if sum > 0.0 {
-            for shares in &mut shares {
-                shares[pixel] /= sum;
-            }
-        }
-    }
-    shares
-}
-
-/// A region without its holes and notches up to `reach` pixels.
-fn closed(region: &[bool], width: usize, reach: f32) -> Vec<bool> {
-    let near = distances(region, width);
-    let outside: Vec<bool> = near.iter().map(|distance| *distance > reach).collect();
-    let away = distances(&outside, width);
-    let within = away.iter().zip(region);
-    within.map(|(away, own)| *own || *away > reach).collect()
-}
-
-/// A region without its parts that are thinner than twice `reach` pixels.
-fn opened(region: &[bool], width: usize, reach: f32) -> Vec<bool> {
-    let rest: Vec<bool> = region.iter().map(|within| !within).collect();
-    let closed = closed(&rest, width, reach);
-    closed.iter().map(|rest| !rest).collect()
-}
-
-/// Distance of each pixel to the nearest of a region, in pixels along the eight directions;
-/// infinite if it is empty.
-fn distances(region: &[bool], width: usize) -> Vec<f32> {
-    let mut found: Vec<f32> = (region.iter())
-        .map(|within| if *within { 0.0 } else { f32::INFINITY })
-        .collect();
-    let height = found.len() / width;
-    let diagonal = std::f32::consts::SQRT_2;
-    let mut visit = |pixel: usize, row: isize, side: isize| {
-        let (x, y) = (pixel % width, pixel / width);
-        let beside = [
-            (row, -1, diagonal),
-            (row, 0, 1.0),
-            (row, 1, diagonal),
-            (0, side, 1.0),
-        ];
-        for (down, right, step) in beside {
-            let x = x.checked_add_signed(right).filter(|x| *x < width);
-            let y = y.checked_add_signed(down).filter(|y| *y < height);
-            if let (Some(x), Some(y)) = (x, y) {
-                found[pixel] = found[pixel].min(found[y * width + x] + step);
-            }
-        }
-    };
-    (0..region.len()).for_each(|pixel| visit(pixel, -1, -1));
-    (0..region.len()).rev().for_each(|pixel| visit(pixel, 1, 1));
-    found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn distances_go_along_the_eight_directions_and_are_infinite_without_a_region() {
-        let mut region = vec![false; 7 * 5];
-        assert!(distances(&region, 7).iter().all(|way| way.is_infinite()));
-        region[2 * 7 + 3] = true;
-        let found = distances(&region, 7);
-        let diagonal = std::f32::consts::SQRT_2;
-        for (pixel, way) in found.iter().enumerate() {
-            let (x, y) = ((pixel % 7).abs_diff(3), (pixel / 7).abs_diff(2));
-            let (least, most) = (x.min(y) as f32, x.max(y) as f32);
-            let expected = diagonal * least + most - least;
-            assert!((way - expected).abs() < 1e-5, "{pixel}: {way} {expected}");
-        }
-    }
-
-    #[test]
-    fn holes_are_closed_and_what_lies_far_from_a_region_stays_outside() {
-        let (width, height) = (24, 20);
-        let within = |pixel: usize| (4..20).contains(&(pixel % width)) && pixel / width >= 6;
-        let whole: Vec<bool> = (0..width * height).map(within).collect();
-        let mut holed = whole.clone();
-        for (x, y) in [(10, 10), (11, 10), (12, 14), (6, 12)] {
-            holed[y * width + x] = false;
-        }
-        assert_eq!(closed(&holed, width, 3.0), whole);
-        assert_eq!(closed(&whole, width, 3.0), whole);
-    }
-
-    #[test]
-    fn what_is_thinner_than_twice_the_reach_is_no_part_of_an_opened_region() {
-        let (width, height) = (40, 30);
-        let part = |from: [usize; 2], to: [usize; 2]| -> Vec<bool> {
-            let within = |pixel: usize| {
-                (from[0]..to[0]).contains(&(pixel % width))
-                    && (from[1]..to[1]).contains(&(pixel / width))
-            };
-            (0..width * height).map(within).collect()
-        };
-        let wide = part([4, 6], [16, 22]);
-        let sliver = part([16, 20], [36, 22]);
-        let both: Vec<bool> = wide.iter().zip(&sliver).map(|(a, b)| a | b).collect();
-        let found = opened(&both, width, 2.0);
-        // The sliver is gone, and corners are rounded by three pixels each.
-        let differs = (0..width * height).filter(|pixel| found[*pixel] != wide[*pixel]);
-        let differs: Vec<usize> = differs.collect();
-        assert!(differs.iter().all(|pixel| wide[*pixel]));
-        assert_eq!(differs.len(), 4 * 3, "{differs:?}");
-        assert_eq!(opened(&sliver, width, 2.0), vec![false; width * height]);
-        assert_eq!(opened(&sliver, width, 0.5), sliver);
-    }
 }

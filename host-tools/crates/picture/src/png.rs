@@ -8,7 +8,7 @@
 
 use crate::{MAX_PIXELS, Picture, Samples};
 use iltm_runtime::FrameSize;
-use png::{BitDepth, ColorType, Decoder, Encoder, Transformations};
+use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, Transformations};
 use std::collections::BTreeSet;
 use std::io::{Cursor, Read, Write};
 
@@ -152,6 +152,10 @@ fn size(info: &png::Info<'_>) -> Result<FrameSize, PngError> {
 /// # Errors
 /// [`PngError::Write`].
 pub fn write(output: impl Write, picture: &Picture) -> Result<(), PngError> {
+    write_by(output, picture, false)
+}
+
+fn write_by(output: impl Write, picture: &Picture, quickly: bool) -> Result<(), PngError> {
     let write = || {
         let (width, height) = (picture.size().width(), picture.size().height());
         let mut encoder = Encoder::new(output, width as u32, height as u32);
@@ -163,6 +167,10 @@ pub fn write(output: impl Write, picture: &Picture) -> Result<(), PngError> {
             Samples::Eight(_) => BitDepth::Eight,
             Samples::Sixteen(_) => BitDepth::Sixteen,
         });
+        if quickly {
+            encoder.set_compression(Compression::Fast);
+            encoder.set_filter(Filter::Adaptive);
+        }
         let mut writer = encoder.write_header()?;
         match picture.samples() {
             Samples::Eight(samples) => writer.write_image_data(samples)?,
@@ -184,6 +192,16 @@ pub fn encode(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Writing to memory does not fail.
     let _ = write(&mut bytes, picture);
+    bytes
+}
+
+/// The same of a photograph: noise is most of it, so that compressing it well takes long and saves
+/// little.
+#[must_use]
+pub fn encode_photograph(picture: &Picture) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Writing to memory does not fail.
+    let _ = write_by(&mut bytes, picture, true);
     bytes
 }
 
@@ -214,7 +232,7 @@ pub fn encode_indexed(size: FrameSize, palette: Vec<u8>, indices: &[u8]) -> Vec<
     let mut encoder = Encoder::new(&mut bytes, size.width() as u32, size.height() as u32);
     encoder.set_color(ColorType::Indexed);
     encoder.set_depth(BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(Compression::High);
     // Indices are no light that neighbours predict.
     encoder.set_filter(png::Filter::NoFilter);
     encoder.set_palette(palette);

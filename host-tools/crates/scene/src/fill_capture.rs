@@ -81,7 +81,8 @@ pub struct UnfilledCapture {
     photos: Vec<PathBuf>,
     frames: Vec<ProjectedFrame>,
     place: SlidePlace,
-    /// Each projector's photographs are a session of their own.
+    /// The photographs of each projector, and from each place of the camera, are a session of their
+    /// own.
     session: u64,
 }
 
@@ -226,6 +227,14 @@ impl UnfilledCapture {
     #[must_use]
     pub fn grid(&self) -> Grid {
         self.place.grid
+    }
+
+    /// The same for photographs from the further place of the camera with this index, which have noise
+    /// of their own.
+    #[must_use]
+    pub fn from_pose(mut self, pose: usize) -> Self {
+        self.session |= (pose as u64 + 1) << 8;
+        self
     }
 
     /// The same with other input codes of every cell of a slide, [`grid`](Self::grid), for each

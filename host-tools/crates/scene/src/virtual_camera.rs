@@ -161,6 +161,13 @@ impl<'s> VirtualCamera<'s> {
         self
     }
 
+    /// The same with the exposure that was set at another place.
+    #[must_use]
+    pub fn exposed_as(mut self, other: &Self) -> Self {
+        self.sensor = other.sensor;
+        self
+    }
+
     /// The same with the noise of another session; the first is 0.
     pub(super) fn in_session(&self, session: u64) -> Self {
         Self {

@@ -1,17 +1,33 @@
-//! Gates between captures of several projectors: one camera that stood still, one light in the
-//! room, one response, and each projector once.
+//! Gates between captures: of several projectors, whether one camera stood still in one light, and
+//! each projector is there once, with one response; from several poses of the camera, whether exposure
+//! and projectors stayed.
 
 use super::movement;
 use super::response::{MOST_STEPS, WARN_STEPS};
 use crate::gate::{Gate, GateName, Verdict};
 use crate::registration::black_shift::BlackShift;
+use crate::registration::correspondence::PictureShift;
 use iltm_picture::ProjectorResponse;
+use iltm_picture::statistics::quantile;
 
 /// Part of the light under black that one has less, from which it is worth a word.
 const DARKER: f64 = 0.1;
 
 /// Share of a picture that others light too, from which it is worth a word.
 const MOST_SHARED: f64 = 0.5;
+
+/// Cells that two poses must both see to compare their light.
+const LEAST_COMPARED: usize = 8;
+
+/// How much of the light two poses may differ by, with a word and at most: the table would show it as a
+/// step.
+const POSES_DIFFER: f64 = 0.02;
+const POSES_DIFFER_MOST: f64 = 0.05;
+
+/// Pixels of the projector that pictures may lie from where they lay, with a word and at most: as a
+/// verification.
+const PICTURES_APART: f64 = 0.5;
+const PICTURES_APART_MOST: f64 = 1.0;
 
 const STAND_STILL: &str = "Fix the camera, let nobody touch it between the captures, and take the \
                            one that came after the bump again.";
@@ -162,6 +178,97 @@ pub(crate) fn shared(name: &str, shared: f64) -> Option<Gate> {
     })
 }
 
+/// Judges whether two poses of the camera have the same exposure, by the light of cells that both see, of
+/// each relative to the first pose's.
+pub(crate) fn light_of_poses(pair: &Pair<'_>, mut light: Vec<f64>) -> Gate {
+    let Pair { first, other } = pair;
+    let name = GateName::Drift;
+    let compared = light.len();
+    if compared < LEAST_COMPARED {
+        let why = format!(
+            "{first} and {other} see {compared} cells in common, too few to compare their light"
+        );
+        return Gate::not_judged(name, why);
+    }
+    let [low, usual, high] =
+        [0.1, 0.5, 0.9].map(|share| quantile(&mut light, share).unwrap_or(1.0));
+    let differs = (usual - 1.0).abs();
+    let verdict = Verdict::of(differs, POSES_DIFFER, POSES_DIFFER_MOST);
+    let what = format!(
+        "from {other}, the {compared} cells that both see are {:.1} % as bright as from {first}, 8 of 10 \
+         from {:.1} to {:.1} %",
+        100.0 * usual,
+        100.0 * low,
+        100.0 * high
+    );
+    Gate {
+        what,
+        ..Gate::of_share(
+            name,
+            verdict,
+            (differs, POSES_DIFFER_MOST),
+            "Photograph from all places with one exposure, aperture, ISO and white balance, shortly after \
+             one another; a wall that shines looks otherwise from elsewhere.",
+        )
+    }
+}
+
+/// Judges whether projectors stayed from pose to pose, by where their pictures lie against each other.
+pub(crate) fn pictures_of_poses(pair: &Pair<'_>, shifts: &[PictureShift]) -> Gate {
+    let Pair { first, other } = pair;
+    let name = GateName::Movement;
+    let farthest = shifts.iter().max_by(|a, b| a.pixels.total_cmp(&b.pixels));
+    let Some(farthest) = farthest else {
+        let why = format!(
+            "whether projectors moved between {first} and {other} is not known: no place that two \
+             projectors light is seen from both"
+        );
+        return Gate::not_judged(name, why);
+    };
+    let verdict = Verdict::of(farthest.pixels, PICTURES_APART, PICTURES_APART_MOST);
+    let [one, two] = farthest.projectors.map(|projector| projector + 1);
+    let what = if farthest.pixels.is_finite() {
+        format!(
+            "the pictures of projectors {one} and {two} lie {:.1} pixels from where they lay in {first} \
+             when {other} was taken",
+            farthest.pixels
+        )
+    } else {
+        format!(
+            "the pictures of projectors {one} and {two} lay elsewhere against each other when {other} was \
+             taken than in {first}"
+        )
+    };
+    Gate {
+        number: farthest.pixels.min(f64::from(u16::MAX)),
+        limit: PICTURES_APART_MOST,
+        unit: "pixels",
+        what,
+        ..Gate::of_share(
+            name,
+            verdict,
+            (0.0, 0.0),
+            "Photograph all poses again without touching a projector in between.",
+        )
+    }
+}
+
+/// Says that a pose sees no cell of a projector.
+pub(crate) fn out_of_view(capture: &str) -> Gate {
+    Gate {
+        what: format!(
+            "{capture}: the camera sees no cell of this projector, only its light on other walls; whether \
+             these photographs show their patterns is not known"
+        ),
+        ..Gate::of_share(
+            GateName::Coverage,
+            Verdict::Warn,
+            (1.0, 1.0),
+            "Where the picture should be in view, check that capture by itself: `iltm check`.",
+        )
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,5 +333,43 @@ mod tests {
         assert_eq!((same(0.5), same(0.6)), (None, Some(Verdict::Fail)));
         let shared = |part| shared("left", part).map(|gate| gate.verdict);
         assert_eq!((shared(0.5), shared(0.6)), (None, Some(Verdict::Warn)));
+    }
+
+    fn shift(pixels: f64) -> PictureShift {
+        PictureShift {
+            projectors: [0, 1],
+            pixels,
+            shift: [pixels, 0.0],
+        }
+    }
+
+    #[test]
+    fn poses_of_another_exposure_or_with_a_projector_that_moved_are_told() {
+        use Verdict::{Fail, NotJudged, Pass, Warn};
+        let light = |usual: f64, cells: usize| {
+            let spread = (0..cells).map(|cell| usual + 0.02 * (cell % 3) as f64 - 0.02);
+            light_of_poses(&PAIR, spread.collect())
+        };
+        let verdicts = [
+            (1.0, 9),
+            (0.985, 9),
+            (0.975, 9),
+            (0.94, 9),
+            (1.06, 9),
+            (0.5, 7),
+        ];
+        let verdicts = verdicts.map(|(usual, cells)| light(usual, cells).verdict);
+        assert_eq!(verdicts, [Pass, Pass, Warn, Fail, Fail, NotJudged]);
+        let what = light(0.94, 9).what;
+        assert!(what.contains("right") && what.contains("94.0 %"), "{what}");
+        let pictures = |pixels: &[f64]| {
+            let shifts: Vec<PictureShift> = pixels.iter().map(|pixels| shift(*pixels)).collect();
+            pictures_of_poses(&PAIR, &shifts).verdict
+        };
+        assert_eq!(pictures(&[]), NotJudged);
+        assert_eq!(pictures(&[0.1, 0.4]), Pass);
+        assert_eq!(pictures(&[0.1, 0.7]), Warn);
+        assert_eq!(pictures(&[1.2, 0.1]), Fail);
+        assert_eq!(pictures(&[f64::INFINITY]), Fail);
     }
 }

@@ -15,7 +15,8 @@
 //! | `response` | which curve makes it add up best? | `response.rs` |
 //! | `noise` | how much of the result will be the camera's noise? | `noise.rs` |
 //!
-//! Between captures of several projectors, `between.rs` asks `coverage`, `movement` and `drift` once
+//! Between captures of several projectors, and between poses of the camera, `between.rs` asks `coverage`,
+//! `movement` and `drift` once
 //! more.
 //!
 //! A gate that fails refuses the capture; one that warns does not. What a gate was
@@ -47,7 +48,7 @@ pub(crate) fn judge(sequence: &Sequence, found: &CaptureEvidence) -> Vec<Gate> {
     let mut gates = vec![
         files::judge_format(file, bits, found.response_stated),
         saturation::judge(&found.clipped, &pixels.left_out, live),
-        order::judge(&sequence.shots, found.order.as_ref()),
+        order::judge(&sequence.shots, found.order.as_ref()).or_out_of_view(live),
         coverage::judge(sequence, &pixels.live, &counts, &pixels.left_out),
     ];
     if let Some(cells) = &found.cells {

@@ -93,6 +93,21 @@ pub(super) fn judge(shots: &[Shot], order: Option<&Order>) -> Gate {
     }
 }
 
+/// Next step where bounced light alone may be seen, which does not tell the patterns.
+const OUT_OF_VIEW: &str = "Make sure that the camera sees this projector's picture, and not only its light \
+                           on other walls; if it does, take those photographs again, or put them in \
+                           their places.";
+
+impl Gate {
+    /// The same where so many cells were found: none may be in view.
+    pub(super) fn or_out_of_view(mut self, live: usize) -> Self {
+        if self.fails() && live == 0 {
+            self.next_step = OUT_OF_VIEW;
+        }
+        self
+    }
+}
+
 /// The sentence and next step if all wrong photographs show the same number of
 /// patterns later or earlier.
 fn shifted(shots: &[Shot], wrong: &[Wrong]) -> Option<(String, &'static str)> {

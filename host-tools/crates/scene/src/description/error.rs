@@ -36,7 +36,7 @@ pub enum SceneProblem {
         /// What it may be.
         must: String,
     },
-    /// The `projector` or the `camera` has no direction.
+    /// The `projector`, the `camera` or a `pose` of it has no direction.
     #[error("[{0}] looks nowhere: position, look_at and up do not make a direction")]
     View(&'static str),
     /// The projector's cells do not make a grid.

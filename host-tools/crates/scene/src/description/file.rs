@@ -16,6 +16,8 @@ pub(super) struct SceneFile {
     #[serde(rename = "projector")]
     pub(super) projectors: ProjectorTables,
     pub(super) camera: CameraTable,
+    #[serde(default, rename = "pose")]
+    pub(super) poses: Vec<PoseTable>,
     /// Light from elsewhere.
     #[serde(default)]
     pub(super) ambient: ColourValue,
@@ -101,6 +103,17 @@ pub(super) struct CameraTable {
     pub(super) response: Response,
     #[serde(default)]
     pub(super) distortion: [f64; 2],
+}
+
+/// `[[pose]]`: what it leaves out is the camera's.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PoseTable {
+    pub(super) name: Option<String>,
+    pub(super) position: [f64; 3],
+    pub(super) look_at: [f64; 3],
+    pub(super) up: Option<[f64; 3]>,
+    pub(super) field_of_view: Option<f64>,
 }
 
 /// `[[panel]]`

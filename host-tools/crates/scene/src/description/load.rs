@@ -1,8 +1,11 @@
 //! Scene file reader: reads a scene file and checks what it says.
 
-use super::file::{AlbedoValue, CameraTable, ColourValue, PanelTable, ProjectorTable, SceneFile};
+use super::file::{
+    AlbedoValue, CameraTable, ColourValue, PanelTable, PoseTable, ProjectorTable, SceneFile,
+};
 use super::{
-    Albedo, Camera, Facet, Gloss, Panel, Projector, Scene, SceneError, SceneProblem, Texture, mesh,
+    Albedo, Camera, Facet, Gloss, Panel, Pose, Projector, Scene, SceneError, SceneProblem, Texture,
+    mesh,
 };
 use crate::geometry::Polygon;
 use crate::pinhole::Pinhole;
@@ -83,7 +86,8 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
             return Err(refused("[[projector]] response", found, must));
         }
     }
-    check_names(&projectors)?;
+    let names = projectors.iter().map(|one| &one.name);
+    check_names("projector", &names.collect::<Vec<_>>())?;
     let cols: usize = projectors.iter().map(|one| one.grid.cols()).sum();
     let [rows, cols] = [first.grid.rows(), cols].map(|count| count.try_into().unwrap_or(u16::MAX));
     Grid::new(rows, cols)?;
@@ -92,6 +96,7 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
         name: file.name,
         projectors,
         camera: camera(&file.camera)?,
+        poses: poses(&file.poses, &file.camera)?,
         ambient: ambient(file.ambient)?,
         panels: panels
             .map(|(index, table)| panel(index, table, folder))
@@ -99,18 +104,18 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
     })
 }
 
-/// Refuses names by which a projector could not be told from the others.
-fn check_names(projectors: &[Projector]) -> Result<(), SceneProblem> {
-    let names: Vec<_> = projectors.iter().filter_map(|p| p.name.as_ref()).collect();
+/// Refuses names by which one projector, or one pose, could not be told from the others.
+fn check_names(of: &str, names: &[&Option<String>]) -> Result<(), SceneProblem> {
+    let names: Vec<_> = names.iter().filter_map(|name| name.as_ref()).collect();
     for (at, name) in names.iter().enumerate() {
         let must = if names[..at].contains(name) {
-            "another for each projector"
+            format!("another for each {of}")
         } else if name.trim().is_empty() || name.parse::<usize>().is_ok() {
-            "a word: a projector without a name is called by its number"
+            format!("a word: a {of} without a name is called by its number")
         } else {
             continue;
         };
-        return Err(refused("[projector] name", format!("{name:?}"), must));
+        return Err(refused(&format!("[{of}] name"), format!("{name:?}"), &must));
     }
     Ok(())
 }
@@ -183,6 +188,21 @@ fn camera(table: &CameraTable) -> Result<Camera, SceneProblem> {
         within("distortion", term, [-0.15, 0.5], "")?;
     }
     Ok(camera)
+}
+
+fn poses(tables: &[PoseTable], of: &CameraTable) -> Result<Vec<Pose>, SceneProblem> {
+    let names: Vec<_> = tables.iter().map(|pose| &pose.name).collect();
+    check_names("pose", &names)?;
+    let aspect = f64::from(of.width) / f64::from(of.height);
+    let pose = |table: &PoseTable| {
+        let places = [table.position, table.look_at, table.up.unwrap_or(of.up)];
+        let field_of_view = table.field_of_view.unwrap_or(of.field_of_view);
+        Ok(Pose {
+            name: table.name.clone(),
+            view: pinhole("pose", places, field_of_view, aspect)?,
+        })
+    };
+    tables.iter().map(pose).collect()
 }
 
 fn pinhole(

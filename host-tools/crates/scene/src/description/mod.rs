@@ -39,6 +39,8 @@ pub struct Scene {
     pub projectors: Vec<Projector>,
     /// What photographs it.
     pub camera: Camera,
+    /// Where else the camera may stand.
+    pub poses: Vec<Pose>,
     /// Light from all around, by channel: what a surface with nothing in view gets,
     /// and what the camera sees beside the scene.
     pub ambient: [f64; 3],
@@ -152,6 +154,15 @@ impl Camera {
     }
 }
 
+/// A further place of the camera.
+#[derive(Clone, Debug)]
+pub struct Pose {
+    /// What it is called by, none of the others' and no number; `None` for its number alone.
+    pub name: Option<String>,
+    /// Where the camera stands and what it looks at.
+    pub view: Pinhole,
+}
+
 /// A named part of the scene with one surface.
 #[derive(Clone, Debug)]
 pub struct Panel {
@@ -244,6 +255,31 @@ impl Albedo {
     }
 }
 
+/// The index of what has this name, or this number, counted from 1.
+fn called<'n>(
+    names: impl ExactSizeIterator<Item = &'n Option<String>>,
+    name: &str,
+) -> Option<usize> {
+    let count = names.len();
+    let mut names = names;
+    let named = names.position(|one| one.as_deref() == Some(name));
+    named.or_else(|| {
+        name.parse::<usize>()
+            .ok()?
+            .checked_sub(1)
+            .filter(|index| *index < count)
+    })
+}
+
+/// Each one's name, or its number, counted from 1.
+fn names<'n>(names: impl Iterator<Item = &'n Option<String>>) -> Vec<String> {
+    let numbered = (1_usize..).zip(names);
+    let named = |(number, name): (usize, &Option<String>)| {
+        name.clone().unwrap_or_else(|| number.to_string())
+    };
+    numbered.map(named).collect()
+}
+
 impl Scene {
     /// Cells of the frame of all projectors side by side.
     #[must_use]
@@ -272,23 +308,37 @@ impl Scene {
     /// there is none.
     #[must_use]
     pub fn projector_called(&self, name: &str) -> Option<usize> {
-        let mut projectors = self.projectors.iter();
-        let named = projectors.position(|one| one.name.as_deref() == Some(name));
-        let numbered = || {
-            let index = name.parse::<usize>().ok()?.checked_sub(1)?;
-            (index < self.projectors.len()).then_some(index)
-        };
-        named.or_else(numbered)
+        called(self.projectors.iter().map(|one| &one.name), name)
+    }
+
+    /// The index of the further place of the camera of this name, or of this number, counted from 1;
+    /// `None` if there is none.
+    #[must_use]
+    pub fn pose_called(&self, name: &str) -> Option<usize> {
+        called(self.poses.iter().map(|one| &one.name), name)
+    }
+
+    /// What each further place of the camera is called: its name, or its number, counted from 1.
+    #[must_use]
+    pub fn pose_names(&self) -> Vec<String> {
+        names(self.poses.iter().map(|one| &one.name))
+    }
+
+    /// The same scene with its camera at one of its further places.
+    ///
+    /// # Panics
+    /// If there is none with this index.
+    #[must_use]
+    pub fn from_pose(&self, index: usize) -> Self {
+        let mut scene = self.clone();
+        scene.camera.view = scene.poses[index].view.clone();
+        scene
     }
 
     /// What each projector is called: its name, or its number, counted from 1.
     #[must_use]
     pub fn projector_names(&self) -> Vec<String> {
-        let named = |(number, one): (usize, &Projector)| {
-            let name = one.name.clone();
-            name.unwrap_or_else(|| number.to_string())
-        };
-        (1..).zip(&self.projectors).map(named).collect()
+        names(self.projectors.iter().map(|one| &one.name))
     }
 
     /// The columns of a frame of this width that each projector has; `None` if a pixel would
