@@ -6,7 +6,9 @@ use iltm::build_table::BuiltTable;
 use iltm::capture::{CameraSettings, Settings};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{CaptureFault, Effect, Forced, InjectedFault, VirtualCamera, fill_capture};
+use iltm::scene::{
+    CaptureFault, Effect, Forced, InjectedFault, Simulation, VirtualCamera, fill_capture,
+};
 use iltm::session::{self, Layout, OrderOptions};
 use iltm::verify::{Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, judge, write};
 use iltm_runtime::FrameSize;
@@ -27,7 +29,10 @@ const CELL: u16 = 20;
 
 /// A scene, and a table learned for it from a session with fine stripes.
 pub struct VerdictRig {
-    scene: Scene,
+    /// Kept as long as the program runs, so that simulations of it can be kept beside it.
+    scene: &'static Scene,
+    /// Its light, with noise and without.
+    simulated: [OnceCell<Simulation<'static>>; 2],
     layout: Layout,
     learned: OnceCell<BuiltTable>,
     /// What all images share in the scene as it was, photographed without noise.
@@ -151,11 +156,12 @@ pub fn faded_mural(folder: &Path, part: f64) -> PathBuf {
 impl VerdictRig {
     /// For this scene.
     pub fn new(scene: Scene) -> Self {
-        let grid = simulation(&scene, Forced::default()).grid();
+        let grid = scene.grid();
         let [width, height] = [grid.cols(), grid.rows()].map(|side| side as u16 * CELL);
         let size = FrameSize::new(width, height).expect("sides above zero");
         Self {
-            scene,
+            scene: Box::leak(Box::new(scene)),
+            simulated: [OnceCell::new(), OnceCell::new()],
             layout: Layout::new(grid, size, 0).expect("cells fit"),
             learned: OnceCell::new(),
             own_fixed: OnceCell::new(),
@@ -177,9 +183,15 @@ impl VerdictRig {
                 ..CameraSettings::default()
             };
             session::write(&slides, &self.layout, &camera, &capture, &Silent).expect("written");
-            fill(&self.scene, &capture, (Forced::default(), 3, &[]));
+            fill(self.own(true), self.scene, &capture, (3, &[]));
             simulated::learned(&capture)
         })
+    }
+
+    /// The light of the scene as it was, with noise or without.
+    fn own(&self, noisy: bool) -> &Simulation<'static> {
+        let known = &self.simulated[usize::from(noisy)];
+        known.get_or_init(|| simulation(self.scene, forced(noisy)))
     }
 
     /// A session without fault that must pass.
@@ -226,8 +238,16 @@ impl VerdictRig {
         };
         let slides = (&settings, Slides::Both { fine: true });
         write(&table, &self.layout, slides, &folder, &Silent).expect("written");
-        let photographs = (Forced::default(), case.seed, &case.faults[..]);
-        fill(&case.scene, &folder, photographs);
+        let photograph = |noisy: bool, faults: &[InjectedFault]| {
+            let photographs = (case.seed, faults);
+            if case.is_changed {
+                let simulation = simulation(&case.scene, forced(noisy));
+                fill(&simulation, &case.scene, &folder, photographs);
+            } else {
+                fill(self.own(noisy), self.scene, &folder, photographs);
+            }
+        };
+        photograph(true, &case.faults);
         if let Some(quality) = case.jpeg {
             as_jpeg(&folder.join("photos"), quality);
         }
@@ -244,8 +264,7 @@ impl VerdictRig {
         let quiet = || {
             fs::remove_dir_all(folder.join("photos")).expect("removed");
             fs::create_dir(folder.join("photos")).expect("made");
-            let forced = Forced::default().with(Effect::Noise, false);
-            fill(&case.scene, &folder, (forced, case.seed, &[]));
+            photograph(false, &[]);
             Some(judged().ok()?.pixels?.fixed?.error)
         };
         let fixed = if case.is_changed {
@@ -270,8 +289,8 @@ impl VerdictRig {
         // The wall as it is now, from where the camera stood then.
         let mut wall = case.scene.clone();
         wall.camera = self.scene.camera.clone();
-        let quiet = Forced::default().with(Effect::Noise, false);
-        let simulation = simulation(&wall, quiet);
+        let changed = case.is_changed.then(|| simulation(&wall, forced(false)));
+        let simulation = changed.as_ref().unwrap_or_else(|| self.own(false));
         let (cells, channels) = (table.grid().cells(), usize::from(table.channels()));
         let light = |picture: &iltm::picture::Picture, of: &dyn Fn(usize, u8) -> f64| {
             let iltm::picture::Samples::Eight(codes) = picture.samples() else {
@@ -315,10 +334,23 @@ impl VerdictRig {
     }
 }
 
-/// Takes the photographs of a folder, with these effects, noise of this seed and faults.
-fn fill(scene: &Scene, folder: &Path, (forced, seed, faults): (Forced, u64, &[InjectedFault])) {
-    let simulation = simulation(scene, forced);
-    let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
+/// Effects as the scene has them, with noise or without.
+fn forced(noisy: bool) -> Forced {
+    if noisy {
+        Forced::default()
+    } else {
+        Forced::default().with(Effect::Noise, false)
+    }
+}
+
+/// Takes the photographs of a folder, with noise of this seed and faults.
+fn fill(
+    simulation: &Simulation<'_>,
+    scene: &Scene,
+    folder: &Path,
+    (seed, faults): (u64, &[InjectedFault]),
+) {
+    let camera = VirtualCamera::new(scene, simulation, seed).expect("light");
     let camera = camera.with_faults(faults);
     let session = fill_capture::UnfilledCapture::read(folder, scene, None);
     let session = session.expect("a folder to fill");
