@@ -48,12 +48,24 @@ fn photographs_from_two_places_become_one_capture_of_each_projector() {
     assert_eq!(data["captures"][1]["seen"], 40);
     assert_eq!(data["poses"][0]["pose"], "b");
     assert_eq!(data["gates"][0]["verdict"], "pass");
-    // A capture is a pose as well as a folder of captures is.
+    // A capture is a pose as well as a folder of captures is. A photograph of the calibration that is not
+    // there from both places is left out.
+    let calibration = user.text("a/left/calibration.csv");
+    let photo = calibration
+        .lines()
+        .last()
+        .unwrap()
+        .rsplit(',')
+        .next()
+        .unwrap();
+    user.remove(&format!("b/left/{photo}"));
     contains(
         &user.says("join a/left b/left -o left"),
-        &["40 of 40 in all"],
+        &["together    cells: 40, of 40 in all"],
     );
     assert!(user.path("left/capture.csv").exists());
+    assert!(user.path("whole/left").join(photo).exists());
+    assert!(!user.path("left").join(photo).exists());
     // Nothing is written over.
     let refused = user.run("join a b -o whole");
     assert_ne!(refused.code, 0);

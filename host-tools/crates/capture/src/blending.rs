@@ -1,11 +1,13 @@
 //! Blending of projectors whose pictures overlap: the share of each in the light of a place.
 //!
-//! A projector's share goes with the distance, in its own picture, to where that ends and others
-//! go on, against the sum of these distances of all that light the place (after Raskar and others,
-//! *Multi-projector displays using camera-based registration*, 1999). It does not depend on where the
-//! camera stands, so that a place has the same share from everywhere.
+//! A projector's share goes with the distance to where others light alone, against the sum of these
+//! distances of all that light the place (after Raskar and others, *Multi-projector displays using
+//! camera-based registration*, 1999). It is measured in the camera's picture. Photographs from several
+//! places of the camera have no one picture; there it is measured in each projector's own, where a
+//! place has the same share from everywhere.
 
 use crate::cells::measurements::Measurements;
+use crate::registration::projector_map::ProjectorMap;
 use crate::wide_frame::place;
 
 /// A sample of no picture.
@@ -32,8 +34,20 @@ impl Samples {
         let per_cell = own.registration.cell_side() / PIXELS_OF_SAMPLE;
         let per_cell = per_cell.clamp(1.0, MOST_SAMPLES).floor();
         let (width, height) = own.registration.camera;
+        // Finer than cells in any case.
+        let of_cells = match &own.map {
+            Some(Ok(_)) => None,
+            _ => Some(ProjectorMap::of_cells(own)),
+        };
         let places = (0..width * height).map(|pixel| {
-            let place = place(own, pixel)?;
+            let place = match &of_cells {
+                Some(map) => {
+                    let place = map.position[pixel];
+                    let known = place.iter().all(|side| side.is_finite());
+                    known.then(|| map.in_cells(place, own.grid))?
+                }
+                None => place(own, pixel)?,
+            };
             Some(place.map(|side| side * per_cell as f32))
         });
         Self {
@@ -95,18 +109,13 @@ impl Samples {
 
 /// Share of each projector at each camera pixel, by projector and pixel; 0 where it does not reach.
 pub(crate) fn pixel_shares(own: &[Measurements]) -> Vec<Vec<f32>> {
-    let width = own[0].registration.camera.0;
-    let pictures: Vec<Samples> = own.iter().map(Samples::new).collect();
-    let mut shares: Vec<Vec<f32>> = (0..own.len())
-        .map(|index| {
-            let mut apart = distances_to_border(&pictures, index);
-            // Single pixels that tell no place are as those beside them.
-            let reach = own[index].registration.cell_side() as f32;
-            fill(&mut apart, width, reach);
-            apart
-        })
-        .collect();
-    for pixel in 0..pictures[0].places.len() {
+    let of_places = own.iter().any(|own| own.settings.camera.places > 1);
+    let mut shares = if of_places {
+        distances_in_own_pictures(own)
+    } else {
+        distances_in_photographs(own)
+    };
+    for pixel in 0..shares[0].len() {
         let sum: f32 = shares.iter().map(|shares| shares[pixel]).sum();
         if sum > 0.0 {
             for shares in &mut shares {
@@ -115,6 +124,58 @@ pub(crate) fn pixel_shares(own: &[Measurements]) -> Vec<Vec<f32>> {
         }
     }
     shares
+}
+
+/// Distance of each camera pixel, in the camera's picture, to where other projectors light alone, by projector
+/// and pixel; 0 where the projector does not reach.
+fn distances_in_photographs(own: &[Measurements]) -> Vec<Vec<f32>> {
+    let (width, height) = own[0].registration.camera;
+    let pixels = width * height;
+    let lit: Vec<Vec<bool>> = own
+        .iter()
+        .map(|own| {
+            let lit: Vec<bool> = (0..pixels)
+                .map(|pixel| place(own, pixel).is_some())
+                .collect();
+            // Single pixels that tell no place are no border.
+            closed(&lit, width, own.registration.cell_side() as f32)
+        })
+        .collect();
+    let apart = |index: usize| {
+        let others_alone = (0..pixels).map(|pixel| {
+            let mut others = lit.iter().enumerate();
+            let others = others.any(|(at, lit)| at != index && lit[pixel]);
+            others && !lit[index][pixel]
+        });
+        // Where edges of pictures run beside each other, one reaches a little farther: no border
+        // either.
+        let half_a_cell = own[index].registration.cell_side() as f32 / 2.0;
+        let others_alone = opened(&others_alone.collect::<Vec<_>>(), width, half_a_cell);
+        let mut apart = distances(&others_alone, width);
+        for (distance, lit) in apart.iter_mut().zip(&lit[index]) {
+            // Finite, so that projectors which cover the same have equal shares.
+            *distance = if *lit {
+                distance.min(pixels as f32)
+            } else {
+                0.0
+            };
+        }
+        apart
+    };
+    (0..own.len()).map(apart).collect()
+}
+
+/// The same, each in the projector's own picture.
+fn distances_in_own_pictures(own: &[Measurements]) -> Vec<Vec<f32>> {
+    let width = own[0].registration.camera.0;
+    let pictures: Vec<Samples> = own.iter().map(Samples::new).collect();
+    let of = |(index, own): (usize, &Measurements)| {
+        let mut apart = distances_to_border(&pictures, index);
+        // Single pixels that tell no place are as those beside them.
+        fill(&mut apart, width, own.registration.cell_side() as f32);
+        apart
+    };
+    own.iter().enumerate().map(of).collect()
 }
 
 /// Distance of camera pixels, in the picture of one projector, to where that ends and others go on, in

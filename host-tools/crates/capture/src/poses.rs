@@ -14,7 +14,7 @@ use crate::format::manifest::{RoleName, ShotOf, listed};
 use crate::format::photo_files::find_photo;
 use crate::format::picture_file::{EXPORT, Opened, Samples, Source};
 use crate::format::sequence::CaptureOptions;
-use crate::format::settings::Settings;
+use crate::format::settings::{SETTINGS_FILE, Settings};
 use crate::gate::{Gate, GateName};
 use crate::gates::between::{self, Pair};
 use crate::registration::cell_map::NO_CELL;
@@ -310,7 +310,9 @@ fn slides(poses: &[PosePhotographs]) -> Result<Vec<Vec<ListedShots>>, CaptureErr
             if shown(own) != shown(of_first) {
                 return refuse("it has other slides");
             }
-            if Settings::read(folder)? != Settings::read(first)? {
+            let [mut settings, of_first] = [Settings::read(folder)?, Settings::read(first)?];
+            settings.camera.places = of_first.camera.places;
+            if settings != of_first {
                 return refuse("its capture.toml says other things");
             }
         }
@@ -395,14 +397,28 @@ fn write(views: &[PoseCapture<'_>], out: &Path, progress: &dyn Progress) -> Resu
         }
     }
     copy(first.folder, &folder, Path::new(""), &photographs)?;
-    // The lists name photographs by the ending that they have now.
+    let mut settings = Settings::read(first.folder)?;
+    settings.camera.places = 0;
+    for view in views {
+        let places = Settings::read(view.folder)?.camera.places;
+        settings.camera.places = settings.camera.places.saturating_add(places);
+    }
+    // Numbers and words are always written.
+    let settings = toml::to_string(&settings).unwrap_or_default();
+    folder.file(SETTINGS_FILE, settings)?;
     let join = |at: usize| {
         let photo = |view: &PoseCapture<'_>| {
-            let photo = &view.slides[at].1.photo;
-            let found = find_photo(view.folder, photo)?;
-            decoded(&view.folder.join(found.as_ref().unwrap_or(photo)))
+            let found = find_photo(view.folder, &view.slides[at].1.photo)?;
+            let decoded = found.map(|found| decoded(&view.folder.join(found)));
+            decoded.transpose()
         };
-        let pictures: Vec<Picture> = views.iter().map(photo).collect::<Result<_, _>>()?;
+        let pictures = views.iter().map(photo);
+        let pictures: Option<Vec<Picture>> = pictures.collect::<Result<_, CaptureError>>()?;
+        // What can be done without, as photographs of the calibration, may not be there from all places.
+        let Some(pictures) = pictures else {
+            progress.advance(1);
+            return Ok(());
+        };
         let kept: Vec<&KeptPixels> = views.iter().map(|view| view.kept).collect();
         let own = &first.slides[at].1.photo;
         let joined = beside(&pictures, &kept).ok_or_else(|| CaptureError::Unlike {
@@ -412,6 +428,7 @@ fn write(views: &[PoseCapture<'_>], out: &Path, progress: &dyn Progress) -> Resu
                     .to_owned(),
             next_step: EXPORT,
         })?;
+        // Photographs are found whatever their ending is on the list.
         folder.file(own.with_extension("png"), png::encode_photograph(&joined))?;
         progress.advance(1);
         Ok::<(), PoseError>(())

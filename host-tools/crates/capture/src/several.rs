@@ -240,9 +240,7 @@ impl WideFrame {
             let mut found = Vec::new();
             for (projector, other) in self.own.iter().enumerate().filter(|(at, _)| *at != own) {
                 let seen = &other.registration.seen_cell;
-                let shares = &self.pixel_shares[projector];
-                let reached = pixels.iter().filter(|pixel| shares[**pixel as usize] > 0.0);
-                let labels = reached.map(|pixel| seen[*pixel as usize]);
+                let labels = pixels.iter().map(|pixel| seen[*pixel as usize]);
                 let mut labels: Vec<u32> = labels.filter(|cell| *cell != NO_CELL).collect();
                 if (labels.len() as f64) < LEAST_OVERLAP * pixels.len() as f64 {
                     continue;

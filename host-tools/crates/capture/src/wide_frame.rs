@@ -6,9 +6,8 @@ use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::Measurements;
 use crate::cells::pixel_views::PixelViews;
 use crate::format::error::CaptureError;
-use crate::registration::PLACED;
 use crate::registration::cell_map::{NO_CELL, Registration};
-use crate::registration::projector_map::{MapError, MapSource, ProjectorMap};
+use crate::registration::projector_map::{MapError, ProjectorMap};
 use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid};
 use std::ops::Range;
@@ -246,18 +245,13 @@ pub(crate) fn wide_size(maps: &[&ProjectorMap]) -> Option<FrameSize> {
 }
 
 /// Where a camera pixel lies in a projector's picture, in cells from the left and upper edge of the
-/// first; `None` where the projector does not reach. Where fine stripes are known, what does not show
-/// them has its light from other walls.
+/// first; `None` where the projector does not reach.
 pub(crate) fn place(own: &Measurements, pixel: usize) -> Option<[f32; 2]> {
     let grid = own.grid;
     if let Some(Ok(map)) = &own.map {
         let place = map.position[pixel];
-        let known = map.uncertainty[pixel] < PLACED || map.source == MapSource::Cells;
-        if known && place.iter().all(|side| side.is_finite()) {
+        if place.iter().all(|side| side.is_finite()) {
             return Some(map.in_cells(place, grid));
-        }
-        if map.source == MapSource::Waves {
-            return None;
         }
     }
     let cell = own.registration.seen_cell[pixel];

@@ -53,6 +53,9 @@ pub struct CameraSettings {
     /// converters write it; larger for light merged from exposures elsewhere.
     #[serde(deserialize_with = "full_scale", skip_serializing_if = "is_one")]
     pub full_scale: f64,
+    /// Places from which the camera took what stands beside each other in each photograph.
+    #[serde(skip_serializing_if = "is_one_place")]
+    pub places: u16,
 }
 
 impl Default for CameraSettings {
@@ -60,6 +63,7 @@ impl Default for CameraSettings {
         Self {
             response: Declared::Unsaid,
             full_scale: 1.0,
+            places: 1,
         }
     }
 }
@@ -105,6 +109,12 @@ fn full_scale<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     }
     let message = format!("a full scale of {scale}; it must be from 0.000001 to 1000000");
     Err(D::Error::custom(message))
+}
+
+// serde hands a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_one_place(places: &u16) -> bool {
+    *places == 1
 }
 
 // serde hands a reference.

@@ -51,7 +51,7 @@ const LEAST_MARGIN: f32 = 0.2;
 
 /// Uncertainty of a pixel's place, in pixels of the projector, below which it sees fine stripes:
 /// only a surface that the projector itself lights shows them.
-pub(crate) const PLACED: f32 = 0.5;
+const PLACED: f32 = 0.5;
 
 /// How pixels were registered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
