@@ -148,6 +148,16 @@ fn a_pose_may_see_nothing_of_a_projector_but_its_light_on_other_walls() {
         .unwrap();
     assert_eq!(unseen.verdict, Verdict::Warn);
     assert!(unseen.what.contains("far left"), "{}", unseen.what);
+    // By itself such a capture is refused, with a next step that names the cause.
+    let options = CaptureOptions::default();
+    let alone = iltm::capture::examine(&poses[2].captures[1], &options, &Silent).unwrap();
+    assert!(alone.measurements.is_none());
+    let failed: Vec<_> = alone.gates.iter().filter(|gate| gate.fails()).collect();
+    assert!(!failed.is_empty());
+    for gate in failed {
+        let next = gate.next_step;
+        assert!(next.contains("camera sees"), "{}: {next}", gate.name);
+    }
 }
 
 fn scene_with_far_pose() -> Scene {
