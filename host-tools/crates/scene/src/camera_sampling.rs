@@ -260,7 +260,9 @@ impl<'e> PixelSampler<'e> {
         let view = &self.facets.projector().view;
         let described = self.facets.described(point.facet);
         let albedo = point.panel.albedo.at(described, &point.world);
-        let at = |patches: &Patches| patches.at(view, point.facet, point.back, &point.world);
+        let before = pixel.indirect.last().map(|(patch, _)| *patch as usize);
+        let at =
+            |patches: &Patches| patches.at(view, point.facet, point.back, &point.world, before);
         if let Some(patch) = self.patches.and_then(at) {
             pixel
                 .indirect

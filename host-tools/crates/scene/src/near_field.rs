@@ -5,7 +5,7 @@
 //! differs from that mean by `F(point, q) - F_pq` of their light, and both are known
 //! in closed form.
 
-use super::form_factor::{Tolerance, exchange_area, from_point};
+use super::form_factor::{Sampled, Tolerance, from_point, sampled_in_front};
 use super::geometry::{Obstacles, Polygon};
 use super::patches::Patch;
 use nalgebra::Vector3;
@@ -28,40 +28,27 @@ impl NearField {
     /// Looks for neighbours that exchange light, for a camera of so many pixels; with
     /// `obstacles`, only for those with a free view of each other.
     pub(crate) fn new(patches: &[Patch], obstacles: Option<&Obstacles>, pixels: usize) -> Self {
-        let entries = |near: &Self| near.pairs() as f64 * pixels as f64 / patches.len() as f64;
-        let wide = REACHES.iter().take(REACHES.len() - 1).filter(|reach| {
-            // All pairs of many patches are too many to try.
-            reach.is_finite() || patches.len() <= 2_000
-        });
-        wide.map(|reach| Self::within(*reach, patches, obstacles))
-            .find(|near| entries(near) <= MOST_ENTRIES)
-            .unwrap_or_else(|| Self::within(REACHES[REACHES.len() - 1], patches, obstacles))
-    }
-
-    fn within(reach: f64, patches: &[Patch], obstacles: Option<&Obstacles>) -> Self {
-        let centres: Vec<_> = patches.iter().map(|p| p.polygon.centroid()).collect();
-        let sides: Vec<_> = patches.iter().map(|p| p.polygon.area().sqrt()).collect();
-        let near = |patch: usize| {
-            let close = |other: &usize| {
-                patches[*other].facet != patches[patch].facet
-                    && (centres[*other] - centres[patch]).norm()
-                        < reach * sides[patch].max(sides[*other])
-            };
-            let here = &patches[patch].polygon;
-            let factor = |other: usize| {
-                let there = &patches[other].polygon;
-                let factor = exchange_area(here, there, Tolerance::default()) / here.area();
-                let seen = factor > 0.0 && obstacles.is_none_or(|o| open(here, there, o));
-                seen.then_some((other as u32, factor))
-            };
-            (0..patches.len())
-                .filter(close)
-                .filter_map(factor)
-                .collect()
+        // All pairs of many patches are too many to try.
+        let reaches = &REACHES[usize::from(patches.len() > 2_000)..];
+        let pairs = exchanging(reaches[0], patches, obstacles);
+        let entries = |reach: f64| {
+            let within = pairs.iter().flatten().filter(|pair| pair.apart < reach);
+            2.0 * within.count() as f64 * pixels as f64 / patches.len() as f64
         };
-        Self {
-            near: (0..patches.len()).into_par_iter().map(near).collect(),
+        let narrow = REACHES[REACHES.len() - 1];
+        let fits = reaches
+            .iter()
+            .find(|reach| entries(**reach) <= MOST_ENTRIES);
+        let reach = *fits.unwrap_or(&narrow);
+        let mut near = vec![Vec::new(); patches.len()];
+        for (patch, pairs) in pairs.iter().enumerate() {
+            for pair in pairs.iter().filter(|pair| pair.apart < reach) {
+                for (here, there) in [(patch, pair.other), (pair.other, patch)] {
+                    near[here].push((there as u32, pair.area / patches[here].polygon.area()));
+                }
+            }
         }
+        Self { near }
     }
 
     /// Calls `each` with the patches whose light a point of `patch` gets more or less
@@ -106,6 +93,48 @@ impl NearField {
     pub(crate) fn pairs(&self) -> usize {
         self.near.iter().map(Vec::len).sum()
     }
+}
+
+/// Two patches that light each other.
+struct ExchangingPair {
+    other: usize,
+    /// Between their centres, in sides of the larger one.
+    apart: f64,
+    /// Exchange area, m^2.
+    area: f64,
+}
+
+/// For each patch, those after it that it exchanges light with, up to so far away; with `obstacles`,
+/// only those with a free view of each other.
+fn exchanging(
+    reach: f64,
+    patches: &[Patch],
+    obstacles: Option<&Obstacles>,
+) -> Vec<Vec<ExchangingPair>> {
+    let sampled: Vec<_> = patches
+        .iter()
+        .map(|patch| Sampled::new(patch.polygon.clone()))
+        .collect();
+    let centres: Vec<_> = patches.iter().map(|p| p.polygon.centroid()).collect();
+    let sides: Vec<_> = patches.iter().map(|p| p.polygon.area().sqrt()).collect();
+    let pair = |patch: usize, other: usize| {
+        let apart = (centres[other] - centres[patch]).norm() / sides[patch].max(sides[other]);
+        if patches[other].facet == patches[patch].facet || apart >= reach {
+            return None;
+        }
+        let (here, there) = sampled_in_front(&sampled[patch], &sampled[other])?;
+        let area = here.exchange_area(&there, Tolerance::default());
+        let open = |o| open(&patches[patch].polygon, &patches[other].polygon, o);
+        let exchanges = area > 0.0 && obstacles.is_none_or(open);
+        exchanges.then_some(ExchangingPair { other, apart, area })
+    };
+    (0..patches.len())
+        .into_par_iter()
+        .map(|patch| {
+            let later = patch + 1..patches.len();
+            later.filter_map(|other| pair(patch, other)).collect()
+        })
+        .collect()
 }
 
 /// Whether nothing stands between two polygons, as far as their centres and the

@@ -124,16 +124,25 @@ impl Patches {
         &self.all
     }
 
-    /// The patch at a point of a facet; `None` where nothing was cut.
+    /// The patch at a point of a facet; `None` where nothing was cut. The patch `before` is likely
+    /// to be this one too, and is tried first.
     pub(crate) fn at(
         &self,
         view: &Pinhole,
         facet: usize,
         back: bool,
         world: &Vector3<f64>,
+        before: Option<usize>,
     ) -> Option<usize> {
         if !back && let Some(patch) = self.in_cell(view, facet, world) {
             return Some(patch);
+        }
+        let same = |patch: &Patch| {
+            (patch.facet, patch.back, patch.cell) == (facet, back, None)
+                && patch.polygon.contains(world)
+        };
+        if let Some(before) = before.filter(|before| same(&self.all[*before])) {
+            return Some(before);
         }
         let candidates = self.beside.get(&(facet, back))?;
         let distance = |patch: &BesidePatch| (patch.centre - world).norm_squared();

@@ -192,7 +192,7 @@ impl Surfaces<'_> {
             origin += hit.along * way;
             let back = self.facets.polygon(hit.facet).normal().dot(&way) > 0.0;
             if back || self.mirror(hit.facet) == 0.0 {
-                let patch = self.patches.at(view, hit.facet, back, &origin)?;
+                let patch = self.patches.at(view, hit.facet, back, &origin, None)?;
                 return Some((patch, kept));
             }
             mirror = hit.facet;

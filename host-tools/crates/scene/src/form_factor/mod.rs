@@ -29,6 +29,7 @@ pub use sampled::Sampled;
 pub use visible::visible_exchange_area;
 
 use crate::geometry::Polygon;
+use std::borrow::Cow;
 use std::cmp::Ordering;
 
 /// Relative error asked of an exchange area.
@@ -76,6 +77,22 @@ pub fn exchange_area(a: &Polygon, b: &Polygon, tolerance: Tolerance) -> f64 {
         Some((a, b)) => Sampled::new(a).exchange_area(&Sampled::new(b), tolerance),
         None => 0.0,
     }
+}
+
+/// The parts of sampled polygons that are in front of each other's planes; those of which nothing
+/// is cut away keep their places.
+pub(crate) fn sampled_in_front<'s>(
+    a: &'s Sampled,
+    b: &'s Sampled,
+) -> Option<(Cow<'s, Sampled>, Cow<'s, Sampled>)> {
+    let (first, second) = ordered(a.polygon(), b.polygon());
+    let (first, second) = parts_in_front(first, second)?;
+    let areas = a.polygon().area() + b.polygon().area();
+    if (first.area() + second.area() - areas).abs() <= 1e-12 * areas {
+        return Some((Cow::Borrowed(a), Cow::Borrowed(b)));
+    }
+    let [first, second] = [first, second].map(|part| Cow::Owned(Sampled::new(part)));
+    Some((first, second))
 }
 
 /// The parts that are in front of each other's planes.

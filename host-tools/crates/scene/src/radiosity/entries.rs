@@ -2,7 +2,7 @@
 
 use super::{Element, FormFactorOptions, Occlusion};
 use crate::form_factor::visible::visible_share;
-use crate::form_factor::{Sampled, Tolerance, ordered, parts_in_front};
+use crate::form_factor::{Sampled, Tolerance, ordered, sampled_in_front};
 use crate::geometry::Polygon;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -72,16 +72,7 @@ impl<'a> Entries<'a> {
 
     /// Of patches that may reach behind each other's planes.
     fn clipped(&self, a: &Sampled, b: &Sampled, between: &[usize]) -> f64 {
-        let (first, second) = ordered(a.polygon(), b.polygon());
-        let Some((first, second)) = parts_in_front(first, second) else {
-            return 0.0;
-        };
-        let areas = a.polygon().area() + b.polygon().area();
-        // Nothing was cut away: the places on both are known already.
-        if (first.area() + second.area() - areas).abs() <= 1e-12 * areas {
-            return self.between_parts(a, b, between);
-        }
-        self.between_parts(&Sampled::new(first), &Sampled::new(second), between)
+        sampled_in_front(a, b).map_or(0.0, |(a, b)| self.between_parts(&a, &b, between))
     }
 
     fn between_parts(&self, a: &Sampled, b: &Sampled, between: &[usize]) -> f64 {
