@@ -243,3 +243,49 @@ fn a_floor_that_the_projector_grazes_keeps_its_pixels() {
         assert!(lit > 100.0 && seen > 0.95 * lit, "{words}");
     }
 }
+
+/// Beside the corner of a room the next wall gets more than half as much light from the lit wall as
+/// that from its projector.
+#[test]
+fn a_wall_beside_the_lit_one_has_no_place_in_the_picture() {
+    let other = |name: &str, place: &str| {
+        format!(
+            "[[projector]]\nname = \"{name}\"\n{place}\nfield_of_view = 52.0\nrows = 12\ncols = 16\n"
+        )
+    };
+    let others = [
+        other(
+            "back",
+            "position = [1.2, 1.2, 2.2]\nlook_at = [1.2, 1.2, 0.0]",
+        ),
+        other(
+            "right",
+            "position = [0.2, 1.2, 1.2]\nlook_at = [2.4, 1.2, 1.2]",
+        ),
+    ];
+    let left = scene("cube-room", &others.each_ref().map(|other| (&**other, "")));
+    let map = measured(&left, (320, 240), 0, false).map.unwrap().unwrap();
+    let middle = [1.2, 1.2, 0.0];
+    let (width, height) = map.camera;
+    let camera = View::new(
+        [[1.2, 1.3, 4.0], middle],
+        76.0,
+        width as f64 / height as f64,
+    );
+    let projector = View::new([[2.2, 1.2, 1.2], [0.0, 1.2, 1.2]], 52.0, 4.0 / 3.0);
+    let (mut lit, mut known) = (0_usize, 0_usize);
+    for (pixel, found) in map.position.iter().enumerate() {
+        let way = camera.way(place(pixel, (width, height)));
+        let wall = camera.position - way * (camera.position.x / way.x);
+        let at = projector.sees(&wall);
+        let left = way.x < 0.0 && wall.z > 0.0;
+        lit += usize::from(left && at.iter().all(|at| (0.01..0.99).contains(at)));
+        if !found[0].is_nan() {
+            known += 1;
+            let near = |at: &f64| (-0.01..1.01).contains(at);
+            assert!(left && at.iter().all(near), "pixel {pixel} is at {found:?}");
+        }
+    }
+    println!("{known} of {lit} pixels");
+    assert!(lit > 40_000 && 100 * known > 99 * lit);
+}

@@ -9,7 +9,7 @@
 
 use super::cell_map::Candidate;
 use super::regression::axis_sums;
-use iltm_picture::statistics::quantile;
+use iltm_picture::statistics::{median, quantile};
 use iltm_runtime::Grid;
 use std::collections::BTreeMap;
 
@@ -29,6 +29,11 @@ const OUTSIDE: f32 = 0.25;
 /// Share of a pixel's light that comes from its own and the next cells, relative to that
 /// of the cell's bright pixels, from which it is lit directly.
 const INDIRECT: f32 = 0.85;
+
+/// Contrast of stripes, relative to that of the cell's pixels whose places they tell, from which a
+/// pixel is lit directly: three walls of a room show .7 at least where the projector lights them and .2
+/// at most where it does not.
+const SHOWN: f32 = 1.0 / 3.0;
 
 /// Which of a cell's pixels count as bright.
 const BRIGHT: f64 = 0.9;
@@ -65,40 +70,77 @@ pub(crate) fn drop_unlit(candidates: &mut Vec<Candidate>, grid: Grid, camera: (u
     candidates.retain(|_| keep.next() == Some(true));
 }
 
-/// Removes candidates that get their cell's light from other surfaces only, as beyond
-/// the border of the projection beside a crease: much darker than the cell's other
-/// pixels, and not for a dark paint, which darkens light from everywhere alike. A surface that
-/// the projector grazes is as dark beside a crease; its pixels stay where stripes tell their
-/// places (`is_placed`). `light` is the flood light of each camera pixel.
+/// What a pixel shows of stripes finer than the cells.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ShownStripes {
+    /// Of white's light.
+    pub(crate) contrast: f32,
+    /// Whether they tell its place.
+    pub(crate) is_placed: bool,
+}
+
+/// What tells light that comes straight from the projector, of a cell's pixels: `V` of each.
+#[derive(Default)]
+struct DirectSigns<V> {
+    /// Light of the cell and those around it.
+    nearest: V,
+    /// Share of that in all light.
+    share: V,
+    /// Contrast of stripes, of pixels whose place they tell.
+    contrast: V,
+}
+
+/// Removes candidates that get their cell's light from other surfaces only, as beyond the border of
+/// the projection beside a crease.
+///
+/// Where stripes tell the places of a cell's pixels, those show none. Elsewhere they are much darker
+/// than the cell's other pixels, and not for a dark paint, which darkens light from everywhere alike.
+/// A surface that the projector grazes is as dark beside a crease; its pixels stay where stripes tell
+/// their places. `light` is the flood light of each camera pixel.
 pub(crate) fn drop_indirect(
     candidates: &mut Vec<Candidate>,
     light: &[f32],
-    is_placed: impl Fn(u32) -> bool,
+    shown: impl Fn(u32) -> ShownStripes,
 ) {
-    let seen = |candidate: &Candidate| {
+    let signs = |candidate: &Candidate| {
         let nearest = candidate.nearest();
-        (nearest, nearest / light[candidate.pixel as usize])
+        let shown = shown(candidate.pixel);
+        let signs = DirectSigns {
+            nearest,
+            share: nearest / light[candidate.pixel as usize],
+            contrast: shown.contrast,
+        };
+        (signs, shown.is_placed)
     };
-    let mut of_cell: BTreeMap<u32, Vec<(f32, f32)>> = BTreeMap::new();
+    let mut of_cell: BTreeMap<u32, DirectSigns<Vec<f32>>> = BTreeMap::new();
     for candidate in &*candidates {
-        of_cell
-            .entry(candidate.cell)
-            .or_default()
-            .push(seen(candidate));
+        let cell = of_cell.entry(candidate.cell).or_default();
+        let (own, is_placed) = signs(candidate);
+        cell.nearest.push(own.nearest);
+        cell.share.push(own.share);
+        cell.contrast.extend(is_placed.then_some(own.contrast));
     }
-    let usual = |pixels: &Vec<(f32, f32)>| {
-        let (mut light, mut share): (Vec<f32>, Vec<f32>) = pixels.iter().copied().unzip();
-        let bright = |of: &mut Vec<f32>| quantile(of, BRIGHT).unwrap_or(0.0);
-        (bright(&mut light), bright(&mut share))
-    };
-    let usual: BTreeMap<u32, (f32, f32)> = of_cell
-        .iter()
-        .map(|(cell, pixels)| (*cell, usual(pixels)))
-        .collect();
+    let usual = of_cell.into_iter().map(|(cell, mut pixels)| {
+        let usual = DirectSigns {
+            nearest: quantile(&mut pixels.nearest, BRIGHT),
+            share: quantile(&mut pixels.share, BRIGHT),
+            contrast: median(pixels.contrast),
+        };
+        (cell, usual)
+    });
+    let usual: BTreeMap<u32, DirectSigns<Option<f32>>> = usual.collect();
+    let reaches =
+        |own: f32, part: f32, usual: Option<f32>| usual.is_some_and(|usual| own >= part * usual);
     candidates.retain(|candidate| {
-        let (nearest, share) = seen(candidate);
-        let (bright, direct) = usual[&candidate.cell];
-        nearest >= OUTSIDE * bright || share >= INDIRECT * direct || is_placed(candidate.pixel)
+        let (own, is_placed) = signs(candidate);
+        let usual = &usual[&candidate.cell];
+        let is_direct = if usual.contrast.is_some() {
+            reaches(own.contrast, SHOWN, usual.contrast)
+        } else {
+            reaches(own.nearest, OUTSIDE, usual.nearest)
+                || reaches(own.share, INDIRECT, usual.share)
+        };
+        is_direct || is_placed
     });
 }
 
@@ -251,21 +293,42 @@ mod tests {
         for (at, candidate) in candidates.iter_mut().enumerate() {
             candidate.pixel = at as u32;
         }
-        let kept = |is_placed: fn(u32) -> bool| -> Vec<u32> {
+        let kept = |shown: fn(u32) -> ShownStripes| -> Vec<u32> {
             let mut candidates = candidates.clone();
-            drop_indirect(&mut candidates, &light, is_placed);
+            drop_indirect(&mut candidates, &light, shown);
             candidates.iter().map(|candidate| candidate.pixel).collect()
         };
-        assert_eq!(kept(|_| false), [0, 1, 2, 3, 4, 5, 7]);
-        // Stripes are seen where it is grazed by the projector's own light.
-        assert_eq!(kept(|pixel| pixel == 6), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(kept(|_| ShownStripes::default()), [0, 1, 2, 3, 4, 5, 7]);
+        // Stripes are seen where it is grazed by the projector's own light, and a blurred border of
+        // the lit part shows some of them.
+        let grazed = |pixel| ShownStripes {
+            contrast: [0.9, 0.9, 0.9, 0.9, 0.5, 0.7, 0.1, 0.9][pixel as usize],
+            is_placed: ![4, 5].contains(&pixel),
+        };
+        assert_eq!(kept(grazed), [0, 1, 2, 3, 4, 5, 6, 7]);
+    }
+
+    #[test]
+    fn what_shows_no_stripes_of_a_cell_is_dropped_however_many_and_bright_its_pixels_are() {
+        let kinds = [pixel(0.4, 0.05, 0.05), pixel(0.3, 0.15, 0.1)];
+        let mut candidates = vec![kinds[0].0; 2];
+        candidates.extend([kinds[1].0; 30]);
+        let light: Vec<f32> = (0..32).map(|at| kinds[usize::from(at > 1)].1).collect();
+        for (at, candidate) in candidates.iter_mut().enumerate() {
+            candidate.pixel = at as u32;
+        }
+        drop_indirect(&mut candidates, &light, |pixel| ShownStripes {
+            contrast: if pixel < 2 { 0.8 } else { 0.15 },
+            is_placed: pixel < 2,
+        });
+        assert_eq!(candidates.len(), 2);
     }
 
     #[test]
     fn a_cell_that_is_seen_by_other_surfaces_only_keeps_its_pixels() {
         let (candidate, light) = pixel(0.03, 0.015, 0.04);
         let mut candidates = vec![candidate; 3];
-        drop_indirect(&mut candidates, &[light], |_| false);
+        drop_indirect(&mut candidates, &[light], |_| ShownStripes::default());
         assert_eq!(candidates.len(), 3);
     }
 }

@@ -32,7 +32,7 @@ use crate::photographs::linearise::LinearPhotographs;
 use cell_map::{Candidate, CellLabels, NO_CELL, Registration};
 use iltm_picture::progress::Progress;
 use iltm_runtime::Grid;
-use mixed_pixels::MIXED;
+use mixed_pixels::{MIXED, ShownStripes};
 use projector_map::{MapError, ProjectorMap};
 use regression::regress;
 use std::path::Path;
@@ -166,11 +166,15 @@ pub(crate) fn register(
     let method = if is_regression {
         let stripes = stripes.as_ref().and_then(|stripes| stripes.as_ref().ok());
         let places = stripes.and_then(|stripes| stripes.map(&first, linear).ok());
-        let is_placed = |pixel: u32| {
-            let uncertainty = places.as_ref().map(|map| map.uncertainty[pixel as usize]);
-            uncertainty.is_some_and(|uncertainty| uncertainty < PLACED)
+        let contrast = stripes.map(|stripes| stripes.contrast(linear));
+        let shown = |pixel: u32| match (&places, &contrast) {
+            (Some(map), Some(contrast)) => ShownStripes {
+                contrast: contrast[pixel as usize],
+                is_placed: map.uncertainty[pixel as usize] < PLACED,
+            },
+            _ => ShownStripes::default(),
         };
-        mixed_pixels::drop_indirect(&mut candidates, &guess.light, is_placed);
+        mixed_pixels::drop_indirect(&mut candidates, &guess.light, shown);
         mixed_pixels::judge(&mut candidates, grid, camera);
         RegistrationMethod::Regression {
             photographs: taken,

@@ -490,6 +490,26 @@ impl DecodedStripes {
         self
     }
 
+    /// Contrast of the stripes that each camera pixel shows, of white's light: the largest of all that
+    /// the camera tells apart. What only bounces to a pixel has next to none.
+    pub(crate) fn contrast(&self, linear: &LinearPhotographs<'_>) -> Vec<f32> {
+        let of = |(pixel, white): (usize, &f32)| {
+            let of_axis = |light: &AxisLight| {
+                let bits = light.bits.iter().map(|bit| bit[pixel].abs());
+                let waves = light.waves.iter().map(|waves| waves.size(pixel));
+                bits.chain(waves).fold(0.0, f32::max)
+            };
+            self.light.iter().map(of_axis).fold(0.0, f32::max) / white
+        };
+        linear
+            .flood_light()
+            .pixels
+            .iter()
+            .enumerate()
+            .map(of)
+            .collect()
+    }
+
     /// The map of all pixels that see a cell: both axes together.
     ///
     /// # Errors
@@ -628,15 +648,14 @@ impl Axis<'_> {
 
     /// The same by waves; `None` where the camera sees none.
     fn in_wave(&self, waves: &WaveLight, cell: usize, pixel: usize, flood: f32) -> Option<Place> {
-        let [re, im] = [0, 1].map(|part: usize| waves.wave[part][pixel]);
-        let size = re.hypot(im);
-        // Opposite steps differ by all the light that comes straight from the projector.
+        let size = waves.size(pixel);
         if size < LEAST_CONTRAST * flood {
             return None;
         }
         let (middle, side) = self.stripe(cell, pixel, self.light.bits.len());
         let wave = WAVE as f32;
         let uncertainty = wave / TAU * 2.0_f32.sqrt() * self.noise[pixel] / size;
+        let [re, im] = [0, 1].map(|part: usize| waves.wave[part][pixel]);
         let phase = im.atan2(re) / TAU * wave;
         let at = phase + wave * ((middle - phase) / wave).round();
         (uncertainty < MOST_UNCERTAIN).then_some(Place {
@@ -648,6 +667,12 @@ impl Axis<'_> {
 }
 
 impl WaveLight {
+    /// Size of the wave that a pixel shows: opposite steps differ by all the light that comes straight
+    /// from the projector.
+    fn size(&self, pixel: usize) -> f32 {
+        self.wave[0][pixel].hypot(self.wave[1][pixel])
+    }
+
     /// Standard deviation of the light of a pixel in one photograph, around each pixel.
     fn noise(&self, (width, height): (usize, usize)) -> Vec<f32> {
         let around =
