@@ -1,7 +1,7 @@
 //! Arguments of the command line.
 
 use super::failure::Kind;
-use super::named::Named;
+use super::name_parser::NameParser;
 use super::simulate_chain::Chain;
 use crate::capture::{CameraSettings, GateName, MapFormat};
 use crate::compile::NEIGHBOURS_FACTOR;
@@ -29,25 +29,25 @@ pub(super) struct Arguments {
     pub(super) command: Command,
 }
 
-fn effect() -> Named<Effect> {
-    Named::new(Effect::VARIANTS.iter().copied())
+fn effect() -> NameParser<Effect> {
+    NameParser::new(Effect::VARIANTS.iter().copied())
 }
 
-fn fault() -> Named<InjectedFault> {
-    Named::new(CaptureFault::VARIANTS.iter().copied())
+fn fault() -> NameParser<InjectedFault> {
+    NameParser::new(CaptureFault::VARIANTS.iter().copied())
 }
 
-fn gate() -> Named<GateName> {
-    Named::new(GateName::ALL.iter().map(|gate| gate.name()))
+fn gate() -> NameParser<GateName> {
+    NameParser::new(GateName::ALL.iter().map(|gate| gate.name()))
 }
 
-fn method() -> Named<Method> {
-    Named::new(Method::VARIANTS.iter().map(Into::into))
+fn method() -> NameParser<Method> {
+    NameParser::new(Method::VARIANTS.iter().map(Into::into))
 }
 
 #[cfg(unix)]
-fn board() -> Named<Board> {
-    Named::new(Board::VARIANTS.iter().map(|board| board.name()))
+fn board() -> NameParser<Board> {
+    NameParser::new(Board::VARIANTS.iter().map(|board| board.name()))
 }
 
 #[derive(Debug, Subcommand)]

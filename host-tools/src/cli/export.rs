@@ -16,7 +16,7 @@ use iltm_runtime::units::Light;
 use serde_json::json;
 
 /// A file's name and bytes.
-type Named = (String, Vec<u8>);
+type NamedFile = (String, Vec<u8>);
 
 pub(super) fn run(arguments: &Export, output: &Output) -> Result<(), Failure> {
     let out = &arguments.output;
@@ -83,7 +83,7 @@ fn too_large(tier: u8) -> Failure {
 /// an even white, and black what it shows for the darkest even grey that the room's light
 /// allows. The gain map is white without the operator, as bright as the gains allow. PNG in codes,
 /// `OpenEXR` in proportion to light.
-fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<Named>, Failure> {
+fn maps(table: &Table<'_>, tier: u8) -> Result<Vec<NamedFile>, Failure> {
     let fine = table.fine_gain().map(|fine| fine.size());
     let size = table.projector().map(ProjectorPixels::size);
     let frame = size

@@ -26,7 +26,7 @@ mod key;
 mod man;
 mod monitor;
 mod mpv;
-mod named;
+mod name_parser;
 mod output;
 mod patterns;
 mod play;

@@ -23,7 +23,7 @@ use crate::device::upload::{Parcel, Upload, UploadError, UploadPlan, UploadSumma
 use crate::user::{Folders, begin_transcript};
 use iltm_runtime::link::{Fault, InUse, Refusal};
 use iltm_runtime::trust::NoRight;
-use preflight::{Named, Now};
+use preflight::{CheckedTable, Now};
 use serde_json::json;
 use show::Show;
 use std::time::{Duration, Instant};
@@ -31,7 +31,7 @@ use std::time::{Duration, Instant};
 pub(super) fn run(arguments: &Flash, output: &Output) -> Result<(), Failure> {
     let untouched = |failure: Failure| failure.with(Active::Untouched);
     let bytes = read_table(&arguments.table).map_err(untouched)?;
-    let table = Named::read(&arguments.table, &bytes).map_err(untouched)?;
+    let table = CheckedTable::read(&arguments.table, &bytes).map_err(untouched)?;
     let connected = connect(&arguments.line, output);
     let mut connection = connected.map_err(|failure| match failure.kind {
         Kind::NoAnswer | Kind::NoDevice | Kind::Port => failure.with(Active::Unknown),
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Flash, output: &Output) -> Result<(), Failure> {
 fn flash(
     arguments: &Flash,
     bytes: &[u8],
-    table: &Named,
+    table: &CheckedTable,
     connection: &mut Connection,
     output: &Output,
 ) -> Result<(), Failure> {
@@ -178,7 +178,7 @@ fn bring(
 /// nothing: it is that one, by its digest, or the device refuses.
 fn on_trial(
     arguments: &Flash,
-    table: &Named,
+    table: &CheckedTable,
     parcel: &Parcel<'_>,
     connection: &mut Connection,
 ) -> Result<InUse, Failure> {
@@ -218,7 +218,7 @@ fn active(slots: &iltm_runtime::link::Slots) -> Active {
 }
 
 /// Says what is about to be done.
-fn announce(table: &Named, plan: &UploadPlan, connection: &Connection, output: &Output) {
+fn announce(table: &CheckedTable, plan: &UploadPlan, connection: &Connection, output: &Output) {
     let (differing, sectors) = (plan.differing.len(), plan.sectors);
     let seconds = seconds(plan.bytes(), connection.baud);
     let slot = letter(plan.slots.target);
@@ -299,7 +299,7 @@ fn after_activation(connection: &mut Connection, error: &DeviceError) -> Failure
 /// What is left to do once the device uses the table.
 struct Ending<'a> {
     arguments: &'a Flash,
-    table: &'a Named,
+    table: &'a CheckedTable,
     output: &'a Output,
     summary: UploadSummary,
     start: Instant,

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// A table's file, checked.
 #[derive(Debug)]
-pub(super) struct Named {
+pub(super) struct CheckedTable {
     path: PathBuf,
     pub(super) called: CalledTable,
     pub(super) size: TableSize,
@@ -34,7 +34,7 @@ pub(super) enum Now {
     OnTrial,
 }
 
-impl Named {
+impl CheckedTable {
     pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Self, Failure> {
         let (table, seal) = check_sealed(path, bytes)?;
         Ok(Self {

@@ -10,19 +10,19 @@ use std::str::FromStr;
 
 /// Reads values of `T`.
 #[derive(Debug)]
-pub(super) struct Named<T> {
+pub(super) struct NameParser<T> {
     names: Vec<&'static str>,
     of: PhantomData<fn() -> T>,
 }
 
 // A derived one would ask it of `T`.
-impl<T> Clone for Named<T> {
+impl<T> Clone for NameParser<T> {
     fn clone(&self) -> Self {
         Self::new(self.names.iter().copied())
     }
 }
 
-impl<T> Named<T> {
+impl<T> NameParser<T> {
     pub(super) fn new(names: impl IntoIterator<Item = &'static str>) -> Self {
         Self {
             names: names.into_iter().collect(),
@@ -31,7 +31,7 @@ impl<T> Named<T> {
     }
 }
 
-impl<T> TypedValueParser for Named<T>
+impl<T> TypedValueParser for NameParser<T>
 where
     T: FromStr<Err: Into<Box<dyn StdError + Send + Sync>>> + Clone + Send + Sync + 'static,
 {
