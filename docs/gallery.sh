@@ -15,15 +15,16 @@ for scene in installation painted-corner m-panels-painted; do
     sed -e 's/^width = .*/width = 640/' -e 's/^height = .*/height = 480/' \
         -e 's/^bits = .*/bits = 12/' -e 's/^full_well = .*/full_well = 60000.0/' \
         "../host-tools/scenes/$scene.toml" > "$file"
-    iltm simulate "$file" -o "$work/$scene" --photos 80
+    rows=$(sed -n 's/^rows = //p' "$file")
+    cols=$(sed -n 's/^cols = //p' "$file")
+    response=$(sed -n '/^\[camera\]/,$ s/^response = "\(.*\)"$/\1/p' "$file")
+    iltm patterns -o "$work/$scene" --rows "$rows" --cols "$cols" \
+        --projector $((20 * cols))x$((20 * rows)) --photos 80 --camera "${response:-linear}"
+    iltm simulate "$file" --photograph "$work/$scene"
     iltm solve "$work/$scene" -o "$work/$scene.iltm"
     iltm verify "$work/$scene.iltm" -o "$work/$scene-verify"
     iltm simulate "$file" --photograph "$work/$scene-verify" --without drift
-    # The verdict may be that the table errs more than it should, or that the camera's noise
-    # hides whether it does: shown all the same.
-    code=0
-    iltm verify "$work/$scene.iltm" "$work/$scene-verify" --report "$work/$scene-verdict" || code=$?
-    case $code in 0 | 31 | 34) ;; *) exit "$code" ;; esac
+    iltm verify "$work/$scene.iltm" "$work/$scene-verify" --report "$work/$scene-verdict"
     for part in wanted before after; do
         cp "$work/$scene-verdict/fine-$part.png" "gallery/$scene-$part.png"
     done
