@@ -30,10 +30,13 @@ const OUTSIDE: f32 = 0.25;
 /// of the cell's bright pixels, from which it is lit directly.
 const INDIRECT: f32 = 0.85;
 
-/// Contrast of stripes, relative to that of the cell's pixels whose places they tell, from which a
-/// pixel is lit directly: three walls of a room show .7 at least where the projector lights them and .2
-/// at most where it does not.
-const SHOWN: f32 = 1.0 / 3.0;
+/// Contrast of stripes, relative to what is usual, from which a pixel is lit directly: three walls of a
+/// room show .7 at least where the projector lights them and .2 at most where it does not.
+const SHOWN: f32 = 0.25;
+
+/// Contrast, relative to the median of all pixels, that nine of ten reach where a projector is sharp:
+/// .77 in scenes, and .53 with a blur of .4 cells.
+const SHARP: f32 = 0.65;
 
 /// Which of a cell's pixels count as bright.
 const BRIGHT: f64 = 0.9;
@@ -86,15 +89,16 @@ struct DirectSigns<V> {
     nearest: V,
     /// Share of that in all light.
     share: V,
-    /// Contrast of stripes, of pixels whose place they tell.
+    /// Contrast of stripes; usual is that of pixels whose places they tell.
     contrast: V,
 }
 
 /// Removes candidates that get their cell's light from other surfaces only, as beyond the border of
 /// the projection beside a crease.
 ///
-/// Where stripes tell the places of a cell's pixels, those show none. Elsewhere they are much darker
-/// than the cell's other pixels, and not for a dark paint, which darkens light from everywhere alike.
+/// Where stripes tell the places of a cell's pixels, or nearly all pixels show them, those show none.
+/// Elsewhere they are much darker than the cell's other pixels, and not for a dark paint, which darkens
+/// light from everywhere alike.
 /// A surface that the projector grazes is as dark beside a crease; its pixels stay where stripes tell
 /// their places. `light` is the flood light of each camera pixel.
 pub(crate) fn drop_indirect(
@@ -120,11 +124,16 @@ pub(crate) fn drop_indirect(
         cell.share.push(own.share);
         cell.contrast.extend(is_placed.then_some(own.contrast));
     }
+    let all: Vec<f32> = candidates
+        .iter()
+        .map(|candidate| shown(candidate.pixel).contrast)
+        .collect();
+    let sharp = sharp(all);
     let usual = of_cell.into_iter().map(|(cell, mut pixels)| {
         let usual = DirectSigns {
             nearest: quantile(&mut pixels.nearest, BRIGHT),
             share: quantile(&mut pixels.share, BRIGHT),
-            contrast: median(pixels.contrast),
+            contrast: median(pixels.contrast).or(sharp),
         };
         (cell, usual)
     });
@@ -142,6 +151,13 @@ pub(crate) fn drop_indirect(
         };
         is_direct || is_placed
     });
+}
+
+/// The usual contrast of stripes, if nearly all pixels show them.
+fn sharp(mut contrast: Vec<f32>) -> Option<f32> {
+    let least = quantile(&mut contrast, 1.0 - BRIGHT)?;
+    let usual = median(contrast).filter(|usual| *usual > 0.0)?;
+    (least >= SHARP * usual).then_some(usual)
 }
 
 /// Sets [`Candidate::mixed`] of every candidate of an image of `camera` (width
@@ -322,6 +338,33 @@ mod tests {
             is_placed: pixel < 2,
         });
         assert_eq!(candidates.len(), 2);
+    }
+
+    #[test]
+    fn a_camera_that_cannot_tell_places_judges_by_stripes_unless_the_projector_is_blurred() {
+        let kinds = [pixel(0.4, 0.05, 0.05), pixel(0.3, 0.15, 0.1)];
+        let candidates: Vec<Candidate> = (0..40)
+            .map(|pixel| Candidate {
+                pixel,
+                ..kinds[usize::from(pixel < 2)].0
+            })
+            .collect();
+        let light: Vec<f32> = (0..40).map(|at| kinds[usize::from(at < 2)].1).collect();
+        let kept = |contrast: fn(u32) -> f32| {
+            let mut candidates = candidates.clone();
+            drop_indirect(&mut candidates, &light, |pixel| ShownStripes {
+                contrast: contrast(pixel),
+                is_placed: false,
+            });
+            candidates.len()
+        };
+        assert_eq!(kept(|pixel| if pixel < 2 { 0.15 } else { 0.8 }), 38);
+        // The middle of cells is where half a cell's stripes have their edges.
+        assert_eq!(
+            kept(|pixel| [0.1, 0.2, 0.4, 0.45, 0.5][pixel as usize % 5]),
+            40
+        );
+        assert_eq!(kept(|_| 0.0), 40);
     }
 
     #[test]
