@@ -287,7 +287,7 @@ fn a_wall_beside_the_lit_one_has_no_place_in_the_picture() {
             let within = |by: f64| left && at.iter().all(|at| (-by..1.0 + by).contains(at));
             lit += usize::from(within(-beside));
             if !found[0].is_nan() {
-                known += 1;
+                known += usize::from(within(-beside));
                 assert!(within(beside), "camera of {width}: {pixel} is at {found:?}");
             }
         }

@@ -403,9 +403,7 @@ fn write(views: &[PoseCapture<'_>], out: &Path, progress: &dyn Progress) -> Resu
         let places = Settings::read(view.folder)?.camera.places;
         settings.camera.places = settings.camera.places.saturating_add(places);
     }
-    // Numbers and words are always written.
-    let settings = toml::to_string(&settings).unwrap_or_default();
-    folder.file(SETTINGS_FILE, settings)?;
+    folder.file(SETTINGS_FILE, settings.to_toml())?;
     let join = |at: usize| {
         let photo = |view: &PoseCapture<'_>| {
             let found = find_photo(view.folder, &view.slides[at].1.photo)?;

@@ -111,6 +111,5 @@ fn settings(scene: &Scene, projector: usize, simulation: &Simulation<'_>) -> Str
             name: scene.name.clone(),
         },
     };
-    // Numbers and strings always have a TOML form.
-    toml::to_string(&settings).unwrap_or_default()
+    settings.to_toml()
 }

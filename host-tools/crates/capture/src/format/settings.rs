@@ -54,7 +54,7 @@ pub struct CameraSettings {
     #[serde(deserialize_with = "full_scale", skip_serializing_if = "is_one")]
     pub full_scale: f64,
     /// Places from which the camera took what stands beside each other in each photograph.
-    #[serde(skip_serializing_if = "is_one_place")]
+    #[serde(skip_serializing_if = "is_one")]
     pub places: u16,
 }
 
@@ -111,16 +111,8 @@ fn full_scale<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Err(D::Error::custom(message))
 }
 
-// serde hands a reference.
-#[allow(clippy::trivially_copy_pass_by_ref)]
-fn is_one_place(places: &u16) -> bool {
-    *places == 1
-}
-
-// serde hands a reference.
-#[allow(clippy::trivially_copy_pass_by_ref, clippy::float_cmp)]
-fn is_one(value: &f64) -> bool {
-    *value == 1.0
+fn is_one<T: PartialEq + From<u8>>(value: &T) -> bool {
+    *value == T::from(1)
 }
 
 /// `[projector]` of [`Settings`].
@@ -196,6 +188,13 @@ impl Settings {
             Ok(None) => Ok(Self::default()),
             Err(source) => Err(CaptureError::Io { path, source }),
         }
+    }
+
+    /// The contents of a `capture.toml` that says this.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        // Numbers and strings always have a TOML form.
+        toml::to_string(self).unwrap_or_default()
     }
 
     /// Reads the contents of a `capture.toml`; `path` is only for errors.

@@ -82,15 +82,39 @@ pub(crate) struct ShownStripes {
     pub(crate) is_placed: bool,
 }
 
-/// What tells light that comes straight from the projector, of a cell's pixels: `V` of each.
-#[derive(Default)]
-struct DirectSigns<V> {
-    /// Light of the cell and those around it.
-    nearest: V,
+/// What tells whether a pixel's light comes straight from the projector.
+struct DirectSigns {
+    /// Light of its cell and those around it.
+    nearest: f32,
     /// Share of that in all light.
-    share: V,
-    /// Contrast of stripes; usual is that of pixels whose places they tell.
-    contrast: V,
+    share: f32,
+    shown: ShownStripes,
+}
+
+/// What is usual in a cell.
+struct UsualSigns {
+    /// Of bright pixels.
+    nearest: f32,
+    /// The same.
+    share: f32,
+    /// Of pixels whose places stripes tell, or of all pixels if nearly all show them.
+    contrast: Option<f32>,
+}
+
+impl UsualSigns {
+    fn of(pixels: &[DirectSigns], sharp: Option<f32>) -> Self {
+        let bright = |of: fn(&DirectSigns) -> f32| {
+            let mut values: Vec<f32> = pixels.iter().map(of).collect();
+            quantile(&mut values, BRIGHT).unwrap_or(0.0)
+        };
+        let placed = pixels.iter().filter(|pixel| pixel.shown.is_placed);
+        let placed = placed.map(|pixel| pixel.shown.contrast).collect();
+        Self {
+            nearest: bright(|pixel| pixel.nearest),
+            share: bright(|pixel| pixel.share),
+            contrast: median(placed).or(sharp),
+        }
+    }
 }
 
 /// Removes candidates that get their cell's light from other surfaces only, as beyond the border of
@@ -108,48 +132,32 @@ pub(crate) fn drop_indirect(
 ) {
     let signs = |candidate: &Candidate| {
         let nearest = candidate.nearest();
-        let shown = shown(candidate.pixel);
-        let signs = DirectSigns {
+        DirectSigns {
             nearest,
             share: nearest / light[candidate.pixel as usize],
-            contrast: shown.contrast,
-        };
-        (signs, shown.is_placed)
+            shown: shown(candidate.pixel),
+        }
     };
-    let mut of_cell: BTreeMap<u32, DirectSigns<Vec<f32>>> = BTreeMap::new();
+    let mut of_cell: BTreeMap<u32, Vec<DirectSigns>> = BTreeMap::new();
     for candidate in &*candidates {
         let cell = of_cell.entry(candidate.cell).or_default();
-        let (own, is_placed) = signs(candidate);
-        cell.nearest.push(own.nearest);
-        cell.share.push(own.share);
-        cell.contrast.extend(is_placed.then_some(own.contrast));
+        cell.push(signs(candidate));
     }
-    let all: Vec<f32> = candidates
+    let pixels = of_cell.values().flatten();
+    let sharp = sharp(pixels.map(|pixel| pixel.shown.contrast).collect());
+    let usual: BTreeMap<u32, UsualSigns> = of_cell
         .iter()
-        .map(|candidate| shown(candidate.pixel).contrast)
+        .map(|(cell, pixels)| (*cell, UsualSigns::of(pixels, sharp)))
         .collect();
-    let sharp = sharp(all);
-    let usual = of_cell.into_iter().map(|(cell, mut pixels)| {
-        let usual = DirectSigns {
-            nearest: quantile(&mut pixels.nearest, BRIGHT),
-            share: quantile(&mut pixels.share, BRIGHT),
-            contrast: median(pixels.contrast).or(sharp),
-        };
-        (cell, usual)
-    });
-    let usual: BTreeMap<u32, DirectSigns<Option<f32>>> = usual.collect();
-    let reaches =
-        |own: f32, part: f32, usual: Option<f32>| usual.is_some_and(|usual| own >= part * usual);
     candidates.retain(|candidate| {
-        let (own, is_placed) = signs(candidate);
+        let own = signs(candidate);
         let usual = &usual[&candidate.cell];
-        let is_direct = if usual.contrast.is_some() {
-            reaches(own.contrast, SHOWN, usual.contrast)
+        let is_direct = if let Some(contrast) = usual.contrast {
+            own.shown.contrast >= SHOWN * contrast
         } else {
-            reaches(own.nearest, OUTSIDE, usual.nearest)
-                || reaches(own.share, INDIRECT, usual.share)
+            own.nearest >= OUTSIDE * usual.nearest || own.share >= INDIRECT * usual.share
         };
-        is_direct || is_placed
+        is_direct || own.shown.is_placed
     });
 }
 

@@ -168,11 +168,7 @@ pub fn write(
     if let Slides::Several(places) = kind {
         stripes = several::write_lists(&folder, &slides, places)?;
     }
-    // Numbers and strings always have a TOML form.
-    folder.file(
-        SETTINGS_FILE,
-        toml::to_string(&settings).unwrap_or_default(),
-    )?;
+    folder.file(SETTINGS_FILE, settings.to_toml())?;
     let film = match kind {
         Slides::Both { .. } | Slides::Several(_) => 0,
         Slides::Wanted => write_film(table, layout, &slides, &folder)?,
