@@ -2,11 +2,15 @@
 //! from them, and the errors that are on the wall then.
 
 use iltm::build_table::{BuiltTable, TableOptions, build_table};
-use iltm::capture::{CaptureOptions, NO_CELL, Registration, pattern_set};
+use iltm::capture::{
+    self, CameraSettings, CaptureOptions, Measurements, NO_CELL, Registration, pattern_set,
+};
 use iltm::compile::reference_white::uniform_white;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
+use iltm::scene::fill_capture::UnfilledCapture;
 use iltm::scene::{Effect, Forced, Simulation, SimulationOptions, VirtualCamera, folder};
+use iltm::session::{self, Layout, OrderOptions, order};
 use iltm::solve::{InverseTransport, Method, SolveOptions, natural_images};
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
@@ -59,6 +63,47 @@ pub fn photograph(scene: &Scene, bernoulli: usize, seed: u64, capture: &Path) {
     let patterns = pattern_set(simulation.grid(), bernoulli, seed);
     let camera = VirtualCamera::new(scene, &simulation, seed).expect("light");
     folder::write(&camera, None, &patterns, capture, &Silent).expect("written");
+}
+
+/// A session with fine stripes and so many random patterns, as it is photographed, changed and
+/// measured; `change` gets the folder of its photographs.
+pub fn measured(
+    scene: &Scene,
+    layout: &Layout,
+    bernoulli: usize,
+    change: impl FnOnce(&Path),
+) -> Measurements {
+    let simulation = simulation(scene, Forced::default());
+    let place = tempfile::tempdir().expect("a folder");
+    let folder = place.path().join("session");
+    let options = OrderOptions {
+        bernoulli,
+        ramp: 0,
+        probe: false,
+        ..OrderOptions::default()
+    };
+    let settings = CameraSettings {
+        response: scene.camera.response.into(),
+        ..CameraSettings::default()
+    };
+    session::write(
+        &order(layout, &options),
+        layout,
+        &settings,
+        &folder,
+        &Silent,
+    )
+    .expect("written");
+    let camera = VirtualCamera::new(scene, &simulation, 1).expect("light");
+    take(scene, &folder, &camera);
+    change(&folder.join("photos"));
+    capture::read(&folder, &CaptureOptions::default(), &Silent).expect("a good session")
+}
+
+/// Photographs all slides of a folder.
+pub fn take(scene: &Scene, folder: &Path, camera: &VirtualCamera<'_>) {
+    let slides = UnfilledCapture::read(folder, scene, None).expect("slides of the scene's size");
+    slides.take_missing(camera, &Silent).expect("written");
 }
 
 /// What is learned from a capture with the usual options.

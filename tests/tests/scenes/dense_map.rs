@@ -2,16 +2,11 @@
 //! stage's floor, and from there to the projector, worked out here from the numbers of the scenes'
 //! descriptions.
 
-use iltm::capture::{
-    self, CameraSettings, CaptureOptions, MapSource, Measurements, NO_CELL, ProjectorMap,
-};
-use iltm::progress::Silent;
+use iltm::capture::{MapSource, Measurements, NO_CELL, ProjectorMap};
 use iltm::scene::description::Scene;
-use iltm::scene::fill_capture::UnfilledCapture;
-use iltm::scene::{Forced, VirtualCamera};
-use iltm::session::{self, Layout, OrderOptions, order};
+use iltm::session::Layout;
 use iltm_runtime::FrameSize;
-use iltm_tests::simulated::{scene, simulation};
+use iltm_tests::simulated::{self, scene};
 use iltm_tests::verdicts::as_jpeg;
 use nalgebra::Vector3;
 
@@ -156,32 +151,15 @@ fn off(map: &ProjectorMap) -> Off {
     }
 }
 
-/// A session with fine stripes and 10 random patterns, as it is photographed and measured.
+/// A session with 10 random patterns, as it is photographed and measured.
 fn measured(scene: &Scene, projector: (u16, u16), border: u16, jpeg: bool) -> Measurements {
-    let simulation = simulation(scene, Forced::default());
-    let place = tempfile::tempdir().unwrap();
-    let folder = place.path().join("session");
-    let options = OrderOptions {
-        bernoulli: 10,
-        ramp: 0,
-        probe: false,
-        ..OrderOptions::default()
-    };
     let size = FrameSize::new(projector.0, projector.1).unwrap();
-    let layout = Layout::new(simulation.grid(), size, border).unwrap();
-    let settings = CameraSettings {
-        response: scene.camera.response.into(),
-        ..CameraSettings::default()
-    };
-    let slides = order(&layout, &options);
-    session::write(&slides, &layout, &settings, &folder, &Silent).unwrap();
-    let unfilled = UnfilledCapture::read(&folder, scene, None).unwrap();
-    let taken = VirtualCamera::new(scene, &simulation, 1).unwrap();
-    unfilled.take_missing(&taken, &Silent).unwrap();
-    if jpeg {
-        as_jpeg(&folder.join("photos"), 90);
-    }
-    capture::read(&folder, &CaptureOptions::default(), &Silent).unwrap()
+    let layout = Layout::new(scene.grid(), size, border).unwrap();
+    simulated::measured(scene, &layout, 10, |photographs| {
+        if jpeg {
+            as_jpeg(photographs, 90);
+        }
+    })
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod closed_loop_simulated;
 mod demo;
 mod dense_map;
+mod even_light;
 mod gates;
 mod hard_cases;
 mod installation;

@@ -6,7 +6,7 @@ use iltm::build_table::BuiltTable;
 use iltm::capture::Settings;
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
-use iltm::scene::{CaptureFault, Effect, Forced, VirtualCamera, fill_capture};
+use iltm::scene::{CaptureFault, Effect, Forced, VirtualCamera};
 use iltm::session::Layout;
 use iltm::verify::{
     Cause, Outcome, Readings, Slides, TableVerdict, VerifyError, WhiteChange, judge, write,
@@ -54,8 +54,7 @@ fn photographed(learned: &BuiltTable, scene: &Scene, folder: &Path) {
     .unwrap();
     let simulation = simulation(scene, Forced::default());
     let camera = VirtualCamera::new(scene, &simulation, 11).unwrap();
-    let session = fill_capture::UnfilledCapture::read(folder, scene, None).unwrap();
-    session.take_missing(&camera, &Silent).unwrap();
+    simulated::take(scene, folder, &camera);
 }
 
 fn verdict(learned: &BuiltTable, folder: &Path) -> Result<TableVerdict, VerifyError> {

@@ -53,7 +53,8 @@ pub fn camera_places(
     };
     let (mut own, mut linear) = (Vec::new(), Vec::new());
     for folder in folders {
-        let (measurements, (_, mut photographs)) = crate::read_keeping(folder, &options, progress)?;
+        let (measurements, (_, mut photographs, _)) =
+            crate::read_keeping(folder, &options, progress)?;
         photographs.photographs.forget();
         own.push(measurements);
         linear.push(photographs);

@@ -228,6 +228,8 @@ impl CaptureEvidence {
             registration: self.registered.registration,
             flood: self.flood.0,
             flood_photographs: self.flood.1,
+            // Found afterwards, by those who need it.
+            even: None,
             map: self.map,
             devices: self.devices,
             settings: settings.clone(),

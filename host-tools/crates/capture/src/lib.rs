@@ -47,7 +47,8 @@ mod wide_frame;
 
 pub use camera_places::{CameraPlaces, camera_places};
 pub use cells::cell_pixels::{LeftOut, Why};
-pub use cells::fine_flood::FineFlood;
+pub use cells::even_light::{EvenChannel, EvenLight};
+pub use cells::fine_flood::{EvenFlood, FineFlood};
 pub use cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 pub use cells::noise::{NoiseModel, NoiseSource};
 pub use cells::nonlinearity::Nonlinearity;
@@ -95,6 +96,7 @@ pub use remeasure::{
 };
 pub use several::{ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_several, read_several};
 
+use cells::drift::Drift;
 use cells::images;
 use evidence::CaptureEvidence;
 use format::sequence::{Selection, Sequence};
@@ -123,11 +125,15 @@ pub fn read(
     options: &CaptureOptions,
     progress: &dyn Progress,
 ) -> Result<Measurements, CaptureError> {
-    Ok(read_keeping(folder, options, progress)?.0)
+    let (mut measurements, (sequence, mut linear, drift)) =
+        read_keeping(folder, options, progress)?;
+    let shown = (&sequence, &mut linear, &drift);
+    measurements.even = EvenLight::add_up(&measurements, shown, progress)?;
+    Ok(measurements)
 }
 
-/// What was shown, and its photographs.
-type Kept<'f> = (Sequence, LinearPhotographs<'f>);
+/// What was shown, its photographs, and how their light changed.
+type Kept<'f> = (Sequence, LinearPhotographs<'f>, Drift);
 
 /// The same, with what was shown and its photographs, for those who go on with them.
 pub(crate) fn read_keeping<'f>(
@@ -195,8 +201,10 @@ fn examine_keeping<'f>(
         }
         found => {
             let (mut found, linear) = found?;
-            kept = Some(linear);
-            cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
+            let cells = found.cells.as_ref();
+            let drift = cells.map(|cells| cells.steadiness.drift.clone());
+            kept = Some((linear, drift.unwrap_or_default()));
+            cause = cells.and_then(|cells| cells.nonlinearity);
             examined.gates.extend(gates::judge(&sequence, &found));
             examined.white = Some(found.white.clone());
             let of_patterns = found.order.take();
@@ -216,5 +224,6 @@ fn examine_keeping<'f>(
             .filter(|shot| shot.role == Role::Bernoulli);
         measurements.diagnostics.bernoulli_taken = bernoulli.count();
     }
-    Ok((examined, kept.map(|linear| (sequence, linear))))
+    let kept = kept.map(|(linear, drift)| (sequence, linear, drift));
+    Ok((examined, kept))
 }

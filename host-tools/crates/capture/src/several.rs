@@ -71,7 +71,7 @@ pub fn read_several(
     check_once(folders)?;
     let (mut own, mut sequences, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
     for folder in folders {
-        let (measurements, (sequence, mut linear)) =
+        let (measurements, (sequence, mut linear, _)) =
             crate::read_keeping(folder, options, progress)?;
         // The others need the room.
         linear.photographs.leave_memory();
@@ -139,7 +139,7 @@ pub fn examine_several(
     let (mut each, mut own, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
     for folder in folders {
         let (examined, kept) = crate::examine_keeping(folder, options, progress)?;
-        if let (Some(measurements), Some((_, mut linear))) = (&examined.measurements, kept) {
+        if let (Some(measurements), Some((_, mut linear, _))) = (&examined.measurements, kept) {
             linear.photographs.forget();
             own.push(measurements.clone());
             photographs.push(linear);

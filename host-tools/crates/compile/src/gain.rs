@@ -1,9 +1,10 @@
 //! Gains in reference units: per cell, and finer than the cells.
 
-use iltm_capture::{FineFlood, Measurements, SeveralCaptures};
+use iltm_capture::{EvenFlood, FineFlood, Measurements, SeveralCaptures};
 use iltm_runtime::{FrameSize, resample::interpolation::Axis};
 use iltm_solve::{ChannelInverse, InverseTransport, LeftOut, WhyLeftOut};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Gains on a grid finer than the cells.
 #[derive(Clone, Debug)]
@@ -83,6 +84,25 @@ impl<'i> BetweenCells<'i> {
 /// darker samples are treated as being that bright, since noise rules there.
 const LEAST_FLOOD: f64 = 0.2;
 
+/// Most by which an even light changes a gain, as a share of it.
+const MOST_BEYOND: f64 = 0.3;
+
+/// The fine gain map of a table: gains that make an even light right, where photographs of patterns
+/// tell it, and else the photograph of white.
+#[must_use]
+pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineGains> {
+    let mut fine = white_gains(inverse, flood)?;
+    for (channel, gains) in fine.channels.iter_mut().enumerate() {
+        let Some(beyond) = beyond_even(inverse, flood, channel) else {
+            continue;
+        };
+        for (gain, beyond) in gains.iter_mut().zip(beyond) {
+            *gain *= 1.0 - beyond;
+        }
+    }
+    Some(fine)
+}
+
 /// The fine gain map from a flood photograph `b`: `g(x) = (1 + (U K A b)(x)) / b(x)`.
 ///
 /// `K b` is that of the cells' observations. Without an operator, what bounces is in the solved
@@ -91,7 +111,7 @@ const LEAST_FLOOD: f64 = 0.2;
 /// worth more.
 /// `None` if the flood map is not of the inverse's grid, or no finer than it.
 #[must_use]
-pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineGains> {
+pub(crate) fn white_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineGains> {
     let grid = inverse.grid;
     let [wide, tall] = flood.factor;
     let fits = flood.rows == tall * grid.rows() && flood.cols == wide * grid.cols();
@@ -134,6 +154,64 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
         });
     let channels = channels.collect();
     Some(FineGains { size, channels })
+}
+
+/// How much brighter each sample would be under an even light than wanted, with gains that make
+/// the photograph of white right, as a share of it. `None` without photographs of patterns that
+/// tell it, or without an operator.
+///
+/// With the weights `a` of a cell, `P a` is the drive of an even light there. By the inverse its
+/// photograph is `((P a)(x) + (U K A Y a)(x)) / g(x)`; what the sum `(Y a)(x)` of the photographs
+/// has beyond that, an even light has too.
+fn beyond_even(inverse: &InverseTransport, flood: &FineFlood, channel: usize) -> Option<Vec<f64>> {
+    let EvenFlood {
+        patterns,
+        observations,
+        weights,
+        beyond,
+    } = flood.even.get(channel)?;
+    let operator = inverse.channel(channel).operator;
+    if operator.is_none() {
+        return None;
+    }
+    let grid = inverse.grid;
+    let [wide, tall] = flood.factor;
+    let between = BetweenCells::new(inverse, flood)?;
+    let of_white = &operator * &DVector::from_column_slice(&flood.observed[channel]);
+    let of_patterns: DMatrix<f64> = &operator * observations;
+    let weights = weights.map(f64::from);
+    let light = &flood.channels[channel];
+    let of_cell = |cell: usize| -> Vec<(usize, f64)> {
+        let weight = weights.row(cell);
+        let drive = weight.dot(&patterns.row(cell));
+        // What the cells around receive, for samples between their centres.
+        let mut received = vec![0.0; grid.cells()];
+        let (row, col) = (cell / grid.cols(), cell % grid.cols());
+        for near in row.saturating_sub(1)..(row + 2).min(grid.rows()) {
+            for across in col.saturating_sub(1)..(col + 2).min(grid.cols()) {
+                let near = near * grid.cols() + across;
+                received[near] = weight.dot(&of_patterns.row(near));
+            }
+        }
+        let samples = (0..wide * tall).filter_map(|at| {
+            let sample = (row * tall + at / wide) * flood.cols + col * wide + at % wide;
+            let beyond = f64::from(beyond[sample]?);
+            let white = between.of(of_white.as_slice(), sample);
+            let bounced = (drive * white - between.of(&received, sample)) / (1.0 + white);
+            let beyond = f64::from(light[sample]) * (beyond + bounced);
+            Some((sample, beyond.clamp(-MOST_BEYOND, MOST_BEYOND)))
+        });
+        samples.collect()
+    };
+    let live = (0..grid.cells())
+        .into_par_iter()
+        .filter(|cell| inverse.live[*cell]);
+    let told: Vec<(usize, f64)> = live.flat_map_iter(of_cell).collect();
+    let mut samples = vec![0.0; light.len()];
+    for (sample, beyond) in told {
+        samples[sample] = beyond;
+    }
+    Some(samples)
 }
 
 /// The fine gain map of several projectors, each from its own flood photograph `b` while the others

@@ -7,12 +7,12 @@
 //!
 //! | part | found from | in a natural image |
 //! |---|---|---|
-//! | how far direct and bounced light of a pixel are off: `a D + b B` | all photographs: two numbers of a pixel, which nothing fitted before; once from either half of them, so that the product of both has no noise | the same `a` and `b` |
+//! | how far direct and bounced light of a pixel are off: `a D + b B` | all photographs: two numbers of a pixel, which nothing fitted before; once from either half of them, so that the product of both has no noise | the same `a` and `b`, less what the table's gains leave out for the sake of an even light |
 //! | how far gains change over as much as a place is off: photographs seen from the same wrong places do not show it | the map from cells to the camera, and its error | the same, of direct light |
 //! | the rest, which is the operator's and differs from photograph to photograph | held-out photographs: products of neighbouring pixels, which have no noise either | less, by the contrast of the image's cells |
 
 use crate::FineGains;
-use crate::gain::{fine_gains, unshared_gains_of_several};
+use crate::gain::{fine_gains, unshared_gains_of_several, white_gains};
 use iltm_capture::{
     ChannelMeasurements, FineFlood, Measurements, OneOfSeveral, PixelLight, SeveralCaptures,
 };
@@ -76,7 +76,12 @@ impl ViewerError {
         flood: &FineFlood,
     ) -> Option<Self> {
         let one = PixelPhotographs::of(measurements);
-        let fine = |inverse: &InverseTransport| fine_gains(inverse, flood);
+        let fine = |inverse: &InverseTransport| {
+            Some(BothGains {
+                table: fine_gains(inverse, flood)?,
+                white: white_gains(inverse, flood)?,
+            })
+        };
         Self::of(&[one], trials, gain_only, fine)
     }
 
@@ -92,7 +97,11 @@ impl ViewerError {
         let photographed =
             (0..several.projectors.len()).map(|at| PixelPhotographs::of_one(several, at));
         let photographed: Vec<PixelPhotographs<'_>> = photographed.collect::<Option<_>>()?;
-        let fine = |inverse: &InverseTransport| unshared_gains_of_several(inverse, flood, several);
+        let fine = |inverse: &InverseTransport| {
+            let table = unshared_gains_of_several(inverse, flood, several)?;
+            let white = table.clone();
+            Some(BothGains { table, white })
+        };
         Self::of(&photographed, trials, gain_only, fine)
     }
 
@@ -100,10 +109,10 @@ impl ViewerError {
         photographed: &[PixelPhotographs<'_>],
         trials: &[Trial],
         gain_only: &InverseTransport,
-        fine: impl Fn(&InverseTransport) -> Option<FineGains>,
+        fine: impl Fn(&InverseTransport) -> Option<BothGains>,
     ) -> Option<Self> {
         let images = Images::new(gain_only.grid);
-        let gains: Vec<Option<FineGains>> =
+        let gains: Vec<Option<BothGains>> =
             trials.iter().map(|trial| fine(&trial.inverse)).collect();
         let mut compensated = Vec::new();
         for (trial, gains) in trials.iter().zip(&gains) {
@@ -135,6 +144,12 @@ impl ViewerError {
             compensated: PictureError::mean(&compensated)?,
         })
     }
+}
+
+/// Gains of a table, and those that make the photograph of white right.
+struct BothGains {
+    table: FineGains,
+    white: FineGains,
 }
 
 /// What cells receive of all others under each pattern, by channel, cell and pattern.
@@ -321,8 +336,10 @@ struct Scene {
     inverses: Vec<Inverse>,
     /// Drives that make as much light as there is ambient light, by channel and cell.
     ambient: Vec<Vec<f64>>,
-    /// `g` by channel and site.
+    /// `g` by channel and site: that of the photograph of white.
     gains: Vec<Vec<f64>>,
+    /// Share of direct light that the table's gains leave out beside it.
+    left_out: Vec<Vec<f64>>,
     /// Square of how far they change over as much as a place is off, relative to themselves.
     unsteady: Vec<Vec<f64>>,
 }
@@ -349,7 +366,7 @@ impl Scene {
     fn new(
         seen: &PixelPhotographs<'_>,
         inverse: &InverseTransport,
-        fine: Option<&FineGains>,
+        fine: Option<&BothGains>,
     ) -> Self {
         let grid = seen.grid;
         let places = &seen.places;
@@ -365,16 +382,32 @@ impl Scene {
             })
         };
         let sites: Vec<Site> = places.iter().enumerate().filter_map(site).collect();
-        let gain_at = |channel: usize, place: [f32; 2]| match fine {
+        let at_place = |fine: Option<&FineGains>, channel: usize, place: [f32; 2]| match fine {
             Some(FineGains { size, channels }) => {
                 let factor = [size.width() / grid.cols(), size.height() / grid.rows()];
                 Corners::new(place, grid, factor).of(&channels[channel])
             }
             None => Corners::new(place, grid, [1; 2]).of(&inverse.channels[channel].gain),
         };
+        let table = fine.map(|fine| &fine.table);
+        let white = fine.map(|fine| &fine.white);
+        let gain_at = |channel: usize, place: [f32; 2]| at_place(table, channel, place);
         let gains = |channel: usize| {
             let sites = sites.iter();
-            sites.map(|site| gain_at(channel, site.place)).collect()
+            sites
+                .map(|site| at_place(white, channel, site.place))
+                .collect()
+        };
+        let left_out = |channel: usize| {
+            let share = |site: &Site| {
+                let whole = at_place(white, channel, site.place);
+                if whole > 0.0 {
+                    1.0 - gain_at(channel, site.place) / whole
+                } else {
+                    0.0
+                }
+            };
+            sites.iter().map(share).collect()
         };
         let off = seen.off;
         let unsteady = |channel: usize| {
@@ -393,6 +426,7 @@ impl Scene {
         Self {
             grid,
             gains: channels.clone().map(gains).collect(),
+            left_out: channels.clone().map(left_out).collect(),
             unsteady: channels.clone().map(unsteady).collect(),
             inverses: channels.map(|channel| inverse.channel(channel)).collect(),
             ambient: inverse
@@ -557,10 +591,12 @@ impl Scene {
                 let bounced = self.bounced(channel, received.as_slice());
                 let sites = wanted.iter().zip(bounced).zip(&fits.channels[channel]);
                 let sites = sites.zip(&self.unsteady[channel]);
+                let sites = sites.zip(&self.left_out[channel]);
                 let mut of_channel = Vec::with_capacity(wanted.len());
-                for (((light, bounced), fit), change) in sites {
+                for ((((light, bounced), fit), change), left_out) in sites {
                     unsteady.add(change * light * light);
-                    let off = |[a, b]: [f64; 2]| a * (light - bounced) + b * bounced;
+                    let off =
+                        |[a, b]: [f64; 2]| a * (light - bounced) + b * bounced - left_out * light;
                     let whole = fit.map_or(0.0, |fit| off(fit.whole));
                     of_channel.push(whole);
                     if let Some(fit) = fit {

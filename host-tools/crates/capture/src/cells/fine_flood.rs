@@ -18,6 +18,7 @@ use crate::registration::projector_map::ProjectorMap;
 use crate::several::SeveralCaptures;
 use iltm_picture::statistics::median;
 use iltm_runtime::{FrameSize, Grid};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Camera pixels that one fine sample should have at least.
@@ -64,6 +65,22 @@ pub struct FineFlood {
     /// The flood observation of each cell that a solve works with, one plane a
     /// channel, length `N`.
     pub observed: Vec<Vec<f64>>,
+    /// What an even light shows beyond it, one entry a channel; empty without a projector map.
+    pub even: Vec<EvenFlood>,
+}
+
+/// What the photograph of an even light ([`EvenLight`](crate::EvenLight)) shows, in one channel.
+#[derive(Clone, PartialEq, Debug)]
+pub struct EvenFlood {
+    /// Patterns that were added up, `N x views`.
+    pub patterns: DMatrix<f64>,
+    /// Observed light of them, `N x views`, camera units.
+    pub observations: DMatrix<f64>,
+    /// [`EvenChannel::weights`](crate::EvenChannel::weights).
+    pub weights: DMatrix<f32>,
+    /// [`EvenChannel::beyond`](crate::EvenChannel::beyond) of each sample, row by row; `None` of a cell
+    /// that no pixel sees.
+    pub beyond: Vec<Option<f32>>,
 }
 
 impl FineFlood {
@@ -118,6 +135,7 @@ impl FineFlood {
             channels,
             mapped: mapped.is_some(),
             observed: observed(measurements, Measurements::WHITE),
+            even: even(measurements, factor),
         }
     }
 
@@ -144,6 +162,8 @@ impl FineFlood {
             channels: vec![vec![0.0; rows * cols]; several.all.channels.len()],
             mapped: true,
             observed: vec![vec![0.0; grid.cells()]; several.all.channels.len()],
+            // Their gains make an even white right.
+            even: Vec::new(),
         };
         for one in &several.projectors {
             let flood = Self::with_factor(&one.own, factor);
@@ -173,6 +193,23 @@ fn observed(measurements: &Measurements, view: usize) -> Vec<Vec<f64>> {
     let channels = measurements.channels.iter();
     let of = channels.map(|channel| channel.observations.column(view).iter().copied().collect());
     of.collect()
+}
+
+/// What an even light shows beyond white's, by channel.
+fn even(measurements: &Measurements, factor: [usize; 2]) -> Vec<EvenFlood> {
+    let (Some(even), Some(Ok(map))) = (&measurements.even, &measurements.map) else {
+        return Vec::new();
+    };
+    let grid = measurements.grid;
+    let views = PixelViews::new(map, grid, factor, &measurements.registration);
+    let channels = even.channels.par_iter().zip(&measurements.channels);
+    let channels = channels.map(|(own, channel)| EvenFlood {
+        patterns: channel.patterns.select_columns(&even.views),
+        observations: channel.observations.select_columns(&even.views),
+        weights: own.weights.clone(),
+        beyond: views.means_within(grid, factor, &own.beyond),
+    });
+    channels.collect()
 }
 
 /// White's light without the noise that is known to be in it.
@@ -232,6 +269,44 @@ impl MappedFlood {
 }
 
 impl PixelViews {
+    /// Mean of the pixels that see each sample and whose place is in the same cell; that of the nearest
+    /// samples where there is none. `None` of a cell without any.
+    fn means_within(&self, grid: Grid, factor: [usize; 2], values: &[f32]) -> Vec<Option<f32>> {
+        let cols = grid.cols() * factor[0];
+        let cell_of = |row: usize, col: usize| row / factor[1] * grid.cols() + col / factor[0];
+        let mut sums = vec![[0.0_f32; 2]; self.samples()];
+        for view in self.pixels() {
+            let value = values[view.pixel as usize];
+            let [across, down] = view.place.map(|at| at.max(0.0) as usize);
+            let own = cell_of(down, across);
+            if value.is_nan() {
+                continue;
+            }
+            for (at, share) in self.seen(view) {
+                if cell_of(at / cols, at % cols) == own {
+                    sums[at][0] += share * value;
+                    sums[at][1] += share;
+                }
+            }
+        }
+        let mut means = vec![None; sums.len()];
+        for cell in 0..grid.cells() {
+            let first = cell / grid.cols() * factor[1] * cols + cell % grid.cols() * factor[0];
+            let at = |sample: usize| first + sample / factor[0] * cols + sample % factor[0];
+            let own = (0..factor[0] * factor[1]).map(|sample| {
+                let [sum, shares] = sums[at(sample)];
+                (shares > 0.0).then(|| sum / shares)
+            });
+            let own: Vec<Option<f32>> = own.collect();
+            if own.iter().any(Option::is_some) {
+                for (sample, value) in filled(&own, factor).into_iter().enumerate() {
+                    means[at(sample)] = Some(value);
+                }
+            }
+        }
+        means
+    }
+
     /// The reciprocal of [`even_gains`](Self::even_gains), where there are any.
     fn even_light(&self, flood: &[f32]) -> Vec<Option<f32>> {
         let gains = self.even_gains(flood);

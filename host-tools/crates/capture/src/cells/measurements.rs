@@ -2,6 +2,7 @@
 //! them, cell by cell.
 
 use super::cell_pixels::LeftOut;
+use super::even_light::EvenLight;
 use super::noise::{NoiseModel, NoiseSource};
 use super::pixel_light::PixelLight;
 use crate::devices::Devices;
@@ -47,6 +48,8 @@ pub struct Measurements {
     pub flood: Vec<Vec<f32>>,
     /// How many photographs of white `flood` is as good as.
     pub flood_photographs: usize,
+    /// The same for an even light; `None` without a projector map.
+    pub even: Option<EvenLight>,
     /// The projector map of stripes finer than the cells, or why they give none; `None` without
     /// any.
     pub map: Option<Result<ProjectorMap, MapError>>,

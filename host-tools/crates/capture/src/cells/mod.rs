@@ -10,12 +10,14 @@
 //! | whether light adds up, and why not | `superposition`, `nonlinearity` |
 //! | between the cells and within one | `cell_interpolation`, `fine_flood`, `wiener_filter` |
 //! | pixel by pixel, some of them | `pixel_light` |
+//! | pixel by pixel, under an even light | `even_light` |
 //! | what pictures that are no patterns throw on cells and pixels | `images` |
 //! | what each pixel sees of a grid | `pixel_views` |
 
 mod cell_interpolation;
 pub(crate) mod cell_pixels;
 pub(crate) mod drift;
+pub(crate) mod even_light;
 pub(crate) mod fine_flood;
 pub(crate) mod images;
 mod leave_one_out;
