@@ -1,5 +1,5 @@
-//! Even light: a photograph that was not taken, of all cells equally bright, as the sum of
-//! photographs of patterns.
+//! Even light, by image-based relighting: the photograph of all cells equally bright, which was not
+//! taken, as a weighted sum of photographs of patterns.
 //!
 //! The photograph of white shows a wall as bright as its paint: much light bounces from what is
 //! bright, little from what is dark. A compensated picture of an even white is lit otherwise, and
@@ -10,7 +10,8 @@
 //! The weights are a ridge regression. Each cell's answer to light of another is off by an unknown
 //! share, which falls with the square of the distance, and its answer to its own light by another;
 //! the weights expect the least square of what is left of both and of noise. They need no
-//! inverse, so that one pass over the photographs does.
+//! inverse, so that one pass over the photographs does. How large these shares are taken to be matters
+//! little: .02 or .1 instead of .05 change the error on two painted scenes by less than 2 %.
 
 use super::drift::Drift;
 use super::measurements::{ChannelMeasurements, Measurements};
@@ -100,7 +101,7 @@ impl EvenLight {
         });
         let mut shots: Vec<(usize, usize)> = shots.collect();
         shots.sort_unstable();
-        let share = |column: usize| 1.0 / sequence.views[views[column]].shots.len() as f32;
+        let repeats = |column: usize| sequence.views[views[column]].shots.len() as f32;
         let mut own = vec![NO_CELL; flood.first().map_or(0, Vec::len)];
         for view in cells.pixels() {
             own[view.pixel as usize] = own_cell(cells, view) as u32;
@@ -117,7 +118,7 @@ impl EvenLight {
             for (channel, sums) in sums.iter_mut().enumerate() {
                 let (weights, black) = (&weights[channel], &black[channel]);
                 for ((shot, photo), &column) in photos.iter().zip(&columns) {
-                    let gain = drift.gain(channel, *shot) as f32 / share(column);
+                    let gain = drift.gain(channel, *shot) as f32 * repeats(column);
                     let dark = drift.dark(channel, *shot) as f32;
                     let light = photo.planes[channel].par_iter().zip(black).zip(&own);
                     sums.par_iter_mut()

@@ -250,7 +250,7 @@ impl MappedFlood {
         Self {
             grid,
             factor,
-            light: light.map(|flood| views.even_light(flood)).collect(),
+            light: light.map(|flood| views.answered_light(flood)).collect(),
         }
     }
 
@@ -308,7 +308,7 @@ impl PixelViews {
     }
 
     /// The reciprocal of [`even_gains`](Self::even_gains), where there are any.
-    fn even_light(&self, flood: &[f32]) -> Vec<Option<f32>> {
+    fn answered_light(&self, flood: &[f32]) -> Vec<Option<f32>> {
         let gains = self.even_gains(flood);
         gains.into_iter().map(|gain| Some(1.0 / gain?)).collect()
     }
