@@ -91,8 +91,17 @@ const MOST_BEYOND: f64 = 0.3;
 /// tell it, and else the photograph of white.
 #[must_use]
 pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineGains> {
-    let mut fine = white_gains(inverse, flood)?;
-    for (channel, gains) in fine.channels.iter_mut().enumerate() {
+    Some(for_even_light(white_gains(inverse, flood)?, inverse, flood))
+}
+
+/// Makes an even light right by gains that make the photograph of white right, where photographs of
+/// patterns tell it.
+pub(crate) fn for_even_light(
+    mut gains_of_white: FineGains,
+    inverse: &InverseTransport,
+    flood: &FineFlood,
+) -> FineGains {
+    for (channel, gains) in gains_of_white.channels.iter_mut().enumerate() {
         let Some(beyond) = beyond_even(inverse, flood, channel) else {
             continue;
         };
@@ -100,7 +109,7 @@ pub fn fine_gains(inverse: &InverseTransport, flood: &FineFlood) -> Option<FineG
             *gain *= 1.0 - beyond;
         }
     }
-    Some(fine)
+    gains_of_white
 }
 
 /// The fine gain map from a flood photograph `b`: `g(x) = (1 + (U K A b)(x)) / b(x)`.

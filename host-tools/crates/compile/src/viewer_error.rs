@@ -12,7 +12,7 @@
 //! | the rest, which is the operator's and differs from photograph to photograph | held-out photographs: products of neighbouring pixels, which have no noise either | less, by the contrast of the image's cells |
 
 use crate::FineGains;
-use crate::gain::{fine_gains, unshared_gains_of_several, white_gains};
+use crate::gain::{for_even_light, unshared_gains_of_several, white_gains};
 use iltm_capture::{
     ChannelMeasurements, FineFlood, Measurements, OneOfSeveral, PixelLight, SeveralCaptures,
 };
@@ -77,10 +77,9 @@ impl ViewerError {
     ) -> Option<Self> {
         let one = PixelPhotographs::of(measurements);
         let fine = |inverse: &InverseTransport| {
-            Some(BothGains {
-                table: fine_gains(inverse, flood)?,
-                white: white_gains(inverse, flood)?,
-            })
+            let white = white_gains(inverse, flood)?;
+            let table = for_even_light(white.clone(), inverse, flood);
+            Some(BothGains { table, white })
         };
         Self::of(&[one], trials, gain_only, fine)
     }
