@@ -138,6 +138,115 @@ fn captures_of_two_projectors_are_checked_beside_each_other() {
     }
 }
 
+/// Copies of both captures in a place of their own.
+fn captures() -> User {
+    let user = User::new();
+    for name in ["left", "right"] {
+        for part in ["", "patterns", "photos", "calibration", "slides"] {
+            let part = format!("{name}/{part}");
+            user.copy(&prepared().path(&part), &part);
+        }
+    }
+    user
+}
+
+/// Replaces samples of a photograph of `left`, each with its place in the file.
+fn change(user: &User, name: &str, sample: impl Fn(usize, f32) -> f32) {
+    let path = user.path(&format!("left/photos/{name}"));
+    let mut photo = image::open(&path).unwrap().into_luma16();
+    for (at, value) in photo.iter_mut().enumerate() {
+        *value = sample(at, f32::from(*value)).round().clamp(0.0, 65535.0) as u16;
+    }
+    photo.save(&path).unwrap();
+}
+
+/// Light of the right projector's white, without black's.
+fn white_of_right() -> Vec<f32> {
+    let photo = |index: u32| {
+        let path = prepared().path(&format!("right/photos/{index:03}.png"));
+        image::open(path).unwrap().into_luma16()
+    };
+    let [white, black] = [photo(0), photo(1)];
+    let pairs = white.iter().zip(black.iter());
+    pairs
+        .map(|(white, black)| f32::from(*white) - f32::from(*black))
+        .collect()
+}
+
+#[test]
+fn a_projector_that_was_not_dark_while_another_one_was_photographed_is_named() {
+    let white = white_of_right();
+    let checked = |share: f32| {
+        let user = captures();
+        for photo in user.names("left/photos") {
+            change(&user, &photo, |at, light| light + share * white[at]);
+        }
+        user.run("check left right").with_code()
+    };
+    let said = "projector of right was not dark while left was photographed";
+    let slight = checked(0.001);
+    assert!(
+        slight.contains("exit 0\n") && !slight.contains(said),
+        "{slight}"
+    );
+    contains(&checked(0.005), &["exit 0\n", said, ".5 % of its white"]);
+    contains(
+        &checked(0.015),
+        &["exit 5\n", said, "1.5 % of its white", "Show black on all"],
+    );
+}
+
+#[test]
+fn photographs_that_another_projector_lit_are_named() {
+    let white = white_of_right();
+    let checked = |photographs: &[&str], share: f32| {
+        let user = captures();
+        for photo in photographs {
+            change(&user, photo, |at, light| light + share * white[at]);
+        }
+        user.run("check left").with_code()
+    };
+    contains(
+        &checked(&["120.png"], 0.2),
+        &[
+            "exit 0\n",
+            "warn flicker",
+            "1 photograph differs",
+            "light: photos/120.png",
+        ],
+    );
+    contains(
+        &checked(&["120.png", "121.png", "122.png"], 1.0),
+        &[
+            "exit 5\n",
+            "FAIL flicker",
+            "photos/120.png, photos/121.png, photos/122.png",
+        ],
+    );
+}
+
+#[test]
+fn photographs_that_a_projector_showed_nothing_for_are_named() {
+    let user = captures();
+    let black = image::open(user.path("left/photos/001.png"))
+        .unwrap()
+        .into_luma16();
+    for index in 0_u16..5 {
+        // No two are the same file.
+        change(&user, &format!("{}.png", 120 + index), |at, _| {
+            f32::from(black.as_raw()[at]) + f32::from(3 * index)
+        });
+    }
+    contains(
+        &user.fails(5, "check left"),
+        &[
+            "5 photographs are dark",
+            "photos/120.png, photos/121.png",
+            "the projector stays on",
+        ],
+    );
+}
+
 #[test]
 fn a_report_of_two_projectors_draws_both_and_says_who_lights_whom_as_a_check_does() {
     let user = prepared();

@@ -1,6 +1,7 @@
 //! Crossing light: what one of several projectors throws on what another one lights, by bounces
 //! and where they overlap.
 
+use nalgebra::{Matrix2, Vector2};
 use std::ops::Range;
 
 /// Light that one projector throws on what another one lights.
@@ -70,9 +71,64 @@ pub(crate) fn crossing_light(
     pairs.filter(|(from, to)| from != to).map(of_pair).collect()
 }
 
+/// Part of what the light under black of two captures differs by that whites must explain.
+const EXPLAINED: f64 = 0.8;
+
+/// Most that the capture's own white may take of it, of what the other's takes: light in the room
+/// falls on what both light.
+const OWN_WHITE: f64 = 0.2;
+
+/// Share of its white that another projector showed while one was photographed and it should be dark: by
+/// the light under black of both captures, the first one's first, and by their white. `None` if
+/// something else is the difference.
+pub(crate) fn shown_under_black(black: [&[f32]; 2], white: [&[f64]; 2]) -> Option<f64> {
+    let mut normal = Matrix2::zeros();
+    let mut right = Vector2::zeros();
+    let mut all = 0.0;
+    for (pixel, (own, other)) in white[0].iter().zip(white[1]).enumerate() {
+        let whites = Vector2::new(*own, *other);
+        let more = f64::from(black[0][pixel]) - f64::from(black[1][pixel]);
+        normal += whites * whites.transpose();
+        right += whites * more;
+        all += more * more;
+    }
+    let shares = normal.try_inverse()? * right;
+    let explained = right.dot(&shares) / all;
+    let [by_own, by_other] = shares.into();
+    (explained > EXPLAINED && by_own < OWN_WHITE * by_other).then_some(by_other)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn white_of_a_projector_that_was_not_dark_is_told_from_light_in_the_room() {
+        // The first lights the left half, the second the right one, and each a little of the other's.
+        let white = [[1.0, 0.9, 0.1, 0.1], [0.1, 0.1, 0.8, 0.7]];
+        let room = [0.02, 0.02, 0.01, 0.03];
+        let black = |shown: [f64; 2], lamp: f64| -> Vec<f32> {
+            let of = |pixel: usize| {
+                shown[0] * white[0][pixel] + shown[1] * white[1][pixel] + (1.0 + lamp) * room[pixel]
+            };
+            (0..4).map(|pixel| of(pixel) as f32).collect()
+        };
+        let found = |own: [f64; 2], other: [f64; 2], lamp: f64| {
+            let black = [black(own, lamp), black(other, 0.0)];
+            let black = black.each_ref().map(Vec::as_slice);
+            shown_under_black(black, white.each_ref().map(|white| &white[..]))
+        };
+        let near = |found: Option<f64>, share: f64| (found.unwrap() - share).abs() < 1e-4;
+        assert!(near(found([0.0, 0.5], [0.0; 2], 0.0), 0.5));
+        assert!(near(found([0.0, 0.003], [0.0; 2], 0.0), 0.003));
+        // Neither was dark in the other's capture.
+        assert!(near(found([0.0, 0.4], [0.3, 0.0], 0.0), 0.4));
+        // A lamp lights what both light; the same black of a projector is in both captures.
+        assert_eq!(found([0.0; 2], [0.0; 2], 5.0), None);
+        assert_eq!(found([0.002; 2], [0.002; 2], 0.0), None);
+        // The other one was off in this capture.
+        assert!(found([0.0; 2], [0.0, 0.01], 0.0).is_none_or(|share| share < 0.0));
+    }
 
     #[test]
     fn bounces_count_where_one_lights_alone_and_overlaps_where_both_do() {

@@ -9,11 +9,12 @@ use crate::Examined;
 use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Measurements};
-use crate::crossing_light::{CrossingLight, ProjectorAreas, crossing_light};
+use crate::crossing_light::{CrossingLight, ProjectorAreas, crossing_light, shown_under_black};
 use crate::format::error::CaptureError;
 use crate::format::sequence::{CaptureOptions, Sequence};
 use crate::gate::Gate;
 use crate::gates::between;
+use crate::photographs::channel_sum;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::sampled::Sampled;
 use crate::registration::black_shift;
@@ -208,14 +209,21 @@ impl WideFrame {
             other: &names[other],
         };
         let black = photographs[0].black_as_seen();
-        let mut gates = Vec::new();
+        let mut gates: Vec<(usize, Gate)> = (self.not_dark(photographs).into_iter())
+            .filter_map(|([of, other], share)| {
+                Some((of, between::not_dark(&pair(of, other), share)?))
+            })
+            .collect();
+        let dark = gates.is_empty();
         for (other, linear) in photographs.iter().enumerate().skip(1) {
             let own = linear.black_as_seen();
             let shift = black_shift::find(&black, &own, width);
             let movement = between::movement(&pair(0, other), (binning, cell), shift);
-            let brighter = black_shift::brighter(&black, &own);
             gates.push((other, movement));
-            gates.push((other, between::black(&pair(0, other), brighter)));
+            if dark {
+                let brighter = black_shift::brighter(&black, &own);
+                gates.push((other, between::black(&pair(0, other), brighter)));
+            }
             let responses = [0, other].map(|at| self.own[at].devices.known_projector());
             gates.push((other, between::response(&pair(0, other), responses)));
         }
@@ -231,6 +239,32 @@ impl WideFrame {
             gates.extend(found.map(|gate| (other, gate)));
         }
         gates
+    }
+
+    /// Which projector was photographed while which other one was not dark, and how much of its white that
+    /// showed.
+    fn not_dark(&self, photographs: &[LinearPhotographs<'_>]) -> Vec<([usize; 2], f64)> {
+        let black = |of: usize| channel_sum(&photographs[of].black);
+        let black: Vec<Vec<f32>> = (0..photographs.len()).map(black).collect();
+        let white = |of: usize| -> Vec<f64> {
+            let pixels = 0..black[of].len();
+            pixels.map(|pixel| white_at(&self.own[of], pixel)).collect()
+        };
+        let white: Vec<Vec<f64>> = (0..photographs.len()).map(white).collect();
+        let all = 0..photographs.len();
+        let pairs = all
+            .clone()
+            .flat_map(|of| all.clone().map(move |other| [of, other]));
+        let pairs = pairs.filter(|[of, other]| of != other);
+        pairs
+            .filter_map(|pair| {
+                let black = pair.map(|at| &black[at][..]);
+                Some((
+                    pair,
+                    shown_under_black(black, pair.map(|at| &white[at][..]))?,
+                ))
+            })
+            .collect()
     }
 
     /// Cells of other projectors that light the same place, by cell.

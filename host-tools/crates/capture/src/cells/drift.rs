@@ -26,6 +26,11 @@ const ROUNDS: usize = 3;
 const CERTAIN: f64 = 4.0;
 const STEADY: f64 = 0.004;
 
+/// Misfit of a photograph from which something else than its pattern lit it or stood in its light, beside
+/// so many times the session's usual misfit: good sessions' coarse stripes have up to .053, or 5.3 times.
+const DISTURBED: f64 = 0.04;
+const USUALLY: f64 = 4.0;
+
 /// Change of the ambient light, of itself, below which it is steady.
 const STEADY_DARK: f64 = 0.02;
 
@@ -87,6 +92,20 @@ pub(crate) struct Steadiness {
 }
 
 impl Steadiness {
+    /// How far each shot is from what the others let expect at its brightness, of the session's usual light,
+    /// and from how much on something disturbed it.
+    pub(crate) fn misfits(&self) -> (Vec<(usize, f64)>, f64) {
+        let shots = self.models.first().map_or(&[][..], |model| &model.shots);
+        let mut misfits = vec![0.0_f64; shots.len()];
+        for model in &self.models {
+            for (most, own) in misfits.iter_mut().zip(model.misfits()) {
+                *most = most.max(own);
+            }
+        }
+        let least = DISTURBED + USUALLY * median(misfits.clone()).unwrap_or(0.0);
+        (shots.iter().copied().zip(misfits).collect(), least)
+    }
+
     /// The same with the changes from photograph to photograph so many times as large.
     pub(crate) fn scaled(mut self, times: f64) -> Self {
         for gain in self.gains.iter_mut().chain(&mut self.slow) {

@@ -134,6 +134,16 @@ impl LeaveOneOut {
         }
     }
 
+    /// How far each photograph is from what the others predict at its gain: root mean square over the
+    /// cells, relative to that of all photographs' light.
+    pub(crate) fn misfits(&self) -> impl Iterator<Item = f64> + '_ {
+        let usual = (self.light.norm_squared() / self.shots.len() as f64).sqrt();
+        (self.gains.iter().enumerate()).map(move |(at, gain)| {
+            let off = self.light.column(at) - self.predicted.column(at) * *gain;
+            off.norm() / usual.max(f64::MIN_POSITIVE)
+        })
+    }
+
     /// Light over prediction in each lit cell of a photograph.
     fn ratios(&self, at: usize) -> Vec<f64> {
         self.lit(at)

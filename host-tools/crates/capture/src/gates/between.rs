@@ -13,6 +13,11 @@ use iltm_picture::statistics::quantile;
 /// Part of the light under black that one has less, from which it is worth a word.
 const DARKER: f64 = 0.1;
 
+/// Share of its white that another projector may show under black, with a word and at most: a table takes
+/// it for light that is always there.
+const SHOWN: f64 = 0.002;
+const MOST_SHOWN: f64 = 0.01;
+
 /// Share of a picture that others light too, from which it is worth a word.
 const MOST_SHARED: f64 = 0.5;
 
@@ -110,6 +115,22 @@ pub(crate) fn black(pair: &Pair<'_>, brighter: Option<f64>) -> Gate {
              projectors show black.",
         )
     }
+}
+
+/// Says that the second capture's projector showed so much of its white while the first one's was
+/// photographed; `None` if it is too little to matter.
+pub(crate) fn not_dark(pair: &Pair<'_>, share: f64) -> Option<Gate> {
+    let Pair { first, other } = pair;
+    let verdict = Verdict::of(share, SHOWN, MOST_SHOWN);
+    let next_step = "Show black on all other projectors, and take that capture again.";
+    (verdict != Verdict::Pass).then(|| Gate {
+        what: format!(
+            "the projector of {other} was not dark while {first} was photographed: under black it lights the \
+             scene by {:.1} % of its white",
+            100.0 * share
+        ),
+        ..Gate::of_share(GateName::Drift, verdict, (share, MOST_SHOWN), next_step)
+    })
 }
 
 /// Judges whether two projectors show the same light for a code: a table has one response for all.

@@ -1,11 +1,11 @@
 //! Gate `flicker`: brightness does not jump from photograph to photograph, nor from
-//! row to row within one.
+//! row to row within one, and nothing else lights some of them.
 
 use crate::cells::CellEvidence;
 use crate::cells::drift::Steadiness;
 use crate::cells::mains_banding::MainsBanding;
 use crate::format::sequence::Sequence;
-use crate::gate::{Evidence, Gate, GateName, Verdict};
+use crate::gate::{Evidence, Gate, GateName, Verdict, listed};
 use iltm_picture::statistics::median;
 
 /// Scatter of the brightness from which it is worth a word.
@@ -34,6 +34,10 @@ pub(super) fn judge(sequence: &Sequence, cells: &CellEvidence) -> Gate {
     let offs = offs(steadiness);
     let (scatter, striped) = (scatter(steadiness), striped(bands));
     let number = scatter.max(striped);
+    let disturbed = disturbed(sequence, &cells.steadiness);
+    if let Some(gate) = disturbed.filter(|gate| gate.number > 100.0 * number || number < WARN) {
+        return gate;
+    }
     let verdict = Verdict::of(number, WARN, MOST);
     let what = match (verdict, bands) {
         (Verdict::Pass, _) if !compared => format!(
@@ -85,6 +89,44 @@ pub(super) fn judge(sequence: &Sequence, cells: &CellEvidence) -> Gate {
         },
         ..Gate::of_share(name, verdict, (number, MOST), next_step)
     }
+}
+
+/// The gate where some photographs are disturbed; `None` where none is.
+fn disturbed(sequence: &Sequence, steadiness: &Steadiness) -> Option<Gate> {
+    let (misfits, least) = steadiness.misfits();
+    let disturbed: Vec<&(usize, f64)> = misfits.iter().filter(|(_, off)| *off > least).collect();
+    let most = disturbed.iter().map(|(_, off)| *off).reduce(f64::max)?;
+    let squares: f64 = disturbed.iter().map(|(_, off)| off * off).sum();
+    let number = (squares / misfits.len() as f64).sqrt();
+    let photo = |(shot, _): &&(usize, f64)| sequence.shots[*shot].photo.display().to_string();
+    let what = format!(
+        "{} from what the others let expect, by up to {:.0} % of the light: another projector or a lamp was \
+         on, or somebody stood in the light: {}",
+        match disturbed.len() {
+            1 => "1 photograph differs".to_owned(),
+            several => format!("{several} photographs differ"),
+        },
+        100.0 * most,
+        listed(disturbed.iter().map(photo), 4)
+    );
+    let index = |shot: &usize| sequence.shots[*shot].index;
+    let values = misfits.iter().map(|(shot, off)| (index(shot), 100.0 * off));
+    Some(Gate {
+        what,
+        evidence: Evidence::Photographs {
+            what: "difference from what the others let expect, % of the light",
+            values: values.collect(),
+            limit: Some(100.0 * least),
+            from: None,
+        },
+        ..Gate::of_share(
+            GateName::Flicker,
+            // Some are, however little that is.
+            Verdict::of(number, 0.0, MOST),
+            (number, MOST),
+            "Keep all other projectors dark and other light out, and take those photographs again.",
+        )
+    })
 }
 
 /// Brightness off the slow curve, of each photograph.

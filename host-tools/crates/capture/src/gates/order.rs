@@ -2,6 +2,7 @@
 
 use crate::format::bracket::Bracket;
 use crate::format::manifest::Shot;
+use crate::format::role::Role;
 use crate::format::sequence::Sequence;
 use crate::gate::{Evidence, Gate, GateName, Verdict, listed};
 use crate::photographs::order::{Order, Wrong};
@@ -73,7 +74,23 @@ pub(super) fn judge(shots: &[Shot], order: Option<&Order>) -> Gate {
         }
         wrong => {
             let (what, next_step) = shifted(shots, wrong).unwrap_or_else(|| {
+                let dark = |shot: &usize| shots[*shot].role == Role::Black;
+                if wrong.iter().all(|wrong| wrong.shows.as_ref().is_some_and(dark)) {
+                    return (
+                        format!(
+                            "{} dark where their patterns are not: {}",
+                            match wrong.len() {
+                                1 => "1 photograph is".to_owned(),
+                                several => format!("{several} photographs are"),
+                            },
+                            listed(wrong.iter().map(|wrong| photo(wrong.shot)), 4)
+                        ),
+                        "Make sure that the projector stays on and shows every slide, and take those \
+                         photographs again.",
+                    );
+                }
                 let one = |wrong: &Wrong| match wrong.shows {
+                    Some(other) if dark(&other) => format!("{} is dark", photo(wrong.shot)),
                     Some(other) => format!("{} shows that of {}", photo(wrong.shot), photo(other)),
                     None => format!("{} shows none", photo(wrong.shot)),
                 };
