@@ -55,6 +55,8 @@ pub struct CellReadings {
     pub white: Vec<CellPlanes>,
     /// Mean of the photographs of black: ambient light and the projector's black.
     pub black: CellPlanes,
+    /// Noise of a camera pixel, by channel.
+    pub noise: Vec<NoiseModel>,
     /// The photographs of the pictures, in their order, ambient light included.
     pub pictures: Vec<CellPlanes>,
     /// The same photographs for people: every [`CellReadings::step`]th pixel of the camera, the
@@ -82,8 +84,6 @@ pub struct PixelReadings {
     pub pictures: Vec<Vec<Vec<f32>>>,
     /// Light under black by channel and pixel.
     pub black: Vec<Vec<f32>>,
-    /// Noise of a pixel, by channel.
-    pub noise: Vec<NoiseModel>,
 }
 
 impl PixelReadings {
@@ -104,7 +104,6 @@ impl PixelReadings {
             factor: finest_factor(grid, (registration, live), Some(map), 1, None),
             pictures: Vec::new(),
             black: Vec::new(),
-            noise: Vec::new(),
         }
     }
 
@@ -212,7 +211,7 @@ pub fn remeasure(
     let pixels = match pixels {
         Some(Ok(mut pixels)) => {
             pixels.read((photographs, &of_fine), &linear.black, progress)?;
-            Some(Ok(PixelReadings { noise, ..pixels }))
+            Some(Ok(pixels))
         }
         other => other,
     };
@@ -228,6 +227,7 @@ pub fn remeasure(
         gates,
         cause,
         white,
+        noise,
         pictures,
         views,
         step,
@@ -311,11 +311,7 @@ pub fn remeasure_several(
     let mut pixels = wide.map().map(|map| {
         let pixels = PixelReadings::new(&map, wide.grid, live, &saturated);
         let views = wide.views(&pixels.views).without(&saturated);
-        Ok(PixelReadings {
-            views,
-            noise,
-            ..pixels
-        })
+        Ok(PixelReadings { views, ..pixels })
     });
     match &mut pixels {
         Some(Ok(pixels)) => pixels.read((&mut photographs, &of_pictures), black, progress)?,
@@ -334,6 +330,7 @@ pub fn remeasure_several(
         gates,
         cause,
         white,
+        noise,
         pictures: light,
         views,
         step,

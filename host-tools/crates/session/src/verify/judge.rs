@@ -6,6 +6,7 @@
 //! known: the table's own predicted error, what the projector's range and its 8-bit codes
 //! leave (the table read backwards, [`Expected`]), and the noise of the photographs.
 
+use super::noise::{self, PhotographNoise};
 use super::outcome::{MOST_SHIFTED, decide, decide_by_pixels, decide_by_shifts};
 use super::readings::Shown;
 use super::{Cause, ChainFault, Expected, Outcome, PixelVerdict, Readings, VerifyError};
@@ -55,7 +56,7 @@ pub struct Bound {
     /// `None` if the table does not tell what light comes of an input.
     pub range: Option<f64>,
     /// Error that the noise of these photographs makes, mean over the images; `None` with
-    /// a single photograph of white.
+    /// a single photograph of white. What counts and is added is the most that it can be.
     pub noise: Option<f64>,
     /// Error of finding the cells again: what white differs by from cell to cell and neighbours
     /// do not share, since a camera elsewhere sees other parts of them; at most 1 %, beyond
@@ -366,7 +367,7 @@ impl LiveCells {
     }
 
     /// Their light side by side, to be compared like a picture.
-    fn light(&self, light: &CellPlanes) -> LightPicture {
+    pub(super) fn light(&self, light: &CellPlanes) -> LightPicture {
         let plane = |plane: &Vec<f64>| self.0.iter().map(|cell| plane[*cell] as f32).collect();
         let size = FrameSize::new(self.0.len() as u16, 1);
         let planes = light.iter().map(plane).collect();
@@ -390,7 +391,7 @@ impl LiveCells {
     }
 
     /// Values of these cells in one channel.
-    fn of<'l>(&'l self, plane: &'l [f64]) -> impl Iterator<Item = f64> + 'l {
+    pub(super) fn of<'l>(&'l self, plane: &'l [f64]) -> impl Iterator<Item = f64> + 'l {
         self.0.iter().map(|cell| plane[*cell])
     }
 }
@@ -454,7 +455,7 @@ fn bound(
         predicted.filter(|_| own > 0.0),
         (before, given),
         &ranges,
-        noise(readings, lit).as_deref(),
+        noise::of_compensated(readings, lit).as_deref(),
         viewpoint,
     )
 }
@@ -465,12 +466,12 @@ fn bound_of(
     predicted: Option<f64>,
     (before, given): (f64, Option<f64>),
     ranges: &[Option<f64>],
-    noise: Option<&[f64]>,
+    noise: Option<&[PhotographNoise]>,
     viewpoint: f64,
 ) -> Bound {
     let count = ranges.len().max(1) as f64;
     let mean = |of: &dyn Fn(usize) -> f64| (0..ranges.len()).map(of).sum::<f64>() / count;
-    let noise_of = |image: usize| noise.map_or(0.0, |noise| noise[image]);
+    let noise_of = |image: usize| noise.map_or(0.0, |noise| noise[image].most);
     let range_of = |image: usize| ranges[image].unwrap_or(0.0);
     let modelled = ranges.iter().all(Option::is_some);
     let unpredicted = given.unwrap_or(UNPREDICTED * before) / MARGIN;
@@ -499,40 +500,13 @@ fn bound_of(
         predicted,
         range: modelled.then(|| mean(&range_of)),
         viewpoint,
-        noise: noise.is_some().then(|| mean(&noise_of)),
+        noise: noise.map(|noise| mean(&|image| noise[image].expected)),
         counted: [0, 1].map(|part| mean(&|image| counted_of(image)[part])),
         promise: mean(&promise_of),
         added: mean(&added_of),
         expected,
         doubt: (MARGIN * explained).max(limit),
     }
-}
-
-/// Error that noise makes in each compensated photograph, from what photographs of white
-/// differ by; `None` with a single one.
-fn noise(readings: &Readings, lit: &LiveCells) -> Option<Vec<f64>> {
-    let white = &readings.revisited.white;
-    let (first, others) = white.split_first()?;
-    let first = lit.light(first);
-    let norm = norm(&first);
-    // Relative to white, of one of the two that differ.
-    let of_pair = |other| Comparison::new(&lit.light(other), &first).error / 2.0_f64.sqrt();
-    let relative: Vec<f64> = others.iter().map(of_pair).collect();
-    if relative.is_empty() || norm <= 0.0 {
-        return None;
-    }
-    let square: f64 = relative.iter().map(|error| error * error).sum();
-    let white = (square / relative.len() as f64).sqrt() * norm;
-    let of_image = |shown: &Shown| white / self::norm(&lit.light(&shown.seen[1])).max(1e-12);
-    Some(readings.shown.iter().map(of_image).collect())
-}
-
-fn norm(picture: &LightPicture) -> f64 {
-    let light = picture.planes().iter().flatten();
-    light
-        .map(|light| f64::from(*light).powi(2))
-        .sum::<f64>()
-        .sqrt()
 }
 
 /// Refuses photographs that show another picture than their own.
@@ -732,9 +706,10 @@ fn worst(table: &Table<'_>, images: &[ImageVerdict]) -> Vec<WorstCell> {
 mod tests {
     use super::*;
     use crate::verify::test_scene::scene;
-    use iltm_capture::{CellReadings, Registration};
+    use iltm_capture::{CellReadings, NoiseModel, Registration};
     use iltm_compile::{CompileOptions, compile};
     use iltm_runtime::Grid;
+    use std::path::PathBuf;
 
     fn close(found: f64, wanted: f64) -> bool {
         (found - wanted).abs() < 1e-12
@@ -780,16 +755,27 @@ mod tests {
     fn a_limit_counts_noise_and_viewpoint_up_to_their_share_of_each_images_promise() {
         // Promises of .05 and .03: the table's own .03, and what range leaves.
         let ranges = [Some(0.04), Some(0.0)];
-        let bound = bound_of(Some(0.03), (0.5, None), &ranges, Some(&[0.0; 2]), 0.0);
+        // What is expected of it does not count.
+        let noise = |most: f64| PhotographNoise {
+            most,
+            expected: most / 2.0,
+        };
+        let bound = bound_of(
+            Some(0.03),
+            (0.5, None),
+            &ranges,
+            Some(&[noise(0.0); 2]),
+            0.0,
+        );
         assert!(close(bound.promise, 0.04) && close(bound.range.unwrap(), 0.02));
         assert!(close(bound.limit, 0.06) && close(bound.doubt, 0.06));
         // Noise beyond 1.5 promises, and a viewpoint beyond 2.5, raise the doubt only.
-        let one = |noise, viewpoint| {
+        let one = |most, viewpoint| {
             bound_of(
                 Some(0.03),
                 (0.5, None),
                 &[Some(0.04)],
-                Some(&[noise]),
+                Some(&[noise(most)]),
                 viewpoint,
             )
         };
@@ -838,6 +824,7 @@ mod tests {
                 cause: None,
                 white,
                 black: Vec::new(),
+                noise: Vec::new(),
                 pictures: Vec::new(),
                 views: Vec::new(),
                 step: 1,
@@ -852,6 +839,47 @@ mod tests {
             unseen: Vec::new(),
             flood: Vec::new(),
         }
+    }
+
+    #[test]
+    fn the_camera_s_own_noise_is_smaller_in_darker_photographs_and_nothing_else_is() {
+        // Four pixels a cell, and shot noise alone: .005 between two means of .5.
+        let (shot, pixels, white, dark) = (1e-4, 4.0, 0.5, 0.125);
+        let by_camera: f64 = shot * white / pixels;
+        let noise_of = |times: f64, models: usize| {
+            let off = times * (2.0 * by_camera).sqrt();
+            let signs = [1.0, -1.0, -1.0, 1.0];
+            let other: Vec<f64> = signs.iter().map(|sign| white + sign * off).collect();
+            let mut readings = readings(vec![vec![vec![white; 4]; 3], vec![other; 3]]);
+            readings.revisited.pixels_of_cells = vec![vec![0; 4]; 4];
+            readings.revisited.noise = vec![NoiseModel { shot, floor: 0.0 }; models];
+            let light = || vec![vec![dark; 4]; 3];
+            readings.shown.push(Shown {
+                image: 0,
+                title: String::new(),
+                clipped: 0.0,
+                wanted: light(),
+                input: [light(), light()],
+                seen: [light(), light()],
+                photos: [PathBuf::new(), PathBuf::new()],
+                views: [None, None],
+            });
+            let noise = noise::of_compensated(&readings, &LiveCells::new(&[true; 4]));
+            noise.unwrap()[0]
+        };
+        let near = |found: PhotographNoise, [most, expected]: [f64; 2]| {
+            for (found, share) in [(found.most, most), (found.expected, expected)] {
+                let wanted = (share * by_camera).sqrt() / dark;
+                assert!((found / wanted - 1.0).abs() < 1e-3, "{found} {wanted}");
+            }
+        };
+        // A quarter of white's light has a quarter of its shot noise.
+        near(noise_of(1.0, 3), [1.0, 0.25]);
+        // The model says more than photographs differ by: they are right.
+        near(noise_of(0.5, 3), [0.25, 0.25 * 0.25]);
+        // What the camera does not explain stays as large as in white.
+        near(noise_of(2.0, 3), [4.0, 3.0 + 0.25]);
+        near(noise_of(1.0, 0), [1.0, 1.0]);
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //!                expected  the light that the table expects of any input
 //!                judge     errors before and after, drift, what they are held against
 //!                chain     what a chain did that was to compensate
+//!                noise     what photographs of one picture differ by
 //!                pixels    what a viewer sees, at every pixel of the camera
 //!                refine    photographs fed back into the table's gains
 //!                outcome   passed, failed, or these photographs cannot tell; and why
@@ -30,6 +31,7 @@ mod images;
 mod judge;
 mod manifest;
 mod maps;
+mod noise;
 mod outcome;
 mod page;
 mod pixels;

@@ -187,7 +187,16 @@ fn expectation(verdict: &TableVerdict) -> Vec<(&'static str, String)> {
         ),
         (
             "noise of these photographs makes",
-            known(bound.noise, "not known: one photograph of white"),
+            bound.noise.map_or_else(
+                || "not known: one photograph of white".to_owned(),
+                |noise| {
+                    let counted = percent(bound.counted[0]);
+                    format!(
+                        "{}; {counted} counts, at most as much as in white",
+                        percent(noise)
+                    )
+                },
+            ),
         ),
         ("finding the cells again makes", percent(bound.viewpoint)),
         (

@@ -10,7 +10,7 @@ use super::fixed_pattern::FixedPattern;
 use super::judge::MARGIN;
 use super::readings::FineShown;
 use super::{Bound, Readings};
-use iltm_capture::PixelReadings;
+use iltm_capture::{NoiseModel, PixelReadings};
 use iltm_compile::Provenance;
 use iltm_picture::{LightPicture, PictureError};
 use iltm_report::tier_costs;
@@ -96,7 +96,7 @@ impl PixelVerdict {
                     &on_camera(pixels, &wanted)?,
                     &compared(pixels),
                 )?;
-                let noise = noise(pixels, &seen, &wanted);
+                let noise = noise(&readings.revisited.noise, &seen, &wanted);
                 squares[half] += (error.relative.powi(2) - noise).max(0.0);
                 if half == 1 {
                     noises += noise;
@@ -251,10 +251,10 @@ pub(super) fn compared(pixels: &PixelReadings) -> Vec<bool> {
 
 /// Square of the relative error that noise makes in a photograph, at the brightness of what was
 /// wanted that suits it best.
-fn noise(pixels: &PixelReadings, seen: &[Vec<f32>], wanted: &[Vec<f32>]) -> f64 {
+fn noise(models: &[NoiseModel], seen: &[Vec<f32>], wanted: &[Vec<f32>]) -> f64 {
     let white = scale(seen, wanted);
     let (mut variance, mut square) = (0.0, 0.0);
-    for ((seen, wanted), model) in seen.iter().zip(wanted).zip(&pixels.noise) {
+    for ((seen, wanted), model) in seen.iter().zip(wanted).zip(models) {
         for (seen, wanted) in seen.iter().zip(wanted) {
             variance += model.variance(f64::from(*seen));
             square += f64::from(*wanted).powi(2);

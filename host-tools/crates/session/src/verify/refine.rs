@@ -299,7 +299,7 @@ impl Seen {
         let white = (product / wanted).max(f64::MIN_POSITIVE);
         let mut square = 0.0;
         for image in &mut images {
-            for (residual, noise) in image.iter_mut().zip(&pixels.noise) {
+            for (residual, noise) in image.iter_mut().zip(&readings.revisited.noise) {
                 for (missing, wanted) in residual.missing.iter_mut().zip(&residual.wanted) {
                     let seen = f64::from(*missing);
                     let known = f64::from(u8::from(*wanted > 0.0));
