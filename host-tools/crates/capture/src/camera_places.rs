@@ -8,7 +8,7 @@ use crate::format::sequence::CaptureOptions;
 use crate::gate::GateName;
 use crate::registration::correspondence::{self, Correspondence};
 use crate::remeasure::CellPlanes;
-use crate::several::check_once;
+use crate::several::{as_the_first, check_once};
 use crate::wide_frame::{WideFrame, wide_size};
 use iltm_picture::progress::Progress;
 use iltm_runtime::{FrameSize, Grid};
@@ -54,7 +54,7 @@ pub fn camera_places(
     let (mut own, mut linear) = (Vec::new(), Vec::new());
     for folder in folders {
         let (measurements, (_, mut photographs, _)) =
-            crate::read_keeping(folder, &options, progress)?;
+            crate::read_keeping(folder, &options, as_the_first(&own), progress)?;
         photographs.photographs.forget();
         own.push(measurements);
         linear.push(photographs);

@@ -6,7 +6,7 @@ use crate::cells::cell_pixels::CellPixels;
 use crate::cells::images::{self, KnownImages};
 use crate::cells::measurements::{ChannelMeasurements, Diagnostics, Measurements};
 use crate::cells::noise::NoiseModel;
-use crate::devices::{CameraFit, ColourMixingMatrix, Devices, MeasuredDevices};
+use crate::devices::{CameraFit, Devices, MeasuredDevices, Unmixing};
 use crate::format::error::CaptureError;
 use crate::format::picture_file::FileFormat;
 use crate::format::sequence::Sequence;
@@ -88,33 +88,37 @@ impl CaptureEvidence {
     pub(crate) fn collect<'f>(
         folder: &'f Path,
         sequence: &Sequence,
-        settings: &Settings,
+        (settings, unmixing): (&Settings, Unmixing<'_>),
         progress: &dyn Progress,
     ) -> Result<(Self, LinearPhotographs<'f>), CaptureError> {
         let reading = settings.camera.reading();
         let mut linear = LinearPhotographs::read(folder, sequence, &reading, progress)?;
-        let found = Self::find(folder, sequence, (settings, None), &mut linear, progress)?;
+        let found = Self::find(
+            folder,
+            sequence,
+            (settings, unmixing),
+            &mut linear,
+            progress,
+        )?;
         Ok((found, linear))
     }
 
-    /// Goes through all phases. With `mixing`, of camera channels by projector channels, and
-    /// also where it is measured, `linear` is afterwards in the projector's channels.
+    /// Goes through all phases. Where a mixing is undone, `linear` is afterwards in the projector's
+    /// channels.
     ///
     /// # Errors
     /// A photograph's own error, or a phase's.
     pub(crate) fn find(
         folder: &Path,
         sequence: &Sequence,
-        (settings, mixing): (&Settings, Option<&ColourMixingMatrix>),
+        (settings, unmixing): (&Settings, Unmixing<'_>),
         linear: &mut LinearPhotographs<'_>,
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
         // In the camera's own channels, where a ceiling is one value.
         let clipped = clipping::find(sequence, linear, progress)?;
-        let mut devices = MeasuredDevices::measure(folder, sequence, settings, linear, progress)?;
-        if let Some(inverse) = mixing.and_then(ColourMixingMatrix::inverse) {
-            linear.unmix(inverse, sequence, progress)?;
-        }
+        let known = (settings, unmixing);
+        let mut devices = MeasuredDevices::measure(folder, sequence, known, linear, progress)?;
         let sampled = Sampled::take(&mut linear.photographs, sequence.shots.len(), progress)?;
         let mut images = match &sequence.images[..] {
             [] => None,

@@ -98,6 +98,7 @@ pub use several::{ExaminedSeveral, OneOfSeveral, SeveralCaptures, examine_severa
 
 use cells::drift::Drift;
 use cells::images;
+use devices::Unmixing;
 use evidence::CaptureEvidence;
 use format::sequence::{Selection, Sequence};
 use iltm_picture::progress::Progress;
@@ -126,7 +127,7 @@ pub fn read(
     progress: &dyn Progress,
 ) -> Result<Measurements, CaptureError> {
     let (mut measurements, (sequence, mut linear, drift)) =
-        read_keeping(folder, options, progress)?;
+        read_keeping(folder, options, Unmixing::Measured, progress)?;
     let shown = (&sequence, &mut linear, &drift);
     measurements.even = EvenLight::add_up(&measurements, shown, progress)?;
     Ok(measurements)
@@ -139,9 +140,10 @@ type Kept<'f> = (Sequence, LinearPhotographs<'f>, Drift);
 pub(crate) fn read_keeping<'f>(
     folder: &'f Path,
     options: &CaptureOptions,
+    unmixing: Unmixing<'_>,
     progress: &dyn Progress,
 ) -> Result<(Measurements, Kept<'f>), CaptureError> {
-    let (examined, kept) = examine_keeping(folder, options, progress)?;
+    let (examined, kept) = examine_keeping(folder, options, unmixing, progress)?;
     let failed = examined.gates.iter().filter(|gate| options.refuses(gate));
     let failed: Vec<Gate> = failed.cloned().collect();
     match (examined.measurements, kept) {
@@ -172,12 +174,13 @@ pub fn examine(
     options: &CaptureOptions,
     progress: &dyn Progress,
 ) -> Result<Examined, CaptureError> {
-    Ok(examine_keeping(folder, options, progress)?.0)
+    Ok(examine_keeping(folder, options, Unmixing::Measured, progress)?.0)
 }
 
 fn examine_keeping<'f>(
     folder: &'f Path,
     options: &CaptureOptions,
+    unmixing: Unmixing<'_>,
     progress: &dyn Progress,
 ) -> Result<(Examined, Option<Kept<'f>>), CaptureError> {
     let manifest = Manifest::read(folder)?;
@@ -195,7 +198,7 @@ fn examine_keeping<'f>(
         sequence => sequence?,
     };
     let (mut cause, mut kept) = (None, None);
-    match CaptureEvidence::collect(folder, &sequence, &settings, progress) {
+    match CaptureEvidence::collect(folder, &sequence, (&settings, unmixing), progress) {
         Err(error @ CaptureError::Unlike { .. }) => {
             examined.gates.push(gates::files::refuse_format(&error));
         }

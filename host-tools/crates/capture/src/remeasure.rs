@@ -7,7 +7,7 @@ use crate::cells::measurements::Measurements;
 use crate::cells::noise::NoiseModel;
 use crate::cells::nonlinearity::Nonlinearity;
 use crate::cells::pixel_views::PixelViews;
-use crate::devices::ColourMixingMatrix;
+use crate::devices::{ColourMixingMatrix, Unmixing};
 use crate::evidence::CaptureEvidence;
 use crate::format::bracket::Bracket;
 use crate::format::error::CaptureError;
@@ -187,7 +187,7 @@ pub fn remeasure(
     let reading = settings.camera.reading();
     let mut linear = LinearPhotographs::read(folder, &sequence, &reading, progress)?;
     let known = known(mixing);
-    let with = (settings, known.as_ref());
+    let with = (settings, Unmixing::As(known.as_ref()));
     let found = CaptureEvidence::find(folder, &sequence, with, &mut linear, progress)?;
     let mut gates = gates::judge(&sequence, &found);
     let cause = found.cells.as_ref().and_then(|cells| cells.nonlinearity);
@@ -252,7 +252,12 @@ pub fn remeasure_several(
     let known = known(mixing);
     let mut of_projector = Vec::new();
     for (index, code) in shots.codes.iter().enumerate() {
-        let found = Placed::find(folder, (settings, known.as_ref()), (index, code), progress)?;
+        let found = Placed::find(
+            folder,
+            (settings, Unmixing::As(known.as_ref())),
+            (index, code),
+            progress,
+        )?;
         of_projector.push(found);
     }
     let (mut pictures, mut white) = (shots.pictures.to_vec(), shots.white.to_vec());
@@ -354,7 +359,7 @@ struct Placed<'f> {
 impl<'f> Placed<'f> {
     fn find(
         folder: &'f Path,
-        (settings, mixing): (&Settings, Option<&ColourMixingMatrix>),
+        (settings, unmixing): (&Settings, Unmixing<'_>),
         (index, code): (usize, &[Shot]),
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
@@ -377,7 +382,7 @@ impl<'f> Placed<'f> {
         let reading = own.camera.reading();
         let mut linear = LinearPhotographs::read(folder, &sequence, &reading, progress)?;
         let found =
-            CaptureEvidence::find(folder, &sequence, (&own, mixing), &mut linear, progress)?;
+            CaptureEvidence::find(folder, &sequence, (&own, unmixing), &mut linear, progress)?;
         linear.photographs.forget();
         let mut gates = gates::judge(&sequence, &found);
         for gate in &mut gates {

@@ -10,6 +10,7 @@ use crate::cells::CellEvidence;
 use crate::cells::cell_pixels::CellPixels;
 use crate::cells::measurements::{ChannelMeasurements, Measurements};
 use crate::crossing_light::{CrossingLight, ProjectorAreas, crossing_light, shown_under_black};
+use crate::devices::Unmixing;
 use crate::format::error::CaptureError;
 use crate::format::sequence::{CaptureOptions, Sequence};
 use crate::gate::Gate;
@@ -73,7 +74,7 @@ pub fn read_several(
     let (mut own, mut sequences, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
     for folder in folders {
         let (measurements, (sequence, mut linear, _)) =
-            crate::read_keeping(folder, options, progress)?;
+            crate::read_keeping(folder, options, as_the_first(&own), progress)?;
         // The others need the room.
         linear.photographs.leave_memory();
         own.push(measurements);
@@ -139,7 +140,8 @@ pub fn examine_several(
     check_once(folders)?;
     let (mut each, mut own, mut photographs) = (Vec::new(), Vec::new(), Vec::new());
     for folder in folders {
-        let (examined, kept) = crate::examine_keeping(folder, options, progress)?;
+        let (examined, kept) =
+            crate::examine_keeping(folder, options, as_the_first(&own), progress)?;
         if let (Some(measurements), Some((_, mut linear, _))) = (&examined.measurements, kept) {
             linear.photographs.forget();
             own.push(measurements.clone());
@@ -159,6 +161,15 @@ pub fn examine_several(
         each,
         between: gates.into_iter().map(|(_, gate)| gate).collect(),
         light,
+    })
+}
+
+/// The mixing that is undone for the next capture: that of the first one, so that white of projectors
+/// which differ in colour is compared in the same channels.
+pub(crate) fn as_the_first(own: &[Measurements]) -> Unmixing<'_> {
+    own.first().map_or(Unmixing::Measured, |first| {
+        let devices = &first.devices;
+        Unmixing::As(devices.mixing().filter(|_| devices.unmixed))
     })
 }
 

@@ -30,6 +30,15 @@ pub struct ColourMixingMatrix {
     pub white: Option<[f64; 3]>,
 }
 
+/// Which mixing is undone in the photographs of a capture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Unmixing<'m> {
+    /// The one that its own photographs tell, if they do.
+    Measured,
+    /// This one, or none: the light of several projectors must be in the same channels.
+    As(Option<&'m ColourMixingMatrix>),
+}
+
 impl ColourMixingMatrix {
     /// The mixing found in light of each projector channel alone, `[camera]
     /// [projector]`, black subtracted; `white` is the light of all three together.

@@ -22,6 +22,7 @@ mod samples;
 
 pub use blur_probe::Probe;
 pub use colour_mixing::ColourMixingMatrix;
+pub(crate) use colour_mixing::Unmixing;
 pub use ramp::{Fall, Ramp, RampPoint};
 pub use response::{CameraFit, CameraSource};
 
@@ -209,7 +210,7 @@ pub(crate) struct MeasuredDevices {
 impl MeasuredDevices {
     /// Measures the devices; afterwards the photographs are in the light that they
     /// say: of the measured camera response where that is asked for, and of the
-    /// projector's channels where the camera mixes them.
+    /// projector's channels where the camera mixes them, as `unmixing` says.
     ///
     /// # Errors
     /// [`CaptureError::ResponseUnknown`] if a response shall be measured and the
@@ -217,7 +218,7 @@ impl MeasuredDevices {
     pub(crate) fn measure(
         folder: &Path,
         sequence: &Sequence,
-        settings: &Settings,
+        (settings, unmixing): (&Settings, Unmixing<'_>),
         linear: &mut LinearPhotographs<'_>,
         progress: &dyn Progress,
     ) -> Result<Self, CaptureError> {
@@ -247,7 +248,11 @@ impl MeasuredDevices {
                 None => {}
             }
         }
-        if let Some(inverse) = devices.mixing().and_then(ColourMixingMatrix::inverse) {
+        let mixing = match unmixing {
+            Unmixing::Measured => devices.mixing(),
+            Unmixing::As(mixing) => mixing,
+        };
+        if let Some(inverse) = mixing.and_then(ColourMixingMatrix::inverse) {
             linear.unmix(inverse, sequence, progress)?;
             devices.unmixed = true;
         }

@@ -327,6 +327,19 @@ mod tests {
     }
 
     #[test]
+    fn a_projector_that_shows_a_little_is_said_and_more_refuses() {
+        let verdict = |share| not_dark(&PAIR, share).map(|gate| gate.verdict);
+        assert_eq!((verdict(-0.3), verdict(0.002)), (None, None));
+        assert_eq!(verdict(0.003), Some(Verdict::Warn));
+        assert_eq!(verdict(0.011), Some(Verdict::Fail));
+        let what = not_dark(&PAIR, 0.5).unwrap().what;
+        assert!(
+            what.starts_with("the projector of right was not dark while left"),
+            "{what}"
+        );
+    }
+
+    #[test]
     fn a_projector_with_another_gamma_is_named() {
         let verdict = |gamma| {
             let responses = [2.2, gamma].map(|gamma| Response::Gamma(gamma).into());
