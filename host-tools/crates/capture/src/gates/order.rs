@@ -75,18 +75,18 @@ pub(super) fn judge(shots: &[Shot], order: Option<&Order>) -> Gate {
         wrong => {
             let (what, next_step) = shifted(shots, wrong).unwrap_or_else(|| {
                 let dark = |shot: &usize| shots[*shot].role == Role::Black;
-                if wrong.iter().all(|wrong| wrong.shows.as_ref().is_some_and(dark)) {
+                let all = wrong
+                    .iter()
+                    .all(|wrong| wrong.shows.as_ref().is_some_and(dark));
+                // A single one may as well be black that was photographed too early.
+                if all && wrong.len() > 1 {
                     return (
                         format!(
-                            "{} dark where their patterns are not: {}",
-                            match wrong.len() {
-                                1 => "1 photograph is".to_owned(),
-                                several => format!("{several} photographs are"),
-                            },
+                            "{} photographs are dark where their patterns are not: {}",
+                            wrong.len(),
                             listed(wrong.iter().map(|wrong| photo(wrong.shot)), 4)
                         ),
-                        "Make sure that the projector stays on and shows every slide, and take those \
-                         photographs again.",
+                        STAY_ON,
                     );
                 }
                 let one = |wrong: &Wrong| match wrong.shows {
@@ -100,15 +100,19 @@ pub(super) fn judge(shots: &[Shot], order: Option<&Order>) -> Gate {
                     wrong.len(),
                     listed(wrong.iter().map(one), 4)
                 );
-                (
-                    what,
-                    "Take those photographs again, or put them in their places.",
-                )
+                (what, AGAIN)
             });
             gate(Verdict::Fail, what, next_step)
         }
     }
 }
+
+/// Next step where photographs are dark.
+const STAY_ON: &str = "Make sure that the projector stays on and shows every slide, and take those photographs \
+                       again.";
+
+/// Next step where nothing says why.
+const AGAIN: &str = "Take those photographs again, or put them in their places.";
 
 /// Next step where bounced light alone may be seen, which does not tell the patterns.
 const OUT_OF_VIEW: &str = "Make sure that the camera sees this projector's picture, and not only its light \
@@ -118,7 +122,7 @@ const OUT_OF_VIEW: &str = "Make sure that the camera sees this projector's pictu
 impl Gate {
     /// The same where so many cells were found: none may be in view.
     pub(super) fn or_out_of_view(mut self, live: usize) -> Self {
-        if self.fails() && live == 0 {
+        if [AGAIN, STAY_ON].contains(&self.next_step) && live == 0 {
             self.next_step = OUT_OF_VIEW;
         }
         self
