@@ -79,15 +79,15 @@ const EXPLAINED: f64 = 0.8;
 const OWN_WHITE: f64 = 0.2;
 
 /// Share of its white that another projector showed while one was photographed and it should be dark: by
-/// the light under black of both captures, the first one's first, and by their white. `None` if
-/// something else is the difference.
-pub(crate) fn shown_under_black(black: [&[f32]; 2], white: [&[f64]; 2]) -> Option<f64> {
+/// the light under black of both captures and by their white at every pixel, the first one's first.
+/// `None` if something else is the difference.
+pub(crate) fn shown_under_black(pixels: impl Iterator<Item = [[f64; 2]; 2]>) -> Option<f64> {
     let mut normal = Matrix2::zeros();
     let mut right = Vector2::zeros();
     let mut all = 0.0;
-    for (pixel, (own, other)) in white[0].iter().zip(white[1]).enumerate() {
-        let whites = Vector2::new(*own, *other);
-        let more = f64::from(black[0][pixel]) - f64::from(black[1][pixel]);
+    for [black, white] in pixels {
+        let whites = Vector2::from(white);
+        let more = black[0] - black[1];
         normal += whites * whites.transpose();
         right += whites * more;
         all += more * more;
@@ -107,18 +107,16 @@ mod tests {
         // The first lights the left half, the second the right one, and each a little of the other's.
         let white = [[1.0, 0.9, 0.1, 0.1], [0.1, 0.1, 0.8, 0.7]];
         let room = [0.02, 0.02, 0.01, 0.03];
-        let black = |shown: [f64; 2], lamp: f64| -> Vec<f32> {
-            let of = |pixel: usize| {
-                shown[0] * white[0][pixel] + shown[1] * white[1][pixel] + (1.0 + lamp) * room[pixel]
-            };
-            (0..4).map(|pixel| of(pixel) as f32).collect()
+        let black = |shown: [f64; 2], lamp: f64, pixel: usize| {
+            shown[0] * white[0][pixel] + shown[1] * white[1][pixel] + (1.0 + lamp) * room[pixel]
         };
         let found = |own: [f64; 2], other: [f64; 2], lamp: f64| {
-            let black = [black(own, lamp), black(other, 0.0)];
-            let black = black.each_ref().map(Vec::as_slice);
-            shown_under_black(black, white.each_ref().map(|white| &white[..]))
+            shown_under_black((0..4).map(|pixel| {
+                let black = [black(own, lamp, pixel), black(other, 0.0, pixel)];
+                [black, white.map(|white| white[pixel])]
+            }))
         };
-        let near = |found: Option<f64>, share: f64| (found.unwrap() - share).abs() < 1e-4;
+        let near = |found: Option<f64>, share: f64| (found.unwrap() - share).abs() < 1e-9;
         assert!(near(found([0.0, 0.5], [0.0; 2], 0.0), 0.5));
         assert!(near(found([0.0, 0.003], [0.0; 2], 0.0), 0.003));
         // Neither was dark in the other's capture.

@@ -15,7 +15,6 @@ use crate::format::error::CaptureError;
 use crate::format::sequence::{CaptureOptions, Sequence};
 use crate::gate::Gate;
 use crate::gates::between;
-use crate::photographs::channel_sum;
 use crate::photographs::linearise::LinearPhotographs;
 use crate::photographs::sampled::Sampled;
 use crate::registration::black_shift;
@@ -255,13 +254,6 @@ impl WideFrame {
     /// Which projector was photographed while which other one was not dark, and how much of its white that
     /// showed.
     fn not_dark(&self, photographs: &[LinearPhotographs<'_>]) -> Vec<([usize; 2], f64)> {
-        let black = |of: usize| channel_sum(&photographs[of].black);
-        let black: Vec<Vec<f32>> = (0..photographs.len()).map(black).collect();
-        let white = |of: usize| -> Vec<f64> {
-            let pixels = 0..black[of].len();
-            pixels.map(|pixel| white_at(&self.own[of], pixel)).collect()
-        };
-        let white: Vec<Vec<f64>> = (0..photographs.len()).map(white).collect();
         let all = 0..photographs.len();
         let pairs = all
             .clone()
@@ -269,11 +261,12 @@ impl WideFrame {
         let pairs = pairs.filter(|[of, other]| of != other);
         pairs
             .filter_map(|pair| {
-                let black = pair.map(|at| &black[at][..]);
-                Some((
-                    pair,
-                    shown_under_black(black, pair.map(|at| &white[at][..]))?,
-                ))
+                let of_pixel = |pixel: usize| {
+                    let black = pair.map(|at| sum_at(&photographs[at].black, pixel));
+                    [black, pair.map(|at| white_at(&self.own[at], pixel))]
+                };
+                let pixels = 0..photographs[pair[0]].black[0].len();
+                Some((pair, shown_under_black(pixels.map(of_pixel))?))
             })
             .collect()
     }
@@ -502,8 +495,12 @@ impl SeveralCaptures {
 
 /// White's light at a camera pixel, over all channels.
 fn white_at(own: &Measurements, pixel: usize) -> f64 {
-    let planes = own.flood.iter();
-    planes.map(|plane| f64::from(plane[pixel])).sum()
+    sum_at(&own.flood, pixel)
+}
+
+/// The sum of all planes at a pixel.
+fn sum_at(planes: &[Vec<f32>], pixel: usize) -> f64 {
+    planes.iter().map(|plane| f64::from(plane[pixel])).sum()
 }
 
 /// Part of the pixels that either projector reaches which see the same place in both pictures, to
