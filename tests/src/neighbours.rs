@@ -114,7 +114,7 @@ pub fn costs((rows, cols): (u16, u16)) -> Vec<NeighboursCost> {
     photograph(&scene, 60, 1, capture.path());
     let parts = split_table(
         &learned(capture.path()).compiled.image,
-        3,
+        Some(3),
         NEIGHBOURS_FACTOR,
     );
     let part = &parts.expect("three alike")[1];

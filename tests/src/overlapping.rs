@@ -5,7 +5,7 @@
 //! from the photographs that a table was learned from.
 
 use crate::neighbours::runtime_frame;
-use crate::simulated::simulation;
+use crate::simulated::{scene, simulation};
 use iltm::build_table::{BuiltTable, TableOptions, build_table, build_table_from};
 use iltm::capture::{
     CameraSettings, CaptureOptions, PosePhotographs, camera_places, join_poses, read_several,
@@ -45,6 +45,13 @@ const BRIGHTEST: f64 = 1.8;
 /// Pixels on both sides of a border over which its step is looked at, and the side of the square
 /// that is averaged on each side.
 const BESIDE: usize = 4;
+
+/// The folded screen with another right projector: its picture is smaller, and has fewer rows.
+pub fn with_smaller() -> Scene {
+    let right = "[0.937, 0.8, 0.656]\nfield_of_view = 43.9\nrows = 15\ncols = 24";
+    let smaller = "[0.8, 0.8, 0.56]\nfield_of_view = 36\nrows = 12\ncols = 16";
+    scene("folded-screen", &[(right, smaller)])
+}
 
 /// Takes the photographs of a session for each projector while the others are dark; their folders.
 pub fn photograph_each(scene: &Scene, bernoulli: usize, place: &Path) -> Vec<PathBuf> {
@@ -276,14 +283,20 @@ impl<'s> Screen<'s> {
     fn lit_places(&self) -> Vec<Option<Vector3<f64>>> {
         let size = pixels(self.scene.grid());
         let mut places = vec![None; size.pixels()];
-        for (columns, projector) in self.scene.columns().iter().zip(&self.scene.projectors) {
+        for (part, projector) in self
+            .scene
+            .parts_of(size)
+            .expect("whole")
+            .iter()
+            .zip(&self.scene.projectors)
+        {
             let (own, view) = (pixels(projector.grid), &projector.view);
             for pixel in 0..own.pixels() {
                 let (x, y) = (pixel % own.width(), pixel / own.width());
                 let across = (x as f64 + 0.5) / own.width() as f64;
                 let down = (y as f64 + 0.5) / own.height() as f64;
-                let at = y * size.width() + columns.start * CELL + x;
-                places[at] = self.met(view.position(), view.ray(across, down));
+                places[part.place(size.width(), pixel)] =
+                    self.met(view.position(), view.ray(across, down));
             }
         }
         places
@@ -330,28 +343,22 @@ impl<'s> Screen<'s> {
     /// for the same light of white.
     pub fn seen_of_each(&self, tables: &[BuiltTable]) -> SeenOnScreen {
         self.seen_of(0.0, &|frame| {
-            let (width, height) = (frame.size().width(), frame.size().height());
+            let width = frame.size().width();
             let Samples::Sixteen(wanted) = frame.samples() else {
                 unreachable!("frames of 16 bits");
             };
             let mut shown = vec![0; wanted.len()];
-            for (columns, built) in self.scene.columns().iter().zip(tables) {
-                let columns = columns.start * CELL..columns.end * CELL;
-                let rows = wanted.chunks_exact(width);
-                let own: Vec<u16> = rows
-                    .flat_map(|row| &row[columns.clone()])
-                    .copied()
-                    .collect();
-                let side = |pixels: usize| u16::try_from(pixels).expect("a frame");
-                let size = FrameSize::new(side(columns.len()), side(height)).expect("a frame");
+            let parts = self.scene.parts_of(frame.size()).expect("whole pixels");
+            for (part, built) in parts.iter().zip(tables) {
+                let own = part.places(width).map(|pixel| wanted[pixel]).collect();
+                let size = part.frame().expect("a frame");
                 let own = Picture::new(size, Samples::Sixteen(own)).expect("one code a pixel");
                 let own = compensated(built, own);
                 let Samples::Sixteen(codes) = own.samples() else {
                     unreachable!("frames of 16 bits");
                 };
-                let rows = shown.chunks_exact_mut(width);
-                for (row, own) in rows.zip(codes.chunks_exact(columns.len())) {
-                    row[columns.clone()].copy_from_slice(own);
+                for (pixel, code) in part.places(width).zip(codes) {
+                    shown[pixel] = *code;
                 }
             }
             Picture::new(frame.size(), Samples::Sixteen(shown)).expect("one code a pixel")
@@ -363,8 +370,11 @@ impl<'s> Screen<'s> {
     /// their light.
     pub fn seen_of_devices(&self, built: &BuiltTable, factor: u16, heard: bool) -> SeenOnScreen {
         let count = self.scene.projectors.len();
-        let parts = split_table(&built.compiled.image, count, factor);
-        let parts = parts.expect("projectors alike");
+        let tables = split_table(&built.compiled.image, Some(count), factor);
+        let tables = tables.expect("a table of so many");
+        let table = Table::check(&built.compiled.image).expect("compile checked it");
+        let frames = Provenance::read(table.provenance()).frames;
+        let frames = frames.unwrap_or_default();
         self.seen_of(black(&built.compiled.image), &|frame| {
             let wide = frame.size();
             let Samples::Sixteen(codes) = frame.samples() else {
@@ -372,9 +382,10 @@ impl<'s> Screen<'s> {
             };
             let codes: Vec<u8> = codes.iter().map(|code| of_eight_bits(*code)).collect();
             let mut shown = vec![0; codes.len()];
-            for (number, part) in parts.iter().enumerate() {
-                let table = Table::check(&part.image).expect("split checked it");
-                let splitter = FrameSplitter::new(&table, wide, Encoding::Display);
+            let parts = self.scene.parts_of(wide).expect("whole pixels");
+            for (part, table) in parts.iter().zip(&tables) {
+                let table = Table::check(&table.image).expect("split checked it");
+                let splitter = FrameSplitter::new((&table, &frames), wide, Encoding::Display);
                 let splitter = splitter.expect("a wide frame");
                 let own = splitter.of_frame(&codes);
                 let format =
@@ -382,10 +393,8 @@ impl<'s> Screen<'s> {
                 let format = format.expect("a frame");
                 let light = heard.then_some(&*own.light);
                 let made = runtime_frame(&table, (table.top_tier(), format), &own.pixels, light);
-                let row = made.len() / wide.height();
-                let rows = shown.chunks_exact_mut(row * count);
-                for (wide, own) in rows.zip(made.chunks_exact(row)) {
-                    wide[number * row..][..row].copy_from_slice(own);
+                for (pixel, code) in part.places(wide.width()).zip(made) {
+                    shown[pixel] = code;
                 }
             }
             Picture::new(wide, Samples::Eight(shown)).expect("a code a sample")
@@ -553,7 +562,8 @@ fn frame(
     Picture::new(size, Samples::Sixteen(codes)).expect("one code a pixel")
 }
 
-fn compensated(built: &BuiltTable, frame: Picture) -> Picture {
+/// What a table makes of a frame.
+pub fn compensated(built: &BuiltTable, frame: Picture) -> Picture {
     let table = Table::check(&built.compiled.image).expect("a table");
     let compensator = Compensator::new(&table, CompensateOptions::default()).expect("threads");
     compensator.frame(frame).expect("a frame of the table").0

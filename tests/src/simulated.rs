@@ -209,9 +209,9 @@ pub fn inputs_of_each_alone(
             .exposure()
     };
     let of_all = exposure(scene);
-    let (cols, columns) = (scene.grid().cols(), scene.columns());
+    let cols = scene.grid().cols();
     let mut shown: Vec<_> = wanted.iter().map(|all| 0.0 * all).collect();
-    for (index, columns) in columns.into_iter().enumerate() {
+    for (index, part) in scene.parts().into_iter().enumerate() {
         let alone = Scene {
             projectors: vec![scene.projectors[index].clone()],
             ..scene.clone()
@@ -221,8 +221,7 @@ pub fn inputs_of_each_alone(
         let learned = learned(&folder.path().join("capture"));
         let units = exposure(&alone) / of_all;
         // Of a cell of its own, the cell of all.
-        let place =
-            |cell: usize| cell / columns.len() * cols + columns.start + cell % columns.len();
+        let place = |cell: usize| part.place(cols, cell);
         for (channel, shown) in shown.iter_mut().enumerate() {
             let own = DMatrix::from_fn(alone.grid().cells(), shown.ncols(), |cell, image| {
                 units * wanted[channel][(place(cell), image)]

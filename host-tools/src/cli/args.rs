@@ -260,8 +260,8 @@ pub(super) struct Patterns {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub(super) seed: u64,
     /// The projector's own resolution. Of several projectors one each, with a name that its folder in
-    /// CAPTURE gets: --projector left=1920x1080 --projector right=1280x1080. Columns are the first
-    /// one's; cells of the others have as many pixels
+    /// CAPTURE gets: --projector left=1920x1080 --projector right=1280x800. Rows and columns are the
+    /// first one's; cells of the others have as many pixels
     #[arg(long, value_name = "[NAME=]WxH", value_parser = named_size, default_value = "1920x1080")]
     pub(super) projector: Vec<NamedSize>,
     /// Pixels to leave black on every side
@@ -832,9 +832,9 @@ pub(super) struct Split {
     /// Folder for the tables, numbered from left to right
     #[arg(short, long, value_name = "FOLDER")]
     pub(super) output: PathBuf,
-    /// How many projectors there are
+    /// How many projectors there are, their frames alike, where the table does not say
     #[arg(long, value_name = "COUNT")]
-    pub(super) projectors: usize,
+    pub(super) projectors: Option<usize>,
     /// Cells along each side of a frame that become one for its neighbours: more make less light to
     /// pass on and a coarser correction
     #[arg(long, value_name = "CELLS", default_value_t = NEIGHBOURS_FACTOR, value_parser = clap::value_parser!(u16).range(1..))]

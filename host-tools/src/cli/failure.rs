@@ -330,7 +330,10 @@ impl From<SplitTableError> for Failure {
     fn from(error: SplitTableError) -> Self {
         let next_step = match error {
             SplitTableError::Compile(error) => return error.into(),
-            SplitTableError::Columns { .. } => "Give the number of projectors with --projectors.",
+            SplitTableError::Columns { .. } | SplitTableError::Unsaid => {
+                "Give the number of projectors with --projectors."
+            }
+            SplitTableError::Projectors { .. } => "Leave --projectors away.",
             SplitTableError::Frames { .. } => {
                 "Take the photographs again with `iltm patterns --projector WxH` of the wide frame, without a border."
             }

@@ -95,22 +95,22 @@ fn layouts(arguments: &Patterns) -> Result<Vec<Layout>, Failure> {
         let (size, border) = (*size, arguments.border);
         let layout = match (layouts.first(), arguments.camera_size) {
             (Some(first), _) => {
-                let cols = first.cols_of(size).ok_or_else(|| {
+                let grid = first.grid_of(size).ok_or_else(|| {
+                    let projectors = arguments.projector.iter().map(|projector| projector.size);
+                    let [rows, cols] = first.nearest_common(&projectors.collect::<Vec<_>>());
                     Failure::new(
                         Kind::Usage,
                         format!(
                             "cells of {} cannot have as many pixels as those of the first projector",
                             name.as_deref().unwrap_or_default()
                         ),
-                        "Give all projectors one height, no border, and columns that divide their widths \
-                         into cells of the same number of pixels.",
+                        format!(
+                            "Leave the border away, and choose cells that divide the frames of all \
+                             projectors: --rows {rows} --cols {cols}."
+                        ),
                     )
                 })?;
-                Layout::new(
-                    Grid::new(first.grid().rows() as u16, cols).map_err(PatternsError::from)?,
-                    size,
-                    border,
-                )?
+                Layout::new(grid, size, border)?
             }
             (None, Some(camera)) => Layout::proposed(size, border, camera)?,
             (None, None) => {

@@ -86,6 +86,7 @@ fn left_out(built: &BuiltTable) -> Vec<String> {
             WhyLeftOut::Unlit => "lit by nothing, though light of others is seen there",
             WhyLeftOut::Black => "black: they give back no light",
             WhyLeftOut::Unseen => unseen(built, out.cell),
+            WhyLeftOut::NoProjector => continue,
         };
         match by_reason.iter_mut().find(|(known, _)| *known == why) {
             Some((_, cells)) => cells.push(out.cell),

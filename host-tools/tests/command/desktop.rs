@@ -25,24 +25,25 @@ impl Desktop {
         Self::of(server, folder)
     }
 
-    /// A desktop of several displays beside each other, of these widths and one height.
-    pub(crate) fn with_displays(widths: &[u16], height: u16) -> Self {
+    /// A desktop of several displays beside each other, of these widths and heights, their upper edges
+    /// at one height.
+    pub(crate) fn with_displays(displays: &[(u16, u16)]) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let socket = folder.path().join("socket");
-        let width: u16 = widths.iter().sum();
+        let [width, height] = around(displays);
         let mut server = Command::new("Xvnc");
         server.args(["-geometry", &format!("{width}x{height}"), "-depth", "24"]);
         server.args(["-SecurityTypes", "None", "-rfbport", "-1"]);
         server.arg("-rfbunixpath").arg(&socket);
         let desktop = Self::of(server, folder);
-        desktop.divide(widths, height);
+        desktop.divide(displays);
         desktop
     }
 
     /// Has other displays from now on.
-    pub(crate) fn divide(&self, widths: &[u16], height: u16) {
+    pub(crate) fn divide(&self, displays: &[(u16, u16)]) {
         let socket = self.folder.path().join("socket");
-        divide(&socket, widths, height).expect("a server that listens");
+        divide(&socket, displays).expect("a server that listens");
     }
 
     fn of(mut server: Command, folder: TempDir) -> Self {
@@ -78,10 +79,19 @@ impl Drop for Desktop {
     }
 }
 
+/// Width and height of a desktop of these displays.
+fn around(displays: &[(u16, u16)]) -> [u16; 2] {
+    let height = displays.iter().map(|(_, height)| *height).max();
+    [
+        displays.iter().map(|(width, _)| width).sum(),
+        height.unwrap_or(0),
+    ]
+}
+
 /// Asks a VNC server on a socket to divide its desktop into displays, by the message `SetDesktopSize`
 /// (251) that the community's extension `ExtendedDesktopSize` (-308) adds to the Remote Framebuffer
 /// Protocol (RFC 6143).
-fn divide(socket: &Path, widths: &[u16], height: u16) -> io::Result<()> {
+fn divide(socket: &Path, displays: &[(u16, u16)]) -> io::Result<()> {
     let mut server = UnixStream::connect(socket)?;
     // Its version, and ways to log in, the only one of which is none.
     server.read_exact(&mut [0; 12])?;
@@ -93,15 +103,16 @@ fn divide(socket: &Path, widths: &[u16], height: u16) -> io::Result<()> {
     // A list of one: this client understands desktops of several displays, by the number -308.
     let mut sent: Vec<u8> = words(&[0x0200, 1, 0xffff, 0xfecc]);
     let mut left = 0;
-    let mut displays = Vec::new();
-    for (number, width) in (0..).zip(widths) {
-        displays.extend([0, number, left, 0, *width, height, 0, 0]);
+    let mut list = Vec::new();
+    for (number, (width, height)) in (0..).zip(displays) {
+        list.extend([0, number, left, 0, *width, *height, 0, 0]);
         left += width;
     }
-    let count = u8::try_from(widths.len()).expect("a few displays");
+    let count = u8::try_from(displays.len()).expect("a few displays");
     sent.extend([251, 0]);
-    sent.extend::<Vec<u8>>(words(&[left, height, u16::from_be_bytes([count, 0])]));
-    sent.extend::<Vec<u8>>(words(&displays));
+    let [width, height] = around(displays);
+    sent.extend::<Vec<u8>>(words(&[width, height, u16::from_be_bytes([count, 0])]));
+    sent.extend::<Vec<u8>>(words(&list));
     server.write_all(&sent)?;
     // The server hangs up once it has done everything.
     server.shutdown(Shutdown::Write)?;

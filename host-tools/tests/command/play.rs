@@ -463,10 +463,10 @@ impl Beside {
     }
 }
 
-/// The table's projector as two, of 176 columns each, and a display of 40 columns for the technician.
+/// The table's projector as two, of 176 columns each, the second lower, and a display of 40 columns for the technician.
 #[test]
 fn a_wide_frame_lies_over_the_displays_that_are_named() {
-    let desktop = Desktop::with_displays(&[40, 176, 176], 224);
+    let desktop = Desktop::with_displays(&[(40, 224), (176, 224), (176, 200)]);
     let user = user();
     let beside = Beside::of(&desktop);
     film(&user, "wide.mkv", 25, "bgr0");
@@ -515,14 +515,14 @@ fn a_display_that_goes_in_mid_show_is_said_and_ends_a_strict_one() {
         "-f lavfi -i testsrc2=size={SIZE} -frames:v 1 wide.png"
     ));
     for (strict, code) in [("", 0), ("--strict", 38)] {
-        let desktop = Desktop::with_displays(&[176, 176, 40], 224);
+        let desktop = Desktop::with_displays(&[(176, 224), (176, 224), (40, 224)]);
         let line = format!("wide.png --display 0,1 {strict}");
         let mut show = Playing::start(&desktop, &user, &line);
         // One that shows none of it.
-        desktop.divide(&[176, 176, 80], 224);
+        desktop.divide(&[(176, 224), (176, 224), (80, 224)]);
         thread::sleep(Duration::from_secs(1));
         assert!(show.get("time-pos").as_f64().is_some());
-        desktop.divide(&[176, 144, 80], 224);
+        desktop.divide(&[(176, 224), (144, 224), (80, 224)]);
         let ended = if code == 0 {
             thread::sleep(Duration::from_secs(1));
             show.end()
@@ -539,7 +539,7 @@ fn a_display_that_goes_in_mid_show_is_said_and_ends_a_strict_one() {
 
 #[test]
 fn displays_that_cannot_show_a_wide_frame_are_refused_with_what_there_is() {
-    let desktop = Desktop::with_displays(&[176, 176, 352], 224);
+    let desktop = Desktop::with_displays(&[(176, 224), (176, 224), (352, 224)]);
     let user = user();
     user.ffmpeg(&format!(
         "-f lavfi -i testsrc2=size={SIZE} -frames:v 1 wide.png"

@@ -196,15 +196,22 @@ fn camera_of(desktop: &Desktop) -> String {
     format!("--camera '{grab} -i {} {rest}'", desktop.display)
 }
 
-/// The slides of a folder are on the wall from this column on, and all others are black.
-fn shown_from(user: &User, folder: &str, left: u32) {
+/// The slides of a folder are on the wall from this column on, as far as these displays are, and all
+/// else is black.
+fn shown_from(user: &User, folder: &str, left: u32, displays: &[(u16, u16)]) {
+    let heights = displays
+        .iter()
+        .flat_map(|(width, height)| vec![u32::from(*height); (*width).into()]);
+    let heights: Vec<u32> = heights.collect();
     let names = user.names(&format!("{folder}/slides"));
     assert!(names.len() > 15, "{names:?}");
     for name in names {
         let slide = user.picture(&format!("{folder}/slides/{name}")).to_rgb8();
         let photo = user.picture(&format!("{folder}/photos/{name}")).to_rgb8();
         for (x, y, pixel) in photo.enumerate_pixels() {
-            let inside = x.checked_sub(left).filter(|x| *x < slide.width());
+            let column = x.checked_sub(left);
+            let inside =
+                column.filter(|x| heights.get(*x as usize).is_some_and(|height| y < *height));
             let wanted = inside.map_or(image::Rgb([0; 3]), |x| *slide.get_pixel(x, y));
             assert_eq!(*pixel, wanted, "{folder}: {name} at {x}, {y}");
         }
@@ -213,25 +220,26 @@ fn shown_from(user: &User, folder: &str, left: u32) {
 
 #[test]
 fn each_of_several_projectors_shows_its_slides_while_the_others_are_black() {
-    let desktop = Desktop::with_displays(&[64, 80, 32], 48);
+    let displays = [(64, 48), (80, 32), (32, 48)];
+    let desktop = Desktop::with_displays(&displays);
     let user = User::new();
-    let both = "--projector left=64x48 --projector right=80x48";
+    let both = "--projector left=64x48 --projector right=80x32";
     let few = "--rows 3 --cols 4 --photos 10 --no-calibration --no-dense";
     let said = user.says(&format!("patterns -o . {few} {both}"));
-    contains(&said, &["3 rows, 5 columns", "iltm capture ./left ./right"]);
+    contains(&said, &["2 rows, 5 columns", "iltm capture ./left ./right"]);
     let camera = camera_of(&desktop);
     let line = format!("capture left right --display 0,1 --dark 2 --latency 100 {camera}");
     let ended = Ended::of(desktop.spawn(&user, &line));
     insta::assert_snapshot!(ended.with_code());
-    shown_from(&user, "left", 0);
-    shown_from(&user, "right", 64);
+    shown_from(&user, "left", 0, &displays[..1]);
+    shown_from(&user, "right", 64, &displays[1..2]);
     // What is missing is taken, and nothing else.
     user.remove("right/photos/003.png");
     let events = Ended::of(desktop.spawn(&user, &format!("{line} --json"))).events();
     let done = events.iter().filter(|event| event["event"] == "done");
     let taken: Vec<_> = done.map(|event| &event["taken"]).collect();
     assert_eq!(taken, [0, 1]);
-    shown_from(&user, "right", 64);
+    shown_from(&user, "right", 64, &displays[1..2]);
 }
 
 #[test]
@@ -243,6 +251,7 @@ fn projectors_that_cannot_stand_beside_each_other_get_no_patterns() {
         (4, ["a=64x48", "a=80x48"]),
         (4, ["a=64x48", "b=80x50"]),
         (4, ["a=64x48", "b=72x48"]),
+        (4, ["a=64x48", "b=80x40"]),
         (5, ["a=64x48", "b=64x48"]),
         (4, ["a=64x48", "../b=64x48"]),
     ] {
@@ -256,7 +265,8 @@ fn projectors_that_cannot_stand_beside_each_other_get_no_patterns() {
 
 #[test]
 fn wide_slides_lie_over_all_displays_that_show_them() {
-    let desktop = Desktop::with_displays(&[64, 80], 48);
+    let displays = [(64, 48), (80, 40)];
+    let desktop = Desktop::with_displays(&displays);
     let user = User::new();
     let few = "--rows 3 --cols 9 --photos 10 --no-calibration --no-dense";
     user.says(&format!("patterns -o c {few} --projector 144x48"));
@@ -264,7 +274,7 @@ fn wide_slides_lie_over_all_displays_that_show_them() {
     let line = format!("capture c --display 0,1 --latency 100 {camera}");
     let ended = Ended::of(desktop.spawn(&user, &line));
     assert_eq!(ended.code, 0, "{}", ended.said);
-    shown_from(&user, "c", 0);
+    shown_from(&user, "c", 0, &displays);
     let mut text = String::new();
     for line in [
         "c --display 0",

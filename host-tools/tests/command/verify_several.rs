@@ -541,7 +541,7 @@ fn a_table_of_overlapping_projectors_asks_for_its_captures() {
 #[test]
 fn a_table_is_split_for_the_device_of_each_projector() {
     let user = prepared();
-    let data = user.json("split t.iltm --projectors 2 -o devices");
+    let data = user.json("split t.iltm -o devices");
     for (number, part) in (1..).zip(data["projectors"].as_array().unwrap()) {
         assert_eq!(part["table"], format!("devices/t-{number}.iltm"));
         assert_eq!(part["cells"]["cols"], 24);
@@ -580,20 +580,22 @@ fn what_cannot_be_split_or_is_for_a_device_is_refused() {
     let user = prepared();
     let own = User::new();
     own.write("t.iltm", user.read("t.iltm"));
-    own.says("split t.iltm --projectors 2 -o d");
+    own.says("split t.iltm -o d");
+    own.write("one.iltm", super::user::table());
     for (line, says) in [
-        ("split t.iltm --projectors 5 -o e", "5 projectors alike"),
-        ("split t.iltm --projectors 1 -o e", "1 projectors alike"),
-        ("split d/t-1.iltm --projectors 2 -o e", "already"),
         (
-            "split t.iltm --projectors 2 --neighbours 0 -o e",
-            "0 is not in 1..",
+            "split t.iltm --projectors 5 -o e",
+            "for 2 projectors, not 5",
         ),
         (
-            "split t.iltm --projectors 4 --neighbours 1 -o e",
-            "the neighbours have 540 cells",
+            "split t.iltm --projectors 1 -o e",
+            "for 2 projectors, not 1",
         ),
-        ("split none.iltm --projectors 2 -o e", "none.iltm"),
+        ("split one.iltm -o e", "does not say how many"),
+        ("split one.iltm --projectors 9 -o e", "9 projectors alike"),
+        ("split d/t-1.iltm -o e", "already"),
+        ("split t.iltm --neighbours 0 -o e", "0 is not in 1.."),
+        ("split none.iltm -o e", "none.iltm"),
     ] {
         refused(&own, line, says);
         assert!(!own.path("e").exists(), "{line}");

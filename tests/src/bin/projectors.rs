@@ -10,7 +10,7 @@ use iltm::picture::png;
 use iltm::verify::{Cause, TableVerdict};
 use iltm_tests::overlapping::{
     Screen, SeenOnScreen, joined, learned_alone, learned_together, learned_with_even_black,
-    photograph_each, photograph_from_poses, photograph_together, refined, verified,
+    photograph_each, photograph_from_poses, photograph_together, refined, verified, with_smaller,
 };
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, overlaps, photograph, scene, showable,
@@ -19,6 +19,9 @@ use std::path::Path;
 
 /// All scenes of several projectors.
 const SCENES: [&str; 4] = ["two-walls", "cube-room", "folded-screen", "dome-of-four"];
+
+/// The folded screen whose projectors have other sizes.
+const OTHER_SIZES: &str = "folded-screen, other sizes";
 
 /// Scenes whose photographs are drawn, and the heading.
 const DRAWN: [(&str, &str); 2] = [
@@ -65,10 +68,13 @@ fn by_pixels() {
     println!("| scene | tables | whole screen | overlap | largest step | of black |");
     println!("|---|---|---|---|---|---|");
     let place = tempfile::tempdir().expect("a folder");
-    for name in SCENES {
-        let scene = scene(name, &[]);
+    for name in SCENES.into_iter().chain([OTHER_SIZES]) {
+        let scene = match name {
+            OTHER_SIZES => with_smaller(),
+            _ => scene(name, &[]),
+        };
         let captures = photograph_each(&scene, 60, &place.path().join(name));
-        let together = if overlaps(name) {
+        let together = if name == OTHER_SIZES || overlaps(name) {
             learned_together(&captures)
         } else {
             // Slides light all of them at once.

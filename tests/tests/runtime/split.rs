@@ -45,7 +45,8 @@ fn side_by_side(
         .iter()
         .map(|part| {
             let table = Table::check(&part.image).expect("split checked it");
-            let frames = FrameSplitter::new(&table, wide, Encoding::Linear).expect("wide frames");
+            let frames =
+                FrameSplitter::new((&table, &[]), wide, Encoding::Linear).expect("wide frames");
             let own = frames.of_frame(frame);
             let light = (!silent).then_some(own.light.as_slice());
             let format = Format::new(frames.own(), channels as u8, Encoding::Linear, 1_000);
@@ -83,7 +84,7 @@ fn devices_make_of_their_parts_what_the_table_of_all_makes_of_the_whole() {
         let (_, operator) = difference(&expected, &gains);
         let mut off = Vec::new();
         for factor in [block, 2 * block] {
-            let parts = split_table(&image, count, factor as u16).expect("so many alike");
+            let parts = split_table(&image, Some(count), factor as u16).expect("so many alike");
             assert_eq!(parts.len(), count);
             let made = side_by_side(&parts, (wide, channels), &frame, false);
             off.push(difference(&expected, &made));
@@ -108,7 +109,7 @@ fn frames_larger_than_the_grid_are_split_as_well() {
     let format = Format::new(wide, 3, Encoding::Linear, 1_000).expect("a format");
     let frame = picture(wide, 3, (7.0, 1));
     let expected = runtime_frame(&whole, (whole.top_tier(), format), &frame, None);
-    let parts = split_table(&image, 2, 1).expect("halves");
+    let parts = split_table(&image, Some(2), 1).expect("halves");
     let made = side_by_side(&parts, (wide, 3), &frame, false);
     // Corrections are not interpolated across the border of two frames, so pixels that are
     // nearer to it than the centre of a cell differ.
@@ -125,11 +126,11 @@ fn frames_larger_than_the_grid_are_split_as_well() {
 #[test]
 fn an_even_light_of_a_neighbour_is_its_light_in_every_cell() {
     let image = random_table(grid(7, 15), 3, Effects::ALL, 5);
-    let parts = split_table(&image, 3, 4).expect("thirds");
+    let parts = split_table(&image, Some(3), 4).expect("thirds");
     let table = Table::check(&parts[1].image).expect("split checked it");
     // Neither rows nor columns of pixels are a multiple of the cells'.
     let wide = FrameSize::new(3 * 23, 31).expect("not empty");
-    let frames = FrameSplitter::new(&table, wide, Encoding::Linear).expect("wide frames");
+    let frames = FrameSplitter::new((&table, &[]), wide, Encoding::Linear).expect("wide frames");
     assert_eq!((frames.own().width(), frames.cells()), (23, grid(2, 4)));
     let colours = [[10, 20, 30], [0, 0, 0], [255, 128, 1]];
     let frame: Vec<u8> = (0..wide.pixels())
@@ -149,16 +150,18 @@ fn an_even_light_of_a_neighbour_is_its_light_in_every_cell() {
 fn tables_of_other_frames_are_refused() {
     let image = random_table(grid(6, 20), 1, Effects::ALL, 6);
     let columns = |count| {
-        let error = split_table(&image, count, 4).expect_err("not so many alike");
+        let error = split_table(&image, Some(count), 4).expect_err("not so many alike");
         assert!(matches!(error, SplitTableError::Columns { .. }), "{error}");
     };
     for count in [0, 1, 3, 9, 20] {
         columns(count);
     }
-    let parts = split_table(&image, 2, 4).expect("halves");
-    let again = split_table(&parts[0].image, 2, 4).expect_err("it is one of two");
+    let unsaid = split_table(&image, None, 4).expect_err("nothing says how many");
+    assert!(matches!(unsaid, SplitTableError::Unsaid), "{unsaid}");
+    let parts = split_table(&image, Some(2), 4).expect("halves");
+    let again = split_table(&parts[0].image, Some(2), 4).expect_err("it is one of two");
     assert!(matches!(again, SplitTableError::Split), "{again}");
-    let four = split_table(&image, 4, 1).expect_err("three times as many as its own");
+    let four = split_table(&image, Some(4), 1).expect_err("three times as many as its own");
     assert!(
         matches!(four, SplitTableError::NeighboursCells { cells: 90 }),
         "{four}"
@@ -167,13 +170,13 @@ fn tables_of_other_frames_are_refused() {
     let size = FrameSize::new(81, 40).expect("not empty");
     made.projector = Some(iltm_runtime::placement::ProjectorPixels::whole(size));
     made.fine_gains = Some((8, 17, vec![1 << 13; 8 * 17]));
-    let odd = split_table(&made.image(), 2, 4).expect_err("17 columns of gains");
+    let odd = split_table(&made.image(), Some(2), 4).expect_err("17 columns of gains");
     assert!(
         matches!(odd, SplitTableError::Columns { cols: 17, .. }),
         "{odd}"
     );
     made.fine_gains = None;
-    let odd = split_table(&made.image(), 2, 4).expect_err("81 pixels");
+    let odd = split_table(&made.image(), Some(2), 4).expect_err("81 pixels");
     assert!(
         matches!(odd, SplitTableError::Frames { width: 81, .. }),
         "{odd}"
@@ -189,7 +192,7 @@ fn gains_alone_are_cut_and_take_no_light_of_others() {
     };
     let image = random_table(grid(6, 20), 3, effects, 7);
     let whole = Table::check(&image).expect("compile checked it");
-    for (own, part) in split_table(&image, 2, 4)
+    for (own, part) in split_table(&image, Some(2), 4)
         .expect("halves")
         .iter()
         .enumerate()
@@ -207,7 +210,7 @@ fn gains_alone_are_cut_and_take_no_light_of_others() {
 fn a_part_is_called_after_its_place() {
     let image = random_table(grid(6, 20), 1, Effects::ALL, 6);
     let whole = Table::check(&image).expect("compile checked it");
-    for (number, part) in (1..).zip(split_table(&image, 2, 4).expect("halves")) {
+    for (number, part) in (1..).zip(split_table(&image, Some(2), 4).expect("halves")) {
         let table = Table::check(&part.image).expect("split checked it");
         let name = format!("{} {number}/2", whole.label().name());
         assert_eq!(table.label().name(), name);

@@ -1,8 +1,8 @@
 //! Several projectors in one scene, their frames side by side.
 
 use iltm::capture::{CaptureOptions, GateName, Verdict, listed, read_several};
-use iltm::compile::Provenance;
-use iltm::picture::{Picture, Response, Samples, png};
+use iltm::compile::{Provenance, split_table};
+use iltm::picture::{FramePart, Picture, Response, Samples, png};
 use iltm::progress::Silent;
 use iltm::scene::description::Scene;
 use iltm::scene::fill_capture::{FillCaptureError, UnfilledCapture};
@@ -10,7 +10,8 @@ use iltm::scene::{Effect, Forced, Pinhole, VirtualCamera};
 use iltm_runtime::image::Table;
 use iltm_runtime::{FrameSize, Grid};
 use iltm_tests::overlapping::{
-    Screen, learned_alone, learned_together, learned_with_even_black, photograph_each,
+    Screen, compensated, learned_alone, learned_together, learned_with_even_black, photograph_each,
+    with_smaller,
 };
 use iltm_tests::simulated::{
     error_on_the_wall, inputs, inputs_of_each_alone, learned, photograph, scene, showable,
@@ -40,19 +41,17 @@ fn light_of_two_projectors_is_the_sum_of_the_light_of_each_and_ambient_light_is_
     };
     let both = light(&scene, &frame);
     let ambient = light(&scene, &(0.0 * &frame));
-    let columns = scene.columns();
-    assert_eq!(columns, [0..16, 16..32]);
+    let parts = scene.parts();
+    assert_eq!(parts, FramePart::side_by_side([[12, 16]; 2]));
     // Each projector as a scene of its own, with its half of the frame.
-    let projectors = scene.projectors.iter().zip(&columns);
+    let projectors = scene.projectors.iter().zip(&parts);
     let halves: Vec<_> = projectors
-        .map(|(projector, columns)| {
+        .map(|(projector, part)| {
             let alone = Scene {
                 projectors: vec![projector.clone()],
                 ..scene.clone()
             };
-            let half = DMatrix::from_fn(12 * 16, 1, |cell, _| {
-                frame[(cell / 16 * 32 + columns.start + cell % 16, 0)]
-            });
+            let half = DMatrix::from_fn(12 * 16, 1, |cell, _| frame[(part.place(32, cell), 0)]);
             light(&alone, &half)
         })
         .collect();
@@ -68,14 +67,17 @@ fn light_of_two_projectors_is_the_sum_of_the_light_of_each_and_ambient_light_is_
 
 /// Columns of cells of the second of two projectors, which are fewer than the first one's.
 const OF_SECOND: usize = 12;
+
+/// Rows of it.
+const ROWS_OF_SECOND: usize = 9;
 /// Codes of black and of another slide, of all cells or pixels.
 type Codes<'c> = &'c dyn Fn(usize, usize) -> u8;
 
-/// Two walls whose projectors have other numbers of cells, glow in black and meet a camera without
-/// noise.
+/// Two walls whose projectors have other numbers of cells, the second fewer rows, glow in black and meet
+/// a camera without noise.
 fn unlike() -> Scene {
     let mut scene = two_walls();
-    scene.projectors[1].grid = Grid::new(12, OF_SECOND as u16).unwrap();
+    scene.projectors[1].grid = Grid::new(ROWS_OF_SECOND as u16, OF_SECOND as u16).unwrap();
     for projector in &mut scene.projectors {
         projector.black = 0.02;
     }
@@ -141,16 +143,15 @@ fn photographs_of_each_projector_while_the_other_shows_black_add_up_to_those_of_
         let frame: Vec<u8> = (0..all * 12 * side).map(|_| random.u8(..)).collect();
         let code = |col: usize, row: usize| frame[row * all + col];
         let place = tempfile::tempdir().unwrap();
-        let take = |name: &str, width: usize, projector, codes: Codes<'_>| {
+        let take = |name: &str, (width, rows), projector, codes: Codes<'_>| {
             let place = place.path().join(name);
-            folder(&place, (width, 12 * side), side > 1, codes);
+            folder(&place, (width, rows * side), side > 1, codes);
             taken(&scene, &place, projector)
         };
-        let [black, both] = take("both", all, None, &code);
-        let [dark, left] = take("left", first, Some(0), &code);
-        let [_, right] = take("right", all - first, Some(1), &|col, row| {
-            code(first + col, row)
-        });
+        let [black, both] = take("both", (all, 12), None, &code);
+        let [dark, left] = take("left", (first, 12), Some(0), &code);
+        let right = (all - first, ROWS_OF_SECOND);
+        let [_, right] = take("right", right, Some(1), &|col, row| code(first + col, row));
         // The others are on and show black.
         assert!(black.iter().zip(&dark).all(|(a, b)| (a - b).abs() < 1e-4));
         assert!(black.iter().sum::<f64>() > 0.005 * black.len() as f64);
@@ -186,9 +187,12 @@ fn slides_that_do_not_fit_the_projector_they_are_for_are_refused() {
     // 62 pixels over 16 columns would be 108.5 over all 28.
     let said = refused("c", (62, 48), true, Some(0));
     assert!(
-        said.contains("62 columns, over 16 columns of cells"),
+        said.contains("62 x 48 pixels, over 12 x 16 cells"),
         "{said}"
     );
+    // 46 pixels over 9 rows would be 61.3 over all 12.
+    let said = refused("d", (48, 46), true, Some(1));
+    assert!(said.contains("48 x 46 pixels, over 9 x 12 cells"), "{said}");
 }
 
 #[test]
@@ -283,6 +287,60 @@ fn projectors_that_overlap_share_the_light_and_cancel_what_crosses() {
     assert!(within(even.overlap, 0.0, 0.016), "{even:?}");
 }
 
+/// The wide frame has cells of no projector below the lower frame.
+#[test]
+fn projectors_of_other_sizes_share_the_light_and_cancel_what_crosses() {
+    let scene = with_smaller();
+    let place = tempfile::tempdir().unwrap();
+    let together = learned_together(&photograph_each(&scene, 40, place.path()));
+    assert_eq!(together.report.cells, 15 * 24 + 12 * 16);
+    assert_eq!(together.report.live_cells, together.report.cells);
+    let screen = Screen::new(&scene);
+    let seen = screen.seen(&together);
+    assert!(seen.whole < 0.006, "{seen:?}");
+    assert!(
+        seen.overlap.is_some_and(|overlap| overlap < 0.016),
+        "{seen:?}"
+    );
+    assert!(seen.step.is_some_and(|step| step < 0.02), "{seen:?}");
+    let three = split_table(&together.compiled.image, Some(3), 4).unwrap_err();
+    let words = three.to_string();
+    assert_eq!(words, "the table is for 2 projectors, not 3");
+    let devices = screen.seen_of_devices(&together, 4, true);
+    assert!(devices.whole < 0.007, "{devices:?}");
+    let silent = screen.seen_of_devices(&together, 4, false);
+    assert!(silent.whole > 0.03, "{silent:?}");
+    // What a wide frame has below the lower one is shown by nobody, and changes nothing.
+    let size = FrameSize::new(40 * 20, 15 * 20).unwrap();
+    let below = scene.parts_of(size).unwrap()[1].rows;
+    let shown = |code: u16| {
+        let codes = (0..size.pixels()).map(|pixel| match pixel / size.width() {
+            row if row >= below && pixel % size.width() >= 24 * 20 => code,
+            _ => 40_000,
+        });
+        let frame = Picture::new(size, Samples::Sixteen(codes.collect())).unwrap();
+        let Samples::Sixteen(codes) = compensated(&together, frame).samples().clone() else {
+            panic!("16 bits");
+        };
+        codes
+    };
+    let (dark, bright) = (shown(0), shown(u16::MAX));
+    for part in scene.parts_of(size).unwrap() {
+        let off = part
+            .places(size.width())
+            .map(|pixel| dark[pixel].abs_diff(bright[pixel]));
+        assert!(off.max().unwrap() < 257, "a code of 8 bits");
+        // Nor do gains fade towards it.
+        let last = part
+            .places(size.width())
+            .map(|pixel| dark[pixel])
+            .last()
+            .unwrap();
+        let above = part.place(size.width(), (part.rows - 8) * part.columns.len() - 1);
+        assert!(last > dark[above] - 257 * 4, "{last} below {}", dark[above]);
+    }
+}
+
 #[test]
 fn captures_that_cannot_be_of_one_frame_are_refused_by_name() {
     let scene = two_walls();
@@ -296,14 +354,44 @@ fn captures_that_cannot_be_of_one_frame_are_refused_by_name() {
     let (words, next) = refused(&[captures[0].clone(), captures[0].clone()]);
     assert!(words.contains("given twice"), "{words}");
     assert!(next.contains("once"), "{next}");
-    let mut lower = scene.clone();
-    lower.projectors[1].grid = Grid::new(11, 16).unwrap();
+    // Cells that have other pixels, a border, or pixels that nobody knows.
     let other = place.path().join("other");
     fs::create_dir(&other).unwrap();
-    let others = photograph_each(&single(&lower, 1), 10, &other);
-    let (words, next) = refused(&[captures[0].clone(), others[0].clone()]);
-    assert!(words.contains("11 rows of cells beside 12"), "{words}");
-    assert!(next.contains("--rows"), "{next}");
+    let stated = |capture: &Path, from: &str, to: &str| {
+        let file = capture.join("capture.toml");
+        let text = fs::read_to_string(&file).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(file, text.replace(from, to)).unwrap();
+    };
+    let others = photograph_each(&single(&scene, 1), 10, &other);
+    for (size, expected) in [
+        (
+            "size = [320, 228]",
+            "20 x 19 pixels, those of the first 20 x 20",
+        ),
+        (
+            "size = [336, 240]",
+            "21 x 20 pixels, those of the first 20 x 20",
+        ),
+        ("", "the size is known of some projectors"),
+    ] {
+        let text = fs::read_to_string(others[0].join("capture.toml")).unwrap();
+        stated(&others[0], "size = [320, 240]", size);
+        let (words, next) = refused(&[captures[0].clone(), others[0].clone()]);
+        assert!(words.contains(expected), "{words}");
+        assert!(next.contains("--rows"), "{next}");
+        fs::write(others[0].join("capture.toml"), text).unwrap();
+    }
+    let mut lower = single(&scene, 1);
+    lower.projectors[0].grid = Grid::new(11, 16).unwrap();
+    let unknown = [single(&scene, 0), lower].map(|scene| {
+        let place = tempfile::tempdir().unwrap();
+        photograph(&scene, 10, 1, &place.path().join("capture"));
+        place
+    });
+    let unknown = unknown.each_ref().map(|place| place.path().join("capture"));
+    let (words, _) = refused(&unknown);
+    assert!(words.contains("11 rows of cells beside 12, and"), "{words}");
     let mut nearer = single(&scene, 1);
     nearer.camera.size = (150, 100);
     let others = photograph_each(&nearer, 10, &place.path().join("other/nearer"));

@@ -10,9 +10,8 @@ use crate::registration::correspondence::{self, Correspondence};
 use crate::remeasure::CellPlanes;
 use crate::several::{as_the_first, check_once};
 use crate::wide_frame::{WideFrame, wide_size};
-use iltm_picture::progress::Progress;
+use iltm_picture::{FramePart, progress::Progress};
 use iltm_runtime::{FrameSize, Grid};
-use std::ops::Range;
 use std::path::PathBuf;
 
 /// Where a camera sees the pixels of a wide frame.
@@ -22,8 +21,8 @@ pub struct CameraPlaces {
     pub grid: Grid,
     /// Pixels of the wide frame.
     pub frame: FrameSize,
-    /// Columns of cells of each projector.
-    pub columns: Vec<Range<usize>>,
+    /// The cells of each projector.
+    pub parts: Vec<FramePart>,
     /// Place of each pixel of the wide frame in the camera's picture, `[x, y]` with the centre of its
     /// first pixel at `[0, 0]`, row by row; `None` where the camera does not see it.
     pub places: Vec<Option<[f32; 2]>>,
@@ -86,7 +85,8 @@ pub fn camera_places(
         let each = maps.iter().zip(&inverse);
         each.flat_map(move |(map, places)| {
             let width = map.projector.size().width();
-            places[row * width..(row + 1) * width].iter()
+            // Below a lower frame there is nothing to see.
+            (row * width..(row + 1) * width).map(|at| places.get(at).copied().flatten())
         })
     };
     let saturated: Vec<&[bool]> = linear.iter().map(|linear| &linear.saturated[..]).collect();
@@ -94,13 +94,13 @@ pub fn camera_places(
     let black = linear.iter().map(|linear| &linear.black[..]);
     let flood = wide.own.iter().map(|own| &own.flood[..]);
     Ok(CameraPlaces {
-        places: (0..frame.height()).flat_map(row).copied().collect(),
+        places: (0..frame.height()).flat_map(row).collect(),
         cell_side: wide.registration().cell_side(),
         correspondences: correspondence::find(&maps, &inverse),
         white: white(&pixels, flood, black),
         grid: wide.grid,
         frame,
-        columns: wide.columns,
+        parts: wide.parts,
     })
 }
 

@@ -1,8 +1,8 @@
 //! Crossing light: what one of several projectors throws on what another one lights, by bounces
 //! and where they overlap.
 
+use iltm_picture::FramePart;
 use nalgebra::{Matrix2, Vector2};
-use std::ops::Range;
 
 /// Light that one projector throws on what another one lights.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,8 +27,8 @@ pub struct ProjectorAreas {
     pub crossing: Vec<CrossingLight>,
     /// Share of the light that each cell's projector shows there, length `N`.
     pub cell_shares: Vec<f64>,
-    /// Columns of cells of each projector in the wide frame.
-    pub columns: Vec<Range<usize>>,
+    /// The cells of each projector in the wide frame.
+    pub parts: Vec<FramePart>,
     /// Share of each projector at each camera pixel; 0 where it does not reach.
     pub pixel_shares: Vec<Vec<f32>>,
 }
@@ -153,7 +153,7 @@ mod tests {
             overlap: true,
             crossing: found,
             cell_shares: Vec::new(),
-            columns: Vec::new(),
+            parts: Vec::new(),
             pixel_shares: shares,
         };
         assert!((areas.alone(0) - 5.0 / 6.0).abs() < 1e-12);

@@ -370,14 +370,17 @@ impl<'f> Placed<'f> {
         let selection = selection.of_part(projector_stripes_file(index + 1));
         let sequence = Sequence::read(folder, selection)?;
         let mut own = settings.clone();
-        if let (Some([width, _]), Some(part)) = (&mut own.projector.size, &sequence.part) {
-            let pixels = part.pixels((*width).into());
-            let pixels = pixels.and_then(|pixels| u16::try_from(pixels).ok());
-            *width = pixels.ok_or_else(|| CaptureError::Unlike {
+        if let (Some(size), Some(part)) = (&mut own.projector.size, &sequence.part) {
+            let [width, height] = *size;
+            let pixels = FrameSize::new(width, height).and_then(|wide| part.pixels(wide));
+            let pixels = pixels.ok_or_else(|| CaptureError::Unlike {
                 path: list.clone(),
-                reason: format!("{width} pixels in all are no whole number for each cell"),
+                reason: format!(
+                    "{width} x {height} pixels in all are no whole number for each cell"
+                ),
                 next_step: "Make the folder again with `iltm verify`.",
             })?;
+            *size = [pixels.width(), pixels.height()].map(|side| side as u16);
         }
         let reading = own.camera.reading();
         let mut linear = LinearPhotographs::read(folder, &sequence, &reading, progress)?;

@@ -20,7 +20,7 @@ use crate::photographs::sampled::Sampled;
 use crate::registration::black_shift;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::wide_frame::{WideFrame, place};
-use iltm_picture::progress::Progress;
+use iltm_picture::{FramePart, progress::Progress};
 use nalgebra::DMatrix;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -53,8 +53,8 @@ pub struct SeveralCaptures {
 pub struct OneOfSeveral {
     /// Its own capture.
     pub own: Measurements,
-    /// Its columns of cells in the wide frame.
-    pub columns: Range<usize>,
+    /// Its cells in the wide frame.
+    pub part: FramePart,
     /// The columns of its photographs in [`ChannelMeasurements::patterns`] of all.
     pub views: Range<usize>,
 }
@@ -197,7 +197,7 @@ impl WideFrame {
         wide.grid = self.grid;
         for view in &mut wide.views {
             let lit = std::mem::take(&mut view.lit);
-            view.lit = self.of_cells(|of, cell| of == projector && lit[cell]);
+            view.lit = self.of_cells(|of, cell| of == projector && lit[cell], || false);
         }
         wide
     }
@@ -274,7 +274,9 @@ impl WideFrame {
     /// Cells of other projectors that light the same place, by cell.
     fn overlaps(&self, pixels: &CellPixels) -> Vec<Vec<usize>> {
         let of_cell = |(cell, pixels): (usize, &[u32])| {
-            let (own, _) = self.own_cell(cell);
+            let Some((own, _)) = self.own_cell(cell) else {
+                return Vec::new();
+            };
             let mut found = Vec::new();
             for (projector, other) in self.own.iter().enumerate().filter(|(at, _)| *at != own) {
                 let seen = &other.registration.seen_cell;
@@ -333,7 +335,10 @@ impl WideFrame {
                     observations: beside(|channel| &channel.observations),
                     ambient: (0..self.grid.cells()).map(ambient).collect(),
                     noise: (0..self.grid.cells())
-                        .map(|cell| of(self.own_cell(cell).0).noise[cell])
+                        .map(|cell| {
+                            let own = self.own_cell(cell).map_or(0, |(projector, _)| projector);
+                            of(own).noise[cell]
+                        })
                         .collect(),
                     noise_model: of(0).noise_model,
                 }
@@ -366,25 +371,19 @@ impl WideFrame {
         }
         all.diagnostics.left_out.clone_from(&pixels.left_out);
         all.map = self.map().map(Ok);
-        let widths = self.own.iter().map(|own| own.settings.projector.size);
-        let widths: Option<Vec<[u16; 2]>> = widths.collect();
-        all.settings.projector.size = widths.and_then(|sizes| {
-            let width = sizes
-                .iter()
-                .map(|[width, _]| usize::from(*width))
-                .sum::<usize>();
-            Some([u16::try_from(width).ok()?, sizes[0][1]])
+        let sizes = self.own.iter().map(|own| own.settings.projector.size);
+        let sizes: Option<Vec<[u16; 2]>> = sizes.collect();
+        all.settings.projector.size = sizes.and_then(|sizes| {
+            let frames = (sizes.iter()).map(|[width, height]| [*height, *width].map(usize::from));
+            let [height, width] = FramePart::around(&FramePart::side_by_side(frames));
+            Some([width.try_into().ok()?, height.try_into().ok()?])
         });
         let overlaps = self.overlaps(pixels);
-        let projectors = self.own.into_iter().zip(self.columns).zip(views);
+        let projectors = self.own.into_iter().zip(self.parts).zip(views);
         SeveralCaptures {
             all,
             projectors: projectors
-                .map(|((own, columns), views)| OneOfSeveral {
-                    own,
-                    columns,
-                    views,
-                })
+                .map(|((own, part), views)| OneOfSeveral { own, part, views })
                 .collect(),
             overlaps,
             pixel_shares: self.pixel_shares,
@@ -399,12 +398,12 @@ impl SeveralCaptures {
         self.overlaps.iter().any(|others| !others.is_empty())
     }
 
-    /// The projector of a cell of the wide frame.
+    /// The projector of a cell of the wide frame; `None` of a cell below a lower frame.
     #[must_use]
-    pub fn projector_of(&self, cell: usize) -> usize {
-        let col = cell % self.all.grid.cols();
-        let of = |one: &OneOfSeveral| one.columns.contains(&col);
-        self.projectors.iter().position(of).unwrap_or(0)
+    pub fn projector_of(&self, cell: usize) -> Option<usize> {
+        let cols = self.all.grid.cols();
+        let of = |one: &OneOfSeveral| one.part.own(cols, cell).is_some();
+        self.projectors.iter().position(of)
     }
 
     /// What several projectors light and how they share it, and the measurements of all.
@@ -415,12 +414,26 @@ impl SeveralCaptures {
             overlap: self.is_overlapping(),
             crossing: crossing_light(&self.pixel_shares, white),
             cell_shares: self.shares_of_cells(),
-            columns: (self.projectors.iter())
-                .map(|one| one.columns.clone())
+            parts: (self.projectors.iter())
+                .map(|one| one.part.clone())
                 .collect(),
             pixel_shares: self.pixel_shares,
         };
         (self.all, areas)
+    }
+
+    /// Has what lies below a lower frame go on as the frame's last row, so that values which are
+    /// interpolated do not fade there. `values` has so many along a cell's width and height, row by row.
+    pub fn continue_below<T: Copy>(&self, [wide, tall]: [usize; 2], values: &mut [T]) {
+        let width = self.all.grid.cols() * wide;
+        for part in self.projectors.iter().map(|one| &one.part) {
+            let columns = part.columns.start * wide..part.columns.end * wide;
+            let (frame, below) = values.split_at_mut(part.rows * tall * width);
+            let last = &frame[frame.len() - width..][columns.clone()];
+            for row in below.chunks_exact_mut(width) {
+                row[columns.clone()].copy_from_slice(last);
+            }
+        }
     }
 
     /// Whether a projector lights a camera pixel itself.
@@ -444,8 +457,8 @@ impl SeveralCaptures {
     /// many samples along a cell's width and height, row by row: the mean over the camera pixels
     /// that see the sample.
     ///
-    /// It is 1 where no other one reaches, and the shares of a place add up to one
-    /// (`blending.rs` says how).
+    /// It is 1 where no other one reaches, and below a lower frame; the shares of a place add up to
+    /// one (`blending.rs` says how).
     #[must_use]
     pub fn shares(&self, factor: [usize; 2]) -> Vec<f64> {
         let [wide, tall] = factor;
@@ -453,8 +466,12 @@ impl SeveralCaptures {
         let width = grid.cols() * wide;
         let mut shares = vec![1.0; width * grid.rows() * tall];
         for (one, of_pixels) in self.projectors.iter().zip(&self.pixel_shares) {
-            let cols = one.columns.len() * wide;
-            let mut sums = vec![(0.0, 0.0); cols * grid.rows() * tall];
+            let part = FramePart {
+                columns: one.part.columns.start * wide..one.part.columns.end * wide,
+                rows: one.part.rows * tall,
+            };
+            let cols = part.columns.len();
+            let mut sums = vec![(0.0, 0.0); cols * part.rows];
             for (pixel, share) in of_pixels.iter().enumerate() {
                 let Some([x, y]) = place(&one.own, pixel) else {
                     continue;
@@ -470,7 +487,7 @@ impl SeveralCaptures {
                 .into_iter()
                 .map(|(sum, count)| (count > 0.0).then(|| sum / count));
             for (at, share) in filled(means.collect(), cols).into_iter().enumerate() {
-                shares[at / cols * width + one.columns.start * wide + at % cols] = share;
+                shares[part.place(width, at)] = share;
             }
         }
         shares

@@ -8,9 +8,9 @@ use crate::cells::pixel_views::PixelViews;
 use crate::format::error::CaptureError;
 use crate::registration::cell_map::{NO_CELL, Registration};
 use crate::registration::projector_map::{MapError, ProjectorMap};
+use iltm_picture::FramePart;
 use iltm_runtime::placement::ProjectorPixels;
 use iltm_runtime::{FrameSize, Grid};
-use std::ops::Range;
 use std::path::PathBuf;
 
 /// The frames of all projectors side by side.
@@ -18,8 +18,8 @@ pub(crate) struct WideFrame {
     pub(crate) grid: Grid,
     /// What was measured of each projector by itself.
     pub(crate) own: Vec<Measurements>,
-    /// Columns of cells of each.
-    pub(crate) columns: Vec<Range<usize>>,
+    /// The cells of each.
+    pub(crate) parts: Vec<FramePart>,
     /// Share of each projector at each camera pixel; 0 where it does not reach.
     pub(crate) pixel_shares: Vec<Vec<f32>>,
 }
@@ -47,28 +47,9 @@ impl WideFrame {
                     "Photograph all projectors with one camera that stays.",
                 );
             }
-            if first.grid.rows() != other.grid.rows() {
-                let (rows, others) = (first.grid.rows(), other.grid.rows());
-                let reason = format!("{others} rows of cells beside {rows}");
-                return refuse(
-                    reason,
-                    "Make patterns with the same --rows for all projectors.",
-                );
-            }
-            let cell = |of: &Measurements| {
-                let pixels = of.settings.projector.pixels()?;
-                let (inner, grid) = (pixels.inner(), of.grid);
-                let whole = pixels.border() == 0 && inner.width() % grid.cols() == 0;
-                let width = whole.then(|| inner.width() / grid.cols());
-                Some((width, inner.height()))
-            };
-            let fits = matches!(cell(other), None | Some((Some(_), _)));
-            if cell(first) != cell(other) || !fits {
-                let reason = "its cells have not as many pixels as those of the others, or a \
-                              border lies around them"
-                    .to_owned();
-                let next_step = "Use projectors of one height without a border, and columns that \
-                                 divide their widths into cells of the same number of pixels.";
+            if let Some(reason) = unlike_cells(first, other) {
+                let next_step = "Make patterns without a border, with --rows and --cols that divide \
+                                 all frames into cells of the same number of pixels.";
                 return refuse(reason, next_step);
             }
             if other.diagnostics.images > 0 {
@@ -76,51 +57,47 @@ impl WideFrame {
                 return refuse(reason, "Use Bernoulli patterns for several projectors.");
             }
         }
-        let mut columns = Vec::new();
-        let mut cols = 0;
-        for own in &own {
-            columns.push(cols..cols + own.grid.cols());
-            cols += own.grid.cols();
-        }
-        let side = |side: usize| u16::try_from(side).unwrap_or(u16::MAX);
-        let grid =
-            Grid::new(side(first.grid.rows()), side(cols)).map_err(|_| CaptureError::Unlike {
+        let grids = own.iter().map(|own| [own.grid.rows(), own.grid.cols()]);
+        let parts = FramePart::side_by_side(grids);
+        let grid = FramePart::grid(&parts).ok_or_else(|| {
+            let [rows, cols] = FramePart::around(&parts);
+            CaptureError::Unlike {
                 path: folders[0].clone(),
-                reason: format!("{} x {cols} cells in all", first.grid.rows()),
+                reason: format!("{rows} x {cols} cells in all"),
                 next_step: "Make patterns with fewer cells.",
-            })?;
+            }
+        })?;
         Ok(Self {
             pixel_shares: pixel_shares(&own),
             grid,
             own,
-            columns,
+            parts,
         })
     }
 
     /// The cell in the wide frame of a projector's own.
     pub(crate) fn place(&self, projector: usize, cell: usize) -> usize {
-        let cols = self.own[projector].grid.cols();
-        cell / cols * self.grid.cols() + self.columns[projector].start + cell % cols
+        self.parts[projector].place(self.grid.cols(), cell)
     }
 
-    /// The projector of a cell, and its number there.
-    pub(crate) fn own_cell(&self, cell: usize) -> (usize, usize) {
-        let (row, col) = (cell / self.grid.cols(), cell % self.grid.cols());
-        let projector = self.columns.iter().position(|all| all.contains(&col));
-        let projector = projector.expect("all columns are a projector's");
-        let columns = &self.columns[projector];
-        (projector, row * columns.len() + col - columns.start)
+    /// The projector of a cell, and its number there; `None` of a cell below a lower frame.
+    pub(crate) fn own_cell(&self, cell: usize) -> Option<(usize, usize)> {
+        let cols = self.grid.cols();
+        let mut parts = self.parts.iter().enumerate();
+        parts.find_map(|(projector, part)| Some((projector, part.own(cols, cell)?)))
     }
 
-    /// An entry a cell from those of each projector's own cells.
-    pub(crate) fn of_cells<T>(&self, of: impl Fn(usize, usize) -> T) -> Vec<T> {
-        let cells = 0..self.grid.cells();
-        cells
-            .map(|cell| {
-                let (projector, own) = self.own_cell(cell);
-                of(projector, own)
-            })
-            .collect()
+    /// An entry a cell from those of each projector's own cells, and `none` for cells of no projector.
+    pub(crate) fn of_cells<T>(
+        &self,
+        of: impl Fn(usize, usize) -> T,
+        none: impl Fn() -> T,
+    ) -> Vec<T> {
+        let of_cell = |cell| {
+            let own = self.own_cell(cell);
+            own.map_or_else(&none, |(projector, own)| of(projector, own))
+        };
+        (0..self.grid.cells()).map(of_cell).collect()
     }
 
     /// Pixels of all cells, without those that are saturated in the photographs of their projector; one
@@ -130,7 +107,8 @@ impl WideFrame {
         let own: Vec<CellPixels> = own
             .map(|(own, saturated)| CellPixels::choose(&own.registration, saturated))
             .collect();
-        CellPixels::joined(&self.of_cells(|projector, cell| (&own[projector], cell)))
+        let of_cell = |projector: usize, cell| Some((&own[projector], cell));
+        CellPixels::joined(&self.of_cells(of_cell, || None))
     }
 
     /// The projector with the largest share of each camera pixel.
@@ -164,7 +142,10 @@ impl WideFrame {
         Registration {
             cell_of_pixel: labels(|registration| &registration.cell_of_pixel),
             seen_cell: labels(|registration| &registration.seen_cell),
-            centre: self.of_cells(|projector, cell| self.own[projector].registration.centre[cell]),
+            centre: self.of_cells(
+                |projector, cell| self.own[projector].registration.centre[cell],
+                || None,
+            ),
             ..self.own[0].registration.clone()
         }
     }
@@ -175,7 +156,7 @@ impl WideFrame {
         let owners = self.owners();
         let [width, height] = of_owners.size();
         let of_projector = |(index, own): (usize, &Measurements)| {
-            let columns = self.columns[index].start as f32;
+            let columns = self.parts[index].columns.start as f32;
             let scale = [
                 width as f32 / self.grid.cols() as f32,
                 height as f32 / self.grid.rows() as f32,
@@ -236,12 +217,48 @@ impl WideFrame {
     }
 }
 
+/// Why the cells of two projectors do not fit into one grid.
+fn unlike_cells(first: &Measurements, other: &Measurements) -> Option<String> {
+    let pixels = |of: &Measurements| {
+        let pixels = of.settings.projector.pixels()?;
+        Some((pixels.border(), pixels.size(), of.grid))
+    };
+    let ((own_border, own, grid), (border, size, cells)) = match (pixels(first), pixels(other)) {
+        (None, None) => {
+            let (rows, others) = (first.grid.rows(), other.grid.rows());
+            return (rows != others).then(|| {
+                format!("{others} rows of cells beside {rows}, and nothing says how large they are")
+            });
+        }
+        (Some(own), Some(other)) => (own, other),
+        _ => return Some("the size is known of some projectors, and not of others".to_owned()),
+    };
+    if own_border.max(border) > 0 {
+        return Some("a border lies around the cells".to_owned());
+    }
+    let whole = |size: FrameSize, grid: Grid| size.width().is_multiple_of(grid.cols());
+    let alike = |size: usize, cells: usize, others: usize, by: usize| size * by == others * cells;
+    let fits = whole(own, grid)
+        && whole(size, cells)
+        && alike(own.width(), grid.cols(), size.width(), cells.cols())
+        && alike(own.height(), grid.rows(), size.height(), cells.rows());
+    let of_cell = |size: FrameSize, grid: Grid| {
+        let side = |pixels: usize, cells: usize| (100 * pixels / cells) as f64 / 100.0;
+        let across = side(size.width(), grid.cols());
+        format!("{across} x {}", side(size.height(), grid.rows()))
+    };
+    (!fits).then(|| {
+        let (found, must) = (of_cell(size, cells), of_cell(own, grid));
+        format!("its cells have {found} pixels, those of the first {must}")
+    })
+}
+
 /// Pixels of frames side by side; `None` if no frame has so many.
 pub(crate) fn wide_size(maps: &[&ProjectorMap]) -> Option<FrameSize> {
     let sizes = maps.iter().map(|map| map.projector.size());
-    let width: usize = sizes.clone().map(FrameSize::width).sum();
-    let height = sizes.map(FrameSize::height).next()?;
-    FrameSize::new(u16::try_from(width).ok()?, u16::try_from(height).ok()?)
+    let parts = FramePart::side_by_side(sizes.map(|size| [size.height(), size.width()]));
+    let [height, width] = FramePart::around(&parts);
+    FrameSize::new(width.try_into().ok()?, height.try_into().ok()?)
 }
 
 /// Where a camera pixel lies in a projector's picture, in cells from the left and upper edge of the

@@ -3,8 +3,7 @@
 use super::acquisition::{self, Acquisition};
 use super::inversion::{self, Inversion, Inverted, KnownTransport};
 use super::{Answer, Description, Errors, GroundTruth, Rig, Unfit};
-use iltm_picture::progress::Progress;
-use std::ops::Range;
+use iltm_picture::{FramePart, progress::Progress};
 use std::time::Instant;
 
 /// What one method did.
@@ -99,11 +98,11 @@ fn row(
 /// Ways to photograph, and ways to invert.
 pub type Methods = (Vec<Box<dyn Acquisition>>, Vec<Box<dyn Inversion>>);
 
-/// All ways to photograph (with `photographs` where one likes) and all ways to invert. `columns` are
-/// those of each of several projectors.
+/// All ways to photograph (with `photographs` where one likes) and all ways to invert. `parts` are
+/// those of several projectors.
 #[must_use]
-pub fn all(columns: &[Range<usize>], photographs: usize, seed: u64) -> Methods {
-    (acquisition::all(photographs, seed), inversion::all(columns))
+pub fn all(parts: &[FramePart], photographs: usize, seed: u64) -> Methods {
+    (acquisition::all(photographs, seed), inversion::all(parts))
 }
 
 /// What each of the methods does, in their order.

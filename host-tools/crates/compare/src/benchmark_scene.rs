@@ -13,8 +13,8 @@ use iltm_capture::{
     CaptureError, CaptureOptions, Measurements, NO_CELL, NoiseModel, ReferenceError,
     SeveralCaptures, pattern_set, read_reference, read_several,
 };
-use iltm_picture::progress::Progress;
 use iltm_picture::unfinished::TemporaryFolder;
+use iltm_picture::{FramePart, progress::Progress};
 use iltm_runtime::Grid;
 use iltm_scene::{
     Simulation, SimulationError, SimulationOptions, VirtualCamera,
@@ -23,7 +23,6 @@ use iltm_scene::{
 };
 use iltm_solve::{SolveError, SolveOptions, solve, wanted_images};
 use nalgebra::{DMatrix, DVector};
-use std::ops::Range;
 use std::path::Path;
 use thiserror::Error;
 
@@ -57,7 +56,7 @@ pub struct BenchmarkScene {
     /// What photographs are taken with; its noise is the camera's.
     pub rig: Rig,
     /// Columns of cells of each of several projectors; empty for one.
-    columns: Vec<Range<usize>>,
+    parts: Vec<FramePart>,
     /// How several projectors that overlap share the light.
     together: Option<Together>,
 }
@@ -152,10 +151,10 @@ impl BenchmarkScene {
         let mut transport = simulated(&simulation, &several, progress)?;
         let known = "simulated without noise, one cell lit at a time";
         let (all, live) = (&several.all, several.all.live.clone());
-        let columns = scene.columns();
-        if !overlap(&transport, all.grid, &columns) {
+        let parts = scene.parts();
+        if !overlap(&transport, all.grid, &parts) {
             let scene = Self::new(all, live, transport, known, seed)?;
-            return Ok(Self { columns, ..scene });
+            return Ok(Self { parts, ..scene });
         }
         clear_dead(&mut transport, &live);
         let together = Together {
@@ -172,7 +171,7 @@ impl BenchmarkScene {
             colour: all.channels.len() > 1,
             rig,
             truth: truth.ok_or(BenchmarkSceneError::Singular)?,
-            columns,
+            parts,
             together: Some(together),
         })
     }
@@ -182,11 +181,8 @@ impl BenchmarkScene {
     #[must_use]
     pub fn methods(&self, photographs: usize, seed: u64) -> Methods {
         match &self.together {
-            Some(together) => (
-                Vec::new(),
-                inversion::of_overlapping(&self.columns, together),
-            ),
-            None => benchmark::all(&self.columns, photographs, seed),
+            Some(together) => (Vec::new(), inversion::of_overlapping(&self.parts, together)),
+            None => benchmark::all(&self.parts, photographs, seed),
         }
     }
 
@@ -206,7 +202,7 @@ impl BenchmarkScene {
             colour: measurements.channels.len() > 1,
             truth,
             rig,
-            columns: Vec::new(),
+            parts: Vec::new(),
             together: None,
         })
     }
@@ -257,8 +253,8 @@ const DIRECT: f64 = 0.1;
 
 /// Whether cells of one projector light another's directly. The transport is known, so it says more than
 /// the photographs: a coarse camera's pixels mix cells at a corner.
-fn overlap(transport: &DMatrix<f64>, grid: Grid, columns: &[Range<usize>]) -> bool {
-    let projector = |cell: usize| projector_of(cell, grid, columns);
+fn overlap(transport: &DMatrix<f64>, grid: Grid, parts: &[FramePart]) -> bool {
+    let projector = |cell: usize| projector_of(cell, grid, parts);
     (0..grid.cells()).any(|cell| {
         let own = transport[(cell, cell)];
         let lit = transport.row(cell);
@@ -304,14 +300,11 @@ fn simulated(
     // Pixels of every projector's cells: where pictures overlap, a pixel is of several.
     let mut labels = Vec::new();
     for projector in &several.projectors {
-        let (own, first) = (&projector.own, projector.columns.start);
+        let (own, part) = (&projector.own, &projector.part);
         let seen = own.registration.cell_of_pixel.iter().enumerate();
         labels.extend(
             seen.filter(|(_, cell)| **cell != NO_CELL)
-                .map(|(pixel, cell)| {
-                    let (cell, cols) = (*cell as usize, own.grid.cols());
-                    (pixel, cell / cols * grid.cols() + first + cell % cols)
-                }),
+                .map(|(pixel, cell)| (pixel, part.place(grid.cols(), *cell as usize))),
         );
     }
     let means = |photograph: &[f32]| {

@@ -91,6 +91,29 @@ pub enum BuildError {
     },
 }
 
+/// Has what is interpolated go on below lower frames; no cell there counts.
+fn continue_below(
+    several: &SeveralCaptures,
+    inverse: &mut InverseTransport,
+    (fine, factor): (&mut Option<FineGains>, [usize; 2]),
+) {
+    for channel in &mut inverse.channels {
+        several.continue_below([1, 1], &mut channel.gain);
+        several.continue_below([1, 1], &mut channel.ambient);
+    }
+    for gains in fine.iter_mut().flat_map(|fine| &mut fine.channels) {
+        several.continue_below(factor, gains);
+    }
+}
+
+/// Rows and columns of the frame of each projector.
+fn frames(several: &SeveralCaptures) -> Vec<[u16; 2]> {
+    let parts = several.projectors.iter().map(|one| &one.part);
+    let sides = parts.map(|part| [part.rows, part.columns.len()]);
+    // Sides of a grid are `u16`s.
+    sides.map(|sides| sides.map(|side| side as u16)).collect()
+}
+
 /// Reads a capture, solves it and compiles the table; one without an operator if
 /// photographs that the solve had not seen do not show that the operator helps, and one that
 /// leaves pictures as they are if the wall is as even as a projector's codes can make it.
@@ -215,7 +238,7 @@ pub fn build_table_from(
             channel.ambient.fill(0.0);
         }
     }
-    let fine = match report.compensation {
+    let mut fine = match report.compensation {
         Compensation::Nothing => None,
         _ => match several {
             Some(several) => crate::gain::fine_gains_of_several(&inverse, &flood, several),
@@ -226,9 +249,13 @@ pub fn build_table_from(
         inverse.share(&several.shares_of_cells());
     }
     let white = ReferenceWhite::new(&inverse, fine.as_ref(), table.white, table.match_black)?;
+    if let Some(several) = several {
+        continue_below(several, &mut inverse, (&mut fine, flood.factor));
+    }
     let provenance = Provenance {
         ambient_kept,
         overlapping: several.is_some_and(SeveralCaptures::is_overlapping),
+        frames: several.map(frames),
         ..Provenance::new(capture, measurements, &report, predicted, &white)
     };
     let options = CompileOptions {

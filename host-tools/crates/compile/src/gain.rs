@@ -25,7 +25,8 @@ pub(crate) fn even(mut inverse: InverseTransport, left_out: &[LeftOut]) -> Inver
     });
     for channel in &mut inverse.channels {
         channel.gain.fill(count / light);
-        for out in left_out.iter().filter(|out| out.why != WhyLeftOut::Unseen) {
+        let dark = |out: &&LeftOut| matches!(out.why, WhyLeftOut::Unlit | WhyLeftOut::Black);
+        for out in left_out.iter().filter(dark) {
             channel.gain[out.cell] = 0.0;
         }
     }
@@ -289,8 +290,7 @@ fn shared_gains(
             let white = one.views.start + Measurements::WHITE;
             let observed = several.all.channels[index].observations.column(white);
             let got = as_light((&operator * &observed.into_owned()).as_slice());
-            for cell in (0..grid.cells()).filter(|cell| one.columns.contains(&(cell % grid.cols())))
-            {
+            for cell in one.part.places(grid.cols()) {
                 of_white[cell] = got[cell];
             }
         }

@@ -4,7 +4,8 @@ use crate::brightness::Brightness;
 use crate::reference_white::ReferenceWhite;
 use crate::viewer_error::ViewerError;
 use iltm_capture::{Measurements, Settings};
-use iltm_picture::PictureError;
+use iltm_picture::{FramePart, PictureError};
+use iltm_runtime::Grid;
 use iltm_runtime::image::Label;
 use iltm_solve::{Compensation, Recovery, SolveReport};
 use serde::de::DeserializeOwned;
@@ -43,6 +44,13 @@ pub struct Provenance {
     /// place on the wall then.
     #[serde(skip_serializing_if = "is_false")]
     pub overlapping: bool,
+    /// Rows and columns of cells of the frame of each projector, from left to right, if it was made from
+    /// a capture of each.
+    #[serde(
+        deserialize_with = "if_readable",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub frames: Option<Vec<[u16; 2]>>,
     /// Names of the gates that failed and were ignored.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ignored_gates: Vec<String>,
@@ -204,6 +212,7 @@ impl Provenance {
             live_cells: report.live_cells,
             ambient_kept: false,
             overlapping: false,
+            frames: None,
             lambda: report.lambda,
             condition: report.condition,
             ignored_gates: failed.map(|gate| gate.name.to_string()).collect(),
@@ -216,6 +225,15 @@ impl Provenance {
             capture: Some(measurements.settings.clone()),
             refined: Vec::new(),
         }
+    }
+
+    /// The part of each projector in a wide frame of these cells, if the table is for such a frame and
+    /// says it.
+    #[must_use]
+    pub fn parts(&self, wide: Grid) -> Option<Vec<FramePart>> {
+        let frames = self.frames.iter().flatten();
+        let parts = FramePart::side_by_side(frames.map(|frame| frame.map(usize::from)));
+        (FramePart::grid(&parts) == Some(wide)).then_some(parts)
     }
 
     /// Reads a table's text; nothing of a text that says nothing.

@@ -8,12 +8,15 @@
 //! is spread over the functions that its own two overlap; most overlap one.
 
 use crate::CompileError;
+use crate::Provenance;
 use crate::haar_entries::{HaarEntry, entries_of, haar_entries};
 use crate::image::{ImageWriter, neighbours_section, operator_sections, projector_section};
 use crate::ladder::{Entry, Part, most_useful_first};
 use crate::quantise::{TooStrong, quantise};
 use crate::table::load;
 use fixed::types::U0F32;
+use iltm_picture::FramePart;
+use iltm_runtime::Grid;
 use iltm_runtime::haar::{Basis, Function};
 use iltm_runtime::image::layout::SectionKind;
 use iltm_runtime::image::layout::fine_gain;
@@ -21,11 +24,9 @@ use iltm_runtime::image::layout::label::NAME_BYTES;
 use iltm_runtime::image::{Checked, Label, Meta, Table, TierInfo};
 use iltm_runtime::operator::{Channels, Operator, Segment};
 use iltm_runtime::placement::ProjectorPixels;
-use iltm_runtime::{FrameSize, Grid};
 use iltm_solve::{Haar, wanted_images};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::ops::Range;
 use thiserror::Error;
 
 /// Cells of a frame along each side of a cell that its neighbours take of it, if nothing else is
@@ -70,9 +71,9 @@ pub enum SplitTableError {
         /// Projectors.
         projectors: usize,
     },
-    /// Its frames have a border, or a width that is not that of so many.
+    /// Its frames have a border, or pixels that are not those of so many.
     #[error(
-        "frames {width} pixels wide with a border of {border} are not those of {projectors} projectors alike"
+        "frames {width} pixels wide with a border of {border} are not those of {projectors} projectors"
     )]
     Frames {
         /// Width of the wide frame.
@@ -82,6 +83,17 @@ pub enum SplitTableError {
         /// Projectors.
         projectors: usize,
     },
+    /// It was made from the captures of another number of projectors.
+    #[error("the table is for {found} projectors, not {asked}")]
+    Projectors {
+        /// Asked for.
+        asked: usize,
+        /// It is for so many.
+        found: usize,
+    },
+    /// It was made from wide slides, which do not tell.
+    #[error("the table does not say how many projectors it is for")]
+    Unsaid,
     /// It is for one of several projectors already.
     #[error("the table is that of one projector of several already")]
     Split,
@@ -99,14 +111,15 @@ pub enum SplitTableError {
     Compile(#[from] CompileError),
 }
 
-/// Splits the table of `projectors` frames side by side, from left to right. Each takes one cell of
-/// its neighbours for `factor` of theirs along each side.
+/// Splits the table of frames side by side, from left to right: those that it was made from, or else
+/// of so many `projectors` alike. Each takes one cell of its neighbours for `factor` of theirs along
+/// each side.
 ///
 /// # Errors
 /// [`SplitTableError`] if the table is none of so many frames, or a part cannot be stored.
 pub fn split_table(
     image: &[u8],
-    projectors: usize,
+    projectors: Option<usize>,
     factor: u16,
 ) -> Result<Vec<SplitTable>, SplitTableError> {
     let own = Checked::new(image, &mut || {}).map_err(CompileError::Image)?;
@@ -114,24 +127,48 @@ pub fn split_table(
     if table.neighbours().is_some() {
         return Err(SplitTableError::Split);
     }
+    let wide = WideTable {
+        functions: table.basis().functions().collect(),
+        images: wanted_images(meta.grid),
+        coefficients: Haar::new(meta.grid).analyse_columns(&wanted_images(meta.grid)),
+        parts: parts(&table, projectors)?,
+        table: &table,
+        meta,
+    };
+    (0..wide.parts.len())
+        .map(|own| wide.part(image, own, factor.max(1)))
+        .collect()
+}
+
+/// The cells of each projector of a table.
+fn parts(table: &Table<'_>, asked: Option<usize>) -> Result<Vec<FramePart>, SplitTableError> {
+    let grid = table.grid();
+    if let Some(parts) = Provenance::read(table.provenance()).parts(grid) {
+        let found = parts.len();
+        return match asked {
+            Some(asked) if asked != found => Err(SplitTableError::Projectors { asked, found }),
+            _ => Ok(parts),
+        };
+    }
+    let projectors = asked.ok_or(SplitTableError::Unsaid)?;
     let fine = table.fine_gain().map(|fine| fine.size().width());
-    for cols in [meta.grid.cols()].into_iter().chain(fine) {
+    for cols in [grid.cols()].into_iter().chain(fine) {
         if !(2..=MOST_PROJECTORS).contains(&projectors) || !cols.is_multiple_of(projectors) {
             return Err(SplitTableError::Columns { cols, projectors });
         }
     }
-    let wide = WideTable::new(&table, meta, projectors, factor)?;
-    (0..projectors).map(|own| wide.part(image, own)).collect()
+    let frame = [grid.rows(), grid.cols() / projectors];
+    Ok(FramePart::side_by_side(std::iter::repeat_n(
+        frame, projectors,
+    )))
 }
 
 /// The wide table and what all parts need of it.
 struct WideTable<'t, 'a> {
     table: &'t Table<'a>,
     meta: Meta,
-    projectors: usize,
-    own: Grid,
-    others: Grid,
-    pixels: Option<ProjectorPixels>,
+    /// The cells of each projector.
+    parts: Vec<FramePart>,
     functions: Vec<Function>,
     /// Natural images, and their coefficients.
     images: DMatrix<f64>,
@@ -141,83 +178,60 @@ struct WideTable<'t, 'a> {
 /// A function of the wide frame by those of another grid: index and product of the two.
 type Overlaps = Vec<Vec<(u32, f64)>>;
 
-/// Where the cells along a side go: the places of the other grid, and the share of a cell that
-/// lies in each.
-type Side = Vec<Vec<(usize, f64)>>;
+/// Where each of some cells goes: the cells of another grid, and the share of it that lies in each.
+type Places = Vec<Vec<(usize, f64)>>;
 
-impl<'t, 'a> WideTable<'t, 'a> {
-    fn new(
-        table: &'t Table<'a>,
-        meta: Meta,
-        projectors: usize,
-        factor: u16,
-    ) -> Result<Self, SplitTableError> {
-        let (rows, cols) = (meta.grid.rows(), meta.grid.cols() / projectors);
-        let coarse = |side: usize| side.div_ceil(factor.max(1).into()) as u16;
-        let of_others = [coarse(rows), (projectors - 1) as u16 * coarse(cols)];
-        let cells = of_others.map(usize::from).iter().product();
-        let too_many = SplitTableError::NeighboursCells { cells };
-        let grids = Grid::new(rows as u16, cols as u16)
-            .ok()
-            .zip(Grid::new(of_others[0], of_others[1]).ok())
-            .filter(|(own, _)| cells <= own.cells() && cells + own.cells() <= Grid::MAX_CELLS);
-        let (own, others) = grids.ok_or(too_many)?;
-        let images = wanted_images(meta.grid);
-        Ok(Self {
-            table,
-            meta,
-            projectors,
-            own,
-            others,
-            pixels: own_pixels(table, projectors)?,
-            functions: table.basis().functions().collect(),
-            coefficients: Haar::new(meta.grid).analyse_columns(&images),
-            images,
-        })
-    }
-
+impl<'a> WideTable<'_, 'a> {
     /// The operator of a tier.
     fn segments(&self, tier: u8) -> impl Iterator<Item = &Segment<'a>> {
         let segments = self.table.operator().map_or(&[][..], Operator::segments);
         segments.iter().filter(move |segment| segment.tier == tier)
     }
 
-    fn columns(&self, own: usize) -> Range<usize> {
-        own * self.own.cols()..(own + 1) * self.own.cols()
+    /// The cells that a projector takes of its neighbours', one for `factor` of theirs along each side:
+    /// as many of each, however large its frame.
+    fn others(&self, own: usize, factor: u16) -> [usize; 2] {
+        let others = || self.parts.iter().enumerate().filter(|(at, _)| *at != own);
+        let side = |of: fn(&FramePart) -> usize| {
+            let most = others().map(|(_, part)| of(part)).max().unwrap_or(1);
+            let least = others().map(|(_, part)| of(part)).min().unwrap_or(1);
+            most.div_ceil(factor.into()).min(least)
+        };
+        [side(|part| part.rows), side(|part| part.columns.len())]
     }
 
-    /// Where columns go: to those of the projector's own frame, and to the coarse ones of the
-    /// others.
-    fn sides(&self, own: usize) -> [[Side; 2]; 2] {
-        let columns = self.columns(own);
-        let (all, width) = (self.meta.grid.cols(), self.own.cols());
-        let rows = self.own.rows();
-        let coarse = self.others.cols() / (self.projectors - 1);
-        let of_own = (0..all).map(|col| {
-            let place = columns.contains(&col).then(|| (col - columns.start, 1.0));
-            place.into_iter().collect()
-        });
-        let side = spread(width, coarse);
-        let of_others = (0..all).map(|col| {
-            let projector = col / width;
-            if projector == own {
-                return Vec::new();
+    /// Where the wide frame's cells go on those of the projector's own frame.
+    fn to_own(&self, own: usize) -> Places {
+        let cols = self.meta.grid.cols();
+        let cells = 0..self.meta.grid.cells();
+        let place = |cell| self.parts[own].own(cols, cell).map(|own| (own, 1.0));
+        cells
+            .map(|cell| place(cell).into_iter().collect())
+            .collect()
+    }
+
+    /// Where they go on the coarse ones of the others, so many rows and columns of each.
+    fn to_others(&self, own: usize, [rows, cols]: [usize; 2]) -> Places {
+        let all = cols * (self.parts.len() - 1);
+        let mut places = vec![Vec::new(); self.meta.grid.cells()];
+        let others = self.parts.iter().enumerate().filter(|(at, _)| *at != own);
+        for (number, (_, part)) in others.enumerate() {
+            let (down, across) = (spread(part.rows, rows), spread(part.columns.len(), cols));
+            for (at, cell) in part.places(self.meta.grid.cols()).enumerate() {
+                let (row, col) = (at / part.columns.len(), at % part.columns.len());
+                places[cell] = (down[row].iter())
+                    .flat_map(|(r, down)| {
+                        let across = across[col].iter();
+                        across.map(move |(c, across)| (r * all + number * cols + c, down * across))
+                    })
+                    .collect();
             }
-            let first = (projector - usize::from(projector > own)) * coarse;
-            let places = side[col % width].iter();
-            places.map(|(at, share)| (first + at, *share)).collect()
-        });
-        [
-            [
-                (0..rows).map(|row| vec![(row, 1.0)]).collect(),
-                of_own.collect(),
-            ],
-            [spread(rows, self.others.rows()), of_others.collect()],
-        ]
+        }
+        places
     }
 
     /// The functions of the wide frame by those of a grid.
-    fn overlaps(&self, grid: Grid, [down, across]: &[Side; 2]) -> Overlaps {
+    fn overlaps(&self, grid: Grid, places: &Places) -> Overlaps {
         const AT_ONCE: usize = 256;
         let haar = Haar::new(grid);
         let chunks = self.functions.par_chunks(AT_ONCE).map(|functions| {
@@ -229,10 +243,8 @@ impl<'t, 'a> WideTable<'t, 'a> {
                 for row in top..top + height {
                     for col in left..left + width {
                         let value = function.at(row, col) as f64 / norm;
-                        for (r, down) in &down[row] {
-                            for (c, across) in &across[col] {
-                                column[r * grid.cols() + c] += value * down * across;
-                            }
+                        for (at, share) in &places[row * self.meta.grid.cols() + col] {
+                            column[*at] += value * share;
                         }
                     }
                 }
@@ -250,19 +262,32 @@ impl<'t, 'a> WideTable<'t, 'a> {
     }
 
     /// The table of one projector.
-    fn part(&self, image: &[u8], own: usize) -> Result<SplitTable, SplitTableError> {
-        let [to_own, to_others] = self.sides(own);
-        let outputs = self.overlaps(self.own, &to_own);
+    fn part(&self, image: &[u8], own: usize, factor: u16) -> Result<SplitTable, SplitTableError> {
+        let of_each = self.others(own, factor);
+        let [rows, cols] = [of_each[0], of_each[1] * (self.parts.len() - 1)];
+        let part = &self.parts[own];
+        let grid =
+            |rows: usize, cols: usize| Grid::new(rows.try_into().ok()?, cols.try_into().ok()?).ok();
+        let grids = grid(part.rows, part.columns.len()).zip(grid(rows, cols));
+        let grids = grids.filter(|(own, others)| {
+            let (own, others) = (own.cells(), others.cells());
+            others <= own && others + own <= Grid::MAX_CELLS
+        });
+        let cells = rows * cols;
+        let (own_grid, others) = grids.ok_or(SplitTableError::NeighboursCells { cells })?;
+        let [to_own, to_others] = [self.to_own(own), self.to_others(own, of_each)];
+        let outputs = self.overlaps(own_grid, &to_own);
         let mut inputs = outputs.clone();
-        let others = self.overlaps(self.others, &to_others);
-        let first = self.own.cells() as u32;
-        for (inputs, others) in inputs.iter_mut().zip(others) {
+        let first = own_grid.cells() as u32;
+        for (inputs, others) in inputs.iter_mut().zip(self.overlaps(others, &to_others)) {
             inputs.extend(others.iter().map(|(at, value)| (first + at, *value)));
         }
         let part = SplitPart {
             wide: self,
             own,
-            content: self.content(&[&to_own, &to_others]),
+            grid: own_grid,
+            others,
+            content: self.content([(own_grid, &to_own), (others, &to_others)]),
             outputs,
             inputs,
             to_others,
@@ -271,21 +296,18 @@ impl<'t, 'a> WideTable<'t, 'a> {
     }
 
     /// Coefficients of the natural images on the own cells and those of the neighbours.
-    fn content(&self, sides: &[&[Side; 2]; 2]) -> DMatrix<f64> {
-        let mut all = DMatrix::zeros(self.own.cells() + self.others.cells(), self.images.ncols());
+    fn content(&self, grids: [(Grid, &Places); 2]) -> DMatrix<f64> {
+        let count = grids.iter().map(|(grid, _)| grid.cells()).sum();
+        let mut all = DMatrix::zeros(count, self.images.ncols());
         let mut start = 0;
-        for (grid, [down, across]) in [self.own, self.others].into_iter().zip(sides) {
+        for (grid, places) in grids {
             let mut cells = DMatrix::zeros(grid.cells(), self.images.ncols());
             let mut weights = vec![0.0; grid.cells()];
-            for (index, light) in self.images.row_iter().enumerate() {
-                let (row, col) = (index / self.meta.grid.cols(), index % self.meta.grid.cols());
-                for (r, by_row) in &down[row] {
-                    for (c, by_col) in &across[col] {
-                        let (at, weight) = (r * grid.cols() + c, by_row * by_col);
-                        weights[at] += weight;
-                        let mut mean = cells.row_mut(at);
-                        mean += light * weight;
-                    }
+            for (light, places) in self.images.row_iter().zip(places) {
+                for (at, weight) in places {
+                    weights[*at] += weight;
+                    let mut mean = cells.row_mut(*at);
+                    mean += light * *weight;
                 }
             }
             for (mut row, weight) in cells.row_iter_mut().zip(weights) {
@@ -298,10 +320,26 @@ impl<'t, 'a> WideTable<'t, 'a> {
         }
         all
     }
+
+    /// The pixels of one of the projectors whose frames make a wide one.
+    fn pixels(&self, own: usize) -> Result<Option<ProjectorPixels>, SplitTableError> {
+        let Some(pixels) = self.table.projector() else {
+            return Ok(None);
+        };
+        let part = self.parts[own].pixels(self.meta.grid, pixels.size());
+        let own = part.and_then(|part| part.frame());
+        let own = own.filter(|_| pixels.border() == 0);
+        let own = own.ok_or(SplitTableError::Frames {
+            width: pixels.size().width(),
+            border: pixels.border(),
+            projectors: self.parts.len(),
+        })?;
+        Ok(Some(ProjectorPixels::whole(own)))
+    }
 }
 
 /// Where the cells along a side of `fine` go on one of `coarse`.
-fn spread(fine: usize, coarse: usize) -> Side {
+fn spread(fine: usize, coarse: usize) -> Places {
     let share = |at: usize, place: usize| {
         // Both sides in units of `1 / (fine coarse)`.
         let from = (at * coarse).max(place * fine);
@@ -312,43 +350,27 @@ fn spread(fine: usize, coarse: usize) -> Side {
     (0..fine).map(of_cell).collect()
 }
 
-/// The pixels of one of the projectors whose frames make a wide one.
-fn own_pixels(
-    table: &Table<'_>,
-    projectors: usize,
-) -> Result<Option<ProjectorPixels>, SplitTableError> {
-    let Some(pixels) = table.projector() else {
-        return Ok(None);
-    };
-    let (width, border) = (pixels.size().width(), pixels.border());
-    let own = FrameSize::new((width / projectors) as u16, pixels.size().height() as u16);
-    let own = own.filter(|_| border == 0 && width.is_multiple_of(projectors));
-    let own = own.ok_or(SplitTableError::Frames {
-        width,
-        border,
-        projectors,
-    })?;
-    Ok(Some(ProjectorPixels::whole(own)))
-}
-
 /// One projector, and the wide frame's functions by its own.
 struct SplitPart<'w, 't, 'a> {
     wide: &'w WideTable<'t, 'a>,
     own: usize,
+    /// Its cells, and those that it takes of its neighbours'.
+    grid: Grid,
+    others: Grid,
     /// Coefficients of the natural images, one row an input.
     content: DMatrix<f64>,
     outputs: Overlaps,
     inputs: Overlaps,
-    /// Where rows and columns go on the neighbours' cells.
-    to_others: [Side; 2],
+    /// Where the wide frame's cells go on the neighbours'.
+    to_others: Places,
 }
 
 impl SplitPart<'_, '_, '_> {
     fn table(&self, image: &[u8]) -> Result<SplitTable, SplitTableError> {
         let wide = self.wide;
         let (table, meta) = (wide.table, wide.meta);
-        let basis = Basis::new(wide.own);
-        let others = Basis::new(wide.others);
+        let basis = Basis::new(self.grid);
+        let others = Basis::new(self.others);
         let functions: Vec<Function> = basis.functions().chain(others.functions()).collect();
         let mut quantised = Vec::new();
         let mut errors = Vec::new();
@@ -379,7 +401,7 @@ impl SplitPart<'_, '_, '_> {
         });
         let tiers: Vec<u8> = tiers.collect();
         let head = Meta {
-            grid: wide.own,
+            grid: self.grid,
             bounds: operator.bounds(),
             label: self.label(),
             ..meta
@@ -387,17 +409,21 @@ impl SplitPart<'_, '_, '_> {
         let mut part = ImageWriter::of_image(image);
         part.replace(SectionKind::Meta, Some(head.emit().to_vec()));
         part.replace(SectionKind::Tiers, Some(tiers));
-        self.cut(&mut part, SectionKind::Gain, meta.grid.cols(), 0);
+        let own = &wide.parts[self.own];
+        let cells = (own, meta.grid.cols());
+        self.cut(&mut part, SectionKind::Gain, cells, 0);
         if let Some(fine) = table.fine_gain() {
-            self.cut(
-                &mut part,
-                SectionKind::FineGain,
-                fine.size().width(),
-                fine_gain::SIZE,
-            );
+            let (size, projectors) = (fine.size(), wide.parts.len());
+            let samples = own.pixels(meta.grid, size);
+            let samples = samples.ok_or(SplitTableError::Columns {
+                cols: size.width(),
+                projectors,
+            })?;
+            let samples = (&samples, size.width());
+            self.cut(&mut part, SectionKind::FineGain, samples, fine_gain::SIZE);
         }
-        self.cut(&mut part, SectionKind::Ambient, meta.grid.cols(), 0);
-        let pixels = wide.pixels.map(projector_section);
+        self.cut(&mut part, SectionKind::Ambient, cells, 0);
+        let pixels = wide.pixels(self.own)?.map(projector_section);
         part.replace(SectionKind::Projector, pixels);
         part.replace(SectionKind::Operator, None);
         for (selector, bytes) in &sections {
@@ -405,8 +431,8 @@ impl SplitPart<'_, '_, '_> {
         }
         // Gains alone take no light of others: a device need not wait for it.
         if table.operator().is_some() {
-            let around = [self.own as u8, (wide.projectors - 1 - self.own) as u8];
-            let section = neighbours_section(wide.others, around, self.ambient_of_others());
+            let around = [self.own as u8, (wide.parts.len() - 1 - self.own) as u8];
+            let section = neighbours_section(self.others, around, self.ambient_of_others());
             part.replace(SectionKind::Neighbours, Some(section));
         }
         let image = part.finish();
@@ -486,7 +512,7 @@ impl SplitPart<'_, '_, '_> {
             },
         );
         let by_inputs: Vec<Vec<(u32, f64)>> = by_inputs.collect();
-        let mut of_output: Vec<Vec<(usize, f64)>> = vec![Vec::new(); self.wide.own.cells()];
+        let mut of_output: Vec<Vec<(usize, f64)>> = vec![Vec::new(); self.grid.cells()];
         for (index, row) in rows.iter().enumerate() {
             for (at, share) in &self.outputs[row[0].row] {
                 of_output[*at as usize].push((index, *share));
@@ -516,7 +542,7 @@ impl SplitPart<'_, '_, '_> {
 
     /// The drive of the natural images by gain alone, root of the sum of squares of an image.
     fn light(&self) -> f64 {
-        let own = self.content.rows(0, self.wide.own.cells());
+        let own = self.content.rows(0, self.grid.cells());
         self.gain() * own.norm() / (own.ncols() as f64).sqrt()
     }
 
@@ -524,8 +550,8 @@ impl SplitPart<'_, '_, '_> {
     fn gain(&self) -> f64 {
         let table = self.wide.table;
         let unit = f64::from(table.gain_fraction()).exp2();
-        let columns = self.wide.columns(self.own);
-        let rows = (0..self.wide.own.rows()).flat_map(|row| {
+        let FramePart { columns, rows } = &self.wide.parts[self.own];
+        let rows = (0..*rows).flat_map(|row| {
             let channels = 0..usize::from(table.channels());
             channels.flat_map(move |channel| table.gain_row(row, channel).enumerate())
         });
@@ -539,7 +565,7 @@ impl SplitPart<'_, '_, '_> {
     /// Errors of these entries in the place of the wide table's, by channel against the corrections that
     /// are `right`.
     fn errors(&self, tier: u8, entries: &[Entry], right: &[DMatrix<f64>]) -> SplitError {
-        let own = self.wide.own.cells() as u32;
+        let own = self.grid.cells() as u32;
         let scales = self.scales();
         let mut squares = [0.0; 3];
         let of_wide = self.wide_corrections(tier);
@@ -579,7 +605,7 @@ impl SplitPart<'_, '_, '_> {
         let wide = self.wide;
         let segments: Vec<Segment<'_>> = wide.segments(tier).copied().collect();
         let of_channel = |entries: Vec<HaarEntry>| {
-            let mut corrections = DMatrix::zeros(wide.own.cells(), self.content.ncols());
+            let mut corrections = DMatrix::zeros(self.grid.cells(), self.content.ncols());
             for entry in entries {
                 for (at, share) in &self.outputs[entry.row] {
                     let mut row = corrections.row_mut(*at as usize);
@@ -595,7 +621,7 @@ impl SplitPart<'_, '_, '_> {
     /// Name of the wide table, and which of its projectors this is.
     fn label(&self) -> Label {
         let label = self.wide.meta.label;
-        let number = format!(" {}/{}", self.own + 1, self.wide.projectors);
+        let number = format!(" {}/{}", self.own + 1, self.wide.parts.len());
         let mut name = label.name().to_owned();
         while name.len() + number.len() > NAME_BYTES {
             name.pop();
@@ -603,21 +629,32 @@ impl SplitPart<'_, '_, '_> {
         Label::new(&(name + &number), label.date())
     }
 
-    /// Cuts a section of values of a grid with `cols` columns, behind a head that says rows and
-    /// columns if it has `head` bytes, to the projector's own columns.
-    fn cut(&self, part: &mut ImageWriter, kind: SectionKind, cols: usize, head: usize) {
+    /// Cuts a section of values of a grid with so many columns, behind a head that says rows and columns
+    /// if it has `head` bytes, to those of the projector's own part.
+    fn cut(
+        &self,
+        part: &mut ImageWriter,
+        kind: SectionKind,
+        (own, cols): (&FramePart, usize),
+        head: usize,
+    ) {
         let Some(bytes) = part.bytes(kind) else {
             return;
         };
         let value = size_of::<u16>() * usize::from(self.wide.meta.channels);
-        let width = cols / self.wide.projectors;
         let (first, values) = bytes.split_at(head);
         let mut cut = first.to_vec();
-        if let Some(stated) = cut.get_mut(fine_gain::COLS) {
-            stated.copy_from_slice(&(width as u16).to_le_bytes());
+        for (place, count) in [
+            (fine_gain::ROWS, own.rows),
+            (fine_gain::COLS, own.columns.len()),
+        ] {
+            if let Some(stated) = cut.get_mut(place) {
+                stated.copy_from_slice(&(count as u16).to_le_bytes());
+            }
         }
-        for row in values.chunks_exact(cols * value) {
-            cut.extend_from_slice(&row[self.own * width * value..][..width * value]);
+        let columns = own.columns.start * value..own.columns.end * value;
+        for row in values.chunks_exact(cols * value).take(own.rows) {
+            cut.extend_from_slice(&row[columns.clone()]);
         }
         part.replace(kind, Some(cut));
     }
@@ -626,21 +663,18 @@ impl SplitPart<'_, '_, '_> {
     fn ambient_of_others(&self) -> Vec<u16> {
         let wide = self.wide;
         let channels = usize::from(wide.meta.channels);
-        let [down, across] = &self.to_others;
-        let mut sums = vec![(0.0, 0.0); wide.others.cells() * channels];
-        for (row, places) in down.iter().enumerate() {
+        let cols = wide.meta.grid.cols();
+        let mut sums = vec![(0.0, 0.0); self.others.cells() * channels];
+        for row in 0..wide.meta.grid.rows() {
             for channel in 0..channels {
                 let Some(ambient) = wide.table.ambient_row(row, channel) else {
                     return Vec::new();
                 };
-                for (col, light) in ambient.enumerate() {
-                    for (r, by_row) in places {
-                        for (c, by_col) in &across[col] {
-                            let at = (r * wide.others.cols() + c) * channels + channel;
-                            let (sum, weight) = &mut sums[at];
-                            *sum += f64::from(light.to_bits()) * by_row * by_col;
-                            *weight += by_row * by_col;
-                        }
+                for (light, places) in ambient.zip(&self.to_others[row * cols..]) {
+                    for (at, share) in places {
+                        let (sum, weight) = &mut sums[at * channels + channel];
+                        *sum += f64::from(light.to_bits()) * share;
+                        *weight += share;
                     }
                 }
             }

@@ -215,11 +215,11 @@ impl<'m> PixelPhotographs<'m> {
 
     /// One of several projectors; `None` without its projector map.
     fn of_one(several: &'m SeveralCaptures, index: usize) -> Option<Self> {
-        let OneOfSeveral { own, columns, .. } = &several.projectors[index];
+        let OneOfSeveral { own, part, .. } = &several.projectors[index];
         own.map.as_ref()?.as_ref().ok()?;
         let beside = |place: Option<[f32; 2]>| {
             let [x, y] = place?;
-            Some([x + columns.start as f32, y])
+            Some([x + part.columns.start as f32, y])
         };
         let pixels = || own.pixel_light.pixels.iter().map(|pixel| *pixel as usize);
         let session = |(at, one): (usize, &'m OneOfSeveral)| {

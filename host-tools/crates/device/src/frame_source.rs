@@ -90,15 +90,16 @@ impl FrameFeed {
     }
 
     /// The same for a device that has this table: its own part of them and its neighbours' light, if
-    /// it is one of several projectors'.
+    /// it is one of several projectors', whose frames have these rows and columns of cells
+    /// ([`FrameSplitter::new`]).
     ///
     /// # Errors
     /// [`VideoError::NotWide`] if the frames are not those of all projectors side by side.
-    pub fn for_table(mut self, table: &Table<'_>) -> Result<Self, VideoError> {
+    pub fn for_table(mut self, table: &Table<'_>, frames: &[[u16; 2]]) -> Result<Self, VideoError> {
         let Some(neighbours) = table.neighbours() else {
             return Ok(self);
         };
-        let wide = FrameSplitter::new(table, self.size, Encoding::Display);
+        let wide = FrameSplitter::new((table, frames), self.size, Encoding::Display);
         let [before, after] = neighbours.around();
         let wide = wide.ok_or(VideoError::NotWide {
             projectors: before + 1 + after,

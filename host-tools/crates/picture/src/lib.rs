@@ -8,6 +8,7 @@
 //! | response curves, declared and measured | [`Response`], [`Curve`] |
 //! | how far a picture is from another | [`PictureError`] |
 //! | between pixels and cells | [`Lattice`] |
+//! | what one of several projectors shows of a wide frame | [`FramePart`] |
 //! | numbers as colours, lines and words | [`ColourScale`], [`chart`], [`numbers`] |
 //! | pictures and letters on one picture | [`ContactSheet`], [`canvas`] |
 //! | medians and quantiles | [`statistics`] |
@@ -24,6 +25,7 @@ mod colour_scale;
 mod contact_sheet;
 mod curve;
 pub mod foreign_file;
+mod frame_part;
 pub mod html;
 mod lattice;
 mod light_picture;
@@ -42,6 +44,7 @@ pub mod whole_folder;
 pub use colour_scale::{ColourScale, Palette, SHADES, Spread, Tick};
 pub use contact_sheet::{ContactSheet, Tile};
 pub use curve::{Curve, DeviceResponse, ProjectorResponse, level};
+pub use frame_part::FramePart;
 pub use lattice::Lattice;
 pub use light_picture::LightPicture;
 pub use picture::{Picture, Samples};

@@ -5,10 +5,10 @@ use super::effects::Effect;
 use super::pixel_sampling::FrameSampling;
 use super::radiosity::{FormFactorMatrix, StopRule, radiosity};
 use super::simulation::{Simulation, SimulationError};
+use iltm_picture::FramePart;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::iter;
-use std::ops::Range;
 
 /// Part of the threshold that bounces may leave out.
 const OF_THRESHOLD: f64 = 0.1;
@@ -46,13 +46,9 @@ fn of_projector(lamps: &[Vec<f64>], projector: usize) -> &[f64] {
     &lamps[projector.min(lamps.len() - 1)]
 }
 
-/// Some columns of frames of this width; frames are columns of a matrix, pixels x frames.
-fn part(frames: &DMatrix<f64>, width: usize, columns: &Range<usize>) -> DMatrix<f64> {
-    let pixels = frames.nrows() / width * columns.len();
-    DMatrix::from_fn(pixels, frames.ncols(), |pixel, frame| {
-        let (row, col) = (pixel / columns.len(), pixel % columns.len());
-        frames[(row * width + columns.start + col, frame)]
-    })
+/// A part of frames of this width; frames are columns of a matrix, pixels x frames.
+fn of_part(frames: &DMatrix<f64>, width: usize, part: &FramePart) -> DMatrix<f64> {
+    frames.select_rows(&part.places(width).collect::<Vec<_>>())
 }
 
 /// Adds the light of a photograph, channel by channel.
@@ -92,11 +88,11 @@ impl Simulation<'_> {
         if self.beside.is_empty() {
             return self.expose_one(projected, of_projector(lamps, 0));
         }
-        let (width, columns) = (self.grid().cols(), self.scene.columns());
+        let (width, parts) = (self.grid().cols(), self.scene.parts());
         let of = |index: usize| -> Vec<_> {
             let channels = projected.iter();
             channels
-                .map(|all| part(all, width, &columns[index]))
+                .map(|all| of_part(all, width, &parts[index]))
                 .collect()
         };
         let mut exposed = self.expose_one(&of(0), of_projector(lamps, 0))?;
@@ -261,8 +257,8 @@ impl Simulation<'_> {
         let of_projectors = sampling.projectors.iter().zip(lamps);
         let each = all
             .zip(of_projectors)
-            .map(|((one, exposed), ((columns, pixels), lamp))| {
-                let own = |frame| part(frame, sampling.size.width(), columns);
+            .map(|((one, exposed), ((part, pixels), lamp))| {
+                let own = |frame| of_part(frame, sampling.size.width(), part);
                 let own: Vec<_> = projected.iter().map(own).collect();
                 let mut shown = one.seen_by_channels(&own, &[*lamp]);
                 for light in &mut shown {

@@ -5,11 +5,10 @@ use super::description::Scene;
 use super::simulation::SimulationError;
 use super::virtual_camera::{Photograph, ProjectedFrame, VirtualCamera};
 use iltm_capture::{CaptureError, Settings, find_photo, listed};
-use iltm_picture::{Samples, foreign_file, png, progress::Progress, whole_file};
+use iltm_picture::{FramePart, Samples, foreign_file, png, progress::Progress, whole_file};
 use iltm_runtime::{FrameSize, Grid, placement::ProjectorPixels, resample::area::AreaAverage};
 use std::fs;
 use std::io::{self, BufReader};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use thiserror::Error;
@@ -91,8 +90,8 @@ pub struct UnfilledCapture {
 struct SlidePlace {
     /// Cells of the frame of all projectors.
     all: Grid,
-    /// Its columns of cells that slides have.
-    columns: Range<usize>,
+    /// Its cells that slides have.
+    part: FramePart,
     /// Cells of a slide.
     grid: Grid,
     /// Of whom the slides are, for words: the scene's projectors, or one of them.
@@ -109,13 +108,16 @@ impl SlidePlace {
         match projector {
             Some(index) => Self {
                 all,
-                columns: scene.columns()[index].clone(),
+                part: scene.parts()[index].clone(),
                 grid: scene.projectors[index].grid,
                 whose: format!("the projector `{}` has", scene.projector_names()[index]),
             },
             None => Self {
                 all,
-                columns: 0..all.cols(),
+                part: FramePart {
+                    columns: 0..all.cols(),
+                    rows: all.rows(),
+                },
                 grid: all,
                 whose: if scene.projectors.len() == 1 {
                     "the scene's projector has".to_owned()
@@ -126,17 +128,19 @@ impl SlidePlace {
         }
     }
 
-    /// Size of the frame of all projectors whose part is a slide of this size, and the columns of
-    /// its pixels that the slide has; `None` if there would be no whole number of them.
-    fn within(&self, scene: &Scene, slide: FrameSize) -> Option<(FrameSize, Range<usize>)> {
-        let cells = self.columns.len();
-        let wide = slide.width() * self.all.cols();
-        let width = wide.is_multiple_of(cells).then_some(wide / cells)?;
-        // No projector shares a pixel with another, however many columns of cells they have.
-        scene.columns_of(width)?;
-        let start = self.columns.start * slide.width() / cells;
-        let size = FrameSize::new(width.try_into().ok()?, slide.height() as u16)?;
-        Some((size, start..start + slide.width()))
+    /// Size of the frame of all projectors whose part is a slide of this size, and the part of its
+    /// pixels; `None` if there would be no whole number of them.
+    fn within(&self, scene: &Scene, slide: FrameSize) -> Option<(FrameSize, FramePart)> {
+        let side = |pixels: usize, cells: usize, all: usize| {
+            let whole = (pixels * all).is_multiple_of(cells);
+            whole.then_some(pixels * all / cells)?.try_into().ok()
+        };
+        let width = side(slide.width(), self.part.columns.len(), self.all.cols())?;
+        let height = side(slide.height(), self.part.rows, self.all.rows())?;
+        let size = FrameSize::new(width, height)?;
+        // No projector shares a pixel with another, however many cells they have.
+        scene.parts_of(size)?;
+        Some((size, self.part.pixels(self.all, size)?))
     }
 
     /// The frame of all projectors while the others show black, and its size.
@@ -146,14 +150,13 @@ impl SlidePlace {
         slide: FrameSize,
         codes: Vec<[u8; 3]>,
     ) -> Option<(FrameSize, Vec<[u8; 3]>)> {
-        let (size, columns) = self.within(scene, slide)?;
+        let (size, part) = self.within(scene, slide)?;
         if size == slide {
             return Some((size, codes));
         }
         let mut frame = vec![[0; 3]; size.pixels()];
-        let rows = frame.chunks_exact_mut(size.width());
-        for (row, own) in rows.zip(codes.chunks_exact(slide.width())) {
-            row[columns.clone()].copy_from_slice(own);
+        for (pixel, code) in part.places(size.width()).zip(codes) {
+            frame[pixel] = code;
         }
         Some((size, frame))
     }
@@ -363,16 +366,15 @@ fn frame(
     let colour = |pixel: &[u8]| [0, 1, 2].map(|channel| pixel[channel % pixel.len()]);
     let widened = place.widened(scene, picture.size(), pixels.map(colour).collect());
     widened.ok_or_else(|| {
-        let (width, all) = (picture.size().width(), place.all.cols());
-        refuse(if place.columns.len() == all {
-            format!(
-                "its {width} columns do not divide among the projectors' {all} columns of cells"
-            )
+        let (size, all) = (picture.size(), place.all);
+        let (width, height) = (size.width(), size.height());
+        refuse(if place.grid == all {
+            format!("its {width} x {height} pixels do not divide among the projectors' {all} cells")
         } else {
             format!(
-                "its {width} columns, over {} columns of cells, leave no whole number of pixels \
-                 for each projector in a frame of all {all} columns of cells",
-                place.columns.len()
+                "its {width} x {height} pixels, over {} cells, leave no whole number of pixels for \
+                 each projector in a frame of all {all} cells",
+                place.grid
             )
         })
     })

@@ -7,7 +7,7 @@ use iltm_capture::{
     CameraSettings, MANIFEST_FILE, Manifest, Pattern, ProjectorSettings, Role, SETTINGS_FILE,
     SceneSettings, Settings, numbered,
 };
-use iltm_picture::{FolderError, WholeFolder, progress::Progress};
+use iltm_picture::{FolderError, FramePart, WholeFolder, progress::Progress};
 use png::{BitDepth, ColorType};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -60,11 +60,13 @@ pub fn write(
         folder.file(numbered("patterns", index as u32), picture)?;
     }
     progress.begin("taking photographs", patterns.len() as u64);
-    let all = 0..camera.grid().cols();
-    let columns = projector.map_or(all, |index| camera.scene.columns()[index].clone());
-    let frame = |(_, pattern): &(Role, Pattern)| {
-        ProjectedFrame::of_pattern(camera.grid(), &columns, pattern)
+    let all = FramePart {
+        columns: 0..camera.grid().cols(),
+        rows: camera.grid().rows(),
     };
+    let part = projector.map_or(all, |index| camera.scene.parts()[index].clone());
+    let frame =
+        |(_, pattern): &(Role, Pattern)| ProjectedFrame::of_pattern(camera.grid(), &part, pattern);
     let frames: Vec<ProjectedFrame> = patterns.iter().map(frame).collect();
     let all: Vec<usize> = (0..frames.len()).collect();
     let taken = AtomicUsize::new(0);

@@ -9,18 +9,18 @@ use super::facets::Facets;
 use super::projector_light::{Beam, ProjectorLight, reached, share};
 use super::simulation::Simulation;
 use super::sparse::SparseRows;
+use iltm_picture::FramePart;
 use iltm_runtime::FrameSize;
 use nalgebra::DMatrix;
 use std::iter;
-use std::ops::Range;
 
 /// What each camera pixel sees of each pixel of a frame, which all projectors share.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameSampling {
     /// Of the frame, borders left out.
     pub(crate) size: FrameSize,
-    /// The columns of each projector and what is seen of them.
-    pub(crate) projectors: Vec<(Range<usize>, PixelSampling)>,
+    /// The part of each projector and what is seen of it.
+    pub(crate) projectors: Vec<(FramePart, PixelSampling)>,
 }
 
 impl FrameSampling {
@@ -29,13 +29,12 @@ impl FrameSampling {
     /// # Panics
     /// If projectors share a pixel of it.
     pub(crate) fn new(simulation: &Simulation<'_>, size: FrameSize) -> Self {
-        let columns = simulation.scene.columns_of(size.width());
-        let columns = columns.expect("a frame that divides among the projectors");
+        let parts = simulation.scene.parts_of(size);
+        let parts = parts.expect("a frame that divides among the projectors");
         let all = iter::once(simulation).chain(&simulation.beside);
-        let projectors = columns.into_iter().zip(all).map(|(columns, one)| {
-            let own = FrameSize::new(columns.len() as u16, size.height() as u16);
-            let own = own.expect("a pixel a cell or more");
-            (columns, PixelSampling::new(one, own))
+        let projectors = parts.into_iter().zip(all).map(|(part, one)| {
+            let own = part.frame().expect("a pixel a cell or more");
+            (part, PixelSampling::new(one, own))
         });
         Self {
             size,

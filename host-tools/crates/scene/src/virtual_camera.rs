@@ -7,13 +7,12 @@ use super::pixel_sampling::FrameSampling;
 use super::sensor::Sensor;
 use super::simulation::{Simulation, SimulationError};
 use iltm_capture::Pattern;
-use iltm_picture::Response;
+use iltm_picture::{FramePart, Response};
 use iltm_runtime::{FrameSize, Grid, resample::area::AreaAverage};
 use nalgebra::DMatrix;
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use rayon::prelude::*;
 use std::io;
-use std::ops::Range;
 
 /// Photographs that are exposed together: their light is held in memory.
 const TOGETHER: usize = 64;
@@ -30,15 +29,11 @@ pub struct ProjectedFrame {
 }
 
 impl ProjectedFrame {
-    /// Lit cells white, the others black; the pattern has these columns of the grid.
-    pub(super) fn of_pattern(grid: Grid, columns: &Range<usize>, pattern: &Pattern) -> Self {
-        let code = |lit: &bool| [255 * u8::from(*lit); 3];
+    /// Lit cells white, the others black; the pattern is of this part of the grid.
+    pub(super) fn of_pattern(grid: Grid, part: &FramePart, pattern: &Pattern) -> Self {
         let mut codes = vec![[0; 3]; grid.cells()];
-        let rows = codes.chunks_exact_mut(grid.cols());
-        for (row, own) in rows.zip(pattern.lit.chunks_exact(columns.len())) {
-            for (code_of, lit) in row[columns.clone()].iter_mut().zip(own) {
-                *code_of = code(lit);
-            }
+        for (cell, lit) in part.places(grid.cols()).zip(&pattern.lit) {
+            codes[cell] = [255 * u8::from(*lit); 3];
         }
         Self {
             size: FrameSize::of_grid(grid),

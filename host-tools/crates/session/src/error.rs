@@ -217,8 +217,9 @@ impl SessionError {
                  slides by a command of your own with --show."
             }
             Self::DisplaySize { found, .. } if found.len() > 1 => {
-                "Set all displays to one height and widths that add up to the slides', without \
-                 scaling, or make the folder with `iltm patterns --projector WxH`."
+                "Set the displays to the projectors' own resolutions, whose widths add up to the \
+                 slides' and the highest of which is as high, without scaling, or make the folder with \
+                 `iltm patterns --projector WxH`."
             }
             Self::DisplaySize { .. } => {
                 "Set the display to the projector's own resolution, without scaling, or make the \

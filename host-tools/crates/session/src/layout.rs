@@ -107,15 +107,42 @@ impl Layout {
         self.inner
     }
 
-    /// Columns of cells of as many pixels as these on another projector; `None` if there is no whole
-    /// number of them, or its rows would be others.
+    /// Cells of as many pixels as these on another projector; `None` if there is no whole number of
+    /// them.
     #[must_use]
-    pub fn cols_of(&self, other: FrameSize) -> Option<u16> {
-        let (own, cols) = (self.projector, self.grid.cols());
-        let is_whole = own.width().is_multiple_of(cols);
-        let width = own.width() / cols;
-        let fits = is_whole && self.border == 0 && other.height() == own.height();
-        (fits && other.width().is_multiple_of(width)).then_some((other.width() / width) as u16)
+    pub fn grid_of(&self, other: FrameSize) -> Option<Grid> {
+        let (own, grid) = (self.projector, self.grid);
+        let is_whole = own.width().is_multiple_of(grid.cols()) && self.border == 0;
+        let cells = |own: usize, cells: usize, other: usize| {
+            let whole = (other * cells).is_multiple_of(own);
+            whole.then_some(other * cells / own)?.try_into().ok()
+        };
+        let rows = cells(own.height(), grid.rows(), other.height())?;
+        let cols = cells(own.width(), grid.cols(), other.width())?;
+        Grid::new(rows, cols).ok().filter(|_| is_whole)
+    }
+
+    /// The cells nearest to these, in size, of which every one of the projectors has a whole number: rows
+    /// and columns of this one.
+    #[must_use]
+    pub fn nearest_common(&self, projectors: &[FrameSize]) -> [usize; 2] {
+        let side = |of: fn(FrameSize) -> usize, cells: usize| {
+            let own = of(self.projector);
+            let divides = |pixels: usize| {
+                let mut others = projectors.iter().map(|other| of(*other));
+                own.is_multiple_of(pixels) && others.all(|other| other.is_multiple_of(pixels))
+            };
+            let counts = (1..=own).filter(|pixels| divides(*pixels));
+            let counts = counts.map(|pixels| own / pixels);
+            let far = |count: &usize| (*count as f64 / cells as f64).ln().abs();
+            let nearest = counts.min_by(|a, b| far(a).total_cmp(&far(b)));
+            nearest.unwrap_or(cells)
+        };
+        let grid = self.grid;
+        [
+            side(FrameSize::height, grid.rows()),
+            side(FrameSize::width, grid.cols()),
+        ]
     }
 
     /// A picture of [`inner`](Self::inner) with its black border, of the projector's size;
@@ -215,6 +242,32 @@ mod tests {
     use super::*;
     use iltm_runtime::units::Light;
     use proptest::prelude::*;
+
+    #[test]
+    fn cells_of_another_projector_have_as_many_pixels() {
+        let size = |width, height| FrameSize::new(width, height).unwrap();
+        let grid = |rows, cols| Grid::new(rows, cols).unwrap();
+        let full = size(1920, 1080);
+        let layout = |rows, cols| Layout::new(grid(rows, cols), full, 0).unwrap();
+        for (own, other, expected) in [
+            ((54, 96), size(1280, 800), Some(grid(40, 64))),
+            ((90, 120), size(1024, 768), Some(grid(64, 64))),
+            // Cells may have parts of pixels down, where the frames are as high.
+            ((64, 96), size(960, 1080), Some(grid(64, 48))),
+            ((54, 96), size(1024, 768), None),
+            ((54, 100), size(1280, 800), None),
+        ] {
+            assert_eq!(layout(own.0, own.1).grid_of(other), expected, "{own:?}");
+        }
+        for (other, expected) in [(size(1280, 800), [54, 96]), (size(1024, 768), [45, 120])] {
+            let nearest = layout(50, 100).nearest_common(&[full, other]);
+            assert_eq!(nearest, expected);
+            let [rows, cols] = nearest.map(|side| side as u16);
+            assert!(layout(rows, cols).grid_of(other).is_some());
+        }
+        let border = Layout::new(grid(54, 96), full, 4).unwrap();
+        assert_eq!(border.grid_of(full), None);
+    }
 
     fn eight(picture: &Picture) -> &[u8] {
         match picture.samples() {

@@ -394,10 +394,12 @@ fn open(events: &ActiveEventLoop, monitor: &MonitorHandle) -> Result<Surface, Se
 }
 
 /// The part of slides of this width and height that each display shows, given theirs; `None` for one
-/// that shows whole slides. `None` if the displays do not have the slides' pixels.
+/// that shows whole slides. `None` if the displays do not have the slides' pixels: as many columns in all,
+/// and as many rows as the highest.
 fn parts(displays: &[(u32, u32)], slides: (u32, u32)) -> Option<Vec<Option<SlidePart>>> {
     let width: u32 = displays.iter().map(|(width, _)| width).sum();
-    let fit = displays.iter().all(|(_, height)| *height == slides.1) && width == slides.0;
+    let height = displays.iter().map(|(_, height)| height).max();
+    let fit = width == slides.0 && height == Some(&slides.1);
     if !fit || displays.len() == 1 {
         return fit.then(|| vec![None]);
     }
@@ -486,6 +488,10 @@ mod tests {
         assert_eq!(
             parts(&[(64, 48), (80, 48)], (144, 48)),
             Some(vec![part(0, 64, 48), part(64, 80, 48)])
+        );
+        assert_eq!(
+            parts(&[(64, 40), (80, 48)], (144, 48)),
+            Some(vec![part(0, 64, 40), part(64, 80, 48)])
         );
         for (displays, slides) in [
             (&[(64, 48)][..], (144, 48)),

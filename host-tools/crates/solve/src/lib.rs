@@ -220,7 +220,7 @@ fn solve_judged(
         photographs: count(&prepared, outcome.method, &splits),
         left_out: prepared.left_out.clone(),
         live_cells: prepared.live_cells(),
-        cells: prepared.cells(),
+        cells: prepared.shown_cells(),
         lambda: outcome.lambda,
         lambda_path: outcome.trials,
         convergence: outcome.solution.convergence,

@@ -33,6 +33,8 @@ pub enum WhyLeftOut {
     Unlit,
     /// It gives back no light at all.
     Black,
+    /// No pattern lights it: it lies below the frame of a projector that is lower than others.
+    NoProjector,
 }
 
 /// All cells that cannot be solved for, in order.
@@ -42,11 +44,16 @@ pub enum WhyLeftOut {
 pub(super) fn left_out(observed: &Observed<'_>, landed: &[Arc<DMatrix<f64>>]) -> Vec<LeftOut> {
     let cells = observed.grid.cells();
     let chosen = photographs(observed);
-    let mut why: Vec<Option<WhyLeftOut>> = observed
-        .live
-        .iter()
-        .map(|live| (!live).then_some(WhyLeftOut::Unseen))
-        .collect();
+    let shown = |cell: usize| {
+        let mut patterns = observed.channels.iter().map(|channel| channel.patterns);
+        patterns.any(|patterns| patterns.row(cell).iter().any(|light| *light > 0.0))
+    };
+    let unseen = |(cell, live): (usize, &bool)| match live {
+        true => None,
+        false if shown(cell) => Some(WhyLeftOut::Unseen),
+        false => Some(WhyLeftOut::NoProjector),
+    };
+    let mut why: Vec<Option<WhyLeftOut>> = (observed.live.iter().enumerate()).map(unseen).collect();
     for (channel, landed) in observed.channels.iter().zip(landed) {
         let total = total(channel, observed.live, &chosen);
         let own: Vec<Own> = (0..cells)

@@ -87,7 +87,7 @@ fn overlapping(several: &SeveralCaptures) -> Vec<Overlapping> {
     let of_cell = |(cell, all): (usize, &Vec<usize>)| {
         let of = |projector: usize| {
             let cells = all.iter().copied();
-            let cells = cells.filter(|other| several.projector_of(*other) == projector);
+            let cells = cells.filter(|other| several.projector_of(*other) == Some(projector));
             (projector, cells.collect::<Vec<_>>())
         };
         let others = projectors.clone().map(of);
@@ -113,7 +113,10 @@ fn by_light(several: &mut SeveralCaptures, overlapping: &[Overlapping], channel:
     };
     let mut found = Vec::new();
     for &Overlapping { cell, ref others } in overlapping {
-        let own = &several.projectors[several.projector_of(cell)];
+        let Some(own) = several.projector_of(cell) else {
+            continue;
+        };
+        let own = &several.projectors[own];
         let near = around(several.all.grid, own, cell);
         // Cells beside it light some of its pixels as well.
         let direct: f64 = follows(cell, own, &near)[..near.len()].iter().sum();
@@ -194,7 +197,7 @@ fn around(grid: Grid, own: &OneOfSeveral, cell: usize) -> Vec<usize> {
     for row in row.saturating_sub(1)..(row + 2).min(grid.rows()) {
         for col in col.saturating_sub(1)..col + 2 {
             let other = row * grid.cols() + col;
-            if own.columns.contains(&col) && other != cell {
+            if own.part.own(grid.cols(), other).is_some() && other != cell {
                 cells.push(other);
             }
         }

@@ -3,7 +3,7 @@
 use super::blur::blur;
 use super::error::SolveError;
 use super::forward::product;
-use super::observability::{self, LeftOut};
+use super::observability::{self, LeftOut, WhyLeftOut};
 use super::observed::{CellNoise, Observed};
 use iltm_capture::Role;
 use nalgebra::DMatrix;
@@ -139,6 +139,13 @@ impl Prepared {
 
     pub(super) fn cells(&self) -> usize {
         self.live.len()
+    }
+
+    /// Cells that a projector shows.
+    pub(super) fn shown_cells(&self) -> usize {
+        let left_out = self.left_out.iter();
+        let missing = left_out.filter(|out| out.why == WhyLeftOut::NoProjector);
+        self.cells() - missing.count()
     }
 
     pub(super) fn live_cells(&self) -> usize {

@@ -20,7 +20,7 @@ pub struct SolveReport {
     pub left_out: Vec<LeftOut>,
     /// Cells that took part.
     pub live_cells: usize,
-    /// Cells of the grid.
+    /// Cells of the grid that a projector shows.
     pub cells: usize,
     /// Weight of the l1 term, light scaled so that a mean flood photograph is 1.
     /// 0 for [`Method::Direct`], which has no such weight.

@@ -14,6 +14,7 @@ use super::failure::{Failure, Kind, cannot_write};
 use super::interrupt;
 use super::output::Output;
 use super::tables::{TableSize, check, read_table};
+use crate::compile::Provenance;
 use crate::compile::sign::read_public_key;
 use crate::device::emulator::{Board, Emulator, EmulatorError};
 use crate::device::frame_source::FrameFeed;
@@ -46,6 +47,9 @@ const OF_SEVERAL: &str = "stages,neighbours";
 
 /// Frames a second of the test scene.
 const RATE: f64 = 25.0;
+
+/// Least width and height of the test scene.
+const LEAST_SCENE: [u16; 2] = [128, 96];
 
 pub(super) fn run(arguments: &Emulate, output: &Output) -> Result<(), Failure> {
     let memory = memory(arguments)?;
@@ -159,7 +163,7 @@ fn frames(arguments: &Emulate, table: Option<&Table<'_>>) -> Result<FrameFeed, F
     if let Some(path) = &arguments.frames {
         let frames = FrameFeed::file(path, channels, arguments.fps)?;
         return Ok(match table {
-            Some(table) => frames.for_table(table)?,
+            Some(table) => frames.for_table(table, &frames_of_all(table))?,
             None => frames,
         });
     }
@@ -174,14 +178,35 @@ fn scene(
     rate: f64,
 ) -> Result<FrameFeed, Failure> {
     let own = size.unwrap_or_else(|| scene_size(table));
-    let neighbours = table.and_then(Table::neighbours);
-    let wide = neighbours.and_then(|neighbours| wide_size(neighbours, own));
-    let channels = table.map_or(3, Table::channels);
-    let frames = FrameFeed::scene(wide.unwrap_or(own), channels, rate);
-    Ok(match table {
-        Some(table) => frames.for_table(table)?,
-        None => frames,
-    })
+    let Some(table) = table else {
+        return Ok(FrameFeed::scene(own, 3, rate));
+    };
+    let all = frames_of_all(table);
+    let wide = |own| wide_size((table, &all), own);
+    let wide = wide(own).or_else(|| smaller(table)?.find_map(wide));
+    let frames = FrameFeed::scene(wide.unwrap_or(own), table.channels(), rate);
+    Ok(frames.for_table(table, &all)?)
+}
+
+/// Rows and columns of cells of the frames of all projectors, if the table says them.
+fn frames_of_all(table: &Table<'_>) -> Vec<[u16; 2]> {
+    let provenance = Provenance::read(table.provenance());
+    provenance.frames.unwrap_or_default()
+}
+
+/// Frames of the projector's aspect whose pixels are whole parts of its own, the smallest first, none
+/// smaller than the board's least.
+fn smaller(table: &Table<'_>) -> Option<impl Iterator<Item = FrameSize>> {
+    let size = table.projector()?.size();
+    let least = LEAST_SCENE.map(usize::from);
+    let parts = (1..=size.width()).rev();
+    Some(parts.filter_map(move |part| {
+        let whole = size.width().is_multiple_of(part) && size.height().is_multiple_of(part);
+        let [width, height] = [size.width() / part, size.height() / part];
+        let enough = width >= least[0] && height >= least[1];
+        let sides = (whole && enough).then(|| [width, height].map(|side| side as u16));
+        sides.and_then(|[width, height]| FrameSize::new(width, height))
+    }))
 }
 
 /// A size that the emulated board can keep up with, in the aspect of the table's projector.
@@ -190,8 +215,8 @@ fn scene_size(table: Option<&Table<'_>>) -> FrameSize {
     let side = |least: u16, side: fn(FrameSize) -> usize| {
         grid.map_or(least, |grid| least.max(side(grid) as u16))
     };
-    let width = side(128, FrameSize::width);
-    let height = side(96, FrameSize::height);
+    let width = side(LEAST_SCENE[0], FrameSize::width);
+    let height = side(LEAST_SCENE[1], FrameSize::height);
     let size = FrameSize::new(width, height).expect("neither side is zero");
     let projector = table.and_then(Table::projector);
     let around = projector.and_then(|projector| projector.around(size));

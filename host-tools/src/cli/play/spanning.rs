@@ -66,7 +66,7 @@ impl SpanningWindow {
         let all = displays(&connection, root).map_err(|error| lost(&error))?;
         let displays = beside(numbers, &all)?;
         if let Some(size) = size {
-            let found = [width_of(&displays), displays[0].1.height.into()];
+            let found = size_of(&displays);
             let wanted = [size.width(), size.height()];
             if found != wanted {
                 let (which, have) = if displays.len() > 1 {
@@ -103,7 +103,8 @@ impl SpanningWindow {
             .override_redirect(1)
             .background_pixel(black)
             .event_mask(EventMask::SUBSTRUCTURE_NOTIFY | EventMask::BUTTON_PRESS);
-        let width = width_of(&displays).try_into().unwrap_or(u16::MAX);
+        let [width, height] =
+            size_of(&displays).map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         connection
             .create_window(
                 COPY_DEPTH_FROM_PARENT,
@@ -112,7 +113,7 @@ impl SpanningWindow {
                 first.left,
                 first.top,
                 width,
-                first.height,
+                height,
                 0,
                 WindowClass::INPUT_OUTPUT,
                 COPY_FROM_PARENT,
@@ -212,7 +213,8 @@ fn displays(connection: &RustConnection, root: Window) -> Result<Vec<DesktopDisp
     Ok(displays)
 }
 
-/// The displays of these numbers, if each lies to the right of the one before and is as high.
+/// The displays of these numbers, if each lies to the right of the one before, their upper edges at
+/// one height.
 fn beside(numbers: &[u16], all: &[DesktopDisplay]) -> Result<Vec<(u16, DesktopDisplay)>, Failure> {
     let chosen = numbers.iter().map(|number| {
         let display = all.get(usize::from(*number)).ok_or_else(|| {
@@ -234,23 +236,26 @@ fn beside(numbers: &[u16], all: &[DesktopDisplay]) -> Result<Vec<(u16, DesktopDi
             continue;
         };
         let edge = i32::from(a.left) + i32::from(a.width);
-        if edge != i32::from(b.left) || a.top != b.top || a.height != b.height {
+        if edge != i32::from(b.left) || a.top != b.top {
             return Err(Failure::new(
                 Kind::Display,
                 format!(
-                    "display {right} does not lie beside display {left}, to its right and as high: \
-                     {left} is {a}; {right} is {b}"
+                    "display {right} does not lie beside display {left}, to its right and with its upper \
+                     edge at the same height: {left} is {a}; {right} is {b}"
                 ),
                 "Place the displays beside each other in the desktop's settings, in the order of the \
-                 wide frame, with modes of one height.",
+                 wide frame, with their upper edges at one height.",
             ));
         }
     }
     Ok(chosen)
 }
 
-fn width_of(displays: &[(u16, DesktopDisplay)]) -> usize {
-    displays.iter().map(|(_, one)| usize::from(one.width)).sum()
+/// Width and height of what covers all of them.
+fn size_of(displays: &[(u16, DesktopDisplay)]) -> [usize; 2] {
+    let width = displays.iter().map(|(_, one)| usize::from(one.width)).sum();
+    let height = displays.iter().map(|(_, one)| one.height).max();
+    [width, height.map_or(0, usize::from)]
 }
 
 #[cfg(test)]
@@ -276,14 +281,14 @@ mod tests {
             display(144, 48, 80, 48),
             display(-32, 0, 32, 48),
         ];
-        for good in [&[0][..], &[0, 1], &[4, 0, 1], &[3]] {
+        for good in [&[0][..], &[0, 1], &[4, 0, 1], &[3], &[1, 2]] {
             let found = beside(good, &all).unwrap_or_else(|error| panic!("{}", error.message));
             assert!(found.iter().map(|(number, _)| number).eq(good));
         }
-        for bad in [&[1, 0][..], &[0, 2], &[1, 2], &[1, 3], &[0, 0], &[0, 5]] {
+        for bad in [&[1, 0][..], &[0, 2], &[1, 3], &[0, 0], &[0, 5]] {
             let refused = beside(bad, &all).map(|_| ()).unwrap_err();
             assert_eq!(refused.kind, Kind::Display, "{bad:?}");
         }
-        assert_eq!(width_of(&beside(&[4, 0, 1], &all).unwrap()), 176);
+        assert_eq!(size_of(&beside(&[4, 0, 1, 2], &all).unwrap()), [256, 50]);
     }
 }

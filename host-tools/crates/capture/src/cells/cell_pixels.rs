@@ -89,17 +89,21 @@ impl CellPixels {
         }
     }
 
-    /// Those of cells from several choices, each by the choice and the cell's number there.
-    pub(crate) fn joined(cells: &[(&Self, usize)]) -> Self {
-        let why = |(all, cell): &(&Self, usize)| {
+    /// Those of cells from several choices, each by the choice and the cell's number there; `None` for
+    /// a cell that nothing lights.
+    pub(crate) fn joined(cells: &[Option<(&Self, usize)>]) -> Self {
+        let why = |own: &Option<(&Self, usize)>| {
+            let (all, cell) = (*own)?;
             let mut out = all.left_out.iter();
-            out.find(|out| out.cell == *cell).map(|out| out.why)
+            out.find(|out| out.cell == cell).map(|out| out.why)
         };
         Self {
             of_cell: (cells.iter())
-                .map(|(all, cell)| all.of_cell[*cell].clone())
+                .map(|own| own.map_or_else(Vec::new, |(all, cell)| all.of_cell[cell].clone()))
                 .collect(),
-            live: cells.iter().map(|(all, cell)| all.live[*cell]).collect(),
+            live: (cells.iter())
+                .map(|own| own.is_some_and(|(all, cell)| all.live[cell]))
+                .collect(),
             left_out: (cells.iter().enumerate())
                 .filter_map(|(cell, own)| {
                     Some(LeftOut {

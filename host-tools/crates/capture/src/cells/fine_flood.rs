@@ -168,7 +168,7 @@ impl FineFlood {
         for one in &several.projectors {
             let flood = Self::with_factor(&one.own, factor);
             all.mapped &= flood.mapped;
-            let start = one.columns.start * factor[0];
+            let start = one.part.columns.start * factor[0];
             for (plane, own) in all.channels.iter_mut().zip(&flood.channels) {
                 let rows = plane.chunks_exact_mut(cols);
                 for (row, own) in rows.zip(own.chunks_exact(flood.cols)) {
@@ -177,10 +177,8 @@ impl FineFlood {
             }
             let white = observed(&several.all, one.views.start + Measurements::WHITE);
             for (all, white) in all.observed.iter_mut().zip(white) {
-                for (cell, light) in white.into_iter().enumerate() {
-                    if one.columns.contains(&(cell % grid.cols())) {
-                        all[cell] = light;
-                    }
+                for cell in one.part.places(grid.cols()) {
+                    all[cell] = white[cell];
                 }
             }
         }

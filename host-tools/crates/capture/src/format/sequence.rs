@@ -10,7 +10,8 @@ use super::photo_files::{PhotoFiles, find_all};
 use super::picture_file::Source;
 use super::role::{CodeAxis, Role};
 use crate::gate::{Gate, GateName};
-use iltm_runtime::Grid;
+use iltm_picture::FramePart;
+use iltm_runtime::{FrameSize, Grid};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::path::Path;
@@ -108,41 +109,47 @@ pub(crate) struct Sequence {
     /// Columns and rows of the patterns, and their codes.
     pub(crate) shown: [(usize, Code); 2],
     /// The projector's part of the frame, if the patterns are of a wide frame.
-    pub(crate) part: Option<FramePart>,
+    pub(crate) part: Option<PatternPart>,
     /// Where the Gray code ends and the Bernoulli patterns begin in `views`.
     bernoulli_from: usize,
 }
 
-/// The part of a wide frame that one of several projectors shows: the columns of cells that its white
-/// lights.
+/// The part of a wide frame that one of several projectors shows: the cells that its white lights.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct FramePart {
-    /// Its columns of cells.
-    pub(crate) columns: Range<usize>,
-    /// Columns of cells of the whole frame.
-    pub(crate) of: usize,
+pub(crate) struct PatternPart {
+    cells: FramePart,
+    /// Cells of the wide frame.
+    grid: Grid,
     /// Name of the list of its fine stripes.
     pub(crate) stripes: String,
 }
 
-impl FramePart {
-    /// The part that white lights; `None` if its columns do not lie side by side.
+impl PatternPart {
+    /// The part that white lights; `None` if its cells are not those of a frame at the upper edge.
     fn lit_by(white: &Pattern, stripes: String) -> Option<Self> {
+        let grid = Grid::new(white.rows.try_into().ok()?, white.cols.try_into().ok()?).ok()?;
         let lit = &white.lit[..white.cols];
         let start = lit.iter().position(|lit| *lit)?;
         let end = lit.iter().rposition(|lit| *lit)? + 1;
-        lit[start..end].iter().all(|lit| *lit).then_some(Self {
+        let below = white.lit[start..].iter().step_by(white.cols);
+        let cells = FramePart {
             columns: start..end,
-            of: white.cols,
-            stripes,
-        })
+            rows: below.take_while(|lit| **lit).count(),
+        };
+        let of_part = |cell| cells.own(white.cols, cell).is_some();
+        let mut lit = white.lit.iter().enumerate();
+        lit.all(|(cell, lit)| *lit == of_part(cell))
+            .then_some(Self {
+                cells,
+                grid,
+                stripes,
+            })
     }
 
-    /// The projector's pixels of a frame that is so many wide; `None` if it would have no whole
-    /// number of them.
-    pub(crate) fn pixels(&self, wide: usize) -> Option<usize> {
-        let pixels = wide * self.columns.len();
-        pixels.is_multiple_of(self.of).then_some(pixels / self.of)
+    /// The projector's pixels of a wide frame; `None` if it would have no whole number of them for each
+    /// cell.
+    pub(crate) fn pixels(&self, wide: FrameSize) -> Option<FrameSize> {
+        self.cells.pixels(self.grid, wide)?.frame()
     }
 }
 
@@ -232,15 +239,15 @@ impl Sequence {
         let mut shots: Vec<Shot> = brackets.iter().map(first).collect();
         check_levels(&shots, &manifest)?;
         let mut patterns = read_patterns(folder, &shots, coarsen)?;
-        let (rows, mut cols) = common_size(folder, &shots, &patterns)?;
+        let (mut rows, mut cols) = common_size(folder, &shots, &patterns)?;
         let part = part.map(|stripes| frame_part(folder, &shots, &patterns, stripes));
         let part = part.transpose()?;
         if let Some(part) = &part {
-            let columns: Vec<usize> = part.columns.clone().collect();
-            let all: Vec<usize> = (0..rows).collect();
-            let of_part = |pattern: &Pattern| pattern.sampled(&all, &columns);
+            let columns: Vec<usize> = part.cells.columns.clone().collect();
+            let down: Vec<usize> = (0..part.cells.rows).collect();
+            let of_part = |pattern: &Pattern| pattern.sampled(&down, &columns);
             patterns = patterns.iter().map(of_part).collect();
-            cols = columns.len();
+            (rows, cols) = (down.len(), columns.len());
         }
         let sides = [(CodeAxis::Column, cols), (CodeAxis::Row, rows)];
         let mut given = [0; 2];
@@ -476,14 +483,14 @@ fn frame_part(
     shots: &[Shot],
     patterns: &[Pattern],
     stripes: String,
-) -> Result<FramePart, CaptureError> {
+) -> Result<PatternPart, CaptureError> {
     let white = shots.iter().zip(patterns);
     let mut white = white.filter(|(shot, _)| shot.role == Role::White);
     // `check_levels` refuses a capture without white.
     let (shot, white) = white.next().unwrap_or((&shots[0], &patterns[0]));
-    FramePart::lit_by(white, stripes).ok_or_else(|| CaptureError::Picture {
+    PatternPart::lit_by(white, stripes).ok_or_else(|| CaptureError::Picture {
         path: folder.join(&shot.pattern),
-        reason: "white lights no columns of cells that lie side by side".to_owned(),
+        reason: "white lights no part of a wide frame".to_owned(),
         next_step: "Make the folder again with `iltm verify`.",
     })
 }

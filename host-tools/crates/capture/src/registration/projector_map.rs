@@ -305,12 +305,12 @@ fn listed(
         what: "pattern",
         line: slide.line,
     })?;
-    let (mut width, height) = picture.size();
-    if let Some(part) = &sequence.part {
-        width = part.pixels(width as usize).unwrap_or(0) as u32;
-    }
+    let (width, height) = picture.size();
     let side = |side: u32| u16::try_from(side).unwrap_or(0);
-    let size = FrameSize::new(side(width), side(height));
+    let mut size = FrameSize::new(side(width), side(height));
+    if let Some(part) = &sequence.part {
+        size = size.and_then(|wide| part.pixels(wide));
+    }
     let projector = size.and_then(|size| ProjectorPixels::new(size, settings.border));
     let cells = [sequence.grid.cols(), sequence.grid.rows()];
     let inner = projector.map(ProjectorPixels::inner);

@@ -3,21 +3,21 @@
 use super::{Inversion, Inverted, KnownTransport};
 use crate::rig::live_cells;
 use crate::{Citation, Description, Unfit};
+use iltm_picture::FramePart;
 use iltm_runtime::Grid;
 use iltm_solve::inverted;
-use std::ops::Range;
 
 /// The exact inverse of every projector's own transport.
 #[derive(Clone, Debug)]
 pub struct EachAlone {
-    /// Columns of cells of each projector.
-    pub columns: Vec<Range<usize>>,
+    /// The cells of each projector.
+    pub parts: Vec<FramePart>,
 }
 
-/// The projector that a cell of a grid with these columns is of.
-pub(crate) fn projector_of(cell: usize, grid: Grid, columns: &[Range<usize>]) -> Option<usize> {
-    let col = cell % grid.cols();
-    columns.iter().position(|own| own.contains(&col))
+/// The projector that a cell of a grid with these parts is of.
+pub(crate) fn projector_of(cell: usize, grid: Grid, parts: &[FramePart]) -> Option<usize> {
+    let of = |part: &FramePart| part.own(grid.cols(), cell).is_some();
+    parts.iter().position(of)
 }
 
 impl Inversion for EachAlone {
@@ -31,7 +31,7 @@ impl Inversion for EachAlone {
     }
 
     fn invert(&self, known: KnownTransport<'_>) -> Result<Inverted, Unfit> {
-        let of_cell = |cell: usize| projector_of(cell, known.grid, &self.columns);
+        let of_cell = |cell: usize| projector_of(cell, known.grid, &self.parts);
         let mut own = known.transport.clone();
         for col in 0..own.ncols() {
             for row in (0..own.nrows()).filter(|row| of_cell(*row) != of_cell(col)) {
@@ -40,7 +40,7 @@ impl Inversion for EachAlone {
         }
         let inverse = inverted(&own, known.live).ok_or(Unfit::Singular)?;
         let live = live_cells(known.live);
-        let multiplications = (0..self.columns.len()).map(|projector| {
+        let multiplications = (0..self.parts.len()).map(|projector| {
             let cells = live
                 .iter()
                 .filter(|cell| of_cell(**cell) == Some(projector));
@@ -62,10 +62,10 @@ mod tests {
     #[test]
     fn light_that_crosses_is_missed_and_nothing_else() {
         let scene = KnownScene::sphere(3, 4, 0.7);
-        let columns = std::iter::once(0..4).collect();
-        assert!(scene.error(&EachAlone { columns }) < 1e-12);
-        let columns = vec![0..2, 2..4];
-        let halves = EachAlone { columns };
+        let parts = FramePart::side_by_side([[3, 4]]);
+        assert!(scene.error(&EachAlone { parts }) < 1e-12);
+        let parts = FramePart::side_by_side([[3, 2]; 2]);
+        let halves = EachAlone { parts };
         let matrix = scene.matrix(&halves);
         assert!(scene.error(&halves) > 0.01);
         for (row, col) in (0..12).flat_map(|row| (0..12).map(move |col| (row, col))) {

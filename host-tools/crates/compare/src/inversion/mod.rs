@@ -32,6 +32,7 @@ pub(crate) use each_alone::projector_of;
 pub use exact::{Cancellation, Exact};
 pub use gain_only::{FloodGain, Uncompensated};
 pub use haar_input::{LargestInputs, StoredElements};
+use iltm_picture::FramePart;
 use iltm_runtime::Grid;
 pub use krylov::Optical;
 use nalgebra::DMatrix;
@@ -39,7 +40,6 @@ pub use neumann::{Neumann, Stratified};
 pub use out_of_focus::OutOfFocus;
 pub use probing::Probing;
 pub use pseudo_inverse::{Fewer, PseudoInverse};
-use std::ops::Range;
 pub use sweeps::{SweepOrder, Sweeps};
 pub use tikhonov::Tikhonov;
 pub use together::Together;
@@ -103,13 +103,13 @@ pub trait Inversion {
 /// more light than its own input does.
 const BLUR: f64 = 0.7;
 
-/// Every way, those with a parameter more than once. `columns` are those of each projector.
+/// Every way, those with a parameter more than once. `parts` are those of several projectors.
 #[must_use]
-pub fn all(columns: &[Range<usize>]) -> Vec<Box<dyn Inversion>> {
+pub fn all(parts: &[FramePart]) -> Vec<Box<dyn Inversion>> {
     let mut all = vec![boxed(Exact)];
-    if columns.len() > 1 {
-        let columns = columns.to_vec();
-        all.push(boxed(EachAlone { columns }));
+    if parts.len() > 1 {
+        let parts = parts.to_vec();
+        all.push(boxed(EachAlone { parts }));
     }
     // Series and sweeps.
     all.extend([1, 3, 8].map(|order| boxed(Neumann { order })));
@@ -151,15 +151,15 @@ pub fn all(columns: &[Range<usize>]) -> Vec<Box<dyn Inversion>> {
     all
 }
 
-/// Ways for projectors that overlap: others need one cell a place. `columns` are those of each projector.
+/// Ways for projectors that overlap: others need one cell a place. `parts` are those of each projector.
 #[must_use]
-pub fn of_overlapping(columns: &[Range<usize>], together: &Together) -> Vec<Box<dyn Inversion>> {
-    let (overlaps, columns) = (together.overlaps.clone(), columns.to_vec());
+pub fn of_overlapping(parts: &[FramePart], together: &Together) -> Vec<Box<dyn Inversion>> {
+    let (overlaps, parts) = (together.overlaps.clone(), parts.to_vec());
     let shares = None;
     vec![
         boxed(together.clone()),
         boxed(Together { overlaps, shares }),
-        boxed(EachAlone { columns }),
+        boxed(EachAlone { parts }),
         boxed(FloodGain),
         boxed(Uncompensated),
     ]

@@ -120,7 +120,7 @@ fn cell_map(learned: &BuiltTable, files: &mut Vec<PictureFile>) -> Markup {
         div {
             h2 { "Where the cells are" }
             p {
-                (live) " of " (measurements.live.len()) " cells were found. Each square of the map is one cell of "
+                (live) " of " (learned.report.cells) " cells were found. Each square of the map is one cell of "
                 @if learned.projectors.is_some() { "a" } @else { "the" }
                 " projector as the camera sees it; pixels between the squares see two cells at once and are not used."
                 @if learned.is_overlapping() {

@@ -11,7 +11,6 @@ use iltm_picture::{
 };
 use iltm_runtime::{FrameSize, Grid};
 use maud::{Markup, html};
-use std::ops::Range;
 
 /// Colours of projectors, one after the other, that people tell apart who see few colours (Okabe and
 /// Ito, *Color Universal Design*, 2008).
@@ -140,10 +139,11 @@ fn blend(
     files: &mut Vec<PictureFile>,
 ) -> Markup {
     let scale = ColourScale::linear(Palette::Viridis, 1.0);
-    let frames = areas.columns.iter().enumerate();
-    let frames = frames.filter_map(|(projector, columns)| {
-        let shares = frame_shares(grid, columns, &areas.cell_shares);
-        let picture = shares_picture(&scale, grid.rows(), columns.len(), &shares)?;
+    let frames = areas.parts.iter().enumerate();
+    let frames = frames.filter_map(|(projector, part)| {
+        let shares = part.places(grid.cols()).map(|cell| areas.cell_shares[cell]);
+        let shares: Vec<f64> = shares.collect();
+        let picture = shares_picture(&scale, part.rows, part.columns.len(), &shares)?;
         let name = format!("blend-{}", projector + 1);
         Some((projector, picture_file(&name, &picture)))
     });
@@ -167,14 +167,6 @@ fn blend(
     } };
     files.extend(frames.into_iter().map(|(_, file)| file));
     markup
-}
-
-/// The shares of one projector's cells, of those of the wide frame.
-fn frame_shares(wide: Grid, columns: &Range<usize>, shares: &[f64]) -> Vec<f64> {
-    let rows = shares.chunks(wide.cols());
-    rows.flat_map(|row| &row[columns.clone()])
-        .copied()
-        .collect()
 }
 
 /// Shares of cells as a table has them, interpolated between the cells' centres.
@@ -288,17 +280,6 @@ mod tests {
         assert!(
             found[1].iter().all(|part| (part - 0.5).abs() < 0.02),
             "{found:?}"
-        );
-    }
-
-    #[test]
-    fn a_frame_has_the_shares_of_its_own_columns() {
-        let wide = Grid::new(2, 5).unwrap();
-        let shares = [1.0, 0.75, 0.25, 1.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0];
-        assert_eq!(frame_shares(wide, &(0..2), &shares), [1.0, 0.75, 1.0, 0.5]);
-        assert_eq!(
-            frame_shares(wide, &(2..5), &shares),
-            [0.25, 1.0, 1.0, 0.5, 1.0, 1.0]
         );
     }
 }

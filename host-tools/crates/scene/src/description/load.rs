@@ -5,11 +5,11 @@ use super::file::{
 };
 use super::{
     Albedo, Camera, Facet, Gloss, Panel, Pose, Projector, Scene, SceneError, SceneProblem, Texture,
-    mesh,
+    mesh, parts,
 };
 use crate::geometry::Polygon;
 use crate::pinhole::Pinhole;
-use iltm_picture::foreign_file;
+use iltm_picture::{FramePart, foreign_file};
 use iltm_runtime::Grid;
 use nalgebra::{Vector2, Vector3};
 use std::fmt::Display;
@@ -76,10 +76,6 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
         return Err(SceneProblem::NoProjector);
     };
     for other in &projectors {
-        if other.grid.rows() != first.grid.rows() {
-            let must = "the same for all projectors: their frames stand side by side";
-            return Err(refused("[[projector]] rows", other.grid.rows(), must));
-        }
         if other.response != first.response {
             let must = "the same for all projectors: a table has one";
             let found = format!("{:?}", other.response);
@@ -88,8 +84,8 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
     }
     let names = projectors.iter().map(|one| &one.name);
     check_names("projector", &names.collect::<Vec<_>>())?;
-    let cols: usize = projectors.iter().map(|one| one.grid.cols()).sum();
-    let [rows, cols] = [first.grid.rows(), cols].map(|count| count.try_into().unwrap_or(u16::MAX));
+    let sides = FramePart::around(&parts(&projectors));
+    let [rows, cols] = sides.map(|count| count.try_into().unwrap_or(u16::MAX));
     Grid::new(rows, cols)?;
     let panels = file.panels.into_iter().enumerate();
     Ok(Scene {

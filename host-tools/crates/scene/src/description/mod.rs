@@ -23,11 +23,10 @@ pub use texture::Texture;
 
 use super::geometry::Polygon;
 use super::pinhole::Pinhole;
-use iltm_picture::Response;
-use iltm_runtime::Grid;
+use iltm_picture::{FramePart, Response};
+use iltm_runtime::{FrameSize, Grid};
 use nalgebra::{Vector2, Vector3};
 use serde::Deserialize;
-use std::ops::Range;
 
 /// A scene and who looks at it.
 #[derive(Clone, Debug)]
@@ -280,28 +279,26 @@ fn names<'n>(names: impl Iterator<Item = &'n Option<String>>) -> Vec<String> {
     numbered.map(named).collect()
 }
 
+/// The part that each projector has of the frame of all.
+fn parts(projectors: &[Projector]) -> Vec<FramePart> {
+    let grids = projectors
+        .iter()
+        .map(|one| [one.grid.rows(), one.grid.cols()]);
+    FramePart::side_by_side(grids)
+}
+
 impl Scene {
     /// Cells of the frame of all projectors side by side.
     #[must_use]
     pub fn grid(&self) -> Grid {
-        let first = self.projectors[0].grid;
-        let cols: usize = self.projectors.iter().map(|one| one.grid.cols()).sum();
         // What reads scenes has made sure that there is such a grid.
-        Grid::new(first.rows() as u16, cols as u16).unwrap_or(first)
+        FramePart::grid(&self.parts()).unwrap_or(self.projectors[0].grid)
     }
 
-    /// The columns of [`grid`](Self::grid) that each projector has.
+    /// The part of [`grid`](Self::grid) that each projector has.
     #[must_use]
-    pub fn columns(&self) -> Vec<Range<usize>> {
-        let mut end = 0;
-        let projectors = self.projectors.iter();
-        projectors
-            .map(|projector| {
-                let start = end;
-                end += projector.grid.cols();
-                start..end
-            })
-            .collect()
+    pub fn parts(&self) -> Vec<FramePart> {
+        parts(&self.projectors)
     }
 
     /// The index of the projector of this name, or of this number, counted from 1; `None` if
@@ -341,20 +338,12 @@ impl Scene {
         names(self.projectors.iter().map(|one| &one.name))
     }
 
-    /// The columns of a frame of this width that each projector has; `None` if a pixel would
-    /// be shared.
+    /// The part of a frame of this size that each projector has; `None` if a pixel would be shared.
     #[must_use]
-    pub fn columns_of(&self, width: usize) -> Option<Vec<Range<usize>>> {
-        let cols = self.grid().cols();
-        let pixel = |col: usize| {
-            (col * width)
-                .is_multiple_of(cols)
-                .then_some(col * width / cols)
-        };
-        let columns = self.columns().into_iter();
-        columns
-            .map(|of| Some(pixel(of.start)?..pixel(of.end)?))
-            .collect()
+    pub fn parts_of(&self, frame: FrameSize) -> Option<Vec<FramePart>> {
+        let grid = self.grid();
+        let parts = self.parts().into_iter();
+        parts.map(|part| part.pixels(grid, frame)).collect()
     }
 
     /// Light from all around, by channel, that is added to that of the projector with this index:

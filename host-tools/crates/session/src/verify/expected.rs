@@ -44,9 +44,23 @@ impl<'t, 'a> Expected<'t, 'a> {
         let channels = || 0..usize::from(table.channels());
         let rows = || 0..table.grid().rows();
         let unit = f64::from(table.gain_fraction()).exp2();
+        let provenance = Provenance::read(table.provenance());
+        let (grid, parts) = (table.grid(), provenance.parts(table.grid()));
+        // Below a lower frame gains go on, and nobody shows it.
+        let is_shown = |cell: usize| {
+            let parts = parts.as_ref();
+            parts.is_none_or(|all| all.iter().any(|part| part.own(grid.cols(), cell).is_some()))
+        };
         let gain = |channel| {
             let bits = rows().flat_map(|row| table.gain_row(row, channel));
-            bits.map(|gain| f64::from(gain) / unit).collect()
+            let shown = |(cell, gain)| {
+                if is_shown(cell) {
+                    f64::from(gain) / unit
+                } else {
+                    0.0
+                }
+            };
+            bits.enumerate().map(shown).collect()
         };
         let ambient = |channel| {
             let own = rows().map(|row| table.ambient_row(row, channel));
@@ -62,7 +76,7 @@ impl<'t, 'a> Expected<'t, 'a> {
             memory: OperatorMemory::new(table),
             gain: channels().map(gain).collect(),
             ambient: channels().map(ambient).collect(),
-            overlapping: Provenance::read(table.provenance()).overlapping,
+            overlapping: provenance.overlapping,
         }
     }
 

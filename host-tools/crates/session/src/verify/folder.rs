@@ -140,7 +140,7 @@ pub fn write(
     }
     let slides = match kind {
         Slides::Both { .. } => slides(table, layout, &images, &fine)?,
-        Slides::Several(places) => several::slides(table, layout, &fine, &places.columns)?,
+        Slides::Several(places) => several::slides(table, layout, &fine, &places.parts)?,
         Slides::Wanted => wanted_slides(table, layout, &images)?,
     };
     progress.begin("writing the pictures", slides.len() as u64);

@@ -280,6 +280,7 @@ fn codes(size: FrameSize, shape: &CellPlanes, (dark, bright): (f64, f64)) -> Pic
 #[cfg(test)]
 mod tests {
     use super::*;
+    use iltm_picture::FramePart;
 
     #[test]
     fn natural_images_are_of_all_brightness_and_each_colour_has_a_share_of_its_own() {
@@ -347,7 +348,7 @@ mod tests {
         let places = CameraPlaces {
             grid: Grid::new(3, 10).unwrap(),
             frame: FrameSize::new(2 * width as u16, height as u16).unwrap(),
-            columns: vec![0..5, 5..10],
+            parts: FramePart::side_by_side([[3, 5]; 2]),
             places: all.collect(),
             cell_side: 8.0,
             white: Vec::new(),

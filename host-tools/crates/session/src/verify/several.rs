@@ -17,11 +17,10 @@ use iltm_capture::{
     projector_file, projector_stripes_file, remeasure_several,
 };
 use iltm_compile::Provenance;
-use iltm_picture::{Picture, Samples, WholeFolder, foreign_file, progress::Progress};
+use iltm_picture::{FramePart, Picture, Samples, WholeFolder, foreign_file, progress::Progress};
 use iltm_runtime::{FrameSize, Grid, image::Table};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
-use std::ops::Range;
 use std::path::Path;
 
 /// File that says what the captures showed that the table was made from.
@@ -45,7 +44,7 @@ pub(super) fn slides(
     table: &Table<'_>,
     layout: &Layout,
     images: &[TestImage],
-    columns: &[Range<usize>],
+    parts: &[FramePart],
 ) -> Result<Vec<VerifySlide>, VerifyError> {
     let curves = ProjectorCurves::new(table);
     let all = || {
@@ -57,9 +56,9 @@ pub(super) fn slides(
     };
     let mut slides = vec![all()?];
     let mut rest = Vec::new();
-    let between = (2 * images.len()).div_ceil(columns.len().max(1)) + AFTER_IMAGES;
-    for (index, columns) in columns.iter().enumerate() {
-        let part = ProjectorPart::new(table.grid(), layout, columns)?;
+    let between = (2 * images.len()).div_ceil(parts.len().max(1)) + AFTER_IMAGES;
+    for (index, part) in parts.iter().enumerate() {
+        let part = ProjectorPart::new(table.grid(), layout, part)?;
         let mut codes = Vec::new();
         for (role, pattern) in pattern_set(part.own.grid(), BERNOULLI, SEED + index as u64) {
             let cells = part.of_cells(&pattern);
@@ -98,54 +97,47 @@ struct ProjectorPart {
     own: Layout,
     /// Cells and pixels of the wide frame.
     all: (Grid, FrameSize),
-    /// Its columns of cells, and of pixels.
-    columns: [Range<usize>; 2],
+    /// Its part of both.
+    parts: [FramePart; 2],
 }
 
 impl ProjectorPart {
-    fn new(grid: Grid, layout: &Layout, columns: &Range<usize>) -> Result<Self, VerifyError> {
+    fn new(grid: Grid, layout: &Layout, cells: &FramePart) -> Result<Self, VerifyError> {
         let frame = layout.projector();
-        let pixels = |column: usize| column * frame.width() / grid.cols();
-        let pixels = pixels(columns.start)..pixels(columns.end);
-        let side = |side: usize| u16::try_from(side).unwrap_or(0);
         let no_cells = || PatternsError::Cells {
             grid,
             projector: frame,
             border: 0,
         };
-        let size = FrameSize::new(side(pixels.len()), side(frame.height()));
-        let own = Grid::new(side(grid.rows()), side(columns.len())).ok();
-        let (own, size) = own.zip(size).ok_or_else(no_cells)?;
+        let pixels = cells.pixels(grid, frame).ok_or_else(no_cells)?;
+        let own = Grid::new(cells.rows as u16, cells.columns.len() as u16).ok();
+        let (own, size) = own.zip(pixels.frame()).ok_or_else(no_cells)?;
         Ok(Self {
             own: Layout::new(own, size, 0)?,
             all: (grid, frame),
-            columns: [columns.clone(), pixels],
+            parts: [cells.clone(), pixels],
         })
     }
 
     /// A pattern of the wide frame's cells, black where others show.
     fn of_cells(&self, pattern: &Pattern) -> Picture {
-        let (grid, columns) = (self.all.0, &self.columns[0]);
+        let (grid, part) = (self.all.0, &self.parts[0]);
         Picture::of_codes(FrameSize::of_grid(grid), 1, |cell, _| {
-            let (row, col) = (cell / grid.cols(), cell % grid.cols());
-            let lit =
-                columns.contains(&col) && pattern.lit[row * columns.len() + col - columns.start];
-            255 * u8::from(lit)
+            let own = part.own(grid.cols(), cell);
+            255 * u8::from(own.is_some_and(|own| pattern.lit[own]))
         })
     }
 
     /// Fine stripes of the projector with this number, as slides of the wide frame.
     fn stripes(&self, projector: usize) -> Vec<VerifySlide> {
-        let (frame, columns) = (self.all.1, &self.columns[1]);
+        let (frame, part) = (self.all.1, &self.parts[1]);
         let widened = |picture: &Picture| {
             let Samples::Eight(codes) = picture.samples() else {
                 unreachable!("stripes have 8 bits");
             };
             Picture::of_codes(frame, 1, |pixel, _| {
-                let (x, y) = (pixel % frame.width(), pixel / frame.width());
-                let inside = columns.contains(&x);
-                let at = || y * columns.len() + x - columns.start;
-                if inside { codes[at()] } else { 0 }
+                let own = part.own(frame.width(), pixel);
+                own.map_or(0, |own| codes[own])
             })
         };
         let slides = fine_stripes(&self.own).into_iter();
@@ -169,7 +161,7 @@ pub(super) fn write_lists(
 ) -> Result<usize, VerifyError> {
     let numbered = || (0_u32..).zip(slides.iter().map(|slide| slide.listed));
     let mut count = 0;
-    for projector in 1..=places.columns.len() {
+    for projector in 1..=places.parts.len() {
         let code = numbered().filter_map(|(index, listed)| match listed {
             ListedAs::Code(of, role) if of == projector => Some((index, role)),
             _ => None,
