@@ -354,7 +354,7 @@ fn captures_that_cannot_be_of_one_frame_are_refused_by_name() {
     let (words, next) = refused(&[captures[0].clone(), captures[0].clone()]);
     assert!(words.contains("given twice"), "{words}");
     assert!(next.contains("once"), "{next}");
-    // Cells that have other pixels, a border, or pixels that nobody knows.
+    // Cells that have other pixels, or pixels that nobody knows.
     let other = place.path().join("other");
     fs::create_dir(&other).unwrap();
     let stated = |capture: &Path, from: &str, to: &str| {
@@ -382,16 +382,6 @@ fn captures_that_cannot_be_of_one_frame_are_refused_by_name() {
         assert!(next.contains("--rows"), "{next}");
         fs::write(others[0].join("capture.toml"), text).unwrap();
     }
-    let mut lower = single(&scene, 1);
-    lower.projectors[0].grid = Grid::new(11, 16).unwrap();
-    let unknown = [single(&scene, 0), lower].map(|scene| {
-        let place = tempfile::tempdir().unwrap();
-        photograph(&scene, 10, 1, &place.path().join("capture"));
-        place
-    });
-    let unknown = unknown.each_ref().map(|place| place.path().join("capture"));
-    let (words, _) = refused(&unknown);
-    assert!(words.contains("11 rows of cells beside 12, and"), "{words}");
     let mut nearer = single(&scene, 1);
     nearer.camera.size = (150, 100);
     let others = photograph_each(&nearer, 10, &place.path().join("other/nearer"));
