@@ -159,7 +159,6 @@ fn what_cannot_be_simulated_is_refused_with_its_place_and_the_next_step() {
         ),
         ("full_well", "read_noise", &["full_well"]),
         (one, "projector = []\n", &["there is no [projector]"]),
-        (one, &two("response = 1.8"), &["[[projector]] response"]),
         (one, &two("clos = 6"), &["clos"]),
         (
             one,

@@ -73,11 +73,12 @@ const ROWS_OF_SECOND: usize = 9;
 /// Codes of black and of another slide, of all cells or pixels.
 type Codes<'c> = &'c dyn Fn(usize, usize) -> u8;
 
-/// Two walls whose projectors have other numbers of cells, the second fewer rows, glow in black and meet
-/// a camera without noise.
+/// Two walls whose projectors have other numbers of cells and other responses, glow in black and meet a
+/// camera without noise.
 fn unlike() -> Scene {
     let mut scene = two_walls();
     scene.projectors[1].grid = Grid::new(ROWS_OF_SECOND as u16, OF_SECOND as u16).unwrap();
+    scene.projectors[1].response = Response::Gamma(1.5);
     for projector in &mut scene.projectors {
         projector.black = 0.02;
     }

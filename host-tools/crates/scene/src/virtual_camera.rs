@@ -1,7 +1,7 @@
 //! Virtual camera: one photograph after another of what the projector shows, as a session takes
 //! them. The lamp drifts, and whatever is asked to go wrong does.
 
-use super::description::Scene;
+use super::description::{Projector, Scene};
 use super::injected_fault::{CaptureFault, InjectedFault, InjectedFaults};
 use super::pixel_sampling::FrameSampling;
 use super::sensor::Sensor;
@@ -244,20 +244,19 @@ impl<'s> VirtualCamera<'s> {
         faults: &InjectedFaults<'_>,
         shown: &[(usize, &ProjectedFrame)],
     ) -> (Vec<DMatrix<f64>>, Vec<Vec<f64>>) {
-        let light = self.light_of_codes();
         let grid = self.grid();
         let mut channels = vec![DMatrix::zeros(grid.cells(), shown.len()); 3];
         for (column, (_, frame)) in shown.iter().enumerate() {
             assert_eq!(frame.codes.len(), frame.size.pixels(), "a code a pixel");
             let owners = AreaAverage::new(grid, frame.size).expect("a pixel a cell or more");
-            let width = frame.size.width();
+            let (light, width) = (self.light_of_codes(frame.size), frame.size.width());
             let mut pixels = vec![0.0_f64; grid.cells()];
             for (pixel, codes) in frame.codes.iter().enumerate() {
                 let Some(cell) = owners.owner(pixel % width, pixel / width) else {
                     continue;
                 };
                 pixels[cell] += 1.0;
-                let projected = faults.projected(codes.map(|code| light[usize::from(code)]));
+                let projected = faults.projected(light.at(pixel, *codes));
                 for (channel, light) in channels.iter_mut().zip(projected) {
                     channel[(cell, column)] += light;
                 }
@@ -288,11 +287,21 @@ impl<'s> VirtualCamera<'s> {
         (channels, lamps)
     }
 
-    /// Light, 0 to 1, that the projector makes of each input code.
-    fn light_of_codes(&self) -> Vec<f64> {
-        let response = self.scene.projectors[0].response;
-        let light = |code| response.light(f64::from(code) / 255.0);
-        (0..=255_u8).map(light).collect()
+    /// Light that the projectors make of a frame's codes.
+    fn light_of_codes(&self, frame: FrameSize) -> CodeLight {
+        let of_codes = |projector: &Projector| {
+            let light = |code| projector.response.light(f64::from(code) / 255.0);
+            (0..=255_u8).map(light).collect()
+        };
+        // Frames that are shown have whole pixels of each.
+        let parts = self.scene.parts_of(frame).unwrap_or_default();
+        CodeLight {
+            width: frame.width(),
+            projectors: parts
+                .into_iter()
+                .zip(self.scene.projectors.iter().map(of_codes))
+                .collect(),
+        }
     }
 
     /// Light of each of the projector's channels in every pixel of a fine frame, one entry
@@ -302,11 +311,13 @@ impl<'s> VirtualCamera<'s> {
         frame: &ProjectedFrame,
         faults: &InjectedFaults<'_>,
     ) -> Vec<DMatrix<f64>> {
-        let light = self.light_of_codes();
-        let projected = |codes: &[u8; 3]| faults.projected(codes.map(|c| light[usize::from(c)]));
+        let light = self.light_of_codes(frame.size);
+        let projected =
+            |(pixel, codes): (usize, &[u8; 3])| faults.projected(light.at(pixel, *codes));
         let grey = frame.codes.iter().all(|[r, g, b]| r == g && g == b);
         let of_channel = |channel: usize| {
-            let light = frame.codes.iter().map(|codes| projected(codes)[channel]);
+            let codes = frame.codes.iter().enumerate();
+            let light = codes.map(|of_pixel| projected(of_pixel)[channel]);
             DMatrix::from_iterator(frame.codes.len(), 1, light)
         };
         (0..if grey { 1 } else { 3 }).map(of_channel).collect()
@@ -328,6 +339,22 @@ impl<'s> VirtualCamera<'s> {
             values: values.collect(),
             scale: self.sensor.file_scale(),
         }
+    }
+}
+
+/// Light, 0 to 1, of the input codes of a wide frame.
+struct CodeLight {
+    width: usize,
+    /// The pixels of each projector, and its light of each code.
+    projectors: Vec<(FramePart, Vec<f64>)>,
+}
+
+impl CodeLight {
+    /// Of the codes of a pixel; none below a lower frame.
+    fn at(&self, pixel: usize, codes: [u8; 3]) -> [f64; 3] {
+        let own = |part: &FramePart| part.own(self.width, pixel).is_some();
+        let light = self.projectors.iter().find(|(part, _)| own(part));
+        codes.map(|code| light.map_or(0.0, |(_, light)| light[usize::from(code)]))
     }
 }
 

@@ -72,15 +72,8 @@ fn scene(file: SceneFile, folder: &Path) -> Result<Scene, SceneProblem> {
     }
     let projectors = file.projectors.0.iter().map(projector);
     let projectors: Vec<_> = projectors.collect::<Result<_, _>>()?;
-    let Some(first) = projectors.first() else {
+    if projectors.is_empty() {
         return Err(SceneProblem::NoProjector);
-    };
-    for other in &projectors {
-        if other.response != first.response {
-            let must = "the same for all projectors: a table has one";
-            let found = format!("{:?}", other.response);
-            return Err(refused("[[projector]] response", found, must));
-        }
     }
     let names = projectors.iter().map(|one| &one.name);
     check_names("projector", &names.collect::<Vec<_>>())?;
