@@ -197,7 +197,7 @@ impl WideFrame {
         wide.grid = self.grid;
         for view in &mut wide.views {
             let lit = std::mem::take(&mut view.lit);
-            view.lit = self.of_cells(|of, cell| of == projector && lit[cell], || false);
+            view.lit = self.of_cells(|of, cell| of == projector && lit[cell]);
         }
         wide
     }

@@ -87,15 +87,11 @@ impl WideFrame {
         parts.find_map(|(projector, part)| Some((projector, part.own(cols, cell)?)))
     }
 
-    /// An entry a cell from those of each projector's own cells, and `none` for cells of no projector.
-    pub(crate) fn of_cells<T>(
-        &self,
-        of: impl Fn(usize, usize) -> T,
-        none: impl Fn() -> T,
-    ) -> Vec<T> {
+    /// An entry a cell from those of each projector's own cells; nothing for cells of no projector.
+    pub(crate) fn of_cells<T: Default>(&self, of: impl Fn(usize, usize) -> T) -> Vec<T> {
         let of_cell = |cell| {
             let own = self.own_cell(cell);
-            own.map_or_else(&none, |(projector, own)| of(projector, own))
+            own.map_or_else(T::default, |(projector, own)| of(projector, own))
         };
         (0..self.grid.cells()).map(of_cell).collect()
     }
@@ -107,8 +103,7 @@ impl WideFrame {
         let own: Vec<CellPixels> = own
             .map(|(own, saturated)| CellPixels::choose(&own.registration, saturated))
             .collect();
-        let of_cell = |projector: usize, cell| Some((&own[projector], cell));
-        CellPixels::joined(&self.of_cells(of_cell, || None))
+        CellPixels::joined(&self.of_cells(|projector, cell| Some((&own[projector], cell))))
     }
 
     /// The projector with the largest share of each camera pixel.
@@ -142,10 +137,7 @@ impl WideFrame {
         Registration {
             cell_of_pixel: labels(|registration| &registration.cell_of_pixel),
             seen_cell: labels(|registration| &registration.seen_cell),
-            centre: self.of_cells(
-                |projector, cell| self.own[projector].registration.centre[cell],
-                || None,
-            ),
+            centre: self.of_cells(|projector, cell| self.own[projector].registration.centre[cell]),
             ..self.own[0].registration.clone()
         }
     }

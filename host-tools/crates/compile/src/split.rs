@@ -127,10 +127,11 @@ pub fn split_table(
     if table.neighbours().is_some() {
         return Err(SplitTableError::Split);
     }
+    let images = wanted_images(meta.grid);
     let wide = WideTable {
         functions: table.basis().functions().collect(),
-        images: wanted_images(meta.grid),
-        coefficients: Haar::new(meta.grid).analyse_columns(&wanted_images(meta.grid)),
+        coefficients: Haar::new(meta.grid).analyse_columns(&images),
+        images,
         parts: parts(&table, projectors)?,
         table: &table,
         meta,
@@ -143,17 +144,22 @@ pub fn split_table(
 /// The cells of each projector of a table.
 fn parts(table: &Table<'_>, asked: Option<usize>) -> Result<Vec<FramePart>, SplitTableError> {
     let grid = table.grid();
+    let few = |projectors| (2..=MOST_PROJECTORS).contains(&projectors);
     if let Some(parts) = Provenance::read(table.provenance()).parts(grid) {
         let found = parts.len();
         return match asked {
             Some(asked) if asked != found => Err(SplitTableError::Projectors { asked, found }),
+            _ if !few(found) => Err(SplitTableError::Columns {
+                cols: grid.cols(),
+                projectors: found,
+            }),
             _ => Ok(parts),
         };
     }
     let projectors = asked.ok_or(SplitTableError::Unsaid)?;
     let fine = table.fine_gain().map(|fine| fine.size().width());
     for cols in [grid.cols()].into_iter().chain(fine) {
-        if !(2..=MOST_PROJECTORS).contains(&projectors) || !cols.is_multiple_of(projectors) {
+        if !few(projectors) || !cols.is_multiple_of(projectors) {
             return Err(SplitTableError::Columns { cols, projectors });
         }
     }

@@ -31,6 +31,15 @@ impl FramePart {
         frames.map(part).collect()
     }
 
+    /// All of a frame.
+    #[must_use]
+    pub const fn whole(grid: Grid) -> Self {
+        Self {
+            columns: 0..grid.cols(),
+            rows: grid.rows(),
+        }
+    }
+
     /// Rows and columns of the wide frame of all parts.
     #[must_use]
     pub fn around(parts: &[Self]) -> [usize; 2] {
@@ -85,6 +94,23 @@ impl FramePart {
         })
     }
 
+    /// The frame for `grid` in which a part of so many cells has `own` pixels; `None` if there would be
+    /// no whole number of them.
+    #[must_use]
+    pub fn wide(&self, grid: Grid, own: FrameSize) -> Option<FrameSize> {
+        let side = |pixels: usize, cells: usize, all: usize| {
+            let wide = pixels * all;
+            wide.is_multiple_of(cells)
+                .then_some(wide / cells)?
+                .try_into()
+                .ok()
+        };
+        FrameSize::new(
+            side(own.width(), self.columns.len(), grid.cols())?,
+            side(own.height(), self.rows, grid.rows())?,
+        )
+    }
+
     /// The part as a frame of its own; `None` if it is none.
     #[must_use]
     pub fn frame(&self) -> Option<FrameSize> {
@@ -125,6 +151,12 @@ mod tests {
         let pixels = parts[1].pixels(grid, size(18, 30)).unwrap();
         assert_eq!((pixels.columns.clone(), pixels.rows), (6..18, 20));
         assert_eq!(pixels.frame(), Some(size(12, 20)));
+        assert_eq!(parts[1].wide(grid, size(12, 20)), Some(size(18, 30)));
+        assert_eq!(parts[1].wide(grid, size(12, 19)), None);
+        assert_eq!(
+            FramePart::whole(grid).wide(grid, size(7, 5)),
+            Some(size(7, 5))
+        );
         assert_eq!(parts[1].pixels(grid, size(16, 30)), None);
         assert_eq!(parts[1].pixels(grid, size(18, 31)), None);
     }

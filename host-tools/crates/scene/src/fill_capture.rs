@@ -114,10 +114,7 @@ impl SlidePlace {
             },
             None => Self {
                 all,
-                part: FramePart {
-                    columns: 0..all.cols(),
-                    rows: all.rows(),
-                },
+                part: FramePart::whole(all),
                 grid: all,
                 whose: if scene.projectors.len() == 1 {
                     "the scene's projector has".to_owned()
@@ -131,13 +128,7 @@ impl SlidePlace {
     /// Size of the frame of all projectors whose part is a slide of this size, and the part of its
     /// pixels; `None` if there would be no whole number of them.
     fn within(&self, scene: &Scene, slide: FrameSize) -> Option<(FrameSize, FramePart)> {
-        let side = |pixels: usize, cells: usize, all: usize| {
-            let whole = (pixels * all).is_multiple_of(cells);
-            whole.then_some(pixels * all / cells)?.try_into().ok()
-        };
-        let width = side(slide.width(), self.part.columns.len(), self.all.cols())?;
-        let height = side(slide.height(), self.part.rows, self.all.rows())?;
-        let size = FrameSize::new(width, height)?;
+        let size = self.part.wide(self.all, slide)?;
         // No projector shares a pixel with another, however many cells they have.
         scene.parts_of(size)?;
         Some((size, self.part.pixels(self.all, size)?))

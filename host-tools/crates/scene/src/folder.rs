@@ -60,10 +60,7 @@ pub fn write(
         folder.file(numbered("patterns", index as u32), picture)?;
     }
     progress.begin("taking photographs", patterns.len() as u64);
-    let all = FramePart {
-        columns: 0..camera.grid().cols(),
-        rows: camera.grid().rows(),
-    };
+    let all = FramePart::whole(camera.grid());
     let part = projector.map_or(all, |index| camera.scene.parts()[index].clone());
     let frame =
         |(_, pattern): &(Role, Pattern)| ProjectedFrame::of_pattern(camera.grid(), &part, pattern);

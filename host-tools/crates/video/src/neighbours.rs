@@ -142,15 +142,11 @@ fn parts(
 /// [`FrameSplitter::new`].
 #[must_use]
 pub fn wide_size((table, frames): (&Table<'_>, &[[u16; 2]]), own: FrameSize) -> Option<FrameSize> {
-    let parts = parts(table, table.neighbours()?, frames)?;
-    let [rows, cols] = FramePart::around(&parts);
-    let side = |own: usize, cells: usize, all: usize| {
-        let whole = (own * all).is_multiple_of(cells);
-        whole.then_some(own * all / cells)?.try_into().ok()
-    };
-    let width = side(own.width(), table.grid().cols(), cols)?;
-    let wide = FrameSize::new(width, side(own.height(), table.grid().rows(), rows)?)?;
+    let neighbours = table.neighbours()?;
+    let parts = parts(table, neighbours, frames)?;
     let grid = FramePart::grid(&parts)?;
+    let [before, _] = neighbours.around();
+    let wide = parts[before].wide(grid, own)?;
     let whole = parts.iter().all(|part| part.pixels(grid, wide).is_some());
     whole.then_some(wide)
 }

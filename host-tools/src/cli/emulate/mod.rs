@@ -183,7 +183,12 @@ fn scene(
     };
     let all = frames_of_all(table);
     let wide = |own| wide_size((table, &all), own);
-    let wide = wide(own).or_else(|| smaller(table)?.find_map(wide));
+    let other = || {
+        size.is_none()
+            .then(|| smaller(table)?.find_map(wide))
+            .flatten()
+    };
+    let wide = wide(own).or_else(other);
     let frames = FrameFeed::scene(wide.unwrap_or(own), table.channels(), rate);
     Ok(frames.for_table(table, &all)?)
 }
