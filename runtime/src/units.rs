@@ -23,6 +23,9 @@ pub type Correction = I9F23;
 /// Fraction bits that a [`Correction`] has beyond a [`Drive`].
 pub const CORRECTION_GUARD_BITS: u32 = Correction::FRAC_NBITS - Drive::FRAC_NBITS;
 
+/// Fraction bits that gains have beyond their own while they are interpolated.
+pub const GAIN_GUARD_BITS: u32 = 12;
+
 /// A Haar coefficient of the input frame as the operator multiplies it. Its
 /// magnitude is at most [`INPUT_COEFFICIENT_MAX`], whatever the frame.
 pub type InputCoefficient = i16;

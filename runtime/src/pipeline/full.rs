@@ -12,7 +12,7 @@
 )]
 
 use super::FrameError;
-use super::stages::{Workspace, correct, drive, drive_row};
+use super::stages::{Workspace, correct, drive_row, driven};
 use crate::FrameSize;
 use crate::features::Stage;
 use crate::haar::ShortSlice;
@@ -20,10 +20,7 @@ use crate::image::{FineGain, Table};
 use crate::placement::PixelArea;
 use crate::resample::area::AreaAverage;
 use crate::resample::interpolation::{Axis, blend, blend_rows};
-use crate::units::{ClippedSamples, Drive, Light};
-
-/// Fraction bits that gains have beyond their own while they are interpolated.
-const GAIN_GUARD_BITS: u32 = 12;
+use crate::units::{ClippedSamples, Drive, GAIN_GUARD_BITS, Light};
 
 /// Half of the last place that is kept of an interpolated gain.
 const GAIN_HALF: i32 = 1 << (GAIN_GUARD_BITS - 1);
@@ -154,6 +151,18 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
         self.cells
     }
 
+    /// Where its pixels lie between the places of the gains that it uses: rows, then columns.
+    #[must_use]
+    pub const fn gain_axes(&self) -> [Axis; 2] {
+        self.gains
+    }
+
+    /// The table's finer gains, where its frames are large enough to show them.
+    #[must_use]
+    pub const fn fine_gain(&self) -> Option<FineGain<'a>> {
+        self.fine_gain
+    }
+
     /// Whether frames of `tier` go through the operator. Those of others need neither
     /// averages nor corrections.
     #[must_use]
@@ -202,10 +211,7 @@ impl<'t, 'a, const C: usize> FullPipeline<'t, 'a, C> {
             };
             let cells = self.table.gain_row(at, channel).zip(ambient);
             for (slot, (gain, ambient)) in line.iter_mut().zip(cells) {
-                let driven = match gain {
-                    0 => ambient.to_bits().into(),
-                    _ => drive(ambient, gain, fraction, 0).min(u16::MAX.into()),
-                };
+                let driven = i32::from(driven(ambient, gain, fraction));
                 *slot = blend(*slot, driven << GAIN_GUARD_BITS, share);
             }
         }

@@ -27,7 +27,7 @@ pub fn subtract_ambient(light: Light, ambient: Light) -> Light {
 /// Half of the last place that a drive keeps of a correction. It is added to the
 /// constant function's coefficient, hence to every correction, and so costs
 /// nothing a pixel.
-const CORRECTION_HALF: i32 = 1 << (CORRECTION_GUARD_BITS - 1);
+pub const CORRECTION_HALF: i32 = 1 << (CORRECTION_GUARD_BITS - 1);
 
 /// `gain * light - correction` in units of [`Drive`], not yet between 0 and 1.
 ///
@@ -42,6 +42,17 @@ pub fn drive(light: Light, gain: u16, gain_fraction: u32, correction: i32) -> i3
     let direct = product.wrapping_add(half).wrapping_shr(gain_fraction) as i32;
     // Below 2^30 + 2^22: a table's gains have at least one fraction bit.
     direct.wrapping_sub(correction >> CORRECTION_GUARD_BITS)
+}
+
+/// The room's light at a cell times its gain, in units of [`Drive`]: what is interpolated between
+/// cells. Where the gain is 0 a table has that product itself.
+#[inline(always)]
+#[must_use]
+pub fn driven(ambient: Light, gain: u16, gain_fraction: u32) -> u16 {
+    match gain {
+        0 => ambient.to_bits(),
+        _ => drive(ambient, gain, gain_fraction, 0).min(u16::MAX.into()) as u16,
+    }
 }
 
 /// A drive between 0 and 1.

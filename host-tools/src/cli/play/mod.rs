@@ -1,7 +1,8 @@
 //! `iltm play`: mpv on a projector, with the table as its shader.
 //!
-//! Decoding, sound and clocks are mpv's, and the compensation is the user shader of
-//! `iltm export`. The script `play.lua` runs within mpv: it has the keys, counts frames that were
+//! Decoding, sound and clocks are mpv's. The compensation is a user shader: the runtime's
+//! arithmetic in integers for frames of the table's projector, or that of `iltm export` where the
+//! table does not say its pixels. The script `play.lua` runs within mpv: it has the keys, counts frames that were
 //! dropped or late, and says what happens as JSON lines on standard output.
 
 mod spanning;
@@ -12,7 +13,7 @@ use super::interrupt;
 use super::mpv::{mpv, start};
 use super::output::Output;
 use super::tables::{check_whole, chosen_tier, watch_table};
-use crate::compile::shader::user_shader;
+use crate::compile::shader::{integer_shader, user_shader};
 use crate::video::watch::FileWatch;
 use iltm_picture::Samples;
 use iltm_picture::unfinished::TemporaryFolder;
@@ -122,10 +123,11 @@ impl ShowFiles<'_> {
     /// Writes a table's shaders, one a tier.
     fn shaders(&self, table: &Table<'_>, generation: u32) -> Result<(), Failure> {
         for tier in 0..=table.top_tier() {
-            self.write(
-                &format!("{generation}-{tier}.glsl"),
-                user_shader(table, tier),
-            )?;
+            let exact = self
+                .projector
+                .and_then(|projector| integer_shader(table, tier, projector));
+            let shader = exact.unwrap_or_else(|| user_shader(table, tier));
+            self.write(&format!("{generation}-{tier}.glsl"), shader)?;
         }
         Ok(())
     }
@@ -178,6 +180,8 @@ impl ShowFiles<'_> {
             .args(["--force-window=immediate", "--cursor-autohide=always"])
             .args(["--input-default-bindings=no", "--osd-bar=no"])
             .args(["--quiet", "--msg-level=all=error"])
+            // What the integer shader needs, and what shows its codes as they are.
+            .args(["--fbo-format=rgba16", "--dither-depth=no"])
             .args(["--idle=yes", "--image-display-duration=10"])
             .arg("--gapless-audio=yes")
             // A stream that pauses is waited for.

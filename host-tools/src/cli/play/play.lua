@@ -61,7 +61,33 @@ local function show_line()
     line:update()
 end
 
+-- Looks in a row, four a second, at which mpv has drawn a film without the table's shader: it leaves
+-- shaders away where the graphics processor cannot keep what they need.
+local without = 0
+local function look_at_passes()
+    local passes = mp.get_property_native("vo-passes")
+    if not passes or not counts.shown or not state.compensated then
+        without = 0
+        return
+    end
+    without = without + 1
+    -- What stands still is drawn again only.
+    for _, kind in ipairs({ passes.fresh, passes.redraw }) do
+        for _, pass in ipairs(kind) do
+            if pass.desc:find("iltm: pixels", 1, true) then
+                without = 0
+            end
+        end
+    end
+    if without == 8 then
+        local format = mp.get_property("fbo-format")
+        trouble({ problem = "nothing is compensated: the graphics processor cannot keep "
+            .. format .. " between passes; try `-- --fbo-format=auto`" })
+    end
+end
+
 local function apply()
+    without = 0
     local shaders = {}
     if state.white then
         table.insert(shaders, folder .. "/white.glsl")
@@ -277,6 +303,7 @@ local function there(name)
     return file and file:close()
 end
 mp.add_periodic_timer(0.25, function()
+    look_at_passes()
     -- No event says so.
     in_step = in_step or mp.get_property_native("display-sync-active")
     if there("stop") or not there("settings.lua") then

@@ -8,9 +8,11 @@
 //! Between passes numbers lie between 0 and 1 and have two texels each, since players keep 16 bits.
 //!
 //! The passes are the same for all players. How a player names the frame, reads a texel and is
-//! told of passes, `mpv.rs`, `isf.rs` and `glsl.rs` say.
+//! told of passes, `mpv.rs`, `isf.rs` and `glsl.rs` say. They take frames of any size and are within
+//! a code of the runtime; for one size, `integers.rs` has mpv make the runtime's own codes.
 
 mod glsl;
+mod integers;
 mod isf;
 mod mpv;
 mod pictures;
@@ -22,6 +24,7 @@ use iltm_runtime::haar::Function;
 use iltm_runtime::image::Table;
 use iltm_runtime::operator::Segment;
 use iltm_runtime::response::{RESPONSE_KNOTS, knot_drive};
+pub use integers::integer_shader;
 pub use isf::isf_files;
 pub use mpv::user_shader;
 use std::collections::BTreeMap;
@@ -306,18 +309,19 @@ impl<'t, 'a> Shader<'t, 'a> {
         self.list("ILTM_ROWS", starts);
         self.list("ILTM_ENTRIES", list);
         // What covers each cell.
-        let mut covering: Vec<Vec<[f32; 4]>> = vec![Vec::new(); grid.cells()];
-        for (index, function) in functions.iter().enumerate() {
-            let norm = (function.squared_norm() as f64).sqrt();
-            let (high, wide) = function.extent();
-            let (top, left) = (usize::from(function.row), usize::from(function.col));
-            for row in top..top + high {
-                for col in left..left + wide {
-                    let value = function.at(row, col) as f64 / norm * bounds[index];
-                    covering[row * grid.cols() + col].push([index as f32, value as f32, 0.0, 0.0]);
-                }
-            }
-        }
+        let texel = |(index, value): (usize, i64)| {
+            let norm = (functions[index].squared_norm() as f64).sqrt();
+            [
+                index as f32,
+                (value as f64 / norm * bounds[index]) as f32,
+                0.0,
+                0.0,
+            ]
+        };
+        let covering = covering(self.table).into_iter();
+        let mut covering: Vec<Vec<[f32; 4]>> = covering
+            .map(|list| list.into_iter().map(texel).collect())
+            .collect();
         let most = covering.iter().map(Vec::len).max().unwrap_or(0);
         for list in &mut covering {
             list.resize(most, [0.0; 4]);
@@ -360,6 +364,22 @@ impl<'t, 'a> Shader<'t, 'a> {
             body: include_str!("pixels.glsl").replace("CORRECTION", correction),
         });
     }
+}
+
+/// Of every cell, the Haar functions that cover it and their values there.
+fn covering(table: &Table<'_>) -> Vec<Vec<(usize, i64)>> {
+    let grid = table.grid();
+    let mut covering = vec![Vec::new(); grid.cells()];
+    for (index, function) in table.basis().functions().enumerate() {
+        let (high, wide) = function.extent();
+        let (top, left) = (usize::from(function.row), usize::from(function.col));
+        for row in top..top + high {
+            for col in left..left + wide {
+                covering[row * grid.cols() + col].push((index, function.at(row, col)));
+            }
+        }
+    }
+    covering
 }
 
 /// A Haar function as a product of two steps.

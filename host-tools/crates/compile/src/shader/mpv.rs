@@ -8,9 +8,9 @@ use iltm_runtime::image::Table;
 use std::fmt::Write;
 
 /// How mpv names what passes name.
-const NAMES: &str = "#define PLACE HOOKED_pos\n\
-                     #define FRAME HOOKED_size\n\
-                     #define FILM(place) HOOKED_tex(place)\n";
+pub(super) const NAMES: &str = "#define PLACE HOOKED_pos\n\
+                                #define FRAME HOOKED_size\n\
+                                #define FILM(place) HOOKED_tex(place)\n";
 
 /// The user shader of a tier of a table.
 ///
@@ -21,7 +21,7 @@ pub fn user_shader(table: &Table<'_>, tier: u8) -> String {
     let mut text = String::new();
     for piece in &shader.pieces {
         if let Piece::Texture(texture) = piece {
-            define(texture, &mut text);
+            write_image(&image_of(texture), &mut text);
         }
     }
     let (width, height) = shader.target_size();
@@ -63,8 +63,8 @@ pub fn user_shader(table: &Table<'_>, tier: u8) -> String {
     text
 }
 
-/// A texture's bytes, in hexadecimal digits.
-fn define(texture: &ShaderTexture, text: &mut String) {
+/// The bytes of a texture's numbers.
+fn image_of(texture: &ShaderTexture) -> Image {
     let (format, bytes): (_, Vec<u8>) = match &texture.texels {
         Texels::Sixteen(texels) => {
             let texels = texels.iter();
@@ -76,14 +76,43 @@ fn define(texture: &ShaderTexture, text: &mut String) {
             ("rgba32f", values.flat_map(|v| v.to_le_bytes()).collect())
         }
     };
-    let (name, (width, height)) = (texture.name, texture.size);
+    Image {
+        name: texture.name.to_owned(),
+        size: texture.size,
+        format,
+        bytes,
+    }
+}
+
+/// A texture as mpv takes it.
+pub(super) struct Image {
+    pub(super) name: String,
+    /// Width and height.
+    pub(super) size: (usize, usize),
+    /// As mpv calls it.
+    pub(super) format: &'static str,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// Writes a texture, its bytes in hexadecimal digits.
+pub(super) fn write_image(image: &Image, text: &mut String) {
+    const DIGITS: [u8; 16] = *b"0123456789abcdef";
+    let Image {
+        name,
+        size: (width, height),
+        format,
+        bytes,
+    } = image;
     let _ = write!(
         text,
         "//!TEXTURE {name}\n//!SIZE {width} {height}\n//!FORMAT {format}\n\
          //!FILTER NEAREST\n//!BORDER CLAMP\n"
     );
+    text.reserve(2 * bytes.len());
     for byte in bytes {
-        let _ = write!(text, "{byte:02x}");
+        for digit in [byte >> 4, byte & 0xf] {
+            text.push(char::from(DIGITS[usize::from(digit)]));
+        }
     }
     text.push_str("\n\n");
 }

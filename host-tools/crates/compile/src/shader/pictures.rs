@@ -8,7 +8,7 @@ use iltm_picture::{Picture, Samples, png};
 use iltm_runtime::FrameSize;
 
 /// Largest side of a texture that graphics processors are made for.
-const MAX_SIDE: usize = 16_384;
+pub(super) const MAX_SIDE: usize = 16_384;
 
 /// A piece for such programs.
 pub(super) struct Readable {
