@@ -65,21 +65,17 @@ end
 -- shaders away where the graphics processor cannot keep what they need.
 local without = 0
 local function look_at_passes()
-    local passes = mp.get_property_native("vo-passes")
-    if not passes or not counts.shown or not state.compensated then
-        without = 0
-        return
-    end
-    without = without + 1
+    local passes = mp.get_property_native("vo-passes") or { fresh = {}, redraw = {} }
+    local drawn, compensated = false, false
     -- What stands still is drawn again only.
     for _, kind in ipairs({ passes.fresh, passes.redraw }) do
         for _, pass in ipairs(kind) do
-            if pass.desc:find("iltm: pixels", 1, true) then
-                without = 0
-            end
+            drawn = true
+            compensated = compensated or pass.desc:find("iltm: pixels", 1, true)
         end
     end
-    if without == 8 then
+    without = drawn and counts.shown and state.compensated and not compensated and without + 1 or 0
+    if without == 20 then
         local format = mp.get_property("fbo-format")
         trouble({ problem = "nothing is compensated: the graphics processor cannot keep "
             .. format .. " between passes; try `-- --fbo-format=auto`" })
