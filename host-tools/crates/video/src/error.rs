@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub enum VideoError {
     /// Frames are not those of all projectors side by side.
     #[error(
-        "the table is for one of {projectors} projectors, and frames of {size} are not so many of one size side by side"
+        "the table is for one of {projectors} projectors, and frames of {size} are not those of all of them side by side"
     )]
     NotWide {
         /// How many there are.
