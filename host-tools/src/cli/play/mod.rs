@@ -2,8 +2,8 @@
 //!
 //! Decoding, sound and clocks are mpv's. The compensation is a user shader: the runtime's
 //! arithmetic in integers for frames of the table's projector, or that of `iltm export` where the
-//! table does not say its pixels. The script `play.lua` runs within mpv: it has the keys, counts frames that were
-//! dropped or late, and says what happens as JSON lines on standard output.
+//! table does not say its pixels. The script `play.lua` runs within mpv: it has the keys, counts
+//! frames that were dropped or late, and says what happens as JSON lines on standard output.
 
 mod spanning;
 

@@ -26,6 +26,7 @@ use std::fmt::Write;
 /// Frames are sRGB. Their codes are rounded to 16 bits, and what is shown in 8 bits are the codes
 /// nearest to those of [`FullPipeline`] for such frames. The player's targets must keep 16 bits:
 /// mpv's are told to by `--fbo-format=rgba16`.
+///
 /// `None` if the projector has fewer pixels than the table has cells, or a texture would be larger
 /// than graphics processors take.
 #[must_use]
