@@ -64,11 +64,16 @@ impl Desktop {
         }
     }
 
+    /// A command line of `iltm` for it.
+    pub(crate) fn command(&self, user: &User, line: &str) -> Command {
+        let mut command = user.iltm(line);
+        command.env("DISPLAY", &self.display);
+        command
+    }
+
     /// Runs a command line of `iltm` on it.
     pub(crate) fn spawn(&self, user: &User, line: &str) -> Child {
-        let mut command = user.iltm(line);
-        let child = command.env("DISPLAY", &self.display).spawn();
-        child.expect("a binary")
+        self.command(user, line).spawn().expect("a binary")
     }
 }
 

@@ -182,6 +182,8 @@ impl ShowFiles<'_> {
             .args(["--quiet", "--msg-level=all=error"])
             // What the integer shader needs, and what shows its codes as they are.
             .args(["--fbo-format=rgba16", "--dither-depth=no"])
+            // Its textures of 16 bits were read wrongly, and nothing said so.
+            .arg("--opengl-es=no")
             .args(["--idle=yes", "--image-display-duration=10"])
             .arg("--gapless-audio=yes")
             // A stream that pauses is waited for.

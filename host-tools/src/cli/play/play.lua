@@ -77,8 +77,8 @@ local function look_at_passes()
     without = drawn and counts.shown and state.compensated and not compensated and without + 1 or 0
     if without == 20 then
         local format = mp.get_property("fbo-format")
-        trouble({ problem = "nothing is compensated: the graphics processor cannot keep "
-            .. format .. " between passes; try `-- --fbo-format=auto`" })
+        trouble({ problem = "nothing is compensated: mpv leaves the table's shader away; if the graphics "
+            .. "processor cannot keep " .. format .. " between passes, try `-- --fbo-format=auto`" })
     end
 end
 

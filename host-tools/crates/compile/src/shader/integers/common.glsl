@@ -58,12 +58,13 @@ uvec2 product(uint a, uint b) {
     uvec2 words;
     umulExtended(a, b, words.y, words.x);
     return words;
-#endif
+#else
     uint low = (a & 0xffffu) * (b & 0xffffu);
     uint middle = (a >> 16u) * (b & 0xffffu) + (low >> 16u);
     uint other = (a & 0xffffu) * (b >> 16u) + (middle & 0xffffu);
     uint high = (a >> 16u) * (b >> 16u) + (middle >> 16u) + (other >> 16u);
     return uvec2((other << 16u) | (low & 0xffffu), high);
+#endif
 }
 
 // (a * b) >> 32, rounded down.
